@@ -1,0 +1,1 @@
+"""HTTP: shapes in milliseconds, from tables that the sweeps built."""

@@ -1,0 +1,1 @@
+"""One file per format that a shape can be asked for in."""

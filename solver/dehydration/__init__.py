@@ -1,0 +1,54 @@
+"""Dehydration of core/shell fruits (Liu et al. 2014): from a fresh fruit to buckles, pits and reticular ridges."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..contract import Context, Cost, Need, Solver, StageAxis
+from ..fruit import PRESETS
+from .params import DehydrationParams
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["SOLVER", "DehydrationParams"]
+
+_DESCRIPTORS = (
+    "mean_radius",
+    "volume",
+    "roughness",
+    "dominant_degree",
+    "wavelength",
+    "buckle_count",
+    "ridge_anisotropy",
+    "penetration",
+)
+
+
+def _run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
+    # the numerics cost a second to import; parameters and schemas must not
+    from .run import run
+
+    return run(params, need, context)
+
+
+def _cost(params: DehydrationParams, need: Need) -> Cost:
+    from .settings import expected_cost
+
+    return expected_cost(params, need)
+
+
+SOLVER = Solver(
+    name="dehydration",
+    version="1",
+    title="Dehydration of core/shell fruits",
+    params=DehydrationParams,
+    fields=("position", "displacement", *_DESCRIPTORS),
+    default_fields=("displacement", *_DESCRIPTORS),
+    stages=StageAxis("s", "shrinkage s = 1 - theta of the sarcocarp", "1", 0.0, 0.6, (0.1, 0.15, 0.2, 0.25, 0.3)),
+    default_resolution={"preview": 64, "default": 96, "fine": 128},
+    tolerances={"preview": 0.2, "default": 0.1, "fine": 0.05},
+    presets=PRESETS,
+    run=_run,
+    cost=_cost,
+)

@@ -1,0 +1,203 @@
+"""The fruit at rest: a spline generatrix turned about an elliptic equator, an ellipsoid stone and an exocarp.
+
+Liu et al. 2014, section 4.1, Eq. 8-9, with the knots at their right spacing of pi/6. The generatrix lies in the
+(x, y) plane; y carries the poles. The surface is described by colatitude (pi/2 minus the spline parameter) and
+azimuth about y, from x towards z. Lengths are in units of the reference radius r1 = 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
+from scipy.interpolate import CubicSpline
+
+from .contract import Params
+
+__all__ = ["PRESETS", "Fruit", "azimuths", "colatitudes", "directions", "lattice"]
+
+Array = NDArray[np.float64]
+
+#: Deepest dent of the outline that is accepted, in units of r1. Jujube 1 of Table 1 has 0.037; the columns of the
+#: mesh run along rays from the centre, and flesh folded deeper than this is no longer the paper's kind of fruit.
+MAX_DENT = 0.08
+#: Thinnest flesh between stone and exocarp, in units of r1.
+MIN_FLESH = 0.02
+
+Radius = Annotated[float, Field(ge=0.2, le=2.0)]
+StoneRadius = Annotated[float, Field(ge=0.05, le=1.5)]
+
+
+class Fruit(Params):
+    """Ten shape parameters of a core/shell fruit (Liu et al. 2014, Eq. 9), in units of r1."""
+
+    axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {
+        **{f"r{i + 1}": ("radii", i) for i in range(1, 8)},
+        "rs1": ("stone", 0),
+        "rs2": ("stone", 1),
+        "te": ("exocarp_thickness", None),
+    }
+
+    radii: tuple[Radius, Radius, Radius, Radius, Radius, Radius, Radius, Radius] = Field(
+        (1.0,) * 8,
+        description="Sarcocarp radii: r1..r7 from pole to pole every 30 degrees, r8 the equator's other half-axis",
+        json_schema_extra={"units": "r1", "axes": [f"r{i}" for i in range(2, 9)]},
+    )
+    stone: tuple[StoneRadius, StoneRadius] = Field(
+        (0.4, 0.4),
+        description="Half-axes of the rigid stone: along the pole axis, and across it (the third follows from r8/r4)",
+        json_schema_extra={"units": "r1", "axes": ["rs1", "rs2"]},
+    )
+    exocarp_thickness: float = Field(
+        0.04,
+        ge=0.002,
+        le=0.2,
+        description="Thickness of the exocarp (skin), along the ray from the centre",
+        json_schema_extra={"units": "r1", "axes": ["te"]},
+    )
+
+    @field_validator("radii")
+    @classmethod
+    def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if value[0] != 1.0:
+            raise ValueError("r1 is the unit of length and must be 1: divide every length by r1")
+        return value
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        outline = self._outline()
+        angle = np.unwrap(np.arctan2(outline[:, 1], outline[:, 0]))
+        if outline[:, 0].min() < -1e-9 or np.diff(angle).min() <= 0:
+            raise ValueError("the outline folds over itself as seen from the centre: bring neighbouring radii closer")
+        dent = _dent(outline)
+        if dent > MAX_DENT:
+            raise ValueError(
+                f"the outline is concave, dented by {dent:.3f} r1 (at most {MAX_DENT}): bring r2..r7 closer to "
+                "their neighbours"
+            )
+        theta, phi = np.meshgrid(np.linspace(0, np.pi, 91), np.linspace(0, 2 * np.pi, 72), indexing="ij")
+        rays = self.sarcocarp(theta, phi)
+        distance = np.linalg.norm(rays, axis=-1)
+        flesh = float((distance - self.stone_distance(rays / distance[..., None])).min())
+        if flesh < MIN_FLESH:
+            s1, s2 = self.stone
+            where = "pokes through the fruit" if flesh < 0 else "leaves too little flesh"
+            raise ValueError(
+                f"the stone {where} (thinnest flesh {flesh:.3f} r1, at least {MIN_FLESH}): make the stone radii "
+                f"rs1 = {s1:g}, rs2 = {s2:g} smaller, or the fruit radii larger"
+            )
+        return self
+
+    @property
+    def is_sphere(self) -> bool:
+        """Whether fruit and stone are concentric spheres, for which closed forms exist."""
+        return len(set(self.radii)) == 1 and self.stone[0] == self.stone[1]
+
+    @property
+    def is_axisymmetric(self) -> bool:
+        """Whether the equator is a circle."""
+        return self.radii[3] == self.radii[7]
+
+    def generatrix(self, colatitude: Array) -> tuple[Array, Array]:
+        """Return (x, y) of the sarcocarp's generatrix (Eq. 8) at colatitudes [radian], shapes as given.
+
+        Equal radii are the paper's spherical fruit and give an exact circle, which the cubic spline through its
+        seven points would miss by 2e-4.
+        """
+        phi = np.pi / 2 - np.asarray(colatitude, dtype=float)
+        if len(set(self.radii[:7])) == 1:
+            return self.radii[0] * np.cos(phi), self.radii[0] * np.sin(phi)
+        spline = _spline(self.radii[:7])
+        x, y = np.moveaxis(spline(phi), -1, 0)
+        return x, y
+
+    def sarcocarp(self, colatitude: Array, azimuth: Array) -> Array:
+        """Return points of the sarcocarp's surface, shape (..., 3), at colatitude and azimuth [radian]."""
+        x, y = self.generatrix(colatitude)
+        squash = self.radii[7] / self.radii[3]
+        return np.stack(np.broadcast_arrays(x * np.cos(azimuth), y, squash * x * np.sin(azimuth)), axis=-1)
+
+    def surface(self, colatitude: Array, azimuth: Array) -> Array:
+        """Return points of the fruit's fresh outer surface X, shape (..., 3): r_e = r_f + te along each ray."""
+        inner = self.sarcocarp(colatitude, azimuth)
+        distance = np.linalg.norm(inner, axis=-1, keepdims=True)
+        return inner * (1 + self.exocarp_thickness / distance)
+
+    def stone_distance(self, rays: Array) -> Array:
+        """Return the distance (...) from the centre to the stone's surface along unit rays (..., 3)."""
+        along, across = self.stone
+        axes = np.array([across, along, across * self.radii[7] / self.radii[3]])
+        return 1 / np.linalg.norm(rays / axes, axis=-1)
+
+    def _outline(self) -> Array:
+        x, y = self.generatrix(np.linspace(np.pi, 0, 361))
+        return np.stack([x, y], axis=-1)
+
+
+def _spline(radii: tuple[float, ...]) -> CubicSpline:
+    """Return the clamped cubic spline (x(phi), y(phi)) through the seven control points."""
+    knots = np.linspace(-np.pi / 2, np.pi / 2, 7)
+    r = np.asarray(radii)
+    points = np.stack([r * np.cos(knots), r * np.sin(knots)], axis=-1)
+    ends: Any = ((1, [r[0], 0.0]), (1, [-r[-1], 0.0]))  # (dx, dy) at the two poles
+    return CubicSpline(knots, points, bc_type=ends)
+
+
+def _dent(outline: Array) -> float:
+    """Return how far the closed outline (n, 2) stays behind its convex hull at the worst place."""
+    from scipy.spatial import ConvexHull
+
+    closed = np.concatenate([outline, outline * [-1, 1]])
+    facets = ConvexHull(closed).equations
+    return float(-(closed @ facets[:, :2].T + facets[:, 2]).max(axis=1).min())
+
+
+# --- the lattice that all surface fields live on ----------------------------------------------------------------
+
+
+def colatitudes(resolution: int) -> Array:
+    """Return `resolution` colatitudes [radian] at cell centres, so that no sample sits on a pole."""
+    return (np.arange(resolution) + 0.5) * np.pi / resolution
+
+
+def azimuths(resolution: int) -> Array:
+    """Return the 2 * `resolution` azimuths [radian] that go with `colatitudes(resolution)`."""
+    return np.arange(2 * resolution) * np.pi / resolution
+
+
+@lru_cache(maxsize=8)
+def lattice(resolution: int) -> tuple[Array, Array]:
+    """Return the broadcast (colatitude, azimuth) grids [radian], each of shape (resolution, 2 * resolution)."""
+    theta, phi = np.meshgrid(colatitudes(resolution), azimuths(resolution), indexing="ij")
+    for grid in (theta, phi):
+        grid.flags.writeable = False
+    return theta, phi
+
+
+def directions(colatitude: Array, azimuth: Array) -> Array:
+    """Return points of the parametric unit sphere, shape (..., 3): y is the pole, azimuth runs from x to z."""
+    s = np.sin(colatitude)
+    return np.stack(np.broadcast_arrays(s * np.cos(azimuth), np.cos(colatitude), s * np.sin(azimuth)), axis=-1)
+
+
+# --- Table 1 ----------------------------------------------------------------------------------------------------
+
+
+def _preset(radii: tuple[float, ...], stone: tuple[float, float], te: float, gamma: float = 10.0) -> dict[str, Any]:
+    return {"radii": radii, "stone": stone, "exocarp_thickness": te, "modulus_ratio": gamma}
+
+
+#: The sphere of Figs. 6-9 and the six fruits of Table 1 (its wolfberry row lacks r8: a circular equator, r8 = r4).
+PRESETS: Mapping[str, Mapping[str, Any]] = {
+    "sphere": _preset((1.0,) * 8, (0.4, 0.4), 0.04),
+    "jujube1": _preset((1, 1.15, 0.95, 0.85, 0.9, 1.15, 1, 0.85), (0.4, 0.3), 0.02),
+    "jujube2": _preset((1, 0.95, 0.7, 0.67, 0.8, 1, 1, 0.67), (0.4, 0.2), 0.02),
+    "plum1": _preset((1, 0.88, 0.8, 0.8, 0.8, 0.88, 1, 0.48), (0.6, 0.5), 0.01),
+    "plum2": _preset((1, 0.98, 0.93, 0.9, 0.93, 0.98, 1, 0.63), (0.3, 0.3), 0.03),
+    "raisin": _preset((1, 0.7, 0.5, 0.45, 0.5, 0.7, 1, 0.45), (0.3, 0.2), 0.01),
+    "wolfberry": _preset((1, 0.7, 0.48, 0.42, 0.45, 0.62, 1, 0.42), (0.3, 0.2), 0.005),
+}

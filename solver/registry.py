@@ -1,0 +1,42 @@
+"""Name -> solver. A solver's module is imported when it is first asked for; heavy numerics only when it runs."""
+
+from __future__ import annotations
+
+import difflib
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+
+from .contract import InvalidInput, Solver
+
+__all__ = ["get", "names"]
+
+#: Our own solvers: name -> "module:attribute". Others join through the entry-point group `wizen.solvers`.
+_OURS = {"dehydration": "solver.dehydration:SOLVER"}
+
+
+@cache
+def _places() -> dict[str, str]:
+    return {**{e.name: e.value for e in entry_points(group="wizen.solvers")}, **_OURS}
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all solvers, sorted."""
+    return tuple(sorted(_places()))
+
+
+@cache
+def get(name: str) -> Solver:
+    """Return the solver called `name`.
+
+    Raises:
+        InvalidInput: there is none of that name.
+
+    """
+    places = _places()
+    if name not in places:
+        near = difflib.get_close_matches(name, list(places), n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise InvalidInput(f"there is no solver {name!r}.", advice=f"{hint}Known: {', '.join(sorted(places))}.")
+    module, _, attribute = places[name].partition(":")
+    return getattr(import_module(module), attribute)

@@ -1,0 +1,1 @@
+"""Batch: plans, the resumable runner, executors and the command line."""
