@@ -1,0 +1,49 @@
+# Two commands do everything on a fresh machine: `make demo` and `make test`.
+# They need Python 3.11 or later, make, gcc (for nothing but wheels without a binary) and a package registry.
+
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+STORE  ?= demo
+PORT   ?= 8765
+
+.PHONY: demo test test-slow bench lint format clean
+
+$(STAMP): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@
+
+## demo: run the six fruits of Fig. 7's right part, build their table, draw it and serve it
+demo: $(STAMP)
+	$(BIN)/wizen sweep examples/fig7-right.toml --store $(STORE)
+	$(BIN)/wizen table build --store $(STORE)
+	$(BIN)/wizen map --store $(STORE) --out buckling-map.png --stages 0.1,0.15,0.2,0.3
+	$(BIN)/wizen serve --store $(STORE) --port $(PORT)
+
+## test: everything quick; CI runs this
+test: $(STAMP)
+	$(BIN)/python -m pytest
+
+## test-slow: the long checks as well
+test-slow: $(STAMP)
+	$(BIN)/python -m pytest -m 'slow or not slow' --timeout 3600
+
+## bench: error against seconds, into docs/
+bench: $(STAMP)
+	$(BIN)/python -m benchmarks
+
+## lint: style, types, floors
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) build *.egg-info

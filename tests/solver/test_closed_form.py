@@ -1,0 +1,34 @@
+"""Closed forms against the exact reference values kept beside the tests."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.dehydration.closed_form import flat_film_strain, flat_film_wavelength, onset_estimate, sphere_radius
+
+REFERENCE = json.loads((Path(__file__).parent / "core_shell_sphere.json").read_text())
+
+
+@pytest.mark.parametrize("case", REFERENCE["base_state"], ids=lambda c: f"A{c['A']}-t{c['t']}-theta{c['theta']}")
+def test_base_state_radii(case):
+    radius = sphere_radius(np.array([1.0, 1.0 + case["t"]]), case["theta"], case["A"])
+    assert radius == pytest.approx([case["r_i"], case["r_o"]], rel=1e-13)
+
+
+@pytest.mark.parametrize("case", REFERENCE["bifurcation"])
+def test_the_march_starts_below_the_exact_onset(case):
+    estimate = onset_estimate(case["gamma"], case["stone_radius"])
+    # the settings start at 0.75 of the estimate; the exact onset must lie above that
+    assert 0.75 * estimate < case["s_cr"] < 1.5 * estimate
+
+
+@pytest.mark.parametrize("case", REFERENCE["bifurcation"])
+def test_flat_film_wavelength_is_near_the_exact_degree(case):
+    degree = 2 * np.pi / flat_film_wavelength(case["exocarp_thickness"], case["gamma"])
+    assert degree == pytest.approx(case["l_cr"], rel=0.25)
+
+
+def test_flat_film_strain_is_the_known_value():
+    assert flat_film_strain(3.0) == pytest.approx(1 / 6)
