@@ -1,0 +1,39 @@
+"""Explicit dynamics of nearly incompressible neo-Hookean hex8 elements with mean dilatation (Q1/P0).
+
+`build_layout` prepares a mesh, `new_state` its state, `march` steps it. `internal_force`, `element_report`,
+`strain_energy` and `kinetic_energy` look at it. The element algebra is in `algebra` and `elements`; `vector_ir` and
+`scalar` are its two compiled back ends (chosen by WIZEN_KERNEL = auto, vector or scalar).
+"""
+
+from solver.dehydration.kernel.diagnostics import ElementReport, element_report, kinetic_energy, strain_energy
+from solver.dehydration.kernel.fixed_point import out_of_reach, place, positions
+from solver.dehydration.kernel.layout import Layout, build_layout
+from solver.dehydration.kernel.march import (
+    Backend,
+    InternalForce,
+    default_backend,
+    internal_force,
+    march,
+    new_state,
+)
+from solver.dehydration.kernel.skin import Skin, make_skin
+
+__all__ = [
+    "Backend",
+    "ElementReport",
+    "InternalForce",
+    "Layout",
+    "Skin",
+    "build_layout",
+    "default_backend",
+    "element_report",
+    "internal_force",
+    "kinetic_energy",
+    "make_skin",
+    "march",
+    "new_state",
+    "out_of_reach",
+    "place",
+    "positions",
+    "strain_energy",
+]

@@ -1,0 +1,89 @@
+"""Energies and inversion checks in float64, element by element, from the same algebra as the forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.dehydration.kernel.algebra import Number
+from solver.dehydration.kernel.elements import energy, one_point_energy
+from solver.dehydration.kernel.fixed_point import positions
+from solver.dehydration.kernel.layout import Layout
+
+Floats: TypeAlias = NDArray[np.float64]
+
+CHUNK = 64
+"""Blocks handled at once, so that temporaries stay in cache."""
+
+
+class NumpyArithmetic:
+    """`algebra.Arithmetic` on numpy arrays, one entry per element."""
+
+    def minimum(self, a: Number, b: Number | float) -> Number:
+        return np.minimum(a, b)
+
+    def maximum(self, a: Number, b: Number | float) -> Number:
+        return np.maximum(a, b)
+
+    def inverse_cube_root(self, a: Number) -> Number:
+        return 1.0 / np.cbrt(a)
+
+
+class ElementReport(NamedTuple):
+    energy: Floats
+    """(elements,): strain energy"""
+    least_ratio: Floats
+    """(elements,): least J/Jd over the integration points of the full rule; inverted where not positive"""
+
+
+def _chunks(
+    layout: Layout, state: NDArray[np.int32], elements: NDArray[np.int64], planes: NDArray[np.float32]
+) -> Iterator[tuple[slice, list[list[Floats]], Floats]]:
+    """(blocks, positions [8][3] of (n,), planes (planes, n)) of a few blocks at a time, float64."""
+    for first in range(0, len(elements), CHUNK):
+        part = slice(first, first + CHUNK)
+        # A lane that only fills its vector has element -1: it computes the last element and is dropped later.
+        corners = positions(state[layout.connectivity[elements[part].ravel()].ravel()]).reshape(-1, 8, 3)
+        nodes = [[np.ascontiguousarray(corners[:, a, i]) for i in range(3)] for a in range(8)]
+        yield part, nodes, planes[part].transpose(1, 0, 2).reshape(planes.shape[1], -1).astype(np.float64)
+
+
+def element_report(
+    layout: Layout, state: NDArray[np.int32], theta: float, *, one_point: bool = False
+) -> ElementReport:
+    """Strain energy and least J/Jd of every element; state (nodes, 4) int32, see `fixed_point`.
+
+    With `one_point` the core's energy is the one-point element's; the ratio is always that of the full rule.
+    """
+    arithmetic = NumpyArithmetic()
+    results: list[tuple[Floats, Floats]] = []
+    for exocarp in (False, True):
+        elements = layout.exocarp_elements if exocarp else layout.core_elements
+        planes = layout.exocarp_planes if exocarp else layout.core_planes
+        energies, ratios = np.empty(elements.shape), np.empty(elements.shape)
+        factor = 1.0 if exocarp else theta
+        for part, positions, stored in _chunks(layout, state, elements, planes):
+            shape = elements[part].shape
+            total, least = energy(arithmetic, positions, stored.__getitem__, np.float64(factor), exocarp)
+            energies[part], ratios[part] = total.reshape(shape), least.reshape(shape)
+        if one_point and not exocarp:
+            for part, positions, stored in _chunks(layout, state, elements, layout.one_point_planes):
+                total = one_point_energy(arithmetic, positions, stored.__getitem__, np.float64(theta))
+                energies[part] = total.reshape(elements[part].shape)
+        results.append((energies, ratios))
+    (core_energy, core_ratio), (skin_energy, skin_ratio) = results
+    return ElementReport(layout.lanes(core_energy, skin_energy), layout.lanes(core_ratio, skin_ratio))
+
+
+def strain_energy(layout: Layout, state: NDArray[np.int32], theta: float, *, one_point: bool = False) -> float:
+    """Total strain energy."""
+    return float(element_report(layout, state, theta, one_point=one_point).energy.sum())
+
+
+def kinetic_energy(layout: Layout, velocity: NDArray[np.floating]) -> float:
+    """Kinetic energy of the scaled masses; velocity (nodes, 3 or 4), displacement per step."""
+    squared = np.square(velocity[:, :3], dtype=np.float64).sum(axis=1)
+    return float(0.5 * np.sum(np.where(layout.free, layout.mass * squared, 0.0)))

@@ -1,0 +1,240 @@
+"""Forces and energies of the three element types, over the abstract numbers of `algebra`.
+
+- ``core_forces``: sarcocarp, 2x2x2 points, mean dilatation (Q1/P0).
+- ``exocarp_forces``: exocarp, 10 % 2x2x2 plus 90 % two points through the thickness at the in-plane centre.
+- ``one_point_forces``: sarcocarp, one point with physical hourglass control: shear from the mean deformation gradient
+  (so that the patch test holds on any hex and rest is free of stress) plus the hourglass gradients integrated with
+  the centre metric (exact on a parallelepiped); the volume is exact. About a third of the arithmetic, half of the
+  memory. A speed option to be checked against ``core_forces`` (fold patterns may differ).
+
+All take ``positions`` (8 vectors), ``plane`` (stored planes, see `algebra`), and ``theta`` (1 in the exocarp), and
+return the derivative of the element's energy by the 8 nodal positions; the force on a node is its negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from solver.dehydration.kernel.algebra import (
+    BARRIER_BELOW,
+    BARRIER_STIFFNESS,
+    CORE_WEIGHTS,
+    ETA,
+    EXOCARP_WEIGHTS,
+    FIRST_POINT,
+    HOURGLASS,
+    INVERSE_VOLUME,
+    KAPPA,
+    LINEAR_PLANES,
+    MEAN_PLANES,
+    MU,
+    POINT_PLANES,
+    TANGENT_BELOW,
+    XI,
+    ZETA,
+    Arithmetic,
+    Number,
+    Planes,
+    Vector,
+    apply_metric,
+    centre_line_derivatives,
+    combine,
+    cross,
+    dot,
+    gauss_derivatives,
+    hexahedron_volume,
+    modal_from_points,
+    modes_of,
+    nodal_from_modal,
+)
+
+
+class Shrinkage(NamedTuple):
+    """Jd = det(Fd) = theta^3 and what is derived from it once per element."""
+
+    volume: Number
+    inverse: Number
+    mu: Number
+    """mu * Jd"""
+
+
+def shrinkage_of(plane: Planes, theta: Number) -> Shrinkage:
+    volume = theta * theta * theta
+    return Shrinkage(volume, 1.0 / volume, plane(MU) * volume)
+
+
+class Isochoric(NamedTuple):
+    """J^(-2/3) with its linear continuation below TANGENT_BELOW, and its slope."""
+
+    value: Number
+    third_of_slope: Number
+    """-(1/2) d value / dJ, that is J^(-5/3) / 3"""
+
+
+def isochoric_factor(ar: Arithmetic, jacobian: Number, shrinkage: Shrinkage) -> Isochoric:
+    bounded = ar.maximum(jacobian, TANGENT_BELOW * shrinkage.volume)
+    root = ar.inverse_cube_root(bounded)
+    square = root * root
+    slope = square * (square * root) * (1 / 3)
+    return Isochoric(square + 2.0 * slope * (bounded - jacobian), slope)
+
+
+def barrier_overlap(ar: Arithmetic, ratio: Number) -> Number:
+    """min(J/Jd - 0.6, 0)."""
+    return ar.minimum(ratio - BARRIER_BELOW, 0.0)
+
+
+def point_planes(plane: Planes, point: int) -> tuple[list[Number], Number]:
+    """(six metric entries, det(B)/512) of an integration point."""
+    first = FIRST_POINT + POINT_PLANES * point
+    return [plane(first + j) for j in range(6)], plane(first + 6)
+
+
+def mean_volume(modes: Sequence[Vector], derivatives: Sequence[Sequence[Vector]], exocarp: bool) -> Number:
+    """Deformed element volume by the element's own rule (2x2x2 integrates a trilinear hex exactly)."""
+    if not exocarp:
+        return hexahedron_volume(modes)[0] * (1 / 64)
+    total: Number = 0.0
+    for weight, d in zip(EXOCARP_WEIGHTS, derivatives, strict=True):
+        total = dot(d[0], cross(d[1], d[2])) * (weight / 512) + total
+    return total
+
+
+def point_stress(
+    ar: Arithmetic, d: Sequence[Vector], plane: Planes, point: int, weight: float, pressure: Number, shrink: Shrinkage
+) -> list[Vector]:
+    """Derivative of the element's energy by the three D_k of one point.
+
+    weight: quadrature weight / 512; pressure: kappa (Jbar/Jd - 1), the derivative of the volumetric energy by the
+    element's volume.
+    """
+    metric, inverse_det = point_planes(plane, point)
+    cofactors = [cross(d[1], d[2]), cross(d[2], d[0]), cross(d[0], d[1])]
+    jacobian = dot(d[0], cofactors[0]) * inverse_det
+    lowered, stretch = apply_metric(metric, d)
+    isochoric = isochoric_factor(ar, jacobian, shrink)
+    overlap = barrier_overlap(ar, jacobian * shrink.inverse)
+    shear = shrink.mu * isochoric.value
+    spherical = (pressure + (BARRIER_STIFFNESS * overlap) * plane(MU)) * weight
+    spherical = spherical - (shrink.mu * stretch) * (isochoric.third_of_slope * inverse_det)
+    return [combine((shear, spherical), pair) for pair in zip(lowered, cofactors, strict=True)]
+
+
+def _forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number, exocarp: bool) -> list[Vector]:
+    modes = modes_of(positions)
+    shrink = shrinkage_of(plane, theta)
+    derivatives = gauss_derivatives(modes) + (centre_line_derivatives(modes) if exocarp else [])
+    weights = EXOCARP_WEIGHTS if exocarp else CORE_WEIGHTS
+    ratio = mean_volume(modes, derivatives, exocarp) * plane(INVERSE_VOLUME) * shrink.inverse
+    pressure = plane(KAPPA) * (ratio - 1.0)
+    stress = [
+        point_stress(ar, d, plane, q, weight / 512, pressure, shrink)
+        for q, (d, weight) in enumerate(zip(derivatives, weights, strict=True))
+    ]
+    return nodal_from_modal(modal_from_points(stress))
+
+
+def core_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number) -> list[Vector]:
+    return _forces(ar, positions, plane, theta, exocarp=False)
+
+
+def exocarp_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number) -> list[Vector]:
+    return _forces(ar, positions, plane, theta, exocarp=True)
+
+
+def energy(
+    ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number, exocarp: bool
+) -> tuple[Number, Number]:
+    """(energy, least J/Jd over the points) of a core or exocarp element: what `core_forces` is the gradient of."""
+    modes = modes_of(positions)
+    shrink = shrinkage_of(plane, theta)
+    derivatives = gauss_derivatives(modes) + (centre_line_derivatives(modes) if exocarp else [])
+    weights = EXOCARP_WEIGHTS if exocarp else CORE_WEIGHTS
+    fresh = 1.0 / plane(INVERSE_VOLUME)
+    dilatation = mean_volume(modes, derivatives, exocarp) * plane(INVERSE_VOLUME) * shrink.inverse - 1.0
+    total = fresh * (0.5 * plane(KAPPA) * shrink.volume * (dilatation * dilatation) - 1.5 * shrink.mu)
+    least: Number = None
+    for q, (d, weight) in enumerate(zip(derivatives, weights, strict=True)):
+        metric, inverse_det = point_planes(plane, q)
+        jacobian = dot(d[0], cross(d[1], d[2])) * inverse_det
+        ratio = jacobian * shrink.inverse
+        overlap = barrier_overlap(ar, ratio)
+        stretch = apply_metric(metric, d)[1]
+        total = total + 0.5 * shrink.mu * isochoric_factor(ar, jacobian, shrink).value * stretch
+        total = total + 0.5 * BARRIER_STIFFNESS * shrink.mu * (overlap * overlap) * (weight / 512) / inverse_det
+        least = ratio if least is None else ar.minimum(least, ratio)
+    return total, least
+
+
+class MeanShear(NamedTuple):
+    """Shear part of the one-point element."""
+
+    stretch: Number
+    """V0 I1, mean and hourglass part"""
+    by_affine: list[Vector]
+    """half its derivative by the affine modes, at fixed hourglass displacement"""
+    by_hourglass: list[Vector]
+    """half its derivative by the four hourglass displacements"""
+    linear: list[list[Number]]
+    """4 hourglass modes x 3: what an affine motion puts into them; the rest is hourglass displacement"""
+
+
+def mean_shear(modes: Sequence[Vector], plane: Planes) -> MeanShear:
+    metric = [plane(FIRST_POINT + j) for j in range(6)]
+    linear = [[plane(LINEAR_PLANES + 3 * h + k) for k in range(3)] for h in range(4)]
+    mean = [[plane(MEAN_PLANES + 3 * h + k) for k in range(3)] for h in range(3)]
+    affine = [modes[XI], modes[ETA], modes[ZETA]]
+    beyond = [
+        [p - q for p, q in zip(modes[m], combine(linear[h], affine), strict=True)] for h, m in enumerate(HOURGLASS)
+    ]
+    mean_affine = [combine((1.0, *(row[k] for row in mean)), (affine[k], *beyond[:3])) for k in range(3)]
+    lowered, stretch = apply_metric(metric, mean_affine)
+    # Averages over the cube of products of hourglass gradients: <xi^2> = 1/3, <xi^2 eta^2> = 1/9.
+    xx, xy, xz, yy, yz, zz = [entry * (1 / 3) for entry in metric]
+    conjugate = [
+        combine((xx + yy, xz, yz), (beyond[0], beyond[1], beyond[2])),
+        combine((yy + zz, xz, xy), (beyond[1], beyond[0], beyond[2])),
+        combine((xx + zz, yz, xy), (beyond[2], beyond[0], beyond[1])),
+        [(xx + yy + zz) * (1 / 3) * p for p in beyond[3]],
+    ]
+    for b, c in zip(beyond, conjugate, strict=True):
+        stretch = stretch + dot(b, c)
+    by_hourglass = [combine((1.0, *mean[h]), (conjugate[h], *lowered)) for h in range(3)] + [conjugate[3]]
+    return MeanShear(stretch, lowered, by_hourglass, linear)
+
+
+def one_point_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number) -> list[Vector]:
+    modes = modes_of(positions)
+    shrink = shrinkage_of(plane, theta)
+    volume, volume_gradient = hexahedron_volume(modes)
+    jacobian = volume * (1 / 64) * plane(INVERSE_VOLUME)
+    ratio = jacobian * shrink.inverse
+    mean = mean_shear(modes, plane)
+    isochoric = isochoric_factor(ar, jacobian, shrink)
+    shear = shrink.mu * isochoric.value
+    spherical = plane(KAPPA) * (ratio - 1.0) + (BARRIER_STIFFNESS * barrier_overlap(ar, ratio)) * plane(MU)
+    spherical = spherical - (shrink.mu * mean.stretch) * (isochoric.third_of_slope * plane(INVERSE_VOLUME))
+    spherical = spherical * (1 / 64)
+    modal = {m: [shear * p for p in vector] for m, vector in zip(HOURGLASS, mean.by_hourglass, strict=True)}
+    for k, own in enumerate((XI, ETA, ZETA)):
+        pulled_back = combine([row[k] for row in mean.linear], mean.by_hourglass)
+        modal[own] = [shear * (p - q) for p, q in zip(mean.by_affine[k], pulled_back, strict=True)]
+    for m, vector in volume_gradient.items():
+        modal[m] = [p + spherical * q for p, q in zip(modal[m], vector, strict=True)]
+    return nodal_from_modal(modal)
+
+
+def one_point_energy(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number) -> Number:
+    """The energy that `one_point_forces` is the gradient of."""
+    modes = modes_of(positions)
+    shrink = shrinkage_of(plane, theta)
+    jacobian = hexahedron_volume(modes)[0] * (1 / 64) * plane(INVERSE_VOLUME)
+    ratio = jacobian * shrink.inverse
+    stretch = mean_shear(modes, plane).stretch
+    overlap = barrier_overlap(ar, ratio)
+    volumetric = 0.5 * plane(KAPPA) * ((ratio - 1.0) * (ratio - 1.0))
+    barrier = 0.5 * BARRIER_STIFFNESS * plane(MU) * (overlap * overlap)
+    fresh = 1.0 / plane(INVERSE_VOLUME)
+    shear = 0.5 * shrink.mu * (isochoric_factor(ar, jacobian, shrink).value * stretch - 3.0 * fresh)
+    return shear + fresh * shrink.volume * (volumetric + barrier)

@@ -1,0 +1,206 @@
+"""The kernel's data: everything that depends on the fresh mesh, in the order and alignment the sweep reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
+from solver.dehydration.kernel.fixed_point import place
+from solver.dehydration.kernel.fixed_point import positions as positions_of
+from solver.dehydration.kernel.masses import largest_stiffness
+from solver.dehydration.kernel.metric import element_planes, one_point_planes, refuse_inverted
+from solver.dehydration.kernel.strips import LANES, Strips, assembly_rows, build_strips
+
+Floats: TypeAlias = NDArray[np.float64]
+Singles: TypeAlias = NDArray[np.float32]
+
+ALIGNMENT = 64
+ROW = 3
+"""Floats per force row: one corner of one lane's face."""
+
+
+def aligned_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """C-contiguous zeros that start on a cache line."""
+    item = np.dtype(dtype)
+    size = int(np.prod(shape)) * item.itemsize
+    raw = np.zeros(size + ALIGNMENT, dtype=np.uint8)
+    start = -raw.ctypes.data % ALIGNMENT
+    return raw[start : start + size].view(item).reshape(shape)
+
+
+def aligned_copy(values: NDArray[Any], dtype: DTypeLike) -> NDArray[Any]:
+    result = aligned_zeros(values.shape, dtype)
+    result[...] = values
+    return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """A mesh, ready to march. Arrays are read-only by convention and shared freely between threads.
+
+    Node numbers are the caller's own. Lengths and moduli keep the caller's units; mass is scaled so that time is in
+    critical steps.
+    """
+
+    nodes: int
+    elements: int
+    strips: NDArray[np.int64]
+    """(strips, 5): see `strips.Strips.table`"""
+    face_offsets: NDArray[np.int32]
+    """(faces, 4, 16): 4 * node of each corner and lane, the node's place in the flat (nn, 4) state"""
+    core_planes: Singles
+    """(core blocks, CORE_PLANES, 16): see `algebra` for the planes"""
+    one_point_planes: Singles
+    """(core blocks, ONE_POINT_PLANES, 16); no blocks if built without"""
+    exocarp_planes: Singles
+    """(exocarp blocks, EXOCARP_PLANES, 16)"""
+    row_start: NDArray[np.int32]
+    """(nodes + 1,): first entry of each node in ``rows``"""
+    rows: NDArray[np.int32]
+    """place of each contribution in the flat force rows, in the fixed order of summation"""
+    inverse_mass: Singles
+    """(nodes,): 1 / scaled mass, 0 where fixed"""
+    core_elements: NDArray[np.int64]
+    """(core blocks, 16): element of each lane; -1 where a lane only fills the vector"""
+    exocarp_elements: NDArray[np.int64]
+    """(exocarp blocks, 16): likewise"""
+    connectivity: NDArray[np.int64]
+    """(elements, 8)"""
+    fresh: NDArray[np.int32]
+    """(nodes, 4): fresh positions as the kernel's state (see `fixed_point`); the fourth column is unused and 0"""
+    mass: Floats
+    """(nodes,): scaled mass, of fixed nodes too"""
+
+    @property
+    def force_rows(self) -> int:
+        """Floats of the force buffer; a row is read as four floats, so the last one needs one to spare."""
+        return self.face_offsets.size * ROW + 1
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """(nodes,) bool: nodes that move."""
+        return self.inverse_mass > 0
+
+    def nbytes(self) -> int:
+        """Memory held, in bytes."""
+        values = (getattr(self, name) for name in self.__slots__)
+        return sum(value.nbytes for value in values if isinstance(value, np.ndarray))
+
+    def lanes(self, core: NDArray[Any], exocarp: NDArray[Any]) -> NDArray[Any]:
+        """Per-lane values of core (core blocks, 16) and exocarp blocks -> one value per element, (elements,)."""
+        result = np.empty(self.elements, dtype=np.result_type(core, exocarp))
+        for elements, values in ((self.core_elements, core), (self.exocarp_elements, exocarp)):
+            real = elements >= 0
+            result[elements[real]] = values[real]
+        return result
+
+
+def _blocks(elements: NDArray[np.int64], planes_of: Any, planes: int, chunk: int = 256) -> Singles:
+    """Planes of whole blocks, (blocks, planes, 16) float32, computed a few thousand elements at a time."""
+    result: Singles = aligned_zeros((len(elements), planes, LANES), np.float32)
+    for first in range(0, len(elements), chunk):
+        part = elements[first : first + chunk]
+        result[first : first + chunk] = planes_of(part.ravel()).reshape(planes, -1, LANES).transpose(1, 0, 2)
+    return result
+
+
+def _checked(
+    positions: ArrayLike, connectivity: ArrayLike, is_exocarp: ArrayLike, mu: ArrayLike, kappa: ArrayLike, fixed: ArrayLike
+) -> Iterator[NDArray[Any]]:
+    """Inputs as arrays of the expected type and shape; ValueError names the first that does not fit."""
+    nodes, count = len(np.asarray(positions)), len(np.asarray(connectivity))
+    expected: tuple[tuple[str, ArrayLike, DTypeLike, tuple[int, ...]], ...] = (
+        ("positions", positions, np.float64, (nodes, 3)),
+        ("connectivity", connectivity, np.int64, (count, 8)),
+        ("is_exocarp", is_exocarp, np.bool_, (count,)),
+        ("mu", mu, np.float64, (count,)),
+        ("kappa", kappa, np.float64, (count,)),
+        ("fixed", fixed, np.bool_, (nodes,)),
+    )
+    for name, value, dtype, shape in expected:
+        array = np.ascontiguousarray(value, dtype=dtype)
+        if array.shape != shape or not array.size:
+            raise ValueError(f"{name} must have shape {shape} and not be empty, got {array.shape}")
+        if dtype is np.float64 and not np.all(np.isfinite(array)):
+            raise ValueError(f"{name} must be finite")
+        if name in ("mu", "kappa") and not np.all(array > 0):
+            raise ValueError(f"{name} must be positive")
+        if name == "connectivity" and (array.min() < 0 or array.max() >= nodes):
+            raise ValueError(f"connectivity must name nodes 0 to {nodes - 1}")
+        yield array
+
+
+def build_layout(
+    positions: ArrayLike,
+    connectivity: ArrayLike,
+    is_exocarp: ArrayLike,
+    mu: ArrayLike,
+    kappa: ArrayLike,
+    fixed: ArrayLike,
+    *,
+    safety: float = 1.5,
+    one_point: bool = True,
+) -> Layout:
+    """Prepare a mesh for `march`.
+
+    positions: (nn, 3) fresh positions, within +-3.9. connectivity: (ne, 8), local bits xi = 4, eta = 2, zeta = 1 with zeta radial,
+    right-handed. is_exocarp: (ne,). mu, kappa: (ne,) shear and bulk modulus, one unit of stress for both.
+    fixed: (nn,) nodes that never move (the stone). safety: factor on the scaled masses against stiffening while the
+    fruit deforms; the critical time step is at least sqrt(safety) at rest and a unit step is marched. Swelling to
+    theta > 1 stiffens by theta: multiply safety by it. one_point: prepare the one-point core element as well.
+
+    Raises ValueError with what to change for inputs that are not a mesh.
+    """
+    corners_at, connect, skin, shear, bulk, held = _checked(positions, connectivity, is_exocarp, mu, kappa, fixed)
+    nodes = len(corners_at)
+    strips: Strips = build_strips(connect, skin)
+    if strips.faces.size * ROW >= 2**31 or nodes * 4 >= 2**31:
+        raise ValueError(f"{len(connect)} elements are too many for 32-bit offsets")
+
+    # Metric and masses come from the positions as the kernel holds them, so that the fresh state is free of stress.
+    fresh = aligned_zeros((nodes, 4), np.int32)
+    place(fresh, corners_at)
+    corners = positions_of(fresh)[connect]
+
+    refuse_inverted(corners)
+    element_mass = np.empty(len(connect))
+    for exocarp in (False, True):
+        chosen = skin == exocarp
+        stiffness = largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp)
+        element_mass[chosen] = safety * stiffness / 4
+
+    def planes(exocarp: bool) -> Any:
+        return lambda e: element_planes(corners[e], shear[e], bulk[e], exocarp)
+
+    core_planes = _blocks(strips.core, planes(False), CORE_PLANES)
+    exocarp_planes = _blocks(strips.exocarp, planes(True), EXOCARP_PLANES)
+    single = strips.core if one_point else strips.core[:0]
+    single_planes = _blocks(single, lambda e: one_point_planes(corners[e], shear[e], bulk[e]), ONE_POINT_PLANES)
+
+    mass = np.bincount(connect.ravel(), weights=np.repeat(element_mass, 8), minlength=nodes)
+    loose = mass == 0
+    inverse_mass = np.zeros(nodes)
+    inverse_mass[~(held | loose)] = 1 / mass[~(held | loose)]
+    row_start, rows = assembly_rows(strips, nodes)
+    return Layout(
+        nodes=nodes,
+        elements=len(connect),
+        strips=aligned_copy(strips.table, np.int64),
+        face_offsets=aligned_copy(4 * strips.faces, np.int32),
+        core_planes=core_planes,
+        one_point_planes=single_planes,
+        exocarp_planes=exocarp_planes,
+        row_start=aligned_copy(row_start, np.int32),
+        rows=aligned_copy(ROW * rows, np.int32),
+        inverse_mass=aligned_copy(inverse_mass, np.float32),
+        core_elements=np.where(strips.core_real, strips.core, -1),
+        exocarp_elements=np.where(strips.exocarp_real, strips.exocarp, -1),
+        connectivity=connect,
+        fresh=fresh,
+        mass=mass,
+    )

@@ -1,0 +1,248 @@
+"""The time loop: damped central differences on scaled masses, and the assembled internal force.
+
+Deterministic: every force row is written by one strip and every node sums its rows in a fixed order, so results do not
+depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+import os
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numba import njit, prange, typeof, types
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from solver.dehydration.kernel.digest import source_digest
+from solver.dehydration.contact import make_contact
+from solver.dehydration.kernel.fixed_point import place
+from solver.dehydration.kernel.layout import ROW, Layout, aligned_zeros
+from solver.dehydration.kernel.skin import Skin, keep_apart, search, widen
+
+Floats: TypeAlias = NDArray[np.float64]
+Singles: TypeAlias = NDArray[np.float32]
+State: TypeAlias = NDArray[np.int32]
+Backend: TypeAlias = Literal["vector", "scalar"]
+
+logger = logging.getLogger("wizen.dehydration.kernel")
+
+# Set by `compiled` before numba compiles `advance`. They must be globals: numba pickles what a closure captures into
+# the key of its cache, and an intrinsic pickles differently in every process.
+strip_forces: Any = None
+update_node: Any = None
+
+_FLAT, _INDICES = types.float32[::1], types.int32[::1]
+_PLANES = types.float32[:, :, ::1]
+SEARCH_EVERY = 20
+"""Steps between two searches for contact pairs; a node moves about a hundredth of an element meanwhile."""
+
+
+def _nobody() -> Skin:
+    """A skin of one quad: stands in where no contact is wanted, and gives numba the type."""
+    node = np.zeros(1, np.float32)
+    contact = make_contact(range(4), [[0, 1, 2, 3]], [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 0.0, 1.0)
+    return Skin(contact, np.zeros(1, np.int32), node.reshape(1, 1), node.reshape(1, 1), node, node)
+
+
+_NOBODY = _nobody()
+_NOTHING: Singles = np.empty(0, np.float32)
+_SIGNATURE = types.int64(
+    types.int64,  # steps
+    _INDICES,  # state
+    _FLAT,  # velocity
+    types.int64[:, ::1],  # strips
+    types.int32[:, :, ::1],  # face offsets
+    _PLANES,  # core
+    _PLANES,  # one-point core
+    _PLANES,  # exocarp
+    types.boolean,  # use the one-point core
+    _INDICES,  # row start
+    _INDICES,  # rows
+    _FLAT,  # inverse mass
+    types.float64,  # theta at the start
+    types.float64,  # theta at the end
+    types.float64,  # damping
+    _FLAT,  # force rows
+    types.boolean,  # record
+    _FLAT,  # squares
+    types.boolean,  # touching
+    typeof(_NOBODY),
+)
+
+
+def _build(stamp: int) -> Callable[..., int]:
+    """Compile the time loop, or load it from numba's cache. `stamp` stands for all sources that it is made of."""
+
+    @njit(
+        _SIGNATURE,
+        parallel=True,
+        cache=True,
+        error_model="numpy",
+        fastmath={"reassoc", "nsz", "arcp", "contract", "afn"},
+        boundscheck=False,
+    )
+    def advance(
+        steps, state, velocity, strips, face_offsets, core, one_point, exocarp, single,
+        row_start, rows, inverse_mass, theta0, theta1, damping, forces, record, squares, touching, skin,
+    ):  # fmt: skip
+        source = stamp  # noqa: F841  a captured cell is part of numba's cache key
+        keep = np.float32((1 - damping / 2) / (1 + damping / 2))
+        push = np.float32(1 / (1 + damping / 2))
+        for step in range(steps):
+            if touching and step % SEARCH_EVERY == 0 and not search(skin, state, velocity):
+                return step
+            theta = np.float32(theta0 + (theta1 - theta0) * (step + 1) / steps)
+            for strip in prange(strips.shape[0]):
+                strip_forces(
+                    state, face_offsets, strips, np.int64(strip), core, one_point, exocarp, single,
+                    theta, forces, record, squares,
+                )  # fmt: skip
+            if not record:
+                for node in prange(inverse_mass.shape[0]):
+                    update_node(
+                        forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(node)
+                    )
+                if touching:
+                    keep_apart(skin, state, velocity)
+        return steps
+
+    compiled_loop: Callable[..., int] = advance
+    return compiled_loop
+
+
+@functools.cache
+def compiled(backend: Backend) -> Callable[..., int]:
+    """The time loop on one back end."""
+    global strip_forces, update_node
+    if backend == "vector":
+        from solver.dehydration.kernel import vector_ir as functions
+    else:
+        from solver.dehydration.kernel import scalar as functions
+    strip_forces, update_node = functions.strip_forces, functions.update_node
+    return _build(int(source_digest(backend)[:15], 16))
+
+
+@functools.cache
+def default_backend() -> Backend:
+    """The back end that `march` uses: WIZEN_KERNEL if it says vector or scalar, else vector if that builds here."""
+    chosen = os.environ.get("WIZEN_KERNEL", "auto")
+    if chosen == "vector" or chosen == "scalar":
+        return chosen
+    if chosen != "auto":
+        raise ValueError(f"WIZEN_KERNEL must be auto, vector or scalar, not {chosen!r}")
+    try:
+        compiled("vector")
+    except Exception as error:  # numba and llvmlite raise many kinds; any of them means "not on this machine"
+        logger.warning("the vector kernel does not build here, using the scalar one: %s", error)
+        return "scalar"
+    return "vector"
+
+
+def new_state(layout: Layout, where: ArrayLike | None = None) -> tuple[State, Singles]:
+    """State and velocity at rest, both (nodes, 4), at positions `where` (nodes, 3) or at the fresh ones.
+
+    The state is fixed point (see `fixed_point`), the velocity float32 in units of length per step.
+    """
+    state: State = aligned_zeros((layout.nodes, 4), np.int32)
+    state[...] = layout.fresh
+    if where is not None:
+        place(state, where)
+    return state, aligned_zeros((layout.nodes, 4), np.float32)
+
+
+def _flat(name: str, values: NDArray[Any], dtype: DTypeLike, layout: Layout) -> NDArray[Any]:
+    if values.shape != (layout.nodes, 4) or values.dtype != dtype or not values.flags.c_contiguous:
+        raise ValueError(f"{name} must be C-contiguous {np.dtype(dtype)} of shape {(layout.nodes, 4)}")
+    return values.reshape(-1)
+
+
+def _arrays(layout: Layout, one_point: bool) -> tuple[Any, ...]:
+    if one_point and len(layout.one_point_planes) != len(layout.core_planes):
+        raise ValueError("this layout was built without the one-point core; build it with one_point=True")
+    return (
+        layout.strips, layout.face_offsets, layout.core_planes, layout.one_point_planes, layout.exocarp_planes,
+        one_point, layout.row_start, layout.rows, layout.inverse_mass,
+    )  # fmt: skip
+
+
+def march(
+    layout: Layout,
+    state: State,
+    velocity: Singles,
+    steps: int,
+    *,
+    theta: tuple[float, float],
+    damping: float,
+    one_point: bool = False,
+    skin: Skin | None = None,
+    backend: Backend | None = None,
+) -> Skin | None:
+    """Advance `state` and `velocity` in place by `steps` critical time steps.
+
+    state: (nodes, 4) int32 positions. velocity: (nodes, 4) float32, displacement per step. theta: shrinkage of the
+    core at the start and the end, linear between; the last step sees the end value. damping: per step (alpha of
+    m a + alpha m v = -f), 0 for none. one_point: use the one-point core element. skin: self-contact, or None.
+    Returns the skin to use in the next call (it grows when more pairs touch than it has room for).
+    A run that blows up leaves positions out of reach and raises nothing: the caller looks.
+    """
+    if steps < 0:
+        raise ValueError("steps must not be negative")
+    forces = aligned_zeros((layout.force_rows,), np.float32)
+    run = compiled(backend or default_backend())
+    begin, end = theta
+    left = steps
+    while left:
+        made = run(
+            left, _flat("state", state, np.int32, layout), _flat("velocity", velocity, np.float32, layout),
+            *_arrays(layout, one_point), begin, end, damping, forces, False, _NOTHING, skin is not None, skin or _NOBODY,
+        )  # fmt: skip
+        begin += (end - begin) * made / left
+        left -= made
+        if left and skin is not None:
+            skin = widen(skin)
+    return skin
+
+
+class InternalForce(NamedTuple):
+    """Assembled internal force, the derivative of the strain energy by the positions."""
+
+    nodal: Floats
+    """(nodes, 3), of fixed nodes too (their reaction)"""
+    norm: float
+    """Euclidean norm over the free nodes"""
+    scale: float
+    """root of the sum, over all elements, of their squared nodal forces at free nodes"""
+
+    @property
+    def relative_residual(self) -> float:
+        return self.norm / self.scale if self.scale > 0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _sum_rows(row_start, rows, forces, squares, nodal, total):
+    """Assemble force rows (float32) and their squares into (nodes, 3) and (nodes,) float64."""
+    for node in range(len(row_start) - 1):
+        for entry in range(row_start[node], row_start[node + 1]):
+            row = rows[entry]
+            for i in range(3):
+                nodal[node, i] += forces[row + i]
+            total[node] += squares[row // 3]
+
+
+def internal_force(
+    layout: Layout, state: State, theta: float, *, one_point: bool = False, backend: Backend | None = None
+) -> InternalForce:
+    """Internal force at `state`: element forces in float32 as `march` computes them, summed in float64."""
+    forces = aligned_zeros((layout.force_rows,), np.float32)
+    squares = aligned_zeros((layout.force_rows // ROW,), np.float32)
+    compiled(backend or default_backend())(
+        1, _flat("state", state, np.int32, layout), _NOTHING, *_arrays(layout, one_point),
+        theta, theta, 0.0, forces, True, squares, False, _NOBODY,
+    )  # fmt: skip
+    nodal, total = np.zeros((layout.nodes, 3)), np.zeros(layout.nodes)
+    _sum_rows(layout.row_start, layout.rows, forces, squares, nodal, total)
+    free = layout.free
+    return InternalForce(nodal, float(np.linalg.norm(nodal[free])), float(np.sqrt(total[free].sum())))

@@ -1,0 +1,122 @@
+"""Fresh geometry of the elements: the stored planes that `elements` reads, in float64, one column per element."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.dehydration.kernel.algebra import (
+    CORE_WEIGHTS,
+    ETA,
+    EXOCARP_WEIGHTS,
+    GAUSS,
+    GAUSS_SIGNS,
+    HOURGLASS,
+    SIGNS,
+    XI,
+    ZETA,
+    hexahedron_volume,
+    modes_of,
+)
+
+Floats: TypeAlias = NDArray[np.float64]
+
+CORNERS = np.array([[1.0 if a & bit else -1.0 for bit in (XI, ETA, ZETA)] for a in range(8)])
+"""Local coordinates of the eight nodes, (8, 3)."""
+GAUSS_POINTS = GAUSS * np.array(GAUSS_SIGNS, dtype=np.float64)
+EXOCARP_POINTS = np.concatenate([GAUSS_POINTS, [(0.0, 0.0, s * GAUSS) for s in SIGNS]])
+
+
+def shape_derivatives(points: Floats) -> Floats:
+    """dN_a/dxi_k of the trilinear hex at (q, 3) local points: (q, 8, 3)."""
+    factors = 1.0 + points[:, None, :] * CORNERS[None, :, :]
+    return np.stack(
+        [CORNERS[:, k] * factors[:, :, (k + 1) % 3] * factors[:, :, (k + 2) % 3] / 8 for k in range(3)], axis=-1
+    )
+
+
+def quadrature(exocarp: bool) -> tuple[Floats, Floats]:
+    """Local points (q, 3) and weights (q,) of an element type, in the order in which their planes are stored."""
+    if exocarp:
+        return EXOCARP_POINTS, np.array(EXOCARP_WEIGHTS)
+    return GAUSS_POINTS, np.array(CORE_WEIGHTS)
+
+
+def inverse_jacobians(corners: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """B = dxi/dX (ne, q, 3, 3), row k = local direction, and det(dX/dxi) (ne, q), for corners (ne, 8, 3)."""
+    jacobians = corners.transpose(0, 2, 1)[:, None] @ shape_derivatives(points)
+    columns = np.moveaxis(jacobians, -1, 0)
+    # Row k of the inverse is the cross product of the other two columns over the determinant.
+    rows = [np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)]
+    determinants: Floats = np.sum(columns[0] * rows[0], axis=-1)
+    return np.stack(rows, axis=-2) / determinants[..., None, None], determinants
+
+
+def refuse_inverted(corners: Floats, chunk: int = 4096) -> None:
+    """ValueError if an element (corners (ne, 8, 3)) is inverted or flat at an integration point or its centre."""
+    derivatives = shape_derivatives(np.concatenate([EXOCARP_POINTS, np.zeros((1, 3))]))
+    least = np.empty(len(corners))
+    for first in range(0, len(corners), chunk):
+        jacobians = corners[first : first + chunk].transpose(0, 2, 1)[:, None] @ derivatives
+        least[first : first + chunk] = np.linalg.det(jacobians).min(axis=1)
+    if not np.all(least > 0):
+        raise ValueError(
+            f"{int(np.sum(~(least > 0)))} fresh elements are inverted or flat, element {int(np.argmin(least))} worst; "
+            "check the mesh and the order of its nodes (bits xi = 4, eta = 2, zeta = 1, right-handed)"
+        )
+
+
+def _metric_planes(inverse: Floats, volume: Floats) -> list[Floats]:
+    """volume/64 * B B^T as six planes 11, 12, 13, 22, 23, 33 for B (ne, 3, 3)."""
+    rows = inverse.transpose(1, 2, 0).copy()
+    return [(rows[k] * rows[l]).sum(axis=0) * (volume / 64) for k in range(3) for l in range(k, 3)]
+
+
+def element_planes(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool) -> Floats:
+    """Planes of the full core or the exocarp element, (planes, ne) float64."""
+    points, weights = quadrature(exocarp)
+    inverse, determinants = inverse_jacobians(corners, points)
+    volumes = determinants * weights
+    planes: list[Floats] = [mu, kappa, 1.0 / volumes.sum(axis=1)]
+    for q in range(len(points)):
+        planes += [*_metric_planes(inverse[:, q], volumes[:, q]), 1.0 / (512.0 * determinants[:, q])]
+    return np.stack(planes)
+
+
+class OnePoint(NamedTuple):
+    """Fresh geometry of the one-point element."""
+
+    volume: Floats
+    """(ne,)"""
+    metric: Floats
+    """(ne, 3, 3): volume/64 * B B^T at the centre"""
+    linear: Floats
+    """(ne, 4, 3): an affine motion with derivatives D_k puts sum_k linear_hk D_k into hourglass mode h"""
+    mean: Floats
+    """(ne, 3, 3): hourglass displacement q_h adds mean_hk q_h to the D_k of the mean deformation gradient"""
+
+
+def one_point_geometry(corners: Floats) -> OnePoint:
+    """The mean gradient is that of the exact volume: b_a = dV/dX_a, mean F = sum_a x_a b_a^T / V."""
+    modes: Any = modes_of([[corners[:, a, i] for i in range(3)] for a in range(8)])
+    inverse = inverse_jacobians(corners, np.zeros((1, 3)))[0][:, 0]
+    scaled_volume, by_mode = hexahedron_volume(modes)
+    affine = np.stack([np.stack(modes[m], axis=-1) for m in (XI, ETA, ZETA)], axis=1)
+    hourglass = np.stack([np.stack(modes[m], axis=-1) for m in HOURGLASS], axis=1)
+    gradient = np.stack([np.stack(by_mode[m], axis=-1) for m in HOURGLASS[:3]], axis=1)
+    return OnePoint(
+        scaled_volume / 64,
+        inverse @ inverse.transpose(0, 2, 1) * (scaled_volume / 64**2)[:, None, None],
+        hourglass @ inverse.transpose(0, 2, 1) / 8,
+        gradient @ affine.transpose(0, 2, 1) / scaled_volume[:, None, None],
+    )
+
+
+def one_point_planes(corners: Floats, mu: Floats, kappa: Floats) -> Floats:
+    """Planes of the one-point core element, (planes, ne) float64."""
+    geometry = one_point_geometry(corners)
+    upper = [geometry.metric[:, k, l] for k in range(3) for l in range(k, 3)]
+    coefficients = [*geometry.linear.reshape(-1, 12).T, *geometry.mean.reshape(-1, 9).T]
+    return np.stack([mu, kappa, 1.0 / geometry.volume, *upper, *coefficients])

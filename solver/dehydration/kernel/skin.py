@@ -1,0 +1,90 @@
+"""The outer skin inside the time loop: its nodes as floats for `contact`, and its pushes back on the state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from solver.dehydration.contact import PAIRS, Contact, find_pairs, grow, make_contact, push_apart
+from solver.dehydration.kernel.fixed_point import QUANTUM, positions
+from solver.dehydration.kernel.layout import Layout
+
+OPTIONS = {"cache": True, "error_model": "numpy"}
+UNIT = np.float32(QUANTUM)
+QUANTA = np.float32(1 / QUANTUM)
+
+
+class Skin(NamedTuple):
+    """Scratch of the loop; a named tuple because numba reads those natively. ns surface nodes."""
+
+    contact: Contact
+    """in the numbering of the skin: its state is `position`, not the fruit's"""
+    rows: NDArray[np.int32]
+    """(ns,) node of the fruit"""
+    position: NDArray[np.float32]
+    """(ns, 4)"""
+    velocity: NDArray[np.float32]
+    """(ns, 4)"""
+    inverse_mass: NDArray[np.float32]
+    """(ns,)"""
+    deepest: NDArray[np.float32]
+    """(1,) deepest penetration of the last step that had pairs"""
+
+
+def make_skin(layout: Layout, surface_nodes: ArrayLike, quads: ArrayLike, clearance: float, te: float) -> Skin:
+    """Self-contact of the surface `surface_nodes` (ns,), `quads` (nq, 4) in surface numbering, outward.
+
+    clearance: gap that contact keeps. te: thickness of the exocarp; both in the layout's unit of length.
+    """
+    rows = np.ascontiguousarray(surface_nodes, np.int32)
+    rest = positions(layout.fresh)[rows]
+    return Skin(
+        make_contact(np.arange(len(rows)), quads, rest, clearance, te),
+        rows,
+        np.zeros((len(rows), 4), np.float32),
+        np.zeros((len(rows), 4), np.float32),
+        np.ascontiguousarray(layout.inverse_mass[rows]),
+        np.zeros(1, np.float32),
+    )
+
+
+def widen(skin: Skin) -> Skin:
+    """The same skin with room for all the pairs that the last search wanted."""
+    return skin._replace(contact=grow(skin.contact, int(skin.contact.counts[1])))
+
+
+@njit(**OPTIONS)
+def read_skin(skin, state, velocity):
+    """Copy the skin's positions and velocities out of the flat state (4 nn,) int32 and velocity (4 nn,)."""
+    for i in range(skin.rows.size):
+        first = 4 * np.int64(skin.rows[i])
+        for k in range(3):
+            skin.position[i, k] = np.float32(state[first + k]) * UNIT
+            skin.velocity[i, k] = velocity[first + k]
+
+
+@njit(**OPTIONS)
+def search(skin, state, velocity):
+    """Look for pairs that may touch; False if there are more than the contact has room for."""
+    read_skin(skin, state, velocity)
+    return find_pairs(skin.contact, skin.position) <= skin.contact.pair_nodes.size
+
+
+@njit(**OPTIONS)
+def keep_apart(skin, state, velocity):
+    """Push touching skin apart in the step just made."""
+    if skin.contact.counts[PAIRS] == 0:
+        skin.deepest[0] = 0
+        return
+    read_skin(skin, state, velocity)
+    skin.deepest[0] = push_apart(skin.contact, skin.position, skin.velocity, skin.inverse_mass)[0]
+    for i in range(skin.rows.size):
+        first = 4 * np.int64(skin.rows[i])
+        for k in range(3):
+            push = skin.velocity[i, k] - velocity[first + k]
+            if push != 0:
+                velocity[first + k] = skin.velocity[i, k]
+                state[first + k] += np.int32(np.rint(push * QUANTA))

@@ -1,0 +1,131 @@
+"""A dehydration run: walk the path, keep what is needed of each stage, and hand it over as one dataset."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..contract import Context, Need, SolverError
+from ..fruit import azimuths, colatitudes, lattice
+from .descriptors import Descriptors, Surface
+from .mesh import Sampler
+from .params import DehydrationParams
+from .penetration import penetration
+from .path import Path, State
+from .settings import choose
+
+__all__ = ["run"]
+
+_FIELDS = ("position", "displacement")
+
+
+class _Record:
+    """Collects what the need asks for, stage by stage, and nothing else."""
+
+    def __init__(self, params: DehydrationParams, need: Need, path: Path) -> None:
+        self._need, self._path = need, path
+        self._wants_fields = any(f in need.fields for f in _FIELDS)
+        self._descriptors = [f for f in need.fields if f in Descriptors._fields]
+        self._surface = Surface(params, path.mesh) if self._descriptors else None
+        assert need.resolution is not None  # settled
+        self._inside = _inside(need)
+        if self._wants_fields:
+            self._sampler = Sampler(path.mesh.sphere, need.resolution)
+            theta, phi = lattice(need.resolution)
+            self._fresh = params.surface(theta, phi)
+        self._fresh_nodes = path.mesh.positions[path.surface_nodes]
+        self._start = time.perf_counter()
+        self.rows: list[dict[str, Any]] = []
+
+    def add(self, state: State, limit: float) -> None:
+        row: dict[str, Any] = {
+            "stage": state.shrinkage,
+            "residual": state.residual,
+            "converged": state.residual <= limit,
+            "iterations": state.steps,
+            "seconds": time.perf_counter() - self._start,
+        }
+        nodes = state.surface
+        if self._wants_fields:
+            u = self._sampler(nodes - self._fresh_nodes)
+            for name, field in (("displacement", u), ("position", self._fresh + u)):
+                if name in self._need.fields:
+                    row[name] = field[self._inside].astype(self._need.dtype)
+        if self._surface is not None:
+            described = self._surface.describe(nodes)
+            row.update({name: getattr(described, name) for name in self._descriptors})
+        if "penetration" in self._need.fields:
+            row["penetration"] = penetration(nodes, self._path.mesh.sphere.quads)
+        self.rows.append(row)
+
+    def dataset(self, attrs: dict[str, Any]) -> xr.Dataset:
+        need = self._need
+        assert need.resolution is not None
+        data: dict[str, Any] = {}
+        for name in self.rows[0]:
+            if name == "stage":
+                continue
+            values = np.array([row[name] for row in self.rows])
+            if name in _FIELDS:
+                data[name] = (("stage", "colatitude", "azimuth", "component"), values)
+            elif name == "converged":
+                data[name] = ("stage", values.astype(np.int8))
+            else:
+                data[name] = ("stage", values)
+        coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in self.rows])}
+        if self._wants_fields:
+            rows, columns = self._inside
+            coords["colatitude"] = colatitudes(need.resolution)[rows]
+            coords["azimuth"] = azimuths(need.resolution)[columns]
+            coords["component"] = ["x", "y", "z"]
+        return xr.Dataset(data, coords, attrs)
+
+
+def _inside(need: Need) -> tuple[slice, slice]:
+    """Return the lattice rows and columns inside the wanted region."""
+    assert need.resolution is not None
+    if need.region is None:
+        return slice(None), slice(None)
+    slices = []
+    for samples, (low, high) in (
+        (colatitudes(need.resolution), need.region.colatitude),
+        (azimuths(need.resolution), need.region.azimuth),
+    ):
+        first, last = np.searchsorted(np.degrees(samples), [low, high])
+        slices.append(slice(int(first), int(last)))
+    return slices[0], slices[1]
+
+
+def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
+    """Return displacement, position and descriptors of the wanted stages; see `solver.quantities` for units.
+
+    Raises:
+        NotConverged: a stage kept a residual above ten times the settings' limit.
+        Unstable: the state left the finite. Both carry the stages that converged.
+        Cancelled: the observer asked to stop.
+
+    """
+    settings = choose(params, need.quality)
+    context.report(0.0, f"meshing {settings.elements} elements")
+    path = Path(params, settings, context)
+    record = _Record(params, need, path)
+    last = need.stages[-1]
+    attrs = {
+        "path": "march" if last > settings.start else "base-state",
+        "elements": path.elements,
+        "residual_limit": settings.residual,
+        "kappa_over_mu": settings.kappa_ratio,
+    }
+    try:
+        for shrinkage in need.stages:
+            record.add(path.stage(shrinkage, last), settings.residual)
+            context.report(shrinkage / last if last else 1.0, f"shrinkage s = {shrinkage:.3f} settled")
+    except SolverError as error:
+        if record.rows:
+            error.partial = record.dataset(attrs)
+            error.last_stage = record.rows[-1]["stage"]
+        raise
+    return record.dataset(attrs)

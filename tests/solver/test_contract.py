@@ -1,0 +1,192 @@
+"""Every registered solver is held to the contract of DESIGN.md."""
+
+import pickle
+import threading
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver import registry
+from solver.contract import Cancelled, Context, InvalidInput, Need, Params, Region, Solver, SolverError, Unstable, finish
+from solver.quantities import QUANTITIES, Quantity, register
+
+#: Per solver: small parameters, cheap stages, and more expensive stages to cancel.
+SMALL = {"dehydration": ({"te": 0.1, "gamma": 3.0}, (0.01, 0.02), (0.5,))}
+
+
+@pytest.fixture(params=registry.names())
+def solver(request: pytest.FixtureRequest) -> Solver:
+    return registry.get(request.param)
+
+
+def small(solver: Solver) -> tuple[Params, Need, Need]:
+    values, cheap, dear = SMALL[solver.name]
+    need = {"quality": "preview", "resolution": 16}
+    return solver.parse(values), Need(stages=cheap, **need), Need(stages=dear, **need)
+
+
+def same(a: xr.Dataset, b: xr.Dataset) -> bool:
+    volatile = [n for n in a.variables if QUANTITIES[n].volatile]
+    return a.drop_vars(volatile).identical(b.drop_vars(volatile))
+
+
+def test_schema_says_units_and_meaning_of_every_field(solver):
+    for name, field in solver.params.model_json_schema()["properties"].items():
+        assert field.get("description"), name
+        assert field.get("units"), name
+
+
+def test_fields_and_defaults_are_known_quantities(solver):
+    assert set(solver.default_fields) <= set(solver.fields) <= set(QUANTITIES)
+    assert solver.stages.lowest <= min(solver.stages.default) <= max(solver.stages.default) <= solver.stages.highest
+
+
+def test_presets_are_valid(solver):
+    for preset in solver.presets:
+        solver.parse({}, preset=preset)
+
+
+def test_a_run_returns_exactly_what_was_needed_with_units_and_convergence(solver):
+    params, need, _ = small(solver)
+    result = solver.solve(params, need)
+    assert result.stage.values.tolist() == list(need.stages)
+    assert set(solver.default_fields) <= set(result.data_vars)
+    assert {"converged", "residual", "iterations", "seconds"} <= set(result.data_vars)
+    for name in result.variables:
+        assert result[name].attrs.get("units"), name
+        assert result[name].attrs.get("long_name"), name
+    assert result.attrs["solver"] == solver.name
+    assert solver.params.model_validate_json(result.attrs["params"]) == params
+    assert "path" in result.attrs
+
+
+def test_only_the_wanted_fields_are_there(solver):
+    params, need, _ = small(solver)
+    field = solver.fields[-1]
+    result = solver.solve(params, need.model_copy(update={"fields": (field,)}))
+    assert set(result.data_vars) & set(solver.fields) == {field}
+
+
+def test_nothing_beyond_the_last_stage_is_solved(solver):
+    params, need, _ = small(solver)
+    both = solver.solve(params, need)
+    first = solver.solve(params, need.model_copy(update={"stages": need.stages[:1]}))
+    assert int(first.iterations[-1]) <= int(both.iterations[0])
+
+
+def test_a_stage_does_not_depend_on_the_other_stages_asked_for(solver):
+    params, need, _ = small(solver)
+    both = solver.solve(params, need).isel(stage=-1)
+    last = solver.solve(params, need.model_copy(update={"stages": need.stages[-1:]})).isel(stage=-1)
+    for name in solver.default_fields:
+        assert np.array_equal(both[name], last[name]), name
+
+
+def test_same_seed_same_bytes_and_another_seed_differs(solver):
+    params, need, _ = small(solver)
+    first, again = solver.solve(params, need), solver.solve(params, need)
+    assert same(first, again)
+    other = solver.solve(params.model_copy(update={"seed": params.seed + 1}), need)
+    assert not same(first, other)
+
+
+def test_an_unknown_field_is_refused_before_any_work(solver):
+    params, need, dear = small(solver)
+    begun = time.perf_counter()
+    with pytest.raises(InvalidInput, match="no field 'colour'"):
+        solver.solve(params, dear.model_copy(update={"fields": ("colour",)}))
+    assert time.perf_counter() - begun < 0.1
+
+
+def test_a_stage_off_the_axis_is_refused(solver):
+    params, need, _ = small(solver)
+    with pytest.raises(InvalidInput, match="outside"):
+        solver.solve(params, need.model_copy(update={"stages": (solver.stages.highest + 1,)}))
+
+
+@pytest.mark.parametrize("bad", [{"no_such_name": 1}, {"seed": float("nan")}, {"seed": "x"}])
+def test_bad_parameters_are_refused(solver, bad):
+    with pytest.raises(InvalidInput):
+        solver.parse(bad)
+
+
+def test_cancellation_is_seen_within_two_seconds_and_keeps_what_converged(solver):
+    params, need, dear = small(solver)
+    solver.solve(params, need)  # compile before the clock runs
+    stop = threading.Event()
+    asked: list[float] = []
+
+    def observe(fraction: float, message: str) -> None:
+        assert 0 <= fraction <= 1
+        if "settled" in message and not asked:
+            asked.append(time.perf_counter())
+            stop.set()
+
+    stages = need.stages[:1] + dear.stages
+    with pytest.raises(Cancelled) as caught:
+        solver.solve(params, need.model_copy(update={"stages": stages}), Context(observe, stop.is_set))
+    assert time.perf_counter() - asked[0] < 2
+    assert caught.value.partial is not None
+    assert caught.value.partial.stage.values.tolist() == list(need.stages[:1])
+    assert caught.value.last_stage == need.stages[0]
+
+
+def test_a_partial_result_survives_pickling(solver):
+    params, need, _ = small(solver)
+    error = Unstable("it blew up.", advice="Ask for less.", partial=solver.solve(params, need), last_stage=0.1)
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is Unstable
+    assert str(back) == "it blew up. Ask for less."
+    assert back.partial.identical(error.partial)
+
+
+def test_region_returns_a_part_of_the_whole(solver):
+    params, need, _ = small(solver)
+    whole = solver.solve(params, need)
+    part = solver.solve(params, need.model_copy(update={"region": Region(colatitude=(30, 90), azimuth=(0, 180))}))
+    assert 0 < part.sizes["colatitude"] < whole.sizes["colatitude"]
+    cut = whole.sel(colatitude=part.colatitude, azimuth=part.azimuth)
+    assert np.array_equal(cut["displacement"], part["displacement"])
+
+
+def test_a_tolerance_picks_the_cheapest_quality_that_was_measured_to_reach_it(solver):
+    settled = solver.settle(Need(tolerance=max(solver.tolerances.values())))
+    assert settled.quality == "preview"
+    with pytest.raises(InvalidInput, match="finest setting"):
+        solver.settle(Need(tolerance=1e-9))
+
+
+def test_cost_grows_with_quality(solver):
+    params, need, dear = small(solver)
+    cheap = solver.cost(params, solver.settle(need))
+    costly = solver.cost(params, solver.settle(dear.model_copy(update={"quality": "fine"})))
+    assert 0 <= cheap.seconds < costly.seconds
+    assert 0 < cheap.bytes < costly.bytes
+
+
+def test_no_nan_leaves(solver):
+    params, need, _ = small(solver)
+    result = solver.solve(params, need)
+    broken = result.assign(residual=result.residual * np.nan)
+    with pytest.raises(Unstable, match="residual"):
+        finish(broken, solver, params, solver.settle(need))
+
+
+def test_errors_carry_code_and_advice():
+    for kind in SolverError.__subclasses__():
+        assert kind.code != SolverError.code
+    assert str(InvalidInput("no.", advice="Yes.")) == "no. Yes."
+
+
+def test_a_quantity_has_one_meaning():
+    with pytest.raises(ValueError, match="already registered"):
+        register(residual=Quantity("m", "something else", "r"))
+
+
+def test_unknown_solver_and_preset_get_a_hint():
+    with pytest.raises(InvalidInput, match="did you mean 'dehydration'"):
+        registry.get("dehydratoin")
+    with pytest.raises(InvalidInput, match="did you mean 'sphere'"):
+        registry.get("dehydration").parse({}, preset="spere")
