@@ -1,0 +1,120 @@
+"""What can go wrong with data at rest. Every error has a stable code, says what happened and what to do about it."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import ClassVar
+
+__all__ = [
+    "CorruptLedger",
+    "CorruptShard",
+    "CorruptTable",
+    "EmptyTable",
+    "MissingStore",
+    "MixedSamples",
+    "OutsideTable",
+    "StorageFull",
+    "StoreError",
+    "UnknownJob",
+    "UnknownTable",
+    "full_disk",
+]
+
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+class StoreError(Exception):
+    """Something the store refuses or cannot do. `code` is stable; `advice` says what to change."""
+
+    code: ClassVar[str] = "store-error"
+
+    def __init__(self, message: str, advice: str = "") -> None:
+        super().__init__(message, advice)
+        self.message = message
+        self.advice = advice
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.advice}".strip()
+
+
+class MissingStore(StoreError):
+    """There is no store in the named directory."""
+
+    code = "missing-store"
+
+
+class CorruptShard(StoreError):
+    """A stored result is damaged, or is not the result that its name says."""
+
+    code = "corrupt-shard"
+
+
+class CorruptTable(StoreError):
+    """A table's manifest or generation file is damaged."""
+
+    code = "corrupt-table"
+
+
+class CorruptLedger(StoreError):
+    """The ledger is not a database that this version can read."""
+
+    code = "corrupt-ledger"
+
+
+class UnknownTable(StoreError):
+    """No table has that name."""
+
+    code = "unknown-table"
+
+
+class EmptyTable(StoreError):
+    """There is nothing to build a table from."""
+
+    code = "empty-table"
+
+
+class OutsideTable(StoreError):
+    """A query that the table cannot answer: off its axes or stages, or for something that it does not hold."""
+
+    code = "outside-table"
+
+
+class MixedSamples(StoreError):
+    """Results that differ in something that is not an axis cannot be interpolated in one table."""
+
+    code = "mixed-samples"
+
+
+class StorageFull(StoreError):
+    """The disk or a quota is full. Nothing half-written stays."""
+
+    code = "storage-full"
+
+
+class UnknownJob(StoreError):
+    """No job or result has that key."""
+
+    code = "unknown-job"
+
+
+@contextmanager
+def full_disk(path: Path) -> Iterator[None]:
+    """Turn the system's ways of saying 'no space' while writing `path` into `StorageFull`.
+
+    Raises:
+        StorageFull: no space, over quota, or over the file size limit.
+
+    """
+    try:
+        yield
+    except OSError as error:
+        # HDF5 reports the system's error number only inside its message
+        if error.errno not in _FULL and not any(f"errno = {number}," in str(error) for number in _FULL):
+            raise
+        raise StorageFull(
+            f"there is no space left to write {path}.",
+            "Free space (`prune` removes old table generations) or move the store; then run the same command again.",
+        ) from error

@@ -1,0 +1,210 @@
+"""One generation of a table as a file: spectra of all samples and stages, their axes and their descriptors.
+
+Spectra lie uncompressed, contiguous and aligned, so that a reader maps them instead of loading them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import h5netcdf  # type: ignore[import-untyped]
+import h5py
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from solver import quantities
+from solver.fruit import Fruit
+
+from . import shards, spectra
+from .canonical import canonical
+from .errors import CorruptTable, MixedSamples, StorageFull
+from .samples import Samples
+from .store import Store
+
+__all__ = ["CONVERGENCE", "DIMS", "Written", "digest", "map_spectra", "open", "write"]
+
+DIMS = ("sample", "stage", "component", "m", "k", "part")
+
+#: Rows of a result that say how its run went, not what the surface is like.
+CONVERGENCE = ("converged", "residual", "iterations")
+
+_PAGE = 4096
+#: What a result says per stage: name -> values and attributes.
+Rows = dict[str, xr.Variable]
+
+_ADVICE = "Rebuild the table from the shards."
+
+
+class Written(NamedTuple):
+    """What came of a file: the digest of its content and the names of the descriptors in it."""
+
+    digest: str
+    descriptors: tuple[str, ...]
+
+
+def write(
+    path: Path,
+    store: Store,
+    samples: Samples,
+    solver: str,
+    band: int,
+    dtype: Literal["float32", "float64"],
+    units: Mapping[str, str],
+) -> Written:
+    """Write the generation of `samples` to `path`, one sample in memory at a time.
+
+    Raises:
+        CorruptShard: a result is damaged.
+        MixedSamples: a result is not what its need says.
+        StorageFull: the disk is full.
+
+    """
+    shape = (len(samples.keys), len(samples.need["stages"]), 3, band + 1, band + 1, 2)
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    if shutil.disk_usage(path.parent).free < size:
+        raise StorageFull(f"a table of {size / 1e6:.0f} MB does not fit on the disk of {path}.", "Free space first.")
+    total = hashlib.sha256()
+    rows: list[Rows] = []
+    with h5netcdf.File(path, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file:
+        file.dimensions = dict(zip(DIMS, shape, strict=True))
+        target = file.create_variable("spectrum", DIMS, dtype)
+        target.attrs["units"] = quantities.QUANTITIES["displacement"].units
+        target.attrs["long_name"] = "double-Fourier-sphere amplitudes of the displacement, see store/spectra.py"
+        for i, key in enumerate(samples.keys):
+            result = store.get(key)
+            block = _spectra(result, key, samples, band).astype(dtype)
+            total.update(block.data)
+            target[i] = block
+            rows.append(_rows(result))
+    small = _small(samples, rows, solver, band, units)
+    content = _combine(small, total.hexdigest())
+    small.attrs["digest"] = content
+    encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
+    for name in ("key", "component", "part"):
+        encoding[name]["dtype"] = "S1"
+    small.to_netcdf(path, mode="a", engine="h5netcdf", encoding=encoding)
+    return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
+
+
+def _spectra(result: xr.Dataset, key: str, samples: Samples, band: int) -> NDArray[Any]:
+    """Return (stage, component, m, k, part) in float64 of a result."""
+    need, n = samples.need, samples.need["resolution"]
+    stages = result["stage"].values
+    if stages.shape != (len(need["stages"]),) or not np.allclose(stages, need["stages"], rtol=0, atol=1e-9):
+        raise MixedSamples(
+            f"the result {key} has the stages {stages.tolist()}, not {need['stages']}.",
+            "Run it again, or leave it out by building from a plan without it.",
+        )
+    field = result["displacement"].transpose("stage", "component", "colatitude", "azimuth").values
+    if field.shape[1:] != (3, n, 2 * n):
+        raise MixedSamples(f"the result {key} is not on the lattice of {n}.", "Run it again over the whole surface.")
+    waves = spectra.truncate(spectra.spectrum(field.astype(np.float64)), band)
+    return np.ascontiguousarray(waves).view(np.float64).reshape(*waves.shape, 2)
+
+
+def _rows(result: xr.Dataset) -> Rows:
+    """Return what a result says per stage: convergence and descriptors, but not the wall time."""
+    volatile = {name for name, quantity in quantities.QUANTITIES.items() if quantity.volatile}
+    return {str(n): v.variable for n, v in result.data_vars.items() if v.dims == ("stage",) and n not in volatile}
+
+
+def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Mapping[str, str]) -> xr.Dataset:
+    """Return all but the spectra as a dataset."""
+    waves = np.arange(band + 1)
+    axes = {name: _axis(samples, name, units) for name in samples.axes}
+    common = [name for name in rows[0] if all(name in row for row in rows)]
+    data = {
+        name: (("sample", "stage"), np.array([row[name].values for row in rows]), dict(rows[0][name].attrs))
+        for name in common
+    }
+    coords = {
+        "stage": ("stage", np.array(samples.need["stages"]), quantities.attrs("stage")),
+        "component": ("component", ["x", "y", "z"], quantities.attrs("component")),
+        "m": ("m", waves, {"units": "1", "long_name": "azimuthal wavenumber"}),
+        "k": ("k", waves, {"units": "1", "long_name": "colatitudinal wavenumber: cosine for even m, sine for odd m"}),
+        "part": ("part", ["real", "imag"], {"long_name": "part of the complex amplitude"}),
+        "key": ("sample", list(samples.keys), {"long_name": "key of the result"}),
+        **axes,
+    }
+    attrs = {
+        "title": f"look-up table of {solver}",
+        "solver": solver,
+        "solver_version": samples.version,
+        "params": canonical(samples.template).decode(),
+        "fixed": canonical(samples.fixed).decode(),
+        "need": canonical(samples.need).decode(),
+        "Conventions": "CF-1.11",
+    }
+    return xr.Dataset(data, coords, attrs)
+
+
+def _axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, NDArray[Any], dict[str, str]]:
+    field, index = samples.axes[name]
+    where = field if index is None else f"{field}[{index}]"
+    attrs = {"long_name": f"parameter {where}"}
+    # lengths of the fruit are in units of r1, and so without units
+    unit = units.get(name, "1" if name in Fruit.axes else "")
+    if unit:
+        attrs["units"] = unit
+    return "sample", np.array([values[name] for values in samples.values]), attrs
+
+
+def _combine(small: xr.Dataset, of_spectra: str) -> str:
+    return hashlib.sha256(canonical([shards.digest(small), small.attrs["fixed"], of_spectra])).hexdigest()
+
+
+def open(path: Path) -> xr.Dataset:
+    """Open a generation lazily; close it after use.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    try:
+        return xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # HDF5 reports damage as whatever it stumbles over
+        raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
+
+
+def map_spectra(path: Path) -> NDArray[Any]:
+    """Map the spectra (sample, stage, component, m, k, part) of a generation, read-only.
+
+    The mapping outlives the file's name. `path` must have been verified: HDF5 only tells where the values lie.
+
+    Raises:
+        CorruptTable: they do not lie there in one piece.
+
+    """
+    try:
+        with h5py.File(path) as file:
+            variable = file["spectrum"]
+            offset, shape, dtype = variable.id.get_offset(), variable.shape, variable.dtype
+        if offset is None:
+            raise ValueError("the spectra are in chunks")
+        return np.asarray(np.memmap(path, dtype, "r", offset, shape))
+    except (OSError, KeyError, ValueError, RuntimeError) as error:
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise CorruptTable(f"the spectra in {path} cannot be mapped ({error}).", _ADVICE) from error
+
+
+def digest(path: Path) -> str:
+    """Compute the digest of a generation's content anew.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    total = hashlib.sha256()
+    for block in map_spectra(path):
+        total.update(np.ascontiguousarray(block).data)
+    with open(path) as opened:
+        small = opened.drop_vars("spectrum").load()
+    return _combine(small, total.hexdigest())

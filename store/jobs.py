@@ -1,0 +1,51 @@
+"""A job as a value: what is to be computed, and how far that is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from sqlite3 import Row
+from typing import Any, Literal, get_args
+
+__all__ = ["STATES", "Job", "JobSpec", "State", "read_row"]
+
+State = Literal["wanted", "running", "done", "failed", "cancelled"]
+
+STATES: tuple[State, ...] = get_args(State)
+
+
+@dataclass(frozen=True)
+class JobSpec:
+    """What is to be computed: `key` is the hash of the rest (`store.keys.key`)."""
+
+    key: str
+    solver: str
+    version: str
+    params: Mapping[str, Any]
+    need: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Job(JobSpec):
+    """A job in the ledger. Times are seconds since the epoch; `seconds` is the wall time of a finished run."""
+
+    plan: str
+    state: State
+    attempts: int
+    worker: str | None
+    lease_until: float | None
+    digest: str | None
+    error: Mapping[str, Any] | None
+    seconds: float | None
+    created: float
+    updated: float
+    progress: float
+
+
+def read_row(row: Row) -> Job:
+    """Return the job in a row of the ledger's table `jobs`."""
+    values = dict(row)
+    values.update(params=json.loads(values["params"]), need=json.loads(values["need"]))
+    values["error"] = None if values["error"] is None else json.loads(values["error"])
+    return Job(**values)

@@ -1,0 +1,266 @@
+"""The ledger: which results are wanted, who computes them until when, which are done, which were given up.
+
+SQLite in WAL mode, safe among threads and processes of one machine (not on a network file system: there, only the
+coordinating process opens it). The shards are the truth; the ledger can be rebuilt from them.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Collection, Iterable
+from pathlib import Path
+from sqlite3 import Connection
+from typing import TYPE_CHECKING, Any
+
+from .canonical import canonical
+from .database import Database
+from .errors import CorruptShard, UnknownJob
+from .jobs import STATES, Job, JobSpec, State, read_row
+
+if TYPE_CHECKING:
+    from .store import Store
+
+__all__ = ["Job", "JobSpec", "Ledger", "State"]
+
+#: A job that took its worker down this often (out of memory, a crash) is given up.
+MAX_LOST = 5
+
+_SCHEMA = """
+CREATE TABLE jobs (
+    key TEXT PRIMARY KEY, solver TEXT NOT NULL, version TEXT NOT NULL, params TEXT NOT NULL, need TEXT NOT NULL,
+    plan TEXT NOT NULL DEFAULT '', state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, worker TEXT,
+    lease_until REAL, digest TEXT, error TEXT, seconds REAL, created REAL NOT NULL, updated REAL NOT NULL,
+    progress REAL NOT NULL DEFAULT 0
+);
+CREATE INDEX jobs_state ON jobs (state, created);
+-- a job may belong to several plans, of which jobs.plan is the one that asked first
+CREATE TABLE plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) WITHOUT ROWID;
+"""
+
+_LOST = {
+    "code": "worker-lost",
+    "message": f"the worker disappeared {MAX_LOST} times while computing this.",
+    "advice": "Give it more memory or a coarser need, then ask again with again=True.",
+}
+
+
+class Ledger:
+    """Jobs by key. A job moves wanted -> running -> done, or back to wanted, or to failed or cancelled."""
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self._database = Database(self.path, _SCHEMA)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.path,)
+
+    def close(self) -> None:
+        """Close the connection; the next call opens it again."""
+        self._database.close()
+
+    def want(self, jobs: Iterable[JobSpec], plan: str = "", again: bool = False) -> int:
+        """Ask for jobs; return how many now wait that did not before. Asking twice changes nothing.
+
+        What is done stays done. What was cancelled waits again; what failed for good only with `again=True`.
+        """
+        revived = ("cancelled", "failed") if again else ("cancelled",)
+        now, count = time.time(), 0
+        with self._database.write() as connection:
+            for job in jobs:
+                texts = canonical(job.params).decode(), canonical(job.need).decode()
+                count += connection.execute(
+                    "INSERT INTO jobs (key, solver, version, params, need, plan, state, created, updated) "
+                    "VALUES (?, ?, ?, ?, ?, ?, 'wanted', ?, ?) ON CONFLICT (key) DO UPDATE SET "
+                    "state = 'wanted', attempts = 0, error = NULL, worker = NULL, progress = 0, "
+                    f"updated = excluded.updated WHERE state IN ({','.join('?' * len(revived))})",
+                    (job.key, job.solver, job.version, *texts, plan, now, now, *revived),
+                ).rowcount
+                if plan:
+                    connection.execute("INSERT OR IGNORE INTO plans VALUES (?, ?)", (plan, job.key))
+        return count
+
+    def claim(self, worker: str, lease: float, keys: Collection[str] | None = None) -> Job | None:
+        """Take the oldest job that waits, or whose worker let its lease run out; None if there is none.
+
+        `lease` [s] is how long the job is `worker`'s unless renewed; `keys` restricts the choice. No two claims ever
+        return the same job while its lease lasts.
+        """
+        now = time.time()
+        among = "" if keys is None else "AND key IN (SELECT value FROM json_each(?))"
+        listed = () if keys is None else (json.dumps(sorted(keys)),)
+        with self._database.write() as connection:
+            connection.execute(
+                "UPDATE jobs SET state = 'failed', error = ?, worker = NULL, lease_until = NULL, updated = ? "
+                "WHERE state = 'running' AND lease_until < ? AND attempts >= ?",
+                (json.dumps(_LOST), now, now, MAX_LOST),
+            )
+            row = connection.execute(
+                f"SELECT key FROM jobs WHERE (state = 'wanted' OR state = 'running' AND lease_until < ?) {among} "
+                "ORDER BY created, rowid LIMIT 1",
+                (now, *listed),
+            ).fetchone()
+            if row is None:
+                return None
+            connection.execute(
+                "UPDATE jobs SET state = 'running', worker = ?, lease_until = ?, attempts = attempts + 1, "
+                "progress = 0, updated = ? WHERE key = ?",
+                (worker, now + lease, now, row["key"]),
+            )
+            return _get(connection, row["key"])
+
+    def renew(self, key: str, worker: str, lease: float, progress: float | None = None) -> bool:
+        """Keep a claimed job for `lease` [s] more and note its progress, 0 to 1.
+
+        False means that the job is no longer `worker`'s (cancelled, or taken over): it should stop.
+        """
+        now = time.time()
+        with self._database.write() as connection:
+            changed = connection.execute(
+                "UPDATE jobs SET lease_until = ?, progress = coalesce(?, progress), updated = ? "
+                "WHERE key = ? AND worker = ? AND state = 'running'",
+                (now + lease, progress, now, key, worker),
+            ).rowcount
+        return changed == 1
+
+    def done(self, key: str, digest: str, seconds: float) -> None:
+        """Note that the result is stored. Call it only after the shard is on the disk.
+
+        Raises:
+            UnknownJob: nobody asked for it.
+
+        """
+        self._set(key, "state = 'done', digest = ?, seconds = ?, progress = 1, error = NULL", digest, seconds)
+
+    def failed(self, key: str, error: dict[str, Any], max_attempts: int = 2) -> State:
+        """Note a failure (`code`, `message`, `advice`) and return the job's new state.
+
+        It waits again until it was tried `max_attempts` times, then it is failed for good.
+
+        Raises:
+            UnknownJob: nobody asked for it.
+
+        """
+        with self._database.write() as connection:
+            job = _get(connection, key)
+            if job.state not in ("running", "wanted"):
+                return job.state
+            state: State = "failed" if job.attempts >= max_attempts else "wanted"
+            connection.execute(
+                "UPDATE jobs SET state = ?, error = ?, worker = NULL, lease_until = NULL, updated = ? WHERE key = ?",
+                (state, json.dumps(error), time.time(), key),
+            )
+        return state
+
+    def release(self, key: str) -> None:
+        """Put a claimed job back as if it had not been claimed: its worker was asked to stop.
+
+        Raises:
+            UnknownJob: nobody asked for it.
+
+        """
+        self._set(
+            key,
+            "state = 'wanted', attempts = max(attempts - 1, 0), progress = 0",
+            only="running",
+        )
+
+    def cancel(self, keys: Iterable[str]) -> int:
+        """Give up jobs that wait or run; return how many. A running worker learns of it when it renews."""
+        with self._database.write() as connection:
+            return sum(
+                connection.execute(
+                    "UPDATE jobs SET state = 'cancelled', worker = NULL, lease_until = NULL, updated = ? "
+                    "WHERE key = ? AND state IN ('wanted', 'running')",
+                    (time.time(), key),
+                ).rowcount
+                for key in keys
+            )
+
+    def get(self, key: str) -> Job:
+        """Return a job.
+
+        Raises:
+            UnknownJob: nobody asked for it.
+
+        """
+        with self._database.read() as connection:
+            return _get(connection, key)
+
+    def jobs(self, state: State | None = None, plan: str | None = None) -> list[Job]:
+        """Return the jobs of a state and a plan (None: any), oldest first."""
+        where, values = _among(plan)
+        if state is not None:
+            where, values = f"{where} AND state = ?", (*values, state)
+        with self._database.read() as connection:
+            rows = connection.execute(f"SELECT * FROM jobs WHERE {where} ORDER BY created, rowid", values)
+            return [read_row(row) for row in rows]
+
+    def counts(self, plan: str | None = None) -> dict[str, int]:
+        """Return how many jobs (of a plan) are in each state; every state is listed."""
+        where, values = _among(plan)
+        with self._database.read() as connection:
+            rows = connection.execute(f"SELECT state, count(*) FROM jobs WHERE {where} GROUP BY state", values)
+            return {**dict.fromkeys(STATES, 0), **{row[0]: row[1] for row in rows}}
+
+    def rebuild(self, store: Store) -> int:
+        """Make the ledger say what the shards say; return how many results read well.
+
+        Every readable shard becomes a done job; a job noted as done whose shard is gone or damaged waits again.
+        """
+        good: list[str] = []
+        stored = store.keys()
+        for key in stored:
+            try:
+                dataset = store.get(key)
+            except CorruptShard:
+                continue
+            attrs, now = dataset.attrs, time.time()
+            seconds = float(dataset["seconds"].max()) if "seconds" in dataset else None
+            with self._database.write() as connection:
+                connection.execute(
+                    "INSERT INTO jobs (key, solver, version, params, need, state, digest, seconds, created, updated, "
+                    "progress) VALUES (?, ?, ?, ?, ?, 'done', ?, ?, ?, ?, 1) ON CONFLICT (key) DO UPDATE SET "
+                    "state = 'done', digest = excluded.digest, error = NULL, worker = NULL, lease_until = NULL, "
+                    "progress = 1, updated = excluded.updated",
+                    (
+                        key,
+                        str(attrs.get("solver", "")),
+                        str(attrs.get("solver_version", "")),
+                        canonical(json.loads(attrs.get("params", "{}"))).decode(),
+                        canonical(json.loads(attrs.get("need", "{}"))).decode(),
+                        attrs["digest"],
+                        seconds,
+                        now,
+                        now,
+                    ),
+                )
+            good.append(key)
+        with self._database.write() as connection:
+            connection.execute(
+                "UPDATE jobs SET state = 'wanted', attempts = 0, digest = NULL, progress = 0, updated = ? "
+                "WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
+                (time.time(), json.dumps(good)),
+            )
+        return len(good)
+
+    def _set(self, key: str, change: str, *values: Any, only: State | None = None) -> None:
+        """Apply `change` to one job, which thereby has no worker any more."""
+        with self._database.write() as connection:
+            job = _get(connection, key)
+            if only is None or job.state == only:
+                connection.execute(
+                    f"UPDATE jobs SET {change}, worker = NULL, lease_until = NULL, updated = ? WHERE key = ?",
+                    (*values, time.time(), key),
+                )
+
+
+def _get(connection: Connection, key: str) -> Job:
+    row = connection.execute("SELECT * FROM jobs WHERE key = ?", (key,)).fetchone()
+    if row is None:
+        raise UnknownJob(f"there is no job {key}.", "`jobs()` lists what was asked for.")
+    return read_row(row)
+
+
+def _among(plan: str | None) -> tuple[str, tuple[Any, ...]]:
+    return ("1", ()) if plan is None else ("key IN (SELECT key FROM plans WHERE plan = ?)", (plan,))

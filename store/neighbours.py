@@ -1,0 +1,45 @@
+"""The samples near a query and their weights: inverse distance in parameters scaled to 0..1 (Eq. 14 of the paper)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+__all__ = ["SAME", "Neighbours", "Weighted"]
+
+Array = NDArray[Any]
+
+#: Scaled distance below which a query is the sample itself: round-off of parameters that went through text.
+SAME = 1e-9
+
+
+class Weighted(NamedTuple):
+    """Indices of samples, their weights (which sum to 1), and the scaled distance of the nearest."""
+
+    samples: Array
+    weights: Array
+    nearest: float
+
+
+class Neighbours:
+    """A tree over samples (count, axes)."""
+
+    def __init__(self, values: Array) -> None:
+        self._low = values.min(axis=0)
+        self._span = values.max(axis=0) - self._low
+        self._count = len(values)
+        self._tree = cKDTree((values - self._low) / self._span)
+
+    def weigh(self, query: Array, m: int, eta: float) -> Weighted:
+        """Weigh the `m` nearest samples by distance^-eta; a sample that is hit takes all."""
+        scaled = (query - self._low) / self._span
+        found = self._tree.query(scaled, k=np.arange(1, min(m, self._count) + 1))
+        distance, samples = np.asarray(found[0]), np.asarray(found[1])
+        nearest = float(distance[0])
+        if nearest < SAME:
+            return Weighted(samples[:1], np.ones(1), 0.0)
+        weights = (nearest / distance) ** eta  # scaled by the nearest: no overflow however close it is
+        return Weighted(samples, weights / weights.sum(), nearest)

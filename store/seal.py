@@ -1,0 +1,119 @@
+"""Files that appear whole or not at all, and that know when a byte of them has changed.
+
+HDF5's Fletcher32 guards chunks of values, not the tree that leads to them, and a damaged tree can crash the library.
+So every file ends in a seal: eight letters and the SHA-256 of all bytes before. HDF5 ignores bytes after its end, so
+a sealed file still opens everywhere, and it is checked before HDF5 sees it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .errors import full_disk
+
+__all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "publish", "scratch", "seal"]
+
+_MARK = b"wizen\x00\x01\n"
+#: Bytes of the seal at the end of a file.
+TRAILER = len(_MARK) + hashlib.sha256().digest_size
+
+_TEMPORARY = ".part"
+#: Seconds after which a temporary file belongs to nobody.
+_ABANDONED = 3600.0
+
+
+@contextmanager
+def scratch(path: Path) -> Iterator[Path]:
+    """Yield a temporary name beside `path`, and remove what is there on leaving unless `adopt` took it.
+
+    Raises:
+        StorageFull: the disk is full.
+
+    """
+    if not path.parent.is_dir():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _sync(path.parent.parent)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}{_TEMPORARY}")
+    try:
+        with full_disk(path):
+            yield temporary
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def adopt(temporary: Path, path: Path) -> None:
+    """Make a file written under a temporary name visible as `path`, whole and on the disk when this returns."""
+    _sync(temporary)
+    temporary.replace(path)
+    _sync(path.parent)
+
+
+def publish(path: Path, data: bytes | memoryview) -> None:
+    """Write `data` to `path` so that it survives a crash, and never shows half of it.
+
+    Raises:
+        StorageFull: the disk is full.
+
+    """
+    with scratch(path) as temporary:
+        temporary.write_bytes(data)
+        adopt(temporary, path)
+
+
+def seal(path: Path) -> None:
+    """Append the seal to the file `path`."""
+    with path.open("r+b") as file:
+        digest = hashlib.file_digest(file, "sha256").digest()
+        file.seek(0, os.SEEK_END)
+        file.write(_MARK + digest)
+
+
+def is_whole(path: Path) -> bool:
+    """Return whether a sealed file is as it was written, without holding it in memory."""
+    left = path.stat().st_size - TRAILER
+    if left < 0:
+        return False
+    digest = hashlib.sha256()
+    block = memoryview(bytearray(1 << 20))
+    with path.open("rb") as file:
+        while left > 0:
+            got = file.readinto(block[: min(left, len(block))])
+            if not got:
+                return False
+            digest.update(block[:got])
+            left -= got
+        return file.read(TRAILER) == _MARK + digest.digest()
+
+
+def body(data: bytes) -> bytes | None:
+    """Return a sealed file's content without its seal, or None if the seal is broken or missing."""
+    content = data[:-TRAILER]
+    return content if data[-TRAILER:] == _MARK + hashlib.sha256(content).digest() else None
+
+
+def clean(directory: Path) -> int:
+    """Remove temporary files that a killed process left in `directory` or one level below; return how many."""
+    removed = 0
+    for pattern in (f".*{_TEMPORARY}", f"*/.*{_TEMPORARY}"):
+        for path in directory.glob(pattern):
+            try:
+                if time.time() - path.stat().st_mtime > _ABANDONED:
+                    path.unlink()
+                    removed += 1
+            except FileNotFoundError:
+                continue  # its writer, or another cleaner, was faster
+    return removed
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

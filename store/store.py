@@ -1,0 +1,127 @@
+"""A store: one directory with shards, tables and a ledger of what was wanted and done.
+
+root/shards/ab/abcd....h5   one file per result, named by its key
+root/tables/<name>/         generations of look-up tables
+root/ledger.sqlite          who computes what; can be rebuilt from the shards
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import xarray as xr
+
+from . import seal, shards
+from .errors import CorruptShard, MissingStore, UnknownJob
+from .keys import is_key
+from .ledger import Ledger
+
+__all__ = ["Store"]
+
+
+class Store:
+    """Results by key. Safe among threads and processes: a result never changes once it is visible."""
+
+    def __init__(self, root: Path | str) -> None:
+        self.root = Path(root)
+
+    @classmethod
+    def open(cls, root: Path | str, create: bool = False) -> Self:
+        """Return the store in directory `root`, cleaned of what killed processes left behind.
+
+        Raises:
+            MissingStore: there is none, and `create` is false.
+
+        """
+        store = cls(root)
+        if create:
+            store._shards.mkdir(parents=True, exist_ok=True)
+            store.tables_dir.mkdir(exist_ok=True)
+        elif not store._shards.is_dir():
+            raise MissingStore(
+                f"there is no store in {store.root.absolute()}.",
+                "Run a sweep with that directory to create it, or name another one.",
+            )
+        for directory in (store._shards, store.tables_dir):
+            seal.clean(directory)
+        return store
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.root,)
+
+    def __repr__(self) -> str:
+        return f"Store({str(self.root)!r})"
+
+    @property
+    def _shards(self) -> Path:
+        return self.root / "shards"
+
+    @property
+    def tables_dir(self) -> Path:
+        """The directory that holds one directory per table."""
+        return self.root / "tables"
+
+    @cached_property
+    def ledger(self) -> Ledger:
+        """The record of jobs; its file appears with the first job."""
+        return Ledger(self.root / "ledger.sqlite")
+
+    def table_names(self) -> list[str]:
+        """Return the names of the tables that can be opened, sorted."""
+        return sorted(path.parent.name for path in self.tables_dir.glob("*/current.json"))
+
+    def shard_path(self, key: str) -> Path:
+        """Return where the result of `key` is or would be.
+
+        Raises:
+            UnknownJob: `key` is not a key at all.
+
+        """
+        if not is_key(key):
+            raise UnknownJob(f"{key!r} is not a key.", "A key has 64 hexadecimal digits.")
+        return self._shards / key[:2] / f"{key}.h5"
+
+    def has(self, key: str) -> bool:
+        """Return whether a result is stored under `key`. Whether it reads well is for `get` to find out."""
+        return is_key(key) and self.shard_path(key).is_file()
+
+    def put(self, key: str, dataset: xr.Dataset) -> str:
+        """Store a result and return its content digest. One that is there already, undamaged, is kept.
+
+        Raises:
+            StorageFull: the disk is full.
+            UnknownJob: `key` is not a key at all.
+
+        """
+        if self.has(key):
+            try:
+                return self.get(key).attrs["digest"]
+            except CorruptShard:
+                pass  # replaced below by the good one
+        return shards.write(self.shard_path(key), dataset, key)
+
+    def get(self, key: str) -> xr.Dataset:
+        """Return the result of `key`, in memory and verified.
+
+        Raises:
+            UnknownJob: nothing is stored under `key`.
+            CorruptShard: it is damaged, or belongs to another key.
+
+        """
+        path = self.shard_path(key)
+        try:
+            dataset = shards.read(path)
+        except FileNotFoundError:
+            raise UnknownJob(f"no result is stored under {key}.", "Ask for it with a job or a sweep.") from None
+        if dataset.attrs.get("key") != key:
+            raise CorruptShard(f"{path} holds the result of another key.", "Delete it and run the same sweep again.")
+        return dataset
+
+    def keys(self) -> Iterator[str]:
+        """Yield the keys of all stored results, sorted."""
+        for path in sorted(self._shards.glob("??/*.h5")):
+            if is_key(path.stem):
+                yield path.stem

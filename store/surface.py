@@ -1,0 +1,91 @@
+"""Geometry on the lattice: the fresh outer surface, cheaply, and normals of any surface."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.fruit import Fruit, azimuths, colatitudes
+
+from . import spectra
+
+__all__ = ["add_fresh", "fresh_poles", "normals"]
+
+Array = NDArray[Any]
+
+
+def add_fresh(fruit: Fruit, displacement: Array) -> Array:
+    """Return X + u as (n, 2n, 3) for displacements u (3, n, 2n); X is `fruit.surface` on the lattice, in u's precision.
+
+    Only the generatrix and the azimuth's sine and cosine are evaluated, each once; the surface is their product.
+    """
+    _, n, _ = displacement.shape
+    kind = displacement.dtype
+    x, y = _generatrix(fruit.radii, n)
+    cosine, sine = _circle(n)
+    squash = fruit.radii[7] / fruit.radii[3]
+    te = fruit.exocarp_thickness
+    position = np.empty((n, 2 * n, 3), kind)
+    if fruit.is_axisymmetric:
+        stretch: Array = 1 + te / np.hypot(x, y)
+        across: Array = (x * stretch)[:, None].astype(kind)
+        along: Array = (y * stretch)[:, None].astype(kind)
+    else:
+        flat = (x**2).astype(kind)[:, None] * (cosine**2 + (squash * sine) ** 2).astype(kind)
+        stretch = 1 + kind.type(te) / np.sqrt(flat + (y**2).astype(kind)[:, None])
+        across, along = stretch * x.astype(kind)[:, None], stretch * y.astype(kind)[:, None]
+    np.add(displacement[0], across * cosine.astype(kind), out=position[..., 0])
+    np.add(displacement[1], along, out=position[..., 1])
+    np.add(displacement[2], across * (squash * sine).astype(kind), out=position[..., 2])
+    return position
+
+
+def fresh_poles(fruit: Fruit) -> Array:
+    """Return the fresh surface's two poles (2, 3)."""
+    return fruit.surface(np.array([0.0, np.pi]), np.zeros(2))
+
+
+@lru_cache(maxsize=64)
+def _generatrix(radii: tuple[float, ...], n: int) -> tuple[Array, Array]:
+    # the fruit that these radii come from has been validated
+    fruit: Any = Fruit.model_construct
+    return fruit(radii=radii).generatrix(colatitudes(n))
+
+
+@lru_cache(maxsize=16)
+def _circle(n: int) -> tuple[Array, Array]:
+    phi = azimuths(n)
+    return np.cos(phi), np.sin(phi)
+
+
+def normals(position: Array) -> tuple[Array, Array]:
+    """Return outward unit normals (n, 2n, 3) of a surface on the lattice, and those at its two poles (2, 3).
+
+    Derivatives are those of the surface's double Fourier series: exact for every wave that the lattice holds. Where
+    the surface has no tangent plane, the normal is zero.
+    """
+    n = position.shape[0]
+    waves = spectra.spectrum(position)
+    southward, eastward = spectra.gradient(waves, n)
+    # at a pole, one step away in direction phi leads to 2 Re(slope exp(i phi)), the slope of the waves m = 1
+    k = np.arange(n + 1, dtype=position.dtype)[:, None]
+    north, south = (waves[1] * k).sum(0), (waves[1] * k * (1 - 2 * (k % 2))).sum(0)
+    poles = np.stack([np.cross(north.real, north.imag), np.cross(south.imag, south.real)])
+    return _unit(_cross(eastward, southward)), _unit(poles)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return a x b of vectors (..., 3), several times faster than numpy's for many."""
+    result = np.empty_like(a)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[..., j], b[..., k], out=result[..., i])
+        result[..., i] -= a[..., k] * b[..., j]
+    return result
+
+
+def _unit(vectors: Array) -> Array:
+    length = np.sqrt(np.einsum("...i,...i", vectors, vectors))[..., None]
+    return vectors / np.where(length > 0, length, 1)

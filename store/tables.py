@@ -1,0 +1,160 @@
+"""Tables: a consolidated, read-only generation of results for look-up.
+
+    root/tables/<name>/<digest>.h5    a generation, netCDF-4/HDF5, sealed
+    root/tables/<name>/current.json   which one is current, and what is in it
+
+A new generation becomes current by renaming the manifest; whoever has the old one open keeps it until it reopens,
+even when it is pruned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+import xarray as xr
+
+from . import generation, seal
+from .errors import CorruptShard, CorruptTable, EmptyTable, UnknownJob
+from .manifest import TableInfo, directory, read_manifest, write_manifest
+from .samples import Axes, collect
+from .store import Store
+
+__all__ = ["TableInfo", "build", "info", "open", "path_of", "prune", "verify"]
+
+
+def build(
+    store: Store,
+    name: str = "default",
+    solver: str = "dehydration",
+    *,
+    axes: Axes | None = None,
+    units: Mapping[str, str] | None = None,
+    plan: str | None = None,
+    quality: str | None = None,
+    version: str | None = None,
+    resolution: int | None = None,
+    dtype: Literal["float32", "float64"] = "float32",
+) -> TableInfo:
+    """Build a table from the finished runs of `solver` and make it current.
+
+    `axes` is the solver's `Params.axes`, `units` the units of those axes (the fruit's have none); `resolution` cuts
+    the spectra to that band. The same results make the same digest, in whatever order they were stored.
+
+    Raises:
+        EmptyTable: no finished run fits.
+        MixedSamples: the runs differ in more than their axes.
+        CorruptShard: a run's result is damaged.
+        StorageFull: the disk is full; the old generation stays current.
+
+    """
+    home = directory(store.tables_dir, name)
+    samples = collect(store, solver, axes, plan, quality, version)
+    band = min(resolution or samples.need["resolution"], samples.need["resolution"])
+    if band < 4:
+        raise EmptyTable(f"a band of {band} waves holds no shape.", "Ask for a resolution of at least 4.")
+    with seal.scratch(home / "next.h5") as temporary:
+        written = generation.write(temporary, store, samples, solver, band, dtype, units or {})
+        seal.seal(temporary)
+        file = f"{written.digest[:16]}.h5"
+        seal.adopt(temporary, home / file)
+    table = TableInfo(
+        name=name,
+        file=file,
+        digest=written.digest,
+        solver=solver,
+        version=samples.version,
+        axes={axis: _bounds(values[axis] for values in samples.values) for axis in samples.varying},
+        fixed=samples.fixed,
+        stages=tuple(samples.need["stages"]),
+        resolution=band,
+        dtype=dtype,
+        samples=len(samples.keys),
+        descriptors=written.descriptors,
+        need=samples.need,
+        template=samples.template,
+        places=samples.axes,
+        keys=samples.keys,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+    write_manifest(store.tables_dir, table)
+    return table
+
+
+def _bounds(values: Iterable[float]) -> tuple[float, float]:
+    known = list(values)
+    return min(known), max(known)
+
+
+def info(store: Store, name: str = "default") -> TableInfo:
+    """Return what the current generation of a table is.
+
+    Raises:
+        UnknownTable: there is none of that name.
+        CorruptTable: its manifest is damaged.
+
+    """
+    return read_manifest(store.tables_dir, name)
+
+
+def path_of(store: Store, table: TableInfo) -> Path:
+    """Return the generation file of a table."""
+    return directory(store.tables_dir, table.name) / table.file
+
+
+def open(store: Store, name: str = "default") -> xr.Dataset:
+    """Open the current generation of a table, lazily; close it after use.
+
+    Raises:
+        UnknownTable: there is none of that name.
+        CorruptTable: it cannot be read.
+
+    """
+    return generation.open(path_of(store, info(store, name)))
+
+
+def verify(store: Store, name: str = "default") -> list[str]:
+    """Check a table to the last byte, and that it could be rebuilt; return what is wrong, one sentence each.
+
+    Raises:
+        UnknownTable: there is none of that name.
+
+    """
+    try:
+        table = info(store, name)
+        path = path_of(store, table)
+        if not path.is_file():
+            return [f"{path} is missing. Rebuild the table."]
+        if not seal.is_whole(path):
+            return [f"{path} is damaged. Rebuild the table."]
+        found = generation.digest(path)
+    except CorruptTable as error:
+        return [str(error)]
+    findings = []
+    if found != table.digest:
+        findings.append(f"{path} holds other values than the manifest says. Rebuild the table.")
+    for key in table.keys:
+        try:
+            store.get(key)
+        except UnknownJob:
+            findings.append(f"the result {key} is gone: the table could not be rebuilt without it.")
+        except CorruptShard as error:
+            findings.append(str(error))
+    return findings
+
+
+def prune(store: Store, name: str = "default") -> list[Path]:
+    """Delete the generations of a table that are not current; return their paths. Open readers keep theirs.
+
+    Raises:
+        UnknownTable: there is none of that name.
+        CorruptTable: its manifest is damaged, so that nobody knows which generation is current.
+
+    """
+    current = path_of(store, info(store, name))
+    old = [path for path in sorted(current.parent.glob("*.h5")) if path != current]
+    for path in old:
+        path.unlink(missing_ok=True)
+    return old

@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+import pickle
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from store.errors import CorruptLedger, UnknownJob
+from store.ledger import MAX_LOST, JobSpec, Ledger
+from store.store import Store
+
+from .conftest import fill, python, spec
+
+ERROR = {"code": "unstable", "message": "blew up.", "advice": "Smaller steps."}
+
+
+def job(name: str) -> JobSpec:
+    return JobSpec(name, "dehydration", "1", {"te": 0.04}, {"stages": [0.1]})
+
+
+@pytest.fixture
+def ledger(tmp_path: Path) -> Ledger:
+    return Ledger(tmp_path / "ledger.sqlite")
+
+
+def test_a_job_s_life(ledger: Ledger) -> None:
+    assert ledger.want([job("a"), job("b")], plan="p") == 2
+    assert ledger.want([job("a"), job("b")], plan="p") == 0
+    first = ledger.claim("w1", 60.0)
+    assert first is not None
+    assert (first.key, first.state, first.worker, first.attempts) == ("a", "running", "w1", 1)
+    assert (first.params, first.need) == ({"te": 0.04}, {"stages": [0.1]})
+    assert ledger.renew("a", "w1", 60.0, progress=0.5)
+    assert not ledger.renew("a", "w2", 60.0)
+    assert ledger.get("a").progress == 0.5
+    ledger.done("a", "digest", 2.5)
+    done = ledger.get("a")
+    assert (done.state, done.digest, done.seconds, done.progress, done.worker) == ("done", "digest", 2.5, 1.0, None)
+    assert ledger.counts("p") == {"wanted": 1, "running": 0, "done": 1, "failed": 0, "cancelled": 0}
+    assert [j.key for j in ledger.jobs("done")] == ["a"]
+    assert ledger.want([job("a")], again=True) == 0
+    assert ledger.get("a").state == "done"
+
+
+def test_failures_are_tried_again_and_then_given_up(ledger: Ledger) -> None:
+    ledger.want([job("a")])
+    ledger.claim("w", 60.0)
+    assert ledger.failed("a", ERROR) == "wanted"
+    assert ledger.claim("w", 60.0) is not None
+    assert ledger.failed("a", ERROR) == "failed"
+    assert ledger.claim("w", 60.0) is None
+    assert ledger.get("a").error == ERROR
+    assert ledger.want([job("a")]) == 0
+    assert ledger.want([job("a")], again=True) == 1
+    again = ledger.claim("w", 60.0)
+    assert again is not None
+    assert (again.attempts, again.error) == (1, None)
+    ledger.done("a", "d", 1.0)
+    assert ledger.failed("a", ERROR) == "done"
+
+
+def test_release_and_cancel(ledger: Ledger) -> None:
+    ledger.want([job("a"), job("b")])
+    ledger.claim("w", 60.0)
+    ledger.release("a")
+    assert (ledger.get("a").state, ledger.get("a").attempts) == ("wanted", 0)
+    ledger.claim("w", 60.0)
+    assert ledger.cancel(["a", "b", "unknown"]) == 2
+    assert not ledger.renew("a", "w", 60.0)
+    ledger.release("a")
+    assert ledger.failed("a", ERROR) == "cancelled"
+    assert ledger.claim("w", 60.0) is None
+    assert ledger.want([job("a")]) == 1
+
+
+def test_leases_run_out(ledger: Ledger) -> None:
+    ledger.want([job("a")])
+    ledger.claim("w1", 0.0)
+    time.sleep(0.01)
+    taken = ledger.claim("w2", 60.0)
+    assert taken is not None
+    assert (taken.worker, taken.attempts) == ("w2", 2)
+    assert not ledger.renew("a", "w1", 60.0)
+
+
+def test_a_job_that_kills_its_workers_is_given_up(ledger: Ledger) -> None:
+    ledger.want([job("a")])
+    for _ in range(MAX_LOST):
+        assert ledger.claim("w", -1.0) is not None
+    assert ledger.claim("w", -1.0) is None
+    lost = ledger.get("a")
+    assert lost.state == "failed"
+    assert lost.error is not None
+    assert lost.error["code"] == "worker-lost"
+
+
+def test_claims_among_keys_and_plans_that_share_jobs(ledger: Ledger) -> None:
+    ledger.want([job("a"), job("b")], plan="p")
+    ledger.want([job("b"), job("c")], plan="q")
+    claimed = ledger.claim("w", 60.0, keys={"c", "b"})
+    assert claimed is not None
+    assert claimed.key == "b"
+    assert ledger.claim("w", 60.0, keys=[]) is None
+    assert [j.key for j in ledger.jobs(plan="q")] == ["b", "c"]
+    assert ledger.counts("q")["running"] == ledger.counts("p")["running"] == 1
+    assert ledger.get("b").plan == "p"
+
+
+def test_unknown_jobs(ledger: Ledger) -> None:
+    for call in (ledger.get, ledger.release, lambda k: ledger.done(k, "", 0.0), lambda k: ledger.failed(k, ERROR)):
+        with pytest.raises(UnknownJob):
+            call("nobody")
+
+
+def test_want_is_all_or_nothing(ledger: Ledger) -> None:
+    def half() -> object:
+        yield job("a")
+        raise RuntimeError("the plan broke")
+
+    with pytest.raises(RuntimeError):
+        ledger.want(half())  # type: ignore[arg-type]
+    assert sum(ledger.counts().values()) == 0
+
+
+CLAIM = """
+import sys
+from store.ledger import Ledger
+ledger = Ledger(sys.argv[1])
+while (job := ledger.claim(sys.argv[2], 600.0)) is not None:
+    print(job.key, flush=True)
+    ledger.done(job.key, "d", 0.0)
+"""
+
+
+def test_no_job_is_handed_out_twice(ledger: Ledger) -> None:
+    # nobody has opened the file yet: the processes also race to create it
+    ledger.path.parent.mkdir(exist_ok=True)
+    Ledger(ledger.path).want(job(f"{i:03d}") for i in range(240))
+    processes = [python(CLAIM, ledger.path, f"w{i}") for i in range(4)]
+    claimed = [line for process in processes for line in process.communicate(timeout=60)[0].split()]
+    assert sorted(claimed) == [f"{i:03d}" for i in range(240)]
+    assert ledger.counts()["done"] == 240
+
+
+CREATE = "import sys; from store.ledger import Ledger; print(Ledger(sys.argv[1]).counts()['done'])"
+
+
+def test_processes_race_to_create_the_file(ledger: Ledger) -> None:
+    processes = [python(CREATE, ledger.path) for _ in range(4)]
+    assert [process.communicate(timeout=60)[0].strip() for process in processes] == ["0"] * 4
+
+
+def test_threads_share_a_ledger(ledger: Ledger) -> None:
+    ledger.want(job(str(i)) for i in range(60))
+    claimed: list[str] = []
+
+    def work(name: str) -> None:
+        while (taken := ledger.claim(name, 60.0)) is not None:
+            claimed.append(taken.key)
+
+    threads = [threading.Thread(target=work, args=(f"t{i}",)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(claimed) == len(set(claimed)) == 60
+
+
+FORK = """
+import os, sys
+from store.ledger import Ledger, JobSpec
+ledger = Ledger(sys.argv[1])
+ledger.want([JobSpec(str(i), "s", "1", {}, {}) for i in range(40)])
+children = []
+for worker in range(2):
+    child = os.fork()
+    if child == 0:
+        while (job := ledger.claim(str(worker), 60.0)) is not None:
+            ledger.done(job.key, "d", 0.0)
+        os._exit(0)
+    children.append(child)
+codes = [os.waitpid(child, 0)[1] for child in children]
+print(codes, ledger.counts()["done"])
+"""
+
+
+def test_a_fork_opens_its_own_connection(ledger: Ledger) -> None:
+    assert python(FORK, ledger.path).communicate(timeout=60)[0].strip() == "[0, 0] 40"
+
+
+def test_travels_between_processes(ledger: Ledger) -> None:
+    ledger.want([job("a")])
+    again = pickle.loads(pickle.dumps(ledger))
+    assert again.get("a") == ledger.get("a")
+    ledger.close()
+    assert ledger.get("a").state == "wanted"
+
+
+def test_a_file_that_is_no_ledger(ledger: Ledger) -> None:
+    ledger.path.write_bytes(b"not a database, but long enough to look at" * 100)
+    with pytest.raises(CorruptLedger, match="rebuild"):
+        ledger.counts()
+
+
+def test_rebuilt_from_shards_alone(store: Store) -> None:
+    keys = fill(store, te=[0.03, 0.04], gamma=[10, 30], resolution=8)
+    before = {j.key: (j.params, j.need, j.digest, j.solver, j.version) for j in store.ledger.jobs()}
+    store.ledger.close()
+    for path in store.root.glob("ledger*"):
+        path.unlink()
+    damaged = store.shard_path(keys[0])
+    damaged.write_bytes(damaged.read_bytes()[:-9])
+    assert store.ledger.rebuild(store) == 3
+    after = {j.key: (j.params, j.need, j.digest, j.solver, j.version) for j in store.ledger.jobs("done")}
+    assert after == {name: row for name, row in before.items() if name != keys[0]}
+    assert store.ledger.want([spec(te=0.03, gamma=10, resolution=8)]) == 1
+
+
+def test_rebuilding_takes_back_what_is_gone(store: Store) -> None:
+    keys = fill(store, te=[0.03, 0.04], resolution=8)
+    store.shard_path(keys[1]).unlink()
+    assert store.ledger.rebuild(store) == 1
+    assert [store.ledger.get(name).state for name in keys] == ["done", "wanted"]
