@@ -54,6 +54,7 @@ register(
     component=Quantity("1", "Cartesian component", "i"),
     converged=Quantity("1", "the stage reached its residual", "-"),
     residual=Quantity("1", "out-of-balance force over internal force, Euclidean norms", "|r|/|f|"),
+    drift=Quantity("1", "rms motion of the surface in its last 200 steps, in exocarp thicknesses", "d"),
     iterations=Quantity("1", "steps or iterations spent up to and including this stage", "n"),
     seconds=Quantity("s", "wall time spent up to and including this stage", "t", volatile=True),
 )

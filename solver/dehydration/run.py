@@ -15,7 +15,7 @@ from .mesh import Sampler
 from .params import DehydrationParams
 from .penetration import penetration
 from .path import Path, State
-from .settings import choose
+from .settings import Settings, choose
 
 __all__ = ["run"]
 
@@ -40,11 +40,12 @@ class _Record:
         self._start = time.perf_counter()
         self.rows: list[dict[str, Any]] = []
 
-    def add(self, state: State, limit: float) -> None:
+    def add(self, state: State, settings: Settings) -> None:
         row: dict[str, Any] = {
             "stage": state.shrinkage,
             "residual": state.residual,
-            "converged": state.residual <= limit,
+            "drift": state.drift,
+            "converged": state.residual <= settings.residual and state.drift <= settings.drift,
             "iterations": state.steps,
             "seconds": time.perf_counter() - self._start,
         }
@@ -103,8 +104,7 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     """Return displacement, position and descriptors of the wanted stages; see `solver.quantities` for units.
 
     Raises:
-        NotConverged: a stage kept a residual above ten times the settings' limit.
-        Unstable: the state left the finite. Both carry the stages that converged.
+        Unstable: the state left the finite; carries the stages before.
         Cancelled: the observer asked to stop.
 
     """
@@ -117,11 +117,12 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
         "path": "march" if last > settings.start else "base-state",
         "elements": path.elements,
         "residual_limit": settings.residual,
+        "drift_limit": settings.drift,
         "kappa_over_mu": settings.kappa_ratio,
     }
     try:
         for shrinkage in need.stages:
-            record.add(path.stage(shrinkage, last), settings.residual)
+            record.add(path.stage(shrinkage, last), settings)
             context.report(shrinkage / last if last else 1.0, f"shrinkage s = {shrinkage:.3f} settled")
     except SolverError as error:
         if record.rows:

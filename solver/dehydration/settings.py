@@ -22,8 +22,9 @@ class Settings:
     """Everything numerical about a run; follows from parameters and quality alone, so that results are repeatable.
 
     n: elements per edge of the cubed sphere. core: fractions of the core's layer breakpoints. kappa_ratio: bulk over
-    shear modulus. pace: shrinkage per step of the march. damping: per step, while marching and while settling.
-    residual: relative residual at which a stage counts as settled. settle_steps: after which it does not. clearance: gap
+    shear modulus. pace: shrinkage per step of the march. damping: per step, while marching, while
+    settling, and while settling skin that touches (less lets contacts chatter).
+    residual, drift: at which a stage counts as settled (see `path.State`). settle_steps: after which it does not. clearance: gap
     that self-contact keeps, in exocarp thicknesses.
     start: shrinkage below which the fruit is still smooth, where the march begins.
     """
@@ -34,7 +35,9 @@ class Settings:
     pace: float
     damping: float
     settle_damping: float
+    touching_damping: float
     residual: float
+    drift: float
     settle_steps: int
     start: float
     clearance: float = 0.1
@@ -52,12 +55,13 @@ class _Quality:
     most: int
     kappa_ratio: float
     residual: float
+    drift: float
 
 
 _QUALITIES = {
-    "preview": _Quality(4.2, 18, 48, 30.0, 2e-3),
-    "default": _Quality(6.0, 24, 96, 100.0, 1e-3),
-    "fine": _Quality(9.0, 36, 160, 100.0, 1e-3),
+    "preview": _Quality(4.2, 18, 48, 30.0, 5e-3, 2e-2),
+    "default": _Quality(6.0, 24, 96, 100.0, 2e-3, 1e-2),
+    "fine": _Quality(9.0, 36, 160, 100.0, 1e-3, 5e-3),
 }
 
 #: Steps from s = 0 to 0.3 that follow the quasi-static path at n = 24, kappa / mu = 30 (twice as many change the
@@ -93,8 +97,10 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
         pace=_STEPS_SPAN / (_STEPS * scale),
         damping=_DAMPING / scale,
         settle_damping=0.02,
+        touching_damping=0.1,
         residual=q.residual,
-        settle_steps=6000,
+        drift=q.drift,
+        settle_steps=4000,
         start=margin * onset,
     )
 

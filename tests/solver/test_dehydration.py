@@ -1,0 +1,96 @@
+"""The dehydration run against closed form and exact bifurcation point, and what happens when it cannot go on."""
+
+import dataclasses
+import json
+from pathlib import Path as File
+
+import numpy as np
+import pytest
+
+from solver import registry
+from solver.contract import Context, Need, Unstable
+from solver.dehydration import run as run_module
+from solver.dehydration.closed_form import sphere_radius
+from solver.dehydration.imperfection import bumps
+from solver.dehydration.path import Path
+from solver.dehydration.settings import choose
+
+SOLVER = registry.get("dehydration")
+REFERENCE = json.loads((File(__file__).parent / "core_shell_sphere.json").read_text())
+DESCRIPTORS = ("roughness", "dominant_degree", "buckle_count", "mean_radius")
+
+
+def smooth_sphere(n: int, kappa_ratio: float) -> np.ndarray:
+    """Deformed distance of the surface nodes from the centre at s = 0.05, no imperfection."""
+    params = SOLVER.parse({"imperfection": 0.0}, preset="sphere")
+    settings = dataclasses.replace(choose(params, "default"), n=n, kappa_ratio=kappa_ratio, residual=1e-3)
+    return np.linalg.norm(Path(params, settings, Context()).stage(0.05, 0.05).surface, axis=1)
+
+
+def test_smooth_sphere_meets_the_closed_form():
+    exact = sphere_radius(np.array([1.04]), 0.95, 0.4)[0]
+    found = [smooth_sphere(n, 100.0) for n in (8, 12, 18)]
+    errors = [np.abs(radius - exact).max() for radius in found]
+    assert sorted(errors, reverse=True) == errors
+    # what is left is the finite bulk modulus: 1e-3 is the target for the default quality
+    assert errors[-1] < 1e-3
+    # the mesh's own error, seen as unevenness over a sphere that should stay round, falls at second order
+    uneven = [np.ptp(radius) for radius in found]
+    assert np.log(uneven[0] / uneven[2]) / np.log(18 / 8) == pytest.approx(2, abs=0.6)
+
+
+def test_finite_bulk_modulus_errs_in_proportion_to_its_inverse():
+    exact = sphere_radius(np.array([1.04]), 0.95, 0.4)[0]
+    soft, stiff = (np.mean(smooth_sphere(12, kappa)) - exact for kappa in (30.0, 120.0))
+    assert soft / stiff == pytest.approx(4, rel=0.15)
+
+
+@pytest.mark.timeout(600)
+def test_buckles_appear_past_the_exact_onset_with_its_degree():
+    case = next(
+        c
+        for c in REFERENCE["bifurcation"]
+        if (c["stone_radius"], c["exocarp_thickness"], c["gamma"]) == (0.4, 0.04, 10)
+    )
+    params = SOLVER.parse({}, preset="sphere")
+    below, above = 0.85 * case["s_cr"], 1.3 * case["s_cr"]
+    need = Need(quality="preview", stages=(below, above), fields=DESCRIPTORS)
+    result = SOLVER.solve(params, need)
+    smooth, wrinkled = result.roughness.values
+    assert smooth < params.imperfection
+    assert wrinkled > 10 * params.imperfection
+    # neighbouring degrees are nearly tied at the onset, and n = 18 carries 4 elements per wavelength
+    assert float(result.dominant_degree[1]) == pytest.approx(case["l_cr"], rel=0.15)
+    assert result.converged.values.all()
+
+
+def test_a_blow_up_is_a_typed_error_with_the_last_good_stage(monkeypatch):
+    def reckless(params, quality):
+        # ten thousand times the pace: the volume shrinks faster than any wave can tell
+        settings = choose(params, quality)
+        return dataclasses.replace(settings, pace=0.05, damping=0.0)
+
+    monkeypatch.setattr(run_module, "choose", reckless)
+    params = SOLVER.parse({"te": 0.1, "gamma": 300.0, "imperfection": 0.01})
+    need = Need(quality="preview", stages=(0.005, 0.6), resolution=16)
+    with pytest.raises(Unstable, match="blew up") as caught:
+        SOLVER.solve(params, need)
+    assert caught.value.last_stage == 0.005
+    assert caught.value.partial.sizes["stage"] == 1
+    assert caught.value.advice
+
+
+def test_bumps_depend_on_the_seed_alone_and_stay_below_one():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(2000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    one, again, other = (bumps(points, Context.generator(seed)) for seed in (1, 1, 2))
+    assert np.array_equal(one, again)
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.2
+    assert np.abs(one).max() < 1.2
+
+
+def test_a_fresh_fruit_is_the_exact_shape():
+    params = SOLVER.parse({"te": 0.1, "gamma": 3.0, "imperfection": 0.0})
+    result = SOLVER.solve(params, Need(stages=(0.0,), quality="preview", resolution=16, fields=("displacement",)))
+    assert np.abs(result.displacement).max() < 1e-5
