@@ -1,1 +1,82 @@
-"""One file per format that a shape can be asked for in."""
+"""File formats of a shape: name -> `Format`, the choice between them, and `write`.
+
+A new format is its own module with `encode(surface, about) -> bytes`, one line in `FORMATS`, and one test that reads
+its output with a reader that is not ours.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import mimeparse
+
+from ..errors import InvalidQuery, NotAcceptable, Wrong
+from . import glb, metadata, npz, obj
+from .about import About
+
+if TYPE_CHECKING:
+    from store.lookup import Shape
+
+__all__ = ["FORMATS", "About", "Format", "negotiate", "write"]
+
+
+class Format(NamedTuple):
+    """A representation: its name in `?format=`, its media type and suffix, and what it needs of the look-up."""
+
+    name: str
+    media_type: str
+    suffix: str
+    title: str
+    fields: tuple[str, ...]
+    encode: Callable[[Shape, About], bytes]
+
+
+#: In order of growing preference: the last one answers those who accept anything.
+FORMATS: Mapping[str, Format] = {
+    f.name: f
+    for f in (
+        Format("obj", "model/obj", ".obj", "Wavefront OBJ", ("position",), obj.encode),
+        Format("npz", "application/x-npz", ".npz", "NumPy archive", ("position", "displacement"), npz.encode),
+        Format("glb", "model/gltf-binary", ".glb", "binary glTF 2.0", ("position",), glb.encode),
+        Format("json", "application/json", ".json", "numbers about the shape", (), metadata.encode),
+    )
+}
+
+
+def negotiate(accept: str | None, explicit: str | None = None) -> Format:
+    """Return the format named by `explicit`, else the best for an Accept header, q-values honoured.
+
+    Raises:
+        InvalidQuery: `explicit` names no format.
+        NotAcceptable: nothing in `accept` can be had.
+
+    """
+    if explicit is not None:
+        if explicit not in FORMATS:
+            near = difflib.get_close_matches(explicit, list(FORMATS), n=1)
+            hint = f"Did you mean {near[0]!r}? " if near else ""
+            advice = f"{hint}Formats: {', '.join(FORMATS)}."
+            raise InvalidQuery.of([Wrong("format", f"there is no format {explicit!r}", advice)])
+        return FORMATS[explicit]
+    by_type = {f.media_type: f for f in FORMATS.values()}
+    try:
+        best = mimeparse.best_match(list(by_type), (accept or "").strip().lower() or "*/*")
+    except mimeparse.MimeTypeParseException:
+        best = ""
+    if not best:
+        listed = ", ".join(f"{f.media_type} (format={f.name})" for f in FORMATS.values())
+        raise NotAcceptable(f"no representation fits Accept: {accept}.", advice=f"Ask for one of {listed}.")
+    return by_type[best]
+
+
+def write(shape: Shape, fmt: str | Format, about: About | None = None) -> bytes:
+    """Return the shape as a file's bytes. `fmt` is a format or its name.
+
+    Raises:
+        InvalidQuery: there is no format of that name.
+
+    """
+    chosen = fmt if isinstance(fmt, Format) else negotiate(None, fmt)
+    return chosen.encode(shape, about or About())

@@ -1,0 +1,66 @@
+"""The application: settings, tables and routes put together. `uvicorn service.app:app` serves it."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any
+
+import anyio.to_thread
+from fastapi import FastAPI
+
+from solver import __version__
+
+from . import catalogue, problems, shapes
+from .limits import Limits
+from .live import LiveTables
+from .openapi import Documented
+from .settings import Settings
+from .telemetry import Metrics, Telemetry
+
+__all__ = ["create_app"]
+
+if TYPE_CHECKING:
+    app: FastAPI
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    # handlers run in this pool; each shape in flight holds its arrays, so their number bounds the memory
+    anyio.to_thread.current_default_thread_limiter().total_tokens = app.state.settings.threads
+    yield
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """Return the service over one store; without settings, those of the environment.
+
+    The store and its tables are opened by the first request that needs them, so the service may start before they
+    exist and says what is missing until they do.
+    """
+    settings = settings or Settings()
+    app = Documented(
+        title="wizen",
+        version=__version__,
+        summary="Physically based shapes that can be asked for",
+        lifespan=_lifespan,
+    )
+    app.state.settings = settings
+    app.state.tables = LiveTables(settings.store, settings.reload_interval)
+    metrics = Metrics()
+    problems.install(app)
+    for part in (catalogue, shapes):
+        app.include_router(part.router)
+    if settings.metrics:
+        app.add_api_route("/metrics", metrics.page, include_in_schema=False)
+    # the last one added is the outermost
+    app.add_middleware(Limits, settings=settings)
+    app.add_middleware(Telemetry, metrics=metrics)
+    return app
+
+
+def __getattr__(name: str) -> Any:
+    # made when first asked for: importing this module must not read the environment
+    if name == "app":
+        globals()["app"] = made = create_app()
+        return made
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

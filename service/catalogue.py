@@ -1,0 +1,143 @@
+"""What there is: tables, solvers with their parameter schemas, and whether all is well."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Path, Request
+
+from solver import __version__, quantities, registry
+from solver.contract import Solver
+from store.errors import CorruptTable
+from store.tables import TableInfo
+
+from . import problems, vocabulary
+from .formats import FORMATS
+from .live import LiveTables
+
+__all__ = ["router"]
+
+router = APIRouter(tags=["catalogue"])
+
+Json = dict[str, Any]
+
+
+@router.get("/", summary="Where to go from here")
+def index(request: Request) -> Json:
+    """List the service's pages."""
+    return {
+        "name": "wizen",
+        "version": __version__,
+        "links": {
+            "tables": "/v1/tables",
+            "solvers": "/v1/solvers",
+            "shapes": "/v1/shapes/{solver}",
+            "health": "/healthz",
+            "documentation": "/docs",
+            "schema": "/openapi.json",
+        },
+        "formats": {f.name: {"media_type": f.media_type, "title": f.title} for f in FORMATS.values()},
+    }
+
+
+@router.get("/healthz", summary="Whether shapes can be served", responses=problems.responses(503))
+def health(request: Request) -> Json:
+    """Open every table; 200 only if the store and all its tables can be read.
+
+    A table whose newest generation is damaged is still served from the one before, and says so under `complaint`.
+    """
+    tables: LiveTables = request.app.state.tables
+    found = {}
+    for name in tables.names():
+        table = tables.get(name)
+        complaint = tables.complaint(name)
+        found[name] = {"digest": table.digest, "samples": table.size, **({"complaint": complaint} if complaint else {})}
+    return {"status": "ok", "version": __version__, "tables": found}
+
+
+@router.get("/v1/tables", summary="All tables", responses=problems.responses(503))
+def tables(request: Request) -> Json:
+    """List the tables that shapes can be asked of; a damaged one has a `complaint` in place of its axes."""
+    live: LiveTables = request.app.state.tables
+    found = []
+    for name in live.names():
+        try:
+            found.append(_table(live.info(name)))
+        except CorruptTable as error:
+            found.append({"name": name, "complaint": str(error)})
+    return {"tables": found}
+
+
+@router.get("/v1/tables/{name}", summary="One table", responses=problems.responses(404, 503))
+def table(request: Request, name: str = Path(description="Name of a table; GET /v1/tables lists them")) -> Json:
+    """Describe a table: its axes with ranges and units, its stages and its generation."""
+    live: LiveTables = request.app.state.tables
+    return _table(live.info(name))
+
+
+@router.get("/v1/solvers", summary="All solvers")
+def solvers() -> Json:
+    """List the solvers."""
+    return {
+        "solvers": [{"name": n, "title": registry.get(n).title, "href": f"/v1/solvers/{n}"} for n in registry.names()]
+    }
+
+
+@router.get("/v1/solvers/{name}", summary="One solver", responses=problems.responses(404))
+def solver(name: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Json:
+    """Describe a solver: parameter schema, query axes and stage axis with units, fields, presets, qualities."""
+    return _solver(vocabulary.solver_named(name))
+
+
+def _solver(solver: Solver) -> Json:
+    return {
+        "name": solver.name,
+        "version": solver.version,
+        "title": solver.title,
+        "params": solver.params.model_json_schema(),
+        "axes": {name: _bounds(axis) for name, axis in vocabulary.axes(solver.name).items()},
+        "stages": solver.stages._asdict(),
+        "fields": {name: quantities.attrs(name) for name in solver.fields},
+        "default_fields": list(solver.default_fields),
+        "presets": solver.presets,
+        "qualities": {
+            name: {"relative_error": solver.tolerances[name], "resolution": solver.default_resolution[name]}
+            for name in solver.tolerances
+        },
+        "links": {"shapes": f"/v1/shapes/{solver.name}"},
+    }
+
+
+def _bounds(axis: vocabulary.Axis) -> Json:
+    return {key: value for key, value in axis._asdict().items() if key != "name" and value is not None}
+
+
+def _table(info: TableInfo) -> Json:
+    """Return what an asker needs of a table's manifest; the keys of its results stay inside."""
+    solver = vocabulary.solver_named(info.solver)
+    described = vocabulary.axes(info.solver)
+    axes = {}
+    for name, (low, high) in info.axes.items():
+        axis = described.get(name)
+        axes[name] = {
+            "lowest": low,
+            "highest": high,
+            "units": axis.units if axis else "1",
+            "description": axis.description if axis else name,
+        }
+    stage = solver.stages
+    return {
+        "name": info.name,
+        "solver": info.solver,
+        "solver_version": info.version,
+        "digest": info.digest,
+        "created": info.created,
+        "samples": info.samples,
+        "resolution": info.resolution,
+        "dtype": info.dtype,
+        "axes": axes,
+        "fixed": info.fixed,
+        "stage": {"symbol": stage.symbol, "long_name": stage.long_name, "units": stage.units, "stored": info.stages},
+        "descriptors": {name: quantities.attrs(name) for name in info.descriptors if name in quantities.QUANTITIES},
+        "links": {"self": f"/v1/tables/{info.name}", "shapes": f"/v1/shapes/{info.solver}?table={info.name}"},
+    }

@@ -1,0 +1,105 @@
+"""The console script `wizen`: the commands of the batch floor, plus `serve` and the service's file formats."""
+
+from __future__ import annotations
+
+import errno
+import socket
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sweeps.cli import app
+from sweeps.console import note
+from sweeps.errors import InvalidOption, SweepError
+from sweeps.formats import extend
+
+if TYPE_CHECKING:
+    from sweeps.formats import Encoder, Made
+
+    from .formats import Format
+
+__all__ = ["app", "main"]
+
+
+class PortInUse(SweepError):
+    """Another program listens where the service should."""
+
+    code = "port-in-use"
+
+
+@app.command()
+def serve(
+    store: Annotated[
+        Path | None, typer.Option("--store", metavar="DIR", help="The store whose tables are served.")
+    ] = None,
+    host: Annotated[str | None, typer.Option("--host", help="Address to listen on; 0.0.0.0 is all of them.")] = None,
+    port: Annotated[int | None, typer.Option("--port", min=0, max=65535, help="0 takes any free one.")] = None,
+) -> None:
+    """Serve the tables of a store over HTTP. What is not given comes from WIZEN_STORE, WIZEN_HOST, WIZEN_PORT.
+
+    [bold]Examples[/bold]
+
+    wizen serve --store demo
+
+    wizen serve --store demo --host 0.0.0.0 --port 9000
+    """
+    import uvicorn
+    from pydantic import ValidationError
+
+    from .app import create_app
+    from .settings import Settings
+
+    given: dict[str, Any] = {"store": store, "host": host, "port": port}
+    try:
+        settings = Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        item = error.errors()[0]
+        name = "_".join(str(part) for part in item["loc"]).upper()
+        raise InvalidOption(f"WIZEN_{name}: {item['msg']}.") from None
+    listener = _listen(settings.host, settings.port)
+    where = f"[{settings.host}]" if ":" in settings.host else settings.host
+    note(f"serving {settings.store} at http://{where}:{listener.getsockname()[1]}")
+    with listener:
+        uvicorn.Server(uvicorn.Config(create_app(settings), log_level="warning")).run(sockets=[listener])
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """Return a listening socket; bound here, because uvicorn's own way to fail is a traceback in its log."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family, backlog=2048)
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            raise PortInUse(f"port {port} on {host} is in use.", "Choose another with --port, or 0 for any.") from None
+        why = error.strerror or str(error)
+        raise SweepError(f"cannot listen on {host}, port {port}: {why}.", "Choose another --host or --port.") from None
+
+
+def _formats() -> Mapping[str, Encoder]:
+    """Return the service's formats as encoders of the command line."""
+    from sweeps.formats import Encoder
+
+    from .formats import FORMATS
+
+    return {f.suffix: Encoder(f.fields, partial(_encode, f), single=True) for f in FORMATS.values()}
+
+
+def _encode(chosen: Format, made: Made) -> bytes:
+    from .formats import About
+
+    about = About(made.solver, made.table, made.fixed, made.stage_symbol, made.units)
+    return chosen.encode(made.shapes[0], about)
+
+
+extend(_formats)
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""What the service itself refuses. These know no HTTP: `service.problems` gives each its status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple, Self
+
+__all__ = [
+    "AmbiguousTable",
+    "BodyTooLarge",
+    "InvalidQuery",
+    "NotAcceptable",
+    "OutsideRanges",
+    "QueryTooLong",
+    "ServiceError",
+    "TimedOut",
+    "UnknownSolver",
+    "Wrong",
+]
+
+
+class Wrong(NamedTuple):
+    """One wrong parameter: its name, what is wrong with it and what to change."""
+
+    name: str
+    detail: str
+    advice: str = ""
+
+
+class ServiceError(Exception):
+    """Something asked for that cannot be answered. `advice` says what to change; `wrong` lists every culprit."""
+
+    code: ClassVar[str] = "service-error"
+
+    def __init__(self, message: str, *, advice: str = "", wrong: Sequence[Wrong] = ()) -> None:
+        super().__init__(message)
+        self.message = message
+        self.advice = advice
+        self.wrong = tuple(wrong)
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.advice}".strip()
+
+
+class InvalidQuery(ServiceError):
+    """Parameters that are misspelt, missing or not what they should be."""
+
+    code = "invalid-query"
+
+    @classmethod
+    def of(cls, wrong: Sequence[Wrong]) -> Self:
+        """Return the error that lists every wrong parameter, with one sentence for all of them."""
+        message = "; ".join(f"{w.name}: {w.detail}" for w in wrong)
+        advice = " ".join(dict.fromkeys(w.advice for w in wrong if w.advice))
+        return cls(f"{message}.", advice=advice, wrong=wrong)
+
+
+class OutsideRanges(InvalidQuery):
+    """Numbers that are off the table's axes; everything else about the query is right."""
+
+    code = "outside-table"
+
+
+class AmbiguousTable(InvalidQuery):
+    """A solver with several tables, none of which was chosen."""
+
+    code = "ambiguous-table"
+
+
+class NotAcceptable(ServiceError):
+    """No representation that the asker accepts."""
+
+    code = "not-acceptable"
+
+
+class UnknownSolver(ServiceError):
+    """No solver of that name."""
+
+    code = "unknown-solver"
+
+
+class QueryTooLong(ServiceError):
+    """A query string longer than any honest one."""
+
+    code = "query-too-long"
+
+
+class BodyTooLarge(ServiceError):
+    """A request body over the limit."""
+
+    code = "body-too-large"
+
+
+class TimedOut(ServiceError):
+    """An answer that did not begin in time."""
+
+    code = "timed-out"

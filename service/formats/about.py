@@ -1,0 +1,50 @@
+"""What a file says about its shape besides the numbers: where it comes from, how far to trust it, in which units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from solver import __version__
+
+if TYPE_CHECKING:
+    from store.lookup import Shape
+
+__all__ = ["GENERATOR", "LENGTH_UNIT", "About", "extras"]
+
+GENERATOR = f"wizen {__version__}"
+#: Every length in a file is in units of the fruit's reference radius; multiply by the real one to get metres.
+LENGTH_UNIT = "r1"
+
+
+@dataclass(frozen=True)
+class About:
+    """What a shape does not know of itself: its solver, its table's name, what the table holds fixed.
+
+    `units` are those of the parameters and the stage; `links` and `timings` [ms] appear in JSON alone.
+    """
+
+    solver: str = ""
+    table: str = ""
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    stage_symbol: str = "stage"
+    units: Mapping[str, str] = field(default_factory=dict)
+    links: Mapping[str, str] = field(default_factory=dict)
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+
+def extras(shape: Shape, about: About) -> dict[str, Any]:
+    """Return what every file format carries along, as plain JSON values."""
+    return {
+        "generator": GENERATOR,
+        "solver": about.solver,
+        "table": about.table,
+        "digest": shape.table,
+        "params": {**about.fixed, **shape.parameters},
+        "stage": {"symbol": about.stage_symbol, "value": shape.stage},
+        "exact": shape.exact,
+        "converged": shape.converged,
+        "nearest": shape.nearest,
+        "units": {"length": LENGTH_UNIT, **about.units},
+    }

@@ -1,0 +1,34 @@
+"""NumPy's own archive: the numbers as they are, read by `numpy.load` without pickle."""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .about import About, extras
+
+if TYPE_CHECKING:
+    from store.lookup import Shape
+
+__all__ = ["encode"]
+
+
+def encode(shape: Shape, about: About) -> bytes:
+    """Return position, displacement, colatitude, azimuth and poles, plus `about`: a JSON text with query and units.
+
+    Equal shapes give equal bytes: the archive holds no time stamps.
+    """
+    arrays = {
+        "position": shape.position,
+        "displacement": shape.displacement,
+        "colatitude": shape.colatitude,
+        "azimuth": shape.azimuth,
+        "poles": shape.poles,
+        "about": np.array(json.dumps(extras(shape, about), sort_keys=True)),
+    }
+    file = io.BytesIO()
+    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})  # type: ignore[arg-type]
+    return file.getvalue()

@@ -1,0 +1,121 @@
+"""The OpenAPI page: query axes with their units and ranges, which no function signature can declare.
+
+Which axes a query has is the table's affair. The page lists all that the solvers know, with the bounds that they
+accept, and takes its examples from the tables that are there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+
+from solver import registry
+from store.errors import StoreError
+
+from . import problems, vocabulary
+from .formats import FORMATS
+from .live import LiveTables
+from .query import LOWEST_RESOLUTION
+from .settings import Settings
+
+__all__ = ["Documented"]
+
+Json = dict[str, Any]
+
+
+class Documented(FastAPI):
+    """FastAPI whose page describes the shapes' query; made anew when a table changes."""
+
+    def openapi(self) -> Json:
+        """Return the OpenAPI document."""
+        examples = _examples(self.state.tables)
+        if self.openapi_schema is None or self.openapi_schema.get("x-examples") != examples:
+            self.openapi_schema = None
+            document = super().openapi()
+            schemas = document.setdefault("components", {}).setdefault("schemas", {})
+            problem = problems.Problem.model_json_schema(ref_template="#/components/schemas/{model}")
+            schemas.update(problem.pop("$defs", {}), Problem=problem)
+            get = document["paths"]["/v1/shapes/{solver}"]["get"]
+            get["parameters"] = [*get["parameters"], *_parameters(self.state.settings, examples)]
+            _replace_validation(document)
+            document["x-examples"] = examples
+        return self.openapi_schema  # type: ignore[return-value]
+
+
+def _replace_validation(document: Json) -> None:
+    """Declare what is sent for wrong input: FastAPI assumes its own shape of error."""
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            responses = operation["responses"]
+            if "HTTPValidationError" in str(responses.get("422")):
+                responses["422"] = problems.responses(422)[422]
+    for name in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(name, None)
+
+
+def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
+    """Return the query parameters of a shape: every solver's axes and stage, and what is common to all."""
+    found: dict[str, Json] = {}
+    for name in registry.names():
+        solver = vocabulary.solver_named(name)
+        stage = solver.stages
+        whole = [
+            *vocabulary.axes(name).values(),
+            vocabulary.Axis(stage.symbol, stage.long_name, stage.units, stage.lowest, stage.highest, None),
+        ]
+        for axis in whole:
+            found.setdefault(axis.name, _axis(axis, examples.get(axis.name, {})))
+    return [
+        *found.values(),
+        _query(
+            "resolution",
+            f"Colatitude samples, {LOWEST_RESOLUTION} to {settings.max_resolution}; azimuth has twice as many. "
+            "64 and 64x128 are the same. Without it, the table's own.",
+            {"type": "string", "pattern": "^[0-9]+(x[0-9]+)?$", "examples": ["64", "64x128"]},
+        ),
+        _query(
+            "table",
+            "Name of the table; needed only where a solver has several",
+            {"type": "string"},
+        ),
+        _query(
+            "format",
+            "Representation; goes before the Accept header",
+            {"type": "string", "enum": list(FORMATS)},
+        ),
+    ]
+
+
+def _axis(axis: vocabulary.Axis, examples: Json) -> Json:
+    schema: Json = {"type": "number"}
+    if axis.lowest is not None:
+        schema["minimum"] = axis.lowest
+    if axis.highest is not None:
+        schema["maximum"] = axis.highest
+    units = "dimensionless" if axis.units == "1" else axis.units
+    parameter = _query(axis.name, f"{axis.description} [{units}]", schema)
+    if examples:
+        parameter["examples"] = examples
+    return parameter
+
+
+def _query(name: str, description: str, schema: Json) -> Json:
+    return {"name": name, "in": "query", "required": False, "description": description, "schema": schema}
+
+
+def _examples(tables: LiveTables) -> dict[str, Json]:
+    """Return, for each axis and stage, the ends of the ranges of the tables that have it; nothing without a store."""
+    found: dict[str, Json] = {}
+    try:
+        for name in tables.names():
+            table = tables.get(name)
+            symbol = vocabulary.solver_named(table.info.solver).stages.symbol
+            ends = {**table.axes, symbol: (0.0, table.stages[-1])}
+            for axis, (low, high) in ends.items():
+                entry = found.setdefault(axis, {})
+                entry[f"{name}-lowest"] = {"summary": f"lowest in table {name}", "value": float(low)}
+                entry[f"{name}-highest"] = {"summary": f"highest in table {name}", "value": float(high)}
+    except StoreError:
+        return {}
+    return found

@@ -1,0 +1,189 @@
+"""RFC 9457 problems: one table gives every exception its HTTP status, and every error one JSON shape.
+
+The type of a problem is `urn:wizen:problem:<code>`; clients branch on it and people read `detail` and `advice`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import quote
+
+import orjson
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+from starlette.types import Scope
+
+from solver import contract
+from store import errors as stored
+
+from . import errors
+
+__all__ = ["MEDIA_TYPE", "STATUS", "Culprit", "Problem", "install", "of", "responses", "unforeseen"]
+
+MEDIA_TYPE = "application/problem+json"
+_URN = "urn:wizen:problem:"
+
+#: Exception class -> status; a class that is not listed has its nearest ancestor's.
+STATUS: Mapping[type[Exception], int] = {
+    contract.SolverError: 500,
+    contract.InvalidInput: 422,
+    contract.NotConverged: 422,
+    contract.Unstable: 422,
+    contract.Cancelled: 409,
+    stored.StoreError: 500,
+    stored.MissingStore: 503,
+    stored.CorruptShard: 503,
+    stored.CorruptTable: 503,
+    stored.CorruptLedger: 503,
+    stored.UnknownTable: 404,
+    stored.EmptyTable: 503,
+    stored.OutsideTable: 422,
+    stored.MixedSamples: 503,
+    stored.StorageFull: 507,
+    stored.UnknownJob: 404,
+    errors.ServiceError: 500,
+    errors.InvalidQuery: 422,
+    errors.NotAcceptable: 406,
+    errors.UnknownSolver: 404,
+    errors.QueryTooLong: 414,
+    errors.BodyTooLarge: 413,
+    errors.TimedOut: 503,
+}
+
+_RETRY = {503: "5"}
+
+
+class Culprit(BaseModel):
+    """One wrong parameter."""
+
+    name: str = Field(description="The parameter")
+    detail: str = Field(description="What is wrong with it")
+    advice: str = Field("", description="What to change")
+
+
+class Problem(BaseModel):
+    """An error as RFC 9457 describes it, with advice."""
+
+    model_config = ConfigDict(json_schema_extra={"description": "An error as RFC 9457 describes it, with advice"})
+
+    type: str = Field(description="What kind of problem this is", examples=[f"{_URN}outside-table"])
+    title: str = Field(description="The kind in words")
+    status: int = Field(description="The HTTP status")
+    detail: str = Field(description="What happened this time")
+    advice: str = Field("", description="What to change")
+    instance: str = Field(description="The request that met the problem")
+    request_id: str = Field("", description="Names the request in the service's log")
+    errors: list[Culprit] = Field(default_factory=list, description="Every wrong parameter")
+
+
+def of(error: Exception, scope: Scope) -> Response:
+    """Return the problem for a known exception: a SolverError, a StoreError or a ServiceError."""
+    status = next(STATUS[kind] for kind in type(error).__mro__ if kind in STATUS)
+    return _response(
+        scope,
+        status,
+        getattr(error, "code", "error"),
+        str(getattr(error, "message", error)),
+        str(getattr(error, "advice", "")),
+        [Culprit(**wrong._asdict()) for wrong in getattr(error, "wrong", ())],
+    )
+
+
+def unforeseen(scope: Scope) -> Response:
+    """Return the problem for an exception that nobody foresaw; what it was stands in the log alone."""
+    return _response(
+        scope,
+        500,
+        "internal",
+        "the service met an error that it did not foresee.",
+        "Report the request id; the log has the rest.",
+    )
+
+
+def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI entries that declare these statuses as problems."""
+    content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
+
+
+def install(app: FastAPI) -> None:
+    """Make every error of `app` a problem."""
+    for root in (contract.SolverError, stored.StoreError, errors.ServiceError):
+        app.add_exception_handler(root, _known)
+    app.add_exception_handler(RequestValidationError, _validation)
+    app.add_exception_handler(HTTPException, _http)
+
+
+async def _known(request: Request, error: Exception) -> Response:
+    return of(error, request.scope)
+
+
+async def _validation(request: Request, error: Exception) -> Response:
+    """List every wrong value of a body or path that FastAPI validated."""
+    assert isinstance(error, RequestValidationError)
+    wrong = []
+    for item in error.errors():
+        name = ".".join(str(part) for part in item["loc"][1:]) or str(item["loc"][0])
+        detail = str(item["msg"]).removeprefix("Value error, ")
+        if isinstance(item.get("input"), str | int | float):
+            detail += f" (got {item['input']!r})"
+        wrong.append(errors.Wrong(name, detail))
+    return of(errors.InvalidQuery.of(wrong), request.scope)
+
+
+async def _http(request: Request, error: Exception) -> Response:
+    """Say what there is instead of a path or method that there is not."""
+    assert isinstance(error, HTTPException)
+    status = error.status_code
+    phrase = HTTPStatus(status).phrase
+    detail, advice = str(error.detail), ""
+    path = request.url.path
+    if status == 404:
+        known = [p for p in _paths(request.app) if "{" not in p]
+        near = difflib.get_close_matches(path, known, n=1)
+        detail = f"there is nothing at {path}."
+        advice = f"Did you mean {near[0]}? " if near else ""
+        advice += "GET / lists what there is."
+    elif status == 405:
+        allowed = (error.headers or {}).get("Allow", "GET")
+        detail = f"{path} does not take {request.method}."
+        advice = f"Use {allowed}."
+    code = phrase.lower().replace(" ", "-").replace("'", "")
+    return _response(request.scope, status, code, detail, advice, headers=error.headers)
+
+
+def _paths(app: FastAPI) -> Iterable[str]:
+    return app.openapi().get("paths", {}).keys()
+
+
+def _response(
+    scope: Scope,
+    status: int,
+    code: str,
+    detail: str,
+    advice: str = "",
+    wrong: Iterable[Culprit] = (),
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    query = scope.get("query_string", b"").decode("latin-1")
+    problem = Problem(
+        type=_URN + code,
+        title=code.replace("-", " ").capitalize(),
+        status=status,
+        detail=detail,
+        advice=advice,
+        instance=quote(scope["path"]) + (f"?{query[:512]}" if query else ""),
+        request_id=scope.get("state", {}).get("request_id", ""),
+        errors=list(wrong),
+    )
+    body = problem.model_dump(exclude_defaults=True)
+    extra = {"Cache-Control": "no-store", **(headers or {})}
+    if status in _RETRY:
+        extra["Retry-After"] = _RETRY[status]
+    return Response(orjson.dumps(body), status, extra, MEDIA_TYPE)

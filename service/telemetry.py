@@ -1,0 +1,109 @@
+"""What an operator sees: one log record per request with its id, and counts and latencies for Prometheus.
+
+The records go to the logger `wizen.service`; besides the sentence they carry `request_id`, `method`, `path`, `route`,
+`status`, `milliseconds` and `bytes` as attributes, so that a JSON formatter needs no parsing.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+import uuid
+
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram, generate_latest
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from . import problems
+
+__all__ = ["LOGGER", "Metrics", "Telemetry"]
+
+LOGGER = logging.getLogger("wizen.service")
+
+#: Ids from outside are kept only if they cannot break a log line.
+_HONEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 5.0)
+
+
+class Metrics:
+    """Counts and latencies per route; one registry per app, so that two apps in a process do not mix."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        self.requests = Counter(
+            "wizen_requests_total", "Answered requests", ["route", "method", "status"], registry=self.registry
+        )
+        self.seconds = Histogram(
+            "wizen_request_seconds", "Time to answer", ["route"], buckets=_BUCKETS, registry=self.registry
+        )
+
+    def page(self, request: Request) -> Response:
+        """Return the numbers in Prometheus' text format."""
+        return Response(generate_latest(self.registry), media_type=CONTENT_TYPE_LATEST)
+
+
+class Telemetry:
+    """The outermost layer: names every request, logs it, and turns what nobody foresaw into a problem."""
+
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+        self.app = app
+        self.metrics = metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on; HEAD goes on as GET and loses its body on the way back."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        begin = time.perf_counter()
+        given = Headers(scope=scope).get("x-request-id", "")
+        request_id = given if _HONEST_ID.fullmatch(given) else uuid.uuid4().hex
+        scope.setdefault("state", {})["request_id"] = request_id
+        method = scope["method"]
+        status, sent = 0, 0
+
+        async def watched(message: Message) -> None:
+            nonlocal status, sent
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)["X-Request-ID"] = request_id
+            elif message["type"] == "http.response.body":
+                if method == "HEAD":
+                    message = {**message, "body": b""}
+                sent += len(message.get("body", b""))
+            await send(message)
+
+        if method == "HEAD":
+            scope["method"] = "GET"
+        try:
+            await self.app(scope, receive, watched)
+        except Exception:
+            LOGGER.exception("request %s failed", request_id, extra={"request_id": request_id})
+            if status:
+                raise  # half an answer is out: the connection must break
+            await problems.unforeseen(scope)(scope, receive, watched)
+        finally:
+            self._record(scope, method, status, sent, time.perf_counter() - begin)
+
+    def _record(self, scope: Scope, method: str, status: int, sent: int, seconds: float) -> None:
+        # the route, not the path: what a stranger types must not become a label
+        route = getattr(scope.get("route"), "path", "none")
+        known = method if method in {"GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"} else "other"
+        self.metrics.requests.labels(route, known, str(status)).inc()
+        self.metrics.seconds.labels(route).observe(seconds)
+        fields = {
+            "request_id": scope["state"]["request_id"],
+            "method": method,
+            "path": scope["path"],
+            "route": route,
+            "status": status,
+            "milliseconds": round(1e3 * seconds, 3),
+            "bytes": sent,
+        }
+        LOGGER.info(
+            "%s %r %d %.1f ms %d bytes id=%s",
+            method, scope["path"], status, 1e3 * seconds, sent, fields["request_id"],
+            extra=fields,
+        )  # fmt: skip

@@ -1,0 +1,66 @@
+"""A solver's words for the outside: its query axes with units, bounds and meaning, read off its parameter schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from solver import quantities, registry
+from solver.contract import Solver
+
+from .errors import UnknownSolver
+
+__all__ = ["Axis", "axes", "solver_named", "units_of"]
+
+
+class Axis(NamedTuple):
+    """One scalar that may be asked for: what it is, its units, and the bounds of what the solver accepts."""
+
+    name: str
+    description: str
+    units: str
+    lowest: float | None
+    highest: float | None
+    default: float | None
+
+
+def solver_named(name: str) -> Solver:
+    """Return the solver called `name`.
+
+    Raises:
+        UnknownSolver: there is none of that name.
+
+    """
+    try:
+        return registry.get(name)
+    except registry.InvalidInput as error:
+        raise UnknownSolver(error.message, advice=error.advice) from None
+
+
+@cache
+def axes(solver_name: str) -> Mapping[str, Axis]:
+    """Return the solver's query axes by name."""
+    solver = solver_named(solver_name)
+    fields: dict[str, Any] = solver.params.model_json_schema()["properties"]
+    found = {}
+    for name, (field, index) in solver.params.axes.items():
+        whole = fields[field]
+        item = whole if index is None else whole["prefixItems"][index]
+        default = whole.get("default")
+        if index is not None and default is not None:
+            default = default[index]
+        found[name] = Axis(
+            name,
+            whole.get("description", ""),
+            whole.get("units", "1"),
+            item.get("minimum"),
+            item.get("maximum"),
+            default,
+        )
+    return found
+
+
+def units_of(names: Mapping[str, Any] | tuple[str, ...]) -> dict[str, str]:
+    """Return the units of those names that are registered quantities."""
+    return {name: quantities.QUANTITIES[name].units for name in names if name in quantities.QUANTITIES}

@@ -1,0 +1,118 @@
+"""What there is: index, tables, solvers, health, and the OpenAPI page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx
+import pytest
+from openapi_spec_validator import validate
+
+from service.app import create_app
+from service.settings import Settings
+from solver import __version__
+from solver.dehydration import SOLVER
+from store import tables
+from store.store import Store
+
+from .conftest import client_of
+
+
+def test_index_links_lead_somewhere(client: httpx.Client) -> None:
+    index = client.get("/").json()
+    for name in ("tables", "solvers", "health", "documentation", "schema"):
+        assert client.get(index["links"][name]).status_code == 200
+    assert set(index["formats"]) == {"glb", "obj", "npz", "json"}
+
+
+def test_tables(client: httpx.Client, built: Path) -> None:
+    (listed,) = client.get("/v1/tables").json()["tables"]
+    one = client.get("/v1/tables/default").json()
+    assert one == listed
+    assert one["digest"] == tables.info(Store.open(built)).digest
+    assert one["axes"]["te"] | {"description": ""} == {
+        "lowest": 0.02,
+        "highest": 0.06,
+        "units": "r1",
+        "description": "",
+    }
+    assert one["fixed"]["rs1"] == 0.4
+    assert one["stage"]["symbol"] == "s"
+    assert one["stage"]["stored"] == [0.1, 0.2, 0.3]
+    assert one["descriptors"]["roughness"]["units"] == "1"
+    assert client.get("/v1/tables/none").status_code == 404
+    assert client.get("/v1/tables/..%2F..").status_code == 404
+
+
+def test_solvers(client: httpx.Client) -> None:
+    assert "dehydration" in {s["name"] for s in client.get("/v1/solvers").json()["solvers"]}
+    solver = client.get("/v1/solvers/dehydration").json()
+    assert solver["axes"]["gamma"]["lowest"] == 1.0
+    assert solver["axes"]["r2"]["units"] == "r1"
+    assert solver["axes"]["rs1"]["default"] == 0.4
+    assert solver["stages"]["highest"] == 0.6
+    assert solver["fields"]["position"]["units"] == "1"
+    assert solver["qualities"]["fine"] == {"relative_error": 0.05, "resolution": 128}
+    for preset in solver["presets"].values():
+        SOLVER.params.parse(preset)
+    assert set(solver["params"]["properties"]) == set(SOLVER.params.model_fields)
+
+
+def test_health(client: httpx.Client, built: Path, tmp_path: Path) -> None:
+    answer = client.get("/healthz")
+    assert answer.status_code == 200
+    assert answer.json()["version"] == __version__
+    assert answer.json()["tables"]["default"]["digest"] == tables.info(Store.open(built)).digest
+    with client_of(tmp_path / "nowhere") as other:
+        sick = other.get("/healthz")
+        assert sick.status_code == 503
+        assert sick.json()["type"] == "urn:wizen:problem:missing-store"
+        assert sick.headers["retry-after"]
+        # the store may come after the service
+        Store.open(tmp_path / "nowhere", create=True)
+        assert other.get("/healthz").status_code == 200
+
+
+def test_a_damaged_table_is_reported(own: Store) -> None:
+    (own.tables_dir / "default" / "current.json").write_text("{}")
+    with client_of(own.root) as client:
+        assert client.get("/healthz").status_code == 503
+        assert client.get("/v1/tables/default").json()["type"] == "urn:wizen:problem:corrupt-table"
+        # the list is still there for the others
+        (row,) = client.get("/v1/tables").json()["tables"]
+        assert "damaged" in row["complaint"]
+
+
+def test_openapi_is_valid_and_explains_the_query(built: Path, client: httpx.Client) -> None:
+    document = client.get("/openapi.json").json()
+    validate(document)
+    get = document["paths"]["/v1/shapes/{solver}"]["get"]
+    parameters = {p["name"]: p for p in get["parameters"]}
+    assert set(parameters) >= {*(f"r{i}" for i in range(2, 9)), "rs1", "rs2", "te", "gamma", "s", "resolution"}
+    assert set(parameters) >= {"table", "format", "solver"}
+    te = parameters["te"]
+    assert "[r1]" in te["description"]
+    assert (te["schema"]["minimum"], te["schema"]["maximum"]) == (0.002, 0.2)
+    assert {e["value"] for e in te["examples"].values()} == {0.02, 0.06}
+    assert parameters["s"]["schema"]["maximum"] == 0.6
+    assert set(get["responses"]["200"]["content"]) == {
+        "application/json",
+        "application/x-npz",
+        "model/gltf-binary",
+        "model/obj",
+    }
+    assert "application/problem+json" in get["responses"]["422"]["content"]
+    assert "HTTPValidationError" not in document["components"]["schemas"]
+
+
+def test_openapi_needs_no_store(tmp_path: Path) -> None:
+    document = create_app(Settings(store=tmp_path / "nowhere")).openapi()
+    validate(document)
+
+
+def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("WIZEN_STORE", str(tmp_path))
+    monkeypatch.setenv("WIZEN_MAX_RESOLUTION", "64")
+    assert Settings().store == tmp_path
+    assert Settings().max_resolution == 64
+    assert Settings().host == "127.0.0.1"

@@ -1,0 +1,158 @@
+"""Every error is a problem that says what to change, and none is a traceback."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from pydantic import BaseModel
+
+from service import errors, problems
+from service.app import create_app
+from service.settings import Settings
+from solver import contract
+from store import errors as stored
+
+from .conftest import served
+
+EXPECTED: dict[type[Exception], int] = {
+    contract.SolverError: 500,
+    contract.InvalidInput: 422,
+    contract.InvalidGeometry: 422,
+    contract.NotConverged: 422,
+    contract.Unstable: 422,
+    contract.Cancelled: 409,
+    stored.StoreError: 500,
+    stored.MissingStore: 503,
+    stored.CorruptShard: 503,
+    stored.CorruptTable: 503,
+    stored.CorruptLedger: 503,
+    stored.UnknownTable: 404,
+    stored.EmptyTable: 503,
+    stored.OutsideTable: 422,
+    stored.MixedSamples: 503,
+    stored.StorageFull: 507,
+    stored.UnknownJob: 404,
+    errors.ServiceError: 500,
+    errors.InvalidQuery: 422,
+    errors.OutsideRanges: 422,
+    errors.AmbiguousTable: 422,
+    errors.NotAcceptable: 406,
+    errors.UnknownSolver: 404,
+    errors.QueryTooLong: 414,
+    errors.BodyTooLarge: 413,
+    errors.TimedOut: 503,
+}
+
+
+class Body(BaseModel):
+    count: int
+    width: float
+
+
+def descendants(kind: type) -> set[type]:
+    return {kind}.union(*(descendants(sub) for sub in kind.__subclasses__()))
+
+
+@pytest.fixture(scope="module")
+def faulty(built: Path) -> Iterator[httpx.Client]:
+    """A service with routes that fail in every way."""
+    app = create_app(Settings(store=built, timeout=0.3, max_body=100, max_query=200))
+    kinds = {kind.__name__: kind for kind in EXPECTED}
+
+    @app.get("/fail/{kind}")
+    def fail(kind: str) -> None:
+        error: Exception = kinds[kind]("it broke.")
+        error.advice = "Mend it."  # type: ignore[attr-defined]
+        raise error
+
+    @app.get("/bug")
+    def bug() -> None:
+        raise ZeroDivisionError("secret detail")
+
+    @app.get("/slow")
+    def slow() -> None:
+        time.sleep(0.8)
+
+    @app.post("/body")
+    def body(value: Body) -> Body:
+        return value
+
+    with served(app) as client:
+        yield client
+
+
+def checked(answer: httpx.Response, status: int, code: str) -> dict:
+    assert answer.status_code == status
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = answer.json()
+    problems.Problem.model_validate(problem)
+    assert (problem["status"], problem["type"]) == (status, f"urn:wizen:problem:{code}")
+    assert problem["request_id"] == answer.headers["x-request-id"]
+    assert "Traceback" not in answer.text
+    return problem
+
+
+@pytest.mark.parametrize(("kind", "status"), EXPECTED.items(), ids=lambda v: getattr(v, "__name__", str(v)))
+def test_every_error_has_its_status(faulty: httpx.Client, kind: type[Exception], status: int) -> None:
+    problem = checked(faulty.get(f"/fail/{kind.__name__}"), status, kind.code)  # type: ignore[attr-defined]
+    assert problem["detail"] == "it broke."
+    assert problem["advice"] == "Mend it."
+    assert problem["instance"] == f"/fail/{kind.__name__}"
+
+
+def test_no_error_is_forgotten() -> None:
+    ours = descendants(contract.SolverError) | descendants(stored.StoreError) | descendants(errors.ServiceError)
+    ours = {kind for kind in ours if kind.__module__ in (contract.__name__, stored.__name__, errors.__name__)}
+    assert ours == set(EXPECTED)
+
+
+def test_a_bug_shows_no_secrets_and_is_logged(faulty: httpx.Client, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.ERROR, "wizen.service"):
+        answer = faulty.get("/bug", headers={"X-Request-ID": "mine-1"})
+    problem = checked(answer, 500, "internal")
+    assert problem["request_id"] == "mine-1"
+    assert "secret" not in answer.text
+    (record,) = [r for r in caplog.records if r.name == "wizen.service"]
+    assert record.exc_info
+    assert record.request_id == "mine-1"  # type: ignore[attr-defined]
+
+
+def test_unknown_paths_and_methods(faulty: httpx.Client) -> None:
+    problem = checked(faulty.get("/v1/table"), 404, "not-found")
+    assert "Did you mean /v1/tables?" in problem["advice"]
+    answer = faulty.post("/v1/tables")
+    problem = checked(answer, 405, "method-not-allowed")
+    assert answer.headers["allow"] == "GET"
+    assert "Use GET" in problem["advice"]
+
+
+def test_wrong_bodies_are_listed(faulty: httpx.Client) -> None:
+    problem = checked(faulty.post("/body", json={"count": "many"}), 422, "invalid-query")
+    assert {wrong["name"] for wrong in problem["errors"]} == {"count", "width"}
+    checked(faulty.post("/body", content=b"{", headers={"content-type": "application/json"}), 422, "invalid-query")
+
+
+def test_too_long_and_too_large(faulty: httpx.Client) -> None:
+    checked(faulty.get("/v1/tables?" + "x" * 201), 414, "query-too-long")
+    checked(faulty.post("/body", content=b" " * 101), 413, "body-too-large")
+    unannounced = (b" " * 60 for _ in range(3))
+    checked(faulty.post("/body", content=unannounced), 413, "body-too-large")
+
+
+def test_too_slow(faulty: httpx.Client) -> None:
+    begin = time.monotonic()
+    answer = faulty.get("/slow")
+    assert time.monotonic() - begin < 0.7
+    checked(answer, 503, "timed-out")
+    assert answer.headers["retry-after"]
+
+
+def test_strange_characters_stay_a_problem(faulty: httpx.Client) -> None:
+    problem = checked(faulty.get("/v1/tables/%00%0a%ff"), 404, "unknown-table")
+    assert "\n" not in problem["instance"]
+    checked(faulty.get("/v1/shapes/dehydration?%ff=%00&te=\u0661"), 422, "invalid-query")
