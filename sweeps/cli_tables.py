@@ -1,0 +1,229 @@
+"""The commands about tables: build, verify, info, map and query."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .console import emit, grid
+from .errors import InvalidOption
+from .options import As_json, Out, Quality, Set, Stages, StorePath, TableName, assignments, numbers
+
+__all__ = ["add_to"]
+
+table_app = typer.Typer(no_args_is_help=True, help="Build, check and describe look-up tables.")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands of this module to the root command."""
+    app.add_typer(table_app, name="table")
+    app.command("map")(draw_map)
+    app.command()(query)
+
+
+@table_app.command()
+def build(
+    store: StorePath,
+    name: TableName = "default",
+    solver: Annotated[str, typer.Option("--solver", help="Whose results.")] = "dehydration",
+    plan: Annotated[str | None, typer.Option("--plan", help="Only the results of this plan.")] = None,
+    quality: Quality = None,
+    resolution: Annotated[int | None, typer.Option("--resolution", help="Cut the spectra to this band.")] = None,
+    as_json: As_json = False,
+) -> None:
+    """Build a table from the finished runs in a store, and make it the current one.
+
+    [bold]Examples[/bold]
+
+    wizen table build --store demo
+
+    wizen table build --store demo --name coarse --plan fig7-right --resolution 32
+    """
+    from solver import registry
+    from store import tables
+    from store.store import Store
+
+    from .plan import units_of
+
+    opened, chosen = Store.open(store), registry.get(solver)
+    made = tables.build(
+        opened,
+        name,
+        solver,
+        axes=chosen.params.axes,
+        units=units_of(solver),
+        plan=plan,
+        quality=quality,
+        resolution=resolution,
+    )
+    _show_table(made, tables.path_of(opened, made), as_json)
+
+
+@table_app.command()
+def info(store: StorePath, name: TableName = "default", as_json: As_json = False) -> None:
+    """Say what a table holds: its axes with bounds, what is fixed, its stages.
+
+    [bold]Examples[/bold]
+
+    wizen table info --store demo
+
+    wizen table info --store demo --name coarse --json
+    """
+    from store import tables
+    from store.store import Store
+
+    opened = Store.open(store)
+    found = tables.info(opened, name)
+    _show_table(found, tables.path_of(opened, found), as_json)
+
+
+@table_app.command()
+def verify(store: StorePath, name: TableName = "default", as_json: As_json = False) -> None:
+    """Check a table to the last byte, and that it could be rebuilt. Exit code 1 if anything is wrong.
+
+    [bold]Example[/bold]
+
+    wizen table verify --store demo
+    """
+    from store import tables
+    from store.store import Store
+
+    findings = tables.verify(Store.open(store), name)
+
+    def show(console: Any) -> None:
+        for finding in findings or [f"table {name} is sound"]:
+            console.print(finding, markup=False)
+
+    emit({"table": name, "sound": not findings, "findings": findings}, as_json, show)
+    if findings:
+        raise typer.Exit(1)
+
+
+def draw_map(
+    store: StorePath,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="The picture.")],
+    name: TableName = "default",
+    x: Annotated[str | None, typer.Option("--x", metavar="AXIS", help="From left to right.")] = None,
+    y: Annotated[str | None, typer.Option("--y", metavar="AXIS", help="From bottom to top.")] = None,
+    stage: Annotated[float | None, typer.Option("--stage", help="One stage; the last one if not given.")] = None,
+    stages: Stages = None,
+    set_: Set = None,
+    pixels: Annotated[int, typer.Option("--pixels", min=32, max=1024, help="Side of one fruit.")] = 260,
+    as_json: As_json = False,
+) -> None:
+    """Draw a table as a contact sheet: two axes at one stage, or with --stages one row per sample.
+
+    [bold]Examples[/bold]
+
+    wizen map --store demo --out map.png --x gamma --y te --stage 0.3
+
+    wizen map --store demo --out stages.png --stages 0.1,0.2,0.3
+    """
+    from store import seal
+    from store.lookup import ShapeTable
+    from store.store import Store
+
+    from . import outputs
+    from .maps import Map
+    from .plan import units_of
+
+    if out.suffix != ".png":
+        raise InvalidOption(f"--out {out}: a map is a picture.", "Name it .png.")
+    if stage is not None and stages is not None:
+        raise InvalidOption("--stage and --stages exclude each other.", "Keep one of them.")
+    outputs.check_suffix(out, False, 1)
+    opened = Store.open(store)
+    table = ShapeTable.open(opened, name)
+    drawing = Map(opened, table, units_of(table.info.solver), assignments(set_), pixels)
+    at = table.stages[-1] if stage is None else stage
+    picture = drawing.by_stages(numbers(stages)) if stages is not None else drawing.by_axes(x, y, at)
+    seal.publish(out, picture)
+    document = {"path": str(out), "table": name, "digest": table.digest, "shapes": drawing.count}
+    emit(document, as_json, lambda console: console.print(f"{drawing.count} shapes drawn to {out}", markup=False))
+
+
+def query(
+    store: StorePath,
+    set_: Set = None,
+    stages: Stages = None,
+    name: TableName = "default",
+    resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None,
+    out: Out = None,
+    as_json: As_json = False,
+) -> None:
+    """Ask a table for a shape between its samples, and write it as .obj, .glb, .npz or .png.
+
+    [bold]Examples[/bold]
+
+    wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.2 --out shape.obj
+
+    wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
+    """
+    from store.lookup import ShapeTable
+
+    from . import outputs
+    from .formats import Made
+    from .plan import units_of
+
+    wanted = numbers(stages)
+    table = ShapeTable.open(store, name)
+    if not wanted:
+        raise InvalidOption("--stages is missing.", f"The table has stages 0 to {table.stages[-1]:g}.")
+    fields: tuple[str, ...] = ()
+    if out is not None:
+        outputs.check_suffix(out, False, len(wanted))
+        fields = outputs.fields_for(out, False)
+    values = assignments(set_)
+    shapes = [table.at(values, stage, resolution=resolution, fields=fields) for stage in wanted]
+    document = {
+        "table": name,
+        "digest": table.digest,
+        "parameters": {**table.fixed, **shapes[0].parameters},
+        "path": None if out is None else str(out),
+        "stages": [_document(shape) for shape in shapes],
+    }
+    if out is not None:
+        title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
+        units = units_of(table.info.solver)
+        outputs.save(out, Made(shapes, document, title, table.info.solver, name, table.fixed, units=units))
+
+    def show(console: Any) -> None:
+        rows = [
+            [key, *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
+            for key in shapes[-1].descriptors
+        ]
+        rows += [["exact", *(str(shape.exact) for shape in shapes)]]
+        grid(console, ["", *(f"s = {shape.stage:g}" for shape in shapes)], rows)
+        if out is not None:
+            console.print(f"written to {out}", markup=False)
+
+    emit(document, as_json, show)
+
+
+def _document(shape: Any) -> dict[str, Any]:
+    return {
+        "stage": shape.stage,
+        "exact": shape.exact,
+        "converged": shape.converged,
+        "nearest": shape.nearest,
+        "weights": dict(shape.weights),
+        "descriptors": {
+            name: {"value": value, "units": shape.units.get(name, "")} for name, value in shape.descriptors.items()
+        },
+    }
+
+
+def _show_table(table: Any, path: Path, as_json: bool) -> None:
+    document = table.to_json() | {"path": str(path)}
+
+    def show(console: Any) -> None:
+        console.print(f"table {table.name}: {table.samples} samples of {table.solver}, digest {table.digest[:16]}")
+        rows = [(axis, f"{low:g} to {high:g}") for axis, (low, high) in table.axes.items()]
+        rows.append(("stages", ", ".join(f"{stage:g}" for stage in table.stages)))
+        rows.append(("resolution", str(table.resolution)))
+        grid(console, ("axis", "values"), rows)
+        console.print(str(path), markup=False)
+
+    emit(document, as_json, show)

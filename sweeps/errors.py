@@ -1,0 +1,54 @@
+"""What the batch floor refuses. Every error has a stable code, says what is wrong and what to change."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+__all__ = ["BAD_INPUT", "InvalidOption", "PlanError", "SweepError", "describe", "exit_code"]
+
+#: Codes that mean "what was asked for is wrong", as opposed to "it could not be done".
+BAD_INPUT = frozenset(
+    {"invalid-input", "invalid-geometry", "invalid-plan", "invalid-option", "invalid-query", "outside-table"}
+)
+
+
+class SweepError(Exception):
+    """Something that a sweep or the command line refuses or cannot do. `advice` says what to change."""
+
+    code: ClassVar[str] = "sweep-error"
+
+    def __init__(self, message: str, advice: str = "") -> None:
+        super().__init__(message, advice)
+        self.message = message
+        self.advice = advice
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.advice}".strip()
+
+
+class PlanError(SweepError):
+    """A plan that says something wrong; found before any work."""
+
+    code = "invalid-plan"
+
+
+class InvalidOption(SweepError):
+    """A value on the command line that has no meaning there."""
+
+    code = "invalid-option"
+
+
+def describe(error: BaseException) -> dict[str, Any]:
+    """Return an error as the JSON object that ledger, service and `--json` show: code, message, advice and extras."""
+    said = {
+        "code": getattr(error, "code", "internal-error"),
+        "message": getattr(error, "message", f"{type(error).__name__}: {error}"),
+        "advice": getattr(error, "advice", ""),
+    }
+    extras = {name: getattr(error, name, None) for name in ("last_stage", "residual")}
+    return said | {name: value for name, value in extras.items() if value is not None}
+
+
+def exit_code(error: BaseException) -> int:
+    """Return 2 for bad input, 1 for everything else. Subclasses of a bad-input error are bad input."""
+    return 2 if any(getattr(kind, "code", None) in BAD_INPUT for kind in type(error).__mro__) else 1

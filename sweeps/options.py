@@ -1,0 +1,91 @@
+"""The grammar that all commands share: presets, `--set NAME=VALUE`, stages, quality, outputs."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .errors import InvalidOption
+
+__all__ = [
+    "As_json",
+    "Out",
+    "Preset",
+    "Quality",
+    "Seed",
+    "Set",
+    "Stages",
+    "StorePath",
+    "TableName",
+    "assignments",
+    "numbers",
+]
+
+Preset = Annotated[str | None, typer.Option("--preset", help="Named parameters to start from (`wizen presets`).")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter, e.g. te=0.04 or radii=[1,1,...]. Repeatable."),
+]
+Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]
+Quality = Annotated[str | None, typer.Option("--quality", help="preview, default or fine.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of everything random in the run.")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Where the result goes; the suffix says how.")]
+As_json = Annotated[bool, typer.Option("--json", help="Print one JSON document; everything else goes to stderr.")]
+StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", envvar="WIZEN_STORE", help="The store's directory.")]
+TableName = Annotated[str, typer.Option("--name", help="Name of the table.")]
+
+
+def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
+    """Return the values of `--set NAME=VALUE` options; VALUE is TOML or JSON, or else plain text.
+
+    Raises:
+        InvalidOption: no NAME=, or a name given twice.
+
+    """
+    values: dict[str, Any] = {}
+    for pair in pairs or ():
+        name, equals, text = (part.strip() for part in pair.partition("="))
+        if not (name and equals and text):
+            raise InvalidOption(f"--set {pair!r} is not NAME=VALUE.", "Write for example --set te=0.04.")
+        if name in values:
+            raise InvalidOption(f"--set {name} is given twice.", "Keep one of them.")
+        values[name] = _value(text)
+    return values
+
+
+def _value(text: str) -> Any:
+    for read in (lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)):
+        try:
+            return read()
+        except ValueError:  # both libraries' errors are ValueErrors
+            continue
+    return text
+
+
+def numbers(text: str | None, option: str = "--stages") -> tuple[float, ...]:
+    """Return the numbers of a comma-separated list; none for None.
+
+    Raises:
+        InvalidOption: something in it is not a finite number.
+
+    """
+    values = []
+    for part in (text or "").split(","):
+        if text is None:
+            break
+        try:
+            value = float(part)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InvalidOption(
+                f"{option} {text!r}: {part!r} is not a number.", f"Write for example {option} 0.05,0.1."
+            )
+        values.append(value)
+    return tuple(values)

@@ -1,0 +1,136 @@
+"""Results as files: the suffix of `--out` says how. Files appear whole or not at all.
+
+Higher floors add formats (`sweeps.formats`); nothing here knows of meshes for other programs.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from store import seal, shards, spectra
+from store.lookup import Shape
+
+from .errors import InvalidOption
+from .formats import Encoder, Made, added
+
+__all__ = ["check_suffix", "fields_for", "of_result", "save", "suffixes"]
+
+
+def _npz(made: Made) -> bytes:
+    out = io.BytesIO()
+    if made.run is not None:
+        arrays: dict[str, Any] = {str(name): made.run[name].values for name in made.run.variables}
+        np.savez_compressed(out, **arrays)
+        return out.getvalue()
+    first = made.shapes[0]
+    np.savez_compressed(
+        out,
+        stage=np.array([shape.stage for shape in made.shapes]),
+        colatitude=first.colatitude,
+        azimuth=first.azimuth,
+        position=np.stack([shape.position for shape in made.shapes if shape.position is not None]),
+        poles=np.stack([shape.poles for shape in made.shapes if shape.poles is not None]),
+    )
+    return out.getvalue()
+
+
+def _png(made: Made) -> bytes:
+    from .picture import Panel, sheet
+
+    panels = [Panel(shape.position, shape.poles) for shape in made.shapes if shape.position is not None]
+    labels = [f"s = {shape.stage:g}" for shape in made.shapes]
+    return sheet([panels], title=made.title, column_labels=labels, pixels=360)
+
+
+def _json(made: Made) -> bytes:
+    return (json.dumps(made.document, indent=2, allow_nan=False) + "\n").encode()
+
+
+_OURS = {
+    ".json": Encoder((), _json),
+    ".npz": Encoder(("position",), _npz),
+    ".png": Encoder(("position",), _png),
+}
+
+
+def suffixes(run: bool) -> dict[str, Encoder | None]:
+    """Return what can be written, by suffix; `.h5` (no encoder) holds whole runs only."""
+    known: dict[str, Encoder | None] = {".h5": None} if run else {}
+    return {**known, **_OURS, **{suffix: encoder for suffix, encoder in added().items() if suffix not in _OURS}}
+
+
+def check_suffix(path: Path, run: bool, stages: int) -> None:
+    """Refuse, before any work, a file that could not be written after it.
+
+    Raises:
+        InvalidOption: unknown suffix, several stages for a format of one, a directory in the way.
+
+    """
+    known = suffixes(run)
+    if path.suffix not in known:
+        raise InvalidOption(
+            f"--out {path}: cannot write {path.suffix or 'no suffix'!r}.", f"Known: {', '.join(known)}."
+        )
+    encoder = known[path.suffix]
+    if encoder is not None and encoder.single and stages > 1:
+        raise InvalidOption(
+            f"--out {path}: {path.suffix} holds one stage, not {stages}.",
+            "Give one stage with --stages, or write .npz or .png.",
+        )
+    if path.is_dir():
+        raise InvalidOption(f"--out {path} is a directory.", "Name a file in it.")
+    if not path.absolute().parent.is_dir():
+        raise InvalidOption(f"--out {path}: there is no directory {path.parent}.", "Create it first.")
+
+
+def fields_for(path: Path | None, run: bool) -> tuple[str, ...]:
+    """Return the fields that writing `path` needs; none if nothing is written."""
+    encoder = suffixes(run).get(path.suffix) if path is not None else None
+    return encoder.fields if encoder is not None else ()
+
+
+def save(path: Path, made: Made) -> None:
+    """Write a result.
+
+    Raises:
+        StorageFull: the disk is full; nothing half-written stays.
+
+    """
+    encoder = suffixes(made.run is not None)[path.suffix]
+    if encoder is None:
+        assert made.run is not None
+        shards.write(path, made.run, made.key)
+    else:
+        seal.publish(path, encoder.encode(made))
+
+
+def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Shape:
+    """Return one stage of a run with the field `position` as a shape; its poles come from the spectrum."""
+    position = result["position"].isel(stage=index).values
+    numbers = {
+        str(name): float(variable[index])
+        for name, variable in result.data_vars.items()
+        if variable.dims == ("stage",) and variable.dtype.kind == "f"
+    }
+    return Shape(
+        colatitude=result["colatitude"].values,
+        azimuth=result["azimuth"].values,
+        position=position,
+        displacement=result["displacement"].isel(stage=index).values if "displacement" in result else None,
+        poles=spectra.poles(spectra.spectrum(position)),
+        stage=float(result["stage"][index]),
+        parameters=params,
+        descriptors=numbers,
+        weights={},
+        nearest=0.0,
+        exact=True,
+        converged=bool(result["converged"][index]),
+        table="",
+    )

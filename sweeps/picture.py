@@ -1,0 +1,93 @@
+"""Contact sheets: surfaces side by side, at one scale and under one light, with names and values at the edges."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .render import BACKGROUND, View, render
+
+__all__ = ["Panel", "sheet"]
+
+#: Dots per inch of a sheet; pixels and points follow from it.
+_DPI = 100
+_INK = "#3a2a24"
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], and a note to write below it."""
+
+    position: NDArray[Any]
+    poles: NDArray[Any] | None = None
+    note: str = ""
+
+
+def sheet(
+    rows: Sequence[Sequence[Panel | None]],
+    *,
+    title: str = "",
+    column_labels: Sequence[str] = (),
+    row_labels: Sequence[str] = (),
+    column_title: str = "",
+    row_title: str = "",
+    pixels: int = 280,
+    view: View | None = None,
+) -> bytes:
+    """Return a PNG of panels in rows and columns; None leaves a place empty. One scale for all, so sizes compare.
+
+    Raises:
+        ValueError: there is nothing to draw.
+
+    """
+    # the object interface: pyplot would keep global state and look for a screen
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    panels = [panel for row in rows for panel in row if panel is not None]
+    if not panels:
+        raise ValueError("there is nothing to draw")
+    reach = max(float(np.linalg.norm(panel.position, axis=-1).max()) for panel in panels)
+    base = view or View()
+    view = View(base.azimuth, base.elevation, 1.13 * reach)
+    columns = max(len(row) for row in rows)
+    left = 96 if row_labels else 16
+    top = (58 if title else 12) + (34 if column_labels else 0) + (26 if column_title else 0)
+    width, height = left + columns * pixels + 16, top + len(rows) * pixels + 16
+    paper = tuple(BACKGROUND ** (1 / 2.2))
+    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor=paper)
+
+    def write(x: float, y: float, text: str, size: float, **more: Any) -> None:
+        figure.text(x / width, 1 - y / height, text, fontsize=size, color=_INK, **more)
+
+    middle = {"ha": "center", "va": "center"}
+    for i, row in enumerate(rows):
+        for j, panel in enumerate(row):
+            x, y = left + j * pixels, top + i * pixels
+            if panel is None:
+                write(x + pixels / 2, y + pixels / 2, "no such fruit", 9, alpha=0.5, **middle)
+                continue
+            box = (x / width, 1 - (y + pixels) / height, pixels / width, pixels / height)
+            axes = figure.add_axes(box)
+            axes.imshow(render(panel.position, panel.poles, pixels, view), interpolation="nearest")
+            axes.set_axis_off()
+            if panel.note:
+                write(x + pixels / 2, y + pixels - 9, panel.note, 8.5, alpha=0.8, **middle)
+    if title:
+        write(left if row_labels else 16, 32, title, 14, va="center", fontweight="bold")
+    if column_title:
+        write(left + columns * pixels / 2, top - 48, column_title, 11, **middle)
+    for j, label in enumerate(column_labels):
+        write(left + (j + 0.5) * pixels, top - 18, label, 11, **middle)
+    if row_title:
+        write(22, top + len(rows) * pixels / 2, row_title, 11, rotation=90, **middle)
+    for i, label in enumerate(row_labels):
+        write(62, top + (i + 0.5) * pixels, label, 11, rotation=90, **middle)
+    out = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(out)
+    return out.getvalue()

@@ -1,0 +1,224 @@
+"""A plan: which samples of a solver's parameters are wanted, and what of each. Everything is checked before any work.
+
+solver = "dehydration"
+preset = "sphere"
+[axes]
+gamma = [10, 30, 50]
+te = {from = 0.01, to = 0.04, count = 4}
+[need]
+stages = [0.1, 0.2]
+"""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from scipy.stats import qmc
+
+from solver import registry
+from solver.contract import InvalidGeometry, InvalidInput, Need, Params, Solver
+from store import keys
+from store.ledger import JobSpec
+
+from . import planfile
+from .errors import PlanError
+from .planfile import Axis, PlanFile, Range
+
+__all__ = ["MAX_SAMPLES", "Plan", "job", "units_of"]
+
+#: More samples than this are a typing error in a range, not a plan.
+MAX_SAMPLES = 100_000
+
+#: Significant digits of a generated value: 0.02 in a list and 0.02 in a range must be one number and one key.
+_DIGITS = 12
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Validated samples and a settled need.
+
+    `axes` are the names that vary; `skipped` counts the impossible combinations that were left out, `repeated` the
+    samples that were listed more than once.
+    """
+
+    name: str
+    solver: Solver
+    samples: tuple[Params, ...]
+    need: Need
+    axes: tuple[str, ...]
+    skipped: int = 0
+    repeated: int = 0
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Read a plan file.
+
+        Raises:
+            PlanError: anything wrong in it, with the place and what to change.
+
+        """
+        path = Path(path)
+        return cls.parse(planfile.load(path), name=path.stem)
+
+    @classmethod
+    def parse(cls, tables: Mapping[str, Any], name: str = "plan") -> Self:
+        """Validate a plan given as nested mappings; `name` is used if the plan does not name itself.
+
+        Raises:
+            PlanError: anything wrong in it, with the place and what to change.
+
+        """
+        written = planfile.parse(tables)
+        try:
+            solver = registry.get(written.solver)
+            need = solver.settle(Need.parse(written.need))
+        except InvalidInput as error:
+            raise PlanError(error.message, error.advice) from None
+        _check_names(written, solver)
+        samples: dict[str, Params] = {}
+        skipped = repeated = 0
+        for values in _combinations(written):
+            try:
+                params = solver.parse({**written.set, **values}, written.preset)
+            except InvalidGeometry as error:
+                if not written.sampling.skip_invalid:
+                    advice = f"{error.advice} Change it, or set skip_invalid = true under [sampling]."
+                    raise PlanError(f"sample {_show(values)}: {error.message}", advice.strip()) from None
+                skipped += 1
+            except InvalidInput as error:
+                where = f"sample {_show(values)}: " if values else ""
+                raise PlanError(f"{where}{error.message}", error.advice) from None
+            else:
+                repeated += samples.setdefault(params.model_dump_json(), params) is not params
+        if not samples:
+            raise PlanError(f"none of the {skipped} combinations is possible.", "Change the ranges under [axes].")
+        varied = written.axes or dict.fromkeys(itertools.chain.from_iterable(written.samples))
+        return cls(
+            name=written.name or name,
+            solver=solver,
+            samples=tuple(samples.values()),
+            need=need,
+            axes=tuple(varied),
+            skipped=skipped,
+            repeated=repeated,
+        )
+
+    def jobs(self) -> list[JobSpec]:
+        """Return one job per sample, in the plan's order, with distinct keys."""
+        return [job(self.solver, params, self.need) for params in self.samples]
+
+
+def job(solver: Solver, params: Params, need: Need) -> JobSpec:
+    """Return the job that computes `need` (settled) of `params`; its key is the same whoever asks."""
+    return JobSpec(
+        key=keys.key(solver.name, solver.version, params, need),
+        solver=solver.name,
+        version=solver.version,
+        params=params.model_dump(mode="json"),
+        need=need.model_dump(mode="json"),
+    )
+
+
+def units_of(solver: str) -> dict[str, str]:
+    """Return the units of a solver's scalar axes, from its parameters' schema.
+
+    Raises:
+        InvalidInput: there is no such solver.
+
+    """
+    params = registry.get(solver).params
+    extras = {field: info.json_schema_extra for field, info in params.model_fields.items()}
+    return {
+        axis: str(extra.get("units", "1"))
+        for axis, (field, _) in params.axes.items()
+        if isinstance(extra := extras[field], dict)
+    }
+
+
+def _check_names(written: PlanFile, solver: Solver) -> None:
+    """Refuse names that the solver does not have, and values given twice."""
+    known = {*solver.params.model_fields, *solver.params.axes}
+    places = {"set": written.set, "axes": written.axes}
+    places |= {f"samples {i}": sample for i, sample in enumerate(written.samples, start=1)}
+    for place, values in places.items():
+        for name in values:
+            if name not in known:
+                raise PlanError(f"[{place}]: {solver.name} has no parameter {name!r}.", planfile.suggest(name, known))
+    # the scalar name of a whole field means the same value: te is exocarp_thickness
+    fixed = {_target(solver, name): name for name in written.set}
+    swept = {_target(solver, name) for name in written.axes}
+    for target, name in fixed.items():
+        if target in swept:
+            raise PlanError(f"{name} stands under [set] and under [axes].", "Remove one of them.")
+    if len(swept) < len(written.axes):
+        raise PlanError("two names under [axes] mean the same parameter.", "Remove one of them.")
+
+
+def _target(solver: Solver, name: str) -> tuple[str, int | None]:
+    return solver.params.axes.get(name, (name, None))
+
+
+def _combinations(written: PlanFile) -> Iterator[Mapping[str, Any]]:
+    if written.sampling.kind == "list":
+        return iter(written.samples)
+    if written.sampling.kind == "sobol":
+        return _sobol(written)
+    lists = {name: _values(axis) for name, axis in written.axes.items()}
+    total = 1
+    for values in lists.values():
+        total *= len(values)
+    _limit(total)
+    return (dict(zip(lists, point, strict=True)) for point in itertools.product(*lists.values()))
+
+
+def _values(axis: Axis) -> tuple[float, ...]:
+    if not isinstance(axis, Range):
+        return axis
+    assert axis.count is not None  # a grid's range has one: checked with the grammar
+    _limit(axis.count)
+    space = np.geomspace if axis.scale == "log" else np.linspace
+    return tuple(_round(value) for value in space(axis.start, axis.to, axis.count))
+
+
+def _sobol(written: PlanFile) -> Iterator[Mapping[str, Any]]:
+    count = written.sampling.count
+    assert count is not None  # checked with the grammar
+    _limit(count)
+    unit = qmc.Sobol(len(written.axes), scramble=True, rng=written.sampling.seed)
+    with warnings.catch_warnings():
+        # any count is allowed: the first points of the sequence stay the same, so that a plan can grow
+        warnings.filterwarnings("ignore", "The balance properties of Sobol", UserWarning)
+        points = unit.random(count)
+    for point in points:
+        yield {name: _scaled(axis, u) for (name, axis), u in zip(written.axes.items(), point, strict=True)}
+
+
+def _scaled(axis: Axis, u: float) -> float:
+    """Return the value at `u` (0 to 1) between an axis's ends."""
+    if isinstance(axis, Range) and axis.scale == "log":
+        return _round(axis.start * (axis.to / axis.start) ** u)
+    low, high = (axis.start, axis.to) if isinstance(axis, Range) else (min(axis), max(axis))
+    return _round(low + (high - low) * u)
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def _limit(count: int) -> None:
+    if count > MAX_SAMPLES:
+        raise PlanError(f"the plan has {count} samples, more than {MAX_SAMPLES}.", "Shorten the ranges.")
+
+
+def _show(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} = {_number(value)}" for name, value in values.items())
+
+
+def _number(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

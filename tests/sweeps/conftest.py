@@ -1,0 +1,75 @@
+"""The extra solver `shrinking`, installed the way any third solver is: a module and an entry point on the path."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from solver import registry
+from store.store import Store
+
+HERE = Path(__file__).parent
+
+
+class Solves:
+    """Counts the solves of `shrinking`, in whichever process they happen."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def lines(self) -> list[str]:
+        return self._path.read_text().splitlines() if self._path.exists() else []
+
+    def __len__(self) -> int:
+        return len(self.lines())
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    info = tmp_path_factory.mktemp("site") / "shrinking-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: shrinking\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[wizen.solvers]\nshrinking = shrinking:SOLVER\n")
+    with pytest.MonkeyPatch.context() as patch:
+        for path in (HERE, info.parent):
+            patch.syspath_prepend(path)
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(HERE), str(info.parent)]))
+        _forget_solvers()
+        yield
+    _forget_solvers()
+
+
+def _forget_solvers() -> None:
+    registry._places.cache_clear()
+    registry.get.cache_clear()
+
+
+@pytest.fixture
+def shrinking(site: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Solves:
+    monkeypatch.setenv("SHRINKING_LOG", str(tmp_path / "solves.log"))
+    return Solves(tmp_path / "solves.log")
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store.open(tmp_path / "store", create=True)
+
+
+def write(path: Path, te: str = "[0.02, 0.03, 0.04]", gamma: str = "[10, 30]", more: str = "") -> Path:
+    """Write a plan of `shrinking`: six samples unless told otherwise."""
+    path.write_text(
+        f'solver = "shrinking"\n{"" if not more else "[set]"}\n{more}\n[axes]\nte = {te}\ngamma = {gamma}\n'
+        '[need]\nstages = [0.1, 0.2]\nquality = "preview"\n'
+    )
+    return path
+
+
+@pytest.fixture
+def write_plan(tmp_path: Path) -> Callable[..., Path]:
+    def here(*values: str, name: str = "six", **more: str) -> Path:
+        return write(tmp_path / f"{name}.toml", *values, **more)
+
+    return here

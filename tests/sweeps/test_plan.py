@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from solver import registry
+from sweeps.errors import PlanError
+from sweeps.plan import Plan
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def plan(**tables: Any) -> Plan:
+    return Plan.parse({"solver": "dehydration", "preset": "sphere", **tables})
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_examples_are_valid(path: Path) -> None:
+    read = Plan.load(path)
+    assert read.name == path.stem
+    assert len({job.key for job in read.jobs()}) == len(read.samples) > 1
+
+
+def test_figure_7() -> None:
+    read = Plan.load(EXAMPLES / "fig7-right.toml")
+    assert read.axes == ("te", "gamma")
+    points = [(p.axis("te"), p.axis("gamma")) for p in read.samples]
+    assert points == [(te, gamma) for te in (0.03, 0.04) for gamma in (10, 30, 50)]
+    assert read.need.stages == (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
+
+
+def test_shared_samples_share_keys() -> None:
+    listed = plan(axes={"te": [0.02, 0.04, 0.1]})
+    ranged = plan(axes={"te": {"from": 0.01, "to": 0.04, "count": 4}})
+    full = plan(axes={"exocarp_thickness": [0.02]}, set={"radii": [1] * 8})
+    keys = [{job.key for job in p.jobs()} for p in (listed, ranged, full)]
+    assert len(keys[0] & keys[1]) == 2
+    assert keys[2] < keys[0]
+
+
+def test_jobs_are_repeatable_and_distinct() -> None:
+    read = plan(axes={"te": [0.02, 0.02, 0.03], "seed": [0, 1]})
+    assert [job.key for job in read.jobs()] == [job.key for job in read.jobs()]
+    assert len(read.samples) == 4
+    assert read.repeated == 2
+    assert read.jobs()[1].params["seed"] == 1
+
+
+def test_logarithmic_range() -> None:
+    read = plan(axes={"gamma": {"from": 1, "to": 100, "count": 3, "scale": "log"}})
+    assert [p.axis("gamma") for p in read.samples] == [1, 10, 100]
+
+
+def test_sobol_stays_inside_and_grows() -> None:
+    axes = {"te": {"from": 0.01, "to": 0.04}, "gamma": {"from": 1, "to": 100, "scale": "log"}, "rs1": [0.3, 0.5]}
+    few = plan(axes=axes, sampling={"kind": "sobol", "count": 5, "seed": 3})
+    many = plan(axes=axes, sampling={"kind": "sobol", "count": 16, "seed": 3})
+    assert many.samples[:5] == few.samples
+    for sample in many.samples:
+        assert 0.01 <= sample.axis("te") <= 0.04
+        assert 1 <= sample.axis("gamma") <= 100
+        assert 0.3 <= sample.axis("rs1") <= 0.5
+    # a logarithmic axis has as many samples below its middle as above
+    assert sum(p.axis("gamma") < 10 for p in many.samples) == 8
+    other = plan(axes=axes, sampling={"kind": "sobol", "count": 5, "seed": 4})
+    assert other.samples != few.samples
+
+
+def test_listed_samples() -> None:
+    read = plan(sampling={"kind": "list"}, samples=[{"te": 0.02, "gamma": 30}, {"te": 0.03}])
+    assert [(p.axis("te"), p.axis("gamma")) for p in read.samples] == [(0.02, 30), (0.03, 10)]
+    assert read.axes == ("te", "gamma")
+
+
+def test_impossible_samples_are_skipped_only_when_told() -> None:
+    axes = {"rs1": [0.4, 0.99], "te": [0.03, 0.04]}
+    with pytest.raises(PlanError, match=r"rs1 = 0.99, te = 0.03: the stone .* skip_invalid"):
+        plan(axes=axes)
+    assert plan(axes=axes, sampling={"skip_invalid": True}).skipped == 2
+    with pytest.raises(PlanError, match="none of the 1 combinations"):
+        plan(axes={"rs1": [0.99]}, sampling={"skip_invalid": True})
+
+
+def test_a_value_out_of_range_is_never_skipped() -> None:
+    with pytest.raises(PlanError, match=r"te = 0\.9"):
+        plan(axes={"te": [0.02, 0.9]}, sampling={"skip_invalid": True})
+
+
+def test_a_plan_without_axes_is_one_sample() -> None:
+    assert len(plan().jobs()) == 1
+
+
+def test_the_need_is_settled() -> None:
+    need = plan(need={"quality": "preview"}).need
+    assert need.resolution == 64
+    assert need.fields == tuple(sorted(registry.get("dehydration").default_fields))
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"solver": "dehydratoin"}, "did you mean 'dehydration'"),
+        ({"solver": 3}, "solver:"),
+        ({"preset": "spere"}, "did you mean 'sphere'"),
+        ({"axis": {"te": [0.02]}}, "Did you mean 'axes'"),
+        ({"axes": {"gama": [10]}}, "Did you mean 'gamma'"),
+        ({"set": {"thickness": 1}}, "Did you mean 'exocarp_thickness'"),
+        ({"axes": {"te": {"from": 0.01, "to": 0.02, "cuont": 4}}}, "Did you mean 'count'"),
+        ({"axes": {"te": {"from": 0.01, "to": 0.02}}}, "needs a count"),
+        ({"axes": {"te": {"from": 0.02, "to": 0.01, "count": 2}}}, "smaller to a larger"),
+        ({"axes": {"te": {"from": 0, "to": 0.01, "count": 2, "scale": "log"}}}, "above zero"),
+        ({"axes": {"te": {"from": 0.01, "to": 0.02, "count": 10**9}}}, "samples, more than"),
+        ({"axes": {"te": []}}, "no values"),
+        ({"axes": {"te": "thin"}}, "a list of numbers, or"),
+        ({"axes": {"te": ["thin"]}}, "axes.te.0"),
+        ({"axes": {"te": [float("nan")]}}, "axes.te.0"),
+        ({"axes": {"te": [0.02]}, "set": {"exocarp_thickness": 0.03}}, "under .set. and under .axes."),
+        ({"axes": {"te": [0.02], "exocarp_thickness": [0.03]}}, "same parameter"),
+        ({"axes": {"te": [0.9]}}, "te = 0.9"),
+        ({"need": {"stage": [0.1]}}, "did you mean 'stages'"),
+        ({"need": {"stages": [0.9]}}, "lies outside"),
+        ({"need": {"fields": ["displacment"]}}, "did you mean 'displacement'"),
+        ({"sampling": {"kind": "random"}}, "sampling.kind"),
+        ({"sampling": {"kind": "sobol"}, "axes": {"te": [0.01, 0.02]}}, "needs a count"),
+        ({"sampling": {"kind": "sobol", "count": 4}}, "needs .axes."),
+        ({"sampling": {"kind": "sobol", "count": 4}, "axes": {"te": [0.01]}}, "two ends"),
+        ({"sampling": {"count": 4}}, "belong to"),
+        ({"sampling": {"kind": "list"}}, "at least one"),
+        ({"samples": [{"te": 0.01}]}, 'need kind = "list"'),
+        ({"sampling": {"kind": "list"}, "samples": [{"te": 0.01, "gama": 3}]}, "samples 1.*Did you mean 'gamma'"),
+    ],
+)
+def test_errors_say_where_and_what(tables: dict[str, Any], said: str) -> None:
+    with pytest.raises(PlanError, match=said) as caught:
+        plan(**tables)
+    assert caught.value.code == "invalid-plan"
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_are_no_plans(tmp_path: Path) -> None:
+    with pytest.raises(PlanError, match="there is no plan"):
+        Plan.load(tmp_path / "missing.toml")
+    with pytest.raises(PlanError, match="cannot be read"):
+        Plan.load(tmp_path)
+    for content in (b"solver = ", b"\xff\xfe"):
+        (tmp_path / "bad.toml").write_bytes(content)
+        with pytest.raises(PlanError, match="is not TOML"):
+            Plan.load(tmp_path / "bad.toml")

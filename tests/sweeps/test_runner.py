@@ -1,0 +1,251 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from conftest import Solves
+
+from store.store import Store
+from sweeps import executors
+from sweeps.plan import Plan
+from sweeps.report import Event
+from sweeps.runner import run_jobs, run_plan
+
+Write = Callable[..., Path]
+
+
+def digests(store: Store) -> dict[str, str]:
+    return dict(sorted((key, store.get(key).attrs["digest"]) for key in iter(store.keys())))
+
+
+def test_a_plan_runs_once(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan, seen = Plan.load(write_plan()), list[Event]()
+    with executors.serial() as workers:
+        first = run_plan(plan, store, workers, seen.append)
+        second = run_plan(plan, store, workers)
+    assert (first.solved, first.reused, first.complete) == (6, 0, True)
+    assert (second.solved, second.reused, second.complete) == (0, 6, True)
+    assert len(shrinking) == 6
+    assert store.ledger.counts("six")["done"] == 6
+    assert [event.finished for event in seen if event.kind == "done"] == [1, 2, 3, 4, 5, 6]
+    assert [event.kind for event in seen].count("started") == 6
+
+
+def test_two_plans_share_results(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    with executors.serial() as workers:
+        run_plan(Plan.load(write_plan()), store, workers)
+        more = run_plan(Plan.load(write_plan(te="[0.04, 0.05]", name="more")), store, workers)
+    assert (more.solved, more.reused) == (2, 2)
+    assert len(shrinking) == 8
+
+
+def test_a_lost_ledger_costs_nothing(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan = Plan.load(write_plan())
+    with executors.serial() as workers:
+        run_plan(plan, store, workers)
+        for path in store.root.glob("ledger.sqlite*"):
+            path.unlink()
+        fresh = Store.open(store.root)
+        report = run_plan(plan, fresh, workers)
+    assert (report.solved, report.reused) == (0, 6)
+    assert len(shrinking) == 6
+
+
+def test_a_deleted_or_damaged_shard_is_solved_again(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan = Plan.load(write_plan())
+    keys = [job.key for job in plan.jobs()]
+    with executors.serial() as workers:
+        run_plan(plan, store, workers)
+        store.shard_path(keys[0]).unlink()
+        store.shard_path(keys[1]).write_bytes(b"rubbish")
+        report = run_plan(plan, store, workers)
+    assert report.complete
+    assert report.solved == 2
+    assert set(digests(store)) == set(keys)
+
+
+def test_what_fails_is_tried_twice_and_put_aside(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan, seen = Plan.load(write_plan("[0.03]", "[10]", 'trouble = "diverges"')), list[Event]()
+    with executors.serial() as workers:
+        report = run_plan(plan, store, workers, seen.append)
+        once_more = run_plan(plan, store, workers)
+        assert len(shrinking) == 2
+        run_plan(plan, store, workers, again=True)
+    assert len(shrinking) == 4
+    (failure,) = report.failed
+    assert once_more.failed == report.failed
+    assert failure.error["code"] == "not-converged"
+    assert failure.error["advice"] == "Take care."
+    assert failure.error["last_stage"] == 0.1
+    assert [event.kind for event in seen if event.kind != "progress"] == ["started", "retry", "started", "failed"]
+    # what did converge is kept where no table looks for it
+    assert list(store.keys()) == []
+    with xr.open_dataset(store.root / failure.error["partial"], engine="h5netcdf") as partial:
+        assert partial.sizes["stage"] == 1
+        assert "it diverged" in partial.attrs["reason"]
+        assert partial["displacement"].attrs["units"] == "1"
+
+
+@pytest.mark.parametrize(
+    ("trouble", "code", "solves"), [("refuses", "invalid-input", 1), ("crashes", "internal-error", 2)]
+)
+def test_errors_are_typed(
+    shrinking: Solves, store: Store, write_plan: Write, trouble: str, code: str, solves: int
+) -> None:
+    with executors.serial() as workers:
+        report = run_plan(Plan.load(write_plan("[0.03]", "[10]", f'trouble = "{trouble}"')), store, workers)
+    assert report.failed[0].error["code"] == code
+    assert len(shrinking) == solves
+
+
+def test_the_second_try_may_succeed(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    with executors.serial() as workers:
+        report = run_plan(Plan.load(write_plan("[0.03]", "[10]", 'trouble = "once"')), store, workers)
+    assert report.complete
+    assert len(shrinking) == 2
+
+
+def test_a_worker_that_dies_takes_only_its_own_job(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    good, bad = Plan.load(write_plan()), Plan.load(write_plan("[0.03]", "[20]", 'trouble = "kills"', name="bad"))
+    with executors.processes(2) as workers:
+        report = run_jobs([*bad.jobs(), *good.jobs()], store, workers)
+    assert report.solved == 6
+    assert [failure.error["code"] for failure in report.failed] == ["worker-lost"]
+
+
+def test_cancelling_gives_jobs_back(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan, stop = Plan.load(write_plan(more="pause = 20")), threading.Event()
+
+    def observe(event: Event) -> None:
+        if event.kind == "progress":
+            stop.set()
+
+    for opened in (executors.serial(), executors.processes(2)):
+        start = time.monotonic()
+        with opened as workers:
+            report = run_plan(plan, store, workers, observe, stop=stop)
+        assert time.monotonic() - start < 10
+        assert report.stopped
+        assert report.waiting == 6
+        assert store.ledger.counts()["wanted"] == 6
+        assert all(job.attempts == 0 for job in store.ledger.jobs())
+        stop.clear()
+    assert list(store.keys()) == []
+
+
+def test_a_job_cancelled_in_the_ledger_stops(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan = Plan.load(write_plan("[0.03]", "[10]", "pause = 20"))
+
+    def observe(event: Event) -> None:
+        if event.kind == "progress":
+            store.ledger.cancel([event.key])
+
+    with executors.serial() as workers:
+        report = run_plan(plan, store, workers, observe)
+    assert report.cancelled == 1
+    assert report.seconds < 10
+
+
+def test_workers_that_must_not_open_the_ledger(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan, slow, stop = Plan.load(write_plan()), Plan.load(write_plan(more="pause = 20")), threading.Event()
+    with executors.serial() as workers:
+        workers.shares_ledger = False
+        assert run_plan(plan, store, workers).solved == 6
+        assert store.ledger.counts()["done"] == 6
+        report = run_plan(slow, store, workers, lambda event: stop.set(), stop=stop)
+    assert report.waiting == 6
+    assert not list((store.root / "stopping").iterdir())
+
+
+def test_a_dead_runner_is_noticed_at_once(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan = Plan.load(write_plan())
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    store.ledger.want(plan.jobs())
+    store.ledger.claim(f"{os.uname().nodename}:{gone.pid}:0", lease=3600)
+    with executors.serial() as workers:
+        assert run_plan(plan, store, workers).complete
+
+
+def test_a_lease_that_ran_out_is_taken_over(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan = Plan.load(write_plan())
+    store.ledger.want(plan.jobs())
+    store.ledger.claim("elsewhere:1:0", lease=1.0)
+    with executors.serial() as workers:
+        assert run_plan(plan, store, workers).solved == 6
+
+
+def sweep_script(folder: Path) -> Path:
+    script = folder / "run.py"
+    script.write_text(
+        "import sys\n"
+        "from store.store import Store\n"
+        "from sweeps import executors, runner\n"
+        "from sweeps.plan import Plan\n"
+        "if __name__ == '__main__':\n"
+        "    with executors.processes(2) as workers:\n"
+        "        runner.run_plan(Plan.load(sys.argv[1]), Store.open(sys.argv[2]), workers)\n"
+    )
+    return script
+
+
+def test_killing_everything_loses_nothing_reported(
+    shrinking: Solves, tmp_path: Path, write_plan: Write, store: Store
+) -> None:
+    """Kill the sweep and all its workers in the middle, twice; no shard that was reported is computed again."""
+    path = write_plan("[0.01, 0.02, 0.03, 0.04, 0.05]", more="pause = 0.15")
+    script = sweep_script(tmp_path)
+    root = Path(__file__).parents[2]
+    environment = {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{os.environ['PYTHONPATH']}"}
+    for wanted in (2, 5):
+        running = subprocess.Popen(
+            [sys.executable, str(script), str(path), str(store.root)], env=environment, start_new_session=True
+        )
+        deadline = time.monotonic() + 30
+        while store.ledger.counts()["done"] < wanted and time.monotonic() < deadline:
+            time.sleep(0.02)
+        os.killpg(running.pid, signal.SIGKILL)
+        running.wait()
+    plan = Plan.load(path)
+    reported = {job.key for job in store.ledger.jobs("done")}
+    before = len(shrinking)
+    assert 5 <= len(reported) < 10
+    assert all(store.get(key) is not None for key in reported)
+    with executors.processes(2) as workers:
+        report = run_plan(plan, store, workers)
+    assert report.complete
+    assert report.solved + report.reused == 10
+    # each kill interrupted at most two solves; everything else was solved exactly once
+    assert len(shrinking) - before <= 10 - len(reported)
+    assert len(shrinking) <= 10 + 2 * 2
+
+
+def test_workers_end_with_a_killed_parent(shrinking: Solves, tmp_path: Path, write_plan: Write, store: Store) -> None:
+    """Kill only the sweep: its workers end by themselves, and hold no job."""
+    path = write_plan(more="pause = 30")
+    script = sweep_script(tmp_path)
+    root = Path(__file__).parents[2]
+    environment = {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{os.environ['PYTHONPATH']}"}
+    running = subprocess.Popen(
+        [sys.executable, str(script), str(path), str(store.root)], env=environment, start_new_session=True
+    )
+    deadline = time.monotonic() + 30
+    while len(shrinking) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    running.kill()
+    running.wait()
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(running.pid, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+    pytest.fail("the workers outlived their parent")
