@@ -9,7 +9,18 @@ import pytest
 import xarray as xr
 
 from solver import registry
-from solver.contract import Cancelled, Context, InvalidInput, Need, Params, Region, Solver, SolverError, Unstable, finish
+from solver.contract import (
+    Cancelled,
+    Context,
+    InvalidInput,
+    Need,
+    Params,
+    Region,
+    Solver,
+    SolverError,
+    Unstable,
+    finish,
+)
 from solver.quantities import QUANTITIES, Quantity, register
 
 #: Per solver: small parameters, cheap stages, and more expensive stages to cancel.
@@ -93,7 +104,7 @@ def test_same_seed_same_bytes_and_another_seed_differs(solver):
 
 
 def test_an_unknown_field_is_refused_before_any_work(solver):
-    params, need, dear = small(solver)
+    params, _, dear = small(solver)
     begun = time.perf_counter()
     with pytest.raises(InvalidInput, match="no field 'colour'"):
         solver.solve(params, dear.model_copy(update={"fields": ("colour",)}))
