@@ -9,124 +9,31 @@ The candidates stay complete while no node has moved farther than `margin` / 2 s
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
 
-Integers = NDArray[np.int32]
-Singles = NDArray[np.float32]
+from solver.dehydration.contact_data import (
+    NEEDED,
+    OPPOSED,
+    OPTIONS,
+    PAIRS,
+    SEARCHES,
+    Contact,
+    Integers,
+    Long,
+    Longs,
+    Single,
+    Singles,
+)
 
-OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"reassoc", "nsz", "arcp", "contract"}}
-
-OPPOSED = np.float32(-0.25)
-"""Cosine between two outward normals below which skin faces skin (104 degrees)."""
 GENTLE = np.float32(0.7071)
 """Cosine to the ellipsoid's normal above which nothing faces anything: two such normals are within 90 degrees."""
-PAIRS, NEEDED, ACTIVE, SEARCHES = 0, 1, 2, 3
-"""Entries of `Contact.counts`."""
 WORLD = np.float32(2**20)
 """Cells counted from the origin in each direction; what lies farther out (or is not finite) touches nothing."""
-ENTRIES = 16
-"""Room for cell entries per quad; a quad grown by the reach overlaps about 6 cells."""
-
-
-class Contact(NamedTuple):
-    """Everything the search and the push need, allocated once; a named tuple because numba reads those natively.
-
-    ns surface nodes, nq quads, nn nodes of the volume mesh. Lengths in units of the fruit, speeds per step.
-    """
-
-    surface_nodes: Integers  # (ns,) rows of the state
-    quads: Integers  # (nq, 4) surface numbering, counter-clockwise from outside
-    quad_nodes: Integers  # (nq, 4) the same corners as rows of the state
-    ellipsoid: Singles  # (2, 3) centre of the rest bounding box and its squared inverse half widths
-    clearance: np.float32  # gap that contact keeps
-    depth: np.float32  # a node deeper than this belongs to another part: left alone
-    margin: np.float32  # how far beyond the clearance candidates are collected
-    size: np.float32  # mean rest edge length h
-    recovery: np.float32  # largest speed at which a penetrating node is led out
-    normals: Singles  # (ns, 3) nodal normals at the last search
-    searched: Singles  # (ns, 3) positions of the last search
-    frames: Singles  # (nq, 8) quad centre (3), circumscribed radius, unit normal (3), unused
-    keys: NDArray[np.int64]  # (ENTRIES nq,) cell of each entry
-    order: Integers  # (ENTRIES nq,) quad of each entry, sorted by bucket
-    starts: Integers  # (buckets + 1,) first of each bucket in `order`; buckets is a power of two
-    pair_nodes: Integers  # (capacity,) surface node of a pair, ascending
-    pair_quads: Integers  # (capacity,)
-    feet: Singles  # (capacity, 2) u, v of the last closest point, where the next search for it starts
-    counts: NDArray[np.int64]  # (4,) PAIRS, NEEDED, ACTIVE, SEARCHES
-    load: Singles  # (ns,) scratch: how much contact each node takes part in
-    hits: Integers  # (ns, 2) scratch: surface node and quad of the active contacts
-    hit_values: Singles  # (ns, 9) scratch: weights (4), direction (3), gap, impulse
-
-
-def make_contact(
-    surface_nodes: ArrayLike,
-    quads: ArrayLike,
-    rest: ArrayLike,
-    clearance: float,
-    te: float,
-    *,
-    margin: float = 0.3,
-    recovery: float = 0.01,
-    capacity: int = 0,
-) -> Contact:
-    """Allocate a contact for the skin with rest positions `rest` (nn, >= 3) and exocarp thickness te.
-
-    margin (mean rest edges h) and recovery (h per step) rarely need changing. Capacity is in pairs, 16 per node unless
-    given.
-    """
-    nodes = np.ascontiguousarray(surface_nodes, np.int32)
-    faces = np.ascontiguousarray(quads, np.int32)
-    positions = np.asarray(rest, np.float64)[nodes, :3]
-    h = float(np.linalg.norm(positions[np.roll(faces, -1, axis=1)] - positions[faces], axis=2).mean())
-    low, high = positions.min(0), positions.max(0)
-    half = np.maximum((high - low) / 2, h)
-    ns, nq = len(nodes), len(faces)
-    buckets = 1 << int(4 * nq - 1).bit_length()
-    pairs = capacity or 16 * ns
-    single, integer = np.float32, np.int32
-    return Contact(
-        surface_nodes=nodes,
-        quads=faces,
-        quad_nodes=np.ascontiguousarray(nodes[faces]),
-        ellipsoid=np.stack([(low + high) / 2, half**-2.0]).astype(single),
-        clearance=single(clearance),
-        # two exocarps back to back are 2 te thick: half of that cannot be mistaken for the far side of a neck
-        depth=single(min(0.6 * h, 0.75 * te)),
-        margin=single(margin * h),
-        size=single(h),
-        recovery=single(recovery * h),
-        normals=np.zeros((ns, 3), single),
-        searched=np.full((ns, 3), 1e30, single),
-        frames=np.zeros((nq, 8), single),
-        keys=np.zeros(ENTRIES * nq, np.int64),
-        order=np.zeros(ENTRIES * nq, integer),
-        starts=np.zeros(buckets + 1, integer),
-        pair_nodes=np.zeros(pairs, integer),
-        pair_quads=np.zeros(pairs, integer),
-        feet=np.zeros((pairs, 2), single),
-        counts=np.zeros(4, np.int64),
-        load=np.zeros(ns, single),
-        hits=np.zeros((ns, 2), integer),
-        hit_values=np.zeros((ns, 9), single),
-    )
-
-
-def grow(contact: Contact, needed: int) -> Contact:
-    """The same contact with room for at least `needed` pairs; search again before the next push."""
-    room = max(2 * needed, len(contact.pair_nodes))
-    contact.searched[:] = 1e30
-    contact.counts[:3] = 0
-    return contact._replace(
-        pair_nodes=np.zeros(room, np.int32), pair_quads=np.zeros(room, np.int32), feet=np.zeros((room, 2), np.float32)
-    )
 
 
 @njit(**OPTIONS)
-def _moved(contact, x):
+def _moved(contact: Contact, x: Singles) -> Single:
     """Largest squared distance of a surface node from where the last search saw it."""
     farthest = np.float32(0)
     for i in range(contact.surface_nodes.size):
@@ -139,7 +46,7 @@ def _moved(contact, x):
 
 
 @njit(**OPTIONS)
-def update_normals(contact, x):
+def update_normals(contact: Contact, x: Singles) -> Single:
     """Quad centres, radii and normals, and nodal normals, at positions x.
 
     Returns the smallest cosine between a quad's normal and the normal of the rest ellipsoid through its centre. Points
@@ -187,20 +94,20 @@ def update_normals(contact, x):
 
 
 @njit(**OPTIONS)
-def cell_key(i, j, k):
+def cell_key(i: int, j: int, k: int) -> int:
     """One integer per cell, 21 bits a direction."""
     return ((i & 0x1FFFFF) << 42) | ((j & 0x1FFFFF) << 21) | (k & 0x1FFFFF)
 
 
 @njit(**OPTIONS)
-def bucket_of(key, buckets):
+def bucket_of(key: int, buckets: int) -> Long:
     """Multiplicative hash of a cell; buckets is a power of two."""
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     return np.int64((mixed ^ (mixed >> np.uint64(32))) & np.uint64(buckets - 1))
 
 
 @njit(**OPTIONS)
-def _first_and_last(x, corners, q, i, reach, cell):
+def _first_and_last(x: Singles, corners: Integers, q: int, i: int, reach: Single, cell: Single) -> tuple[Long, Long]:
     """First and last cell in direction i that quad q's bounding box, grown by reach, overlaps; (0, -1) if far away."""
     low = high = x[corners[q, 0], i]
     for k in range(1, 4):
@@ -212,7 +119,9 @@ def _first_and_last(x, corners, q, i, reach, cell):
 
 
 @njit(**OPTIONS)
-def sort_into_cells(x, quad_nodes, reach, cell, keys, order, starts):
+def sort_into_cells(
+    x: Singles, quad_nodes: Integers, reach: Single, cell: Single, keys: Longs, order: Integers, starts: Integers
+) -> Single:
     """Enter each quad, grown by reach, into every cell it overlaps; equal input gives equal order.
 
     A counting sort by hashed cell fills `order` (entries,) with quads and `keys` with their cells; `starts` holds the
@@ -258,7 +167,9 @@ def sort_into_cells(x, quad_nodes, reach, cell, keys, order, starts):
 
 
 @njit(**OPTIONS)
-def _near(x, row, quad_nodes, frames, quad, outward, depth):
+def _near(
+    x: Singles, row: int, quad_nodes: Integers, frames: Singles, quad: int, outward: Single, depth: Single
+) -> tuple[bool, Single, Single]:
     """Whether the node is within reach of the quad by its mean plane, and a first guess of u and v."""
     a, b, c, d = quad_nodes[quad, 0], quad_nodes[quad, 1], quad_nodes[quad, 2], quad_nodes[quad, 3]
     quarter, one = np.float32(0.25), np.float32(1)
@@ -284,7 +195,7 @@ def _near(x, row, quad_nodes, frames, quad, outward, depth):
 
 
 @njit(**OPTIONS)
-def find_pairs(contact, x):
+def find_pairs(contact: Contact, x: Singles) -> int:
     """Collect candidate pairs at positions x (nn, 4) float32; call every 20-40 steps.
 
     Returns the number of pairs wanted. More than `contact.pair_nodes.size` means that the rest was left out: `grow`

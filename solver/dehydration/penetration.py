@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["penetration", "penetration_depths"]
 
 Doubles = NDArray[np.float64]
+Longs = NDArray[np.int64]
 OPPOSED = -0.25
 """Cosine between outward normals below which skin faces skin."""
 LIFT = 0.01
@@ -25,17 +26,17 @@ LIFT = 0.01
 
 
 @njit(cache=True, error_model="numpy")
-def _dot(a, b):
+def _dot(a: Doubles, b: Doubles) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, error_model="numpy")
-def _cross(a, b):
+def _cross(a: Doubles, b: Doubles) -> Doubles:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 @njit(cache=True, error_model="numpy")
-def closest_on_triangle(p, a, b, c):
+def closest_on_triangle(p: Doubles, a: Doubles, b: Doubles, c: Doubles) -> Doubles:
     """Point of the triangle abc nearest to p, each (3,). Ericson, Real-Time Collision Detection (2005), 5.1.5."""
     ab, ac, ap = b - a, c - a, p - a
     d1, d2 = _dot(ab, ap), _dot(ac, ap)
@@ -62,7 +63,7 @@ def closest_on_triangle(p, a, b, c):
 
 
 @njit(cache=True, error_model="numpy")
-def winding_number(p, corners, centres):
+def winding_number(p: Doubles, corners: Doubles, centres: Doubles) -> float:
     """Signed number of times the skin encloses p (3,); corners (nq, 4, 3), centres (nq, 3).
 
     Solid angles by van Oosterom & Strackee 1983, doi 10.1109/TBME.1983.325207.
@@ -80,7 +81,7 @@ def winding_number(p, corners, centres):
 
 
 @njit(cache=True, error_model="numpy")
-def _sort_nodes(positions, low, cell, counts, starts, order):
+def _sort_nodes(positions: Doubles, low: Doubles, cell: float, counts: Longs, starts: Longs, order: Longs) -> None:
     """Nodes sorted into a plain grid of cells counts (3,): `order` (ns,) and the first of each cell in `starts`."""
     place = np.empty(positions.shape[0], np.int64)
     for i in range(positions.shape[0]):
@@ -89,8 +90,8 @@ def _sort_nodes(positions, low, cell, counts, starts, order):
             index = index * counts[k] + min(np.int64((positions[i, k] - low[k]) / cell), counts[k] - 1)
         place[i] = index
         starts[index + 1] += 1
-    for index in range(starts.size - 1):
-        starts[index + 1] += starts[index]
+    for cell_index in range(starts.size - 1):
+        starts[cell_index + 1] += starts[cell_index]
     cursor = starts.copy()
     for i in range(positions.shape[0]):
         order[cursor[place[i]]] = i
@@ -98,7 +99,20 @@ def _sort_nodes(positions, low, cell, counts, starts, order):
 
 
 @njit(cache=True, error_model="numpy")
-def _depths(positions, quads, corners, centres, normals, low, cell, counts, limit, lift, closed, depths):
+def _depths(
+    positions: Doubles,
+    quads: Longs,
+    corners: Doubles,
+    centres: Doubles,
+    normals: Doubles,
+    low: Doubles,
+    cell: float,
+    counts: Longs,
+    limit: float,
+    lift: float,
+    closed: bool,
+    depths: Doubles,
+) -> None:
     """Fill depths (ns,); see `penetration_depths`."""
     starts = np.zeros(counts[0] * counts[1] * counts[2] + 1, np.int64)
     order = np.empty(positions.shape[0], np.int64)
@@ -109,8 +123,9 @@ def _depths(positions, quads, corners, centres, normals, low, cell, counts, limi
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     for q in range(quads.shape[0]):
         for k in range(3):
-            first[k] = max(np.int64((corners[q, :, k].min() - limit - low[k]) / cell), 0)
-            last[k] = min(np.int64((corners[q, :, k].max() + limit - low[k]) / cell), counts[k] - 1)
+            least, most = corners[q, :, k].min() - limit - low[k], corners[q, :, k].max() + limit - low[k]
+            first[k] = np.int64(max(least, 0.0) / cell)
+            last[k] = np.int64(min(most / cell, counts[k] - 1))
         for ix in range(first[0], last[0] + 1):
             for iy in range(first[1], last[1] + 1):
                 row = (ix * counts[1] + iy) * counts[2]
@@ -130,16 +145,18 @@ def _depths(positions, quads, corners, centres, normals, low, cell, counts, limi
                         square = abs(_dot(offset, normal))
                         if distance < nearest[node] - 1e-9 * limit or square > lean[node]:
                             nearest[node], lean[node] = distance, square
-                            behind[node] = _dot(offset, normal) < 0 and _dot(normal, normals[node]) < OPPOSED
+                            inward = _dot(offset, normal) < 0
+                            behind[node] = inward and _dot(normal, normals[node]) < OPPOSED
     for node in range(positions.shape[0]):
         if behind[node]:
-            inside = True
+            # an open sheet has no inside: there a node must at least be seen squarely, not from past a border
+            inside = lean[node] > 0.7 * nearest[node]
             if closed:
                 inside = abs(winding_number(positions[node] + lift * normals[node], corners, centres)) > 0.5
             depths[node] = nearest[node] if inside else 0.0
 
 
-def _normals(corners: Doubles, faces: NDArray[np.int64], nodes: int) -> Doubles:
+def _normals(corners: Doubles, faces: Longs, nodes: int) -> Doubles:
     """Outward nodal normals weighted by the quads' angles at the node (Baerentzen & Aanaes 2005), (nodes, 3).
 
     Weighted by area, the larger wall of a sharp crease would turn them into the smaller one.
@@ -172,7 +189,7 @@ def penetration_depths(positions: ArrayLike, quads: ArrayLike, limit: float | No
     closed = bool(np.array_equal(np.sort(tails * len(x) + heads), np.sort(heads * len(x) + tails)))
     low = x.min(0)
     extent = x.max(0) - low
-    cell = max(1.5 * h, float(extent.max()) / 200)
+    cell = max(1.5 * h, float(extent.max()) / 100)
     counts = (extent / cell).astype(np.int64) + 1
     depths = np.zeros(len(x))
     _depths(x, faces, corners, corners.mean(1), normals, low, cell, counts, reach, LIFT * h, closed, depths)
