@@ -23,16 +23,21 @@ class NumpyArithmetic:
     """`algebra.Arithmetic` on numpy arrays, one entry per element."""
 
     def minimum(self, a: Number, b: Number | float) -> Number:
+        """Smaller of each pair."""
         return np.minimum(a, b)
 
     def maximum(self, a: Number, b: Number | float) -> Number:
+        """Larger of each pair."""
         return np.maximum(a, b)
 
     def inverse_cube_root(self, a: Number) -> Number:
+        """a^(-1/3) to float64."""
         return 1.0 / np.cbrt(a)
 
 
 class ElementReport(NamedTuple):
+    """What each element holds and how far it is from turning inside out."""
+
     energy: Floats
     """(elements,): strain energy"""
     least_ratio: Floats
@@ -51,9 +56,7 @@ def _chunks(
         yield part, nodes, planes[part].transpose(1, 0, 2).reshape(planes.shape[1], -1).astype(np.float64)
 
 
-def element_report(
-    layout: Layout, state: NDArray[np.int32], theta: float, *, one_point: bool = False
-) -> ElementReport:
+def element_report(layout: Layout, state: NDArray[np.int32], theta: float, *, one_point: bool = False) -> ElementReport:
     """Strain energy and least J/Jd of every element; state (nodes, 4) int32, see `fixed_point`.
 
     With `one_point` the core's energy is the one-point element's; the ratio is always that of the full rule.
@@ -65,13 +68,13 @@ def element_report(
         planes = layout.exocarp_planes if exocarp else layout.core_planes
         energies, ratios = np.empty(elements.shape), np.empty(elements.shape)
         factor = 1.0 if exocarp else theta
-        for part, positions, stored in _chunks(layout, state, elements, planes):
+        for part, nodes, stored in _chunks(layout, state, elements, planes):
             shape = elements[part].shape
-            total, least = energy(arithmetic, positions, stored.__getitem__, np.float64(factor), exocarp)
+            total, least = energy(arithmetic, nodes, stored.__getitem__, np.float64(factor), exocarp)
             energies[part], ratios[part] = total.reshape(shape), least.reshape(shape)
         if one_point and not exocarp:
-            for part, positions, stored in _chunks(layout, state, elements, layout.one_point_planes):
-                total = one_point_energy(arithmetic, positions, stored.__getitem__, np.float64(theta))
+            for part, nodes, stored in _chunks(layout, state, elements, layout.one_point_planes):
+                total = one_point_energy(arithmetic, nodes, stored.__getitem__, np.float64(theta))
                 energies[part] = total.reshape(elements[part].shape)
         results.append((energies, ratios))
     (core_energy, core_ratio), (skin_energy, skin_ratio) = results

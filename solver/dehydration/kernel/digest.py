@@ -5,17 +5,15 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-SOURCES = (
-    "../contact.py",
-    "../contact_search.py",
-    "fixed_point.py",
-    "skin.py",
-    "algebra.py", "elements.py", "strips.py", "vector_ir.py", "scalar.py", "generate.py", "march.py")
+HERE = Path(__file__).parent
 
 
 def source_digest(backend: str) -> str:
-    """Hex digest of the sources that make up the compiled kernel, and of the back end's name."""
+    """Hex digest of every file that the compiled loop may be made of, and of the back end's name.
+
+    All files of the package count, needed or not: a needless compilation costs seconds, a stale kernel a wrong table.
+    """
     digest = hashlib.sha256(backend.encode())
-    for name in SOURCES:
-        digest.update(b"\0" + name.encode() + b"\0" + Path(__file__).parent.joinpath(name).read_bytes())
+    for path in sorted(HERE.glob("*.py")) + sorted(HERE.parent.glob("contact*.py")):
+        digest.update(b"\0" + path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()

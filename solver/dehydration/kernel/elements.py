@@ -22,14 +22,13 @@ from solver.dehydration.kernel.algebra import (
     CORE_WEIGHTS,
     ETA,
     EXOCARP_WEIGHTS,
-    FIRST_POINT,
+    GEOMETRY,
     HOURGLASS,
     INVERSE_VOLUME,
     KAPPA,
     LINEAR_PLANES,
     MEAN_PLANES,
     MU,
-    POINT_PLANES,
     TANGENT_BELOW,
     XI,
     ZETA,
@@ -60,6 +59,7 @@ class Shrinkage(NamedTuple):
 
 
 def shrinkage_of(plane: Planes, theta: Number) -> Shrinkage:
+    """Jd and its companions for Fd = theta I."""
     volume = theta * theta * theta
     return Shrinkage(volume, 1.0 / volume, plane(MU) * volume)
 
@@ -73,6 +73,7 @@ class Isochoric(NamedTuple):
 
 
 def isochoric_factor(ar: Arithmetic, jacobian: Number, shrinkage: Shrinkage) -> Isochoric:
+    """J^(-2/3) of a point or element, safe for any J."""
     bounded = ar.maximum(jacobian, TANGENT_BELOW * shrinkage.volume)
     root = ar.inverse_cube_root(bounded)
     square = root * root
@@ -85,10 +86,28 @@ def barrier_overlap(ar: Arithmetic, ratio: Number) -> Number:
     return ar.minimum(ratio - BARRIER_BELOW, 0.0)
 
 
-def point_planes(plane: Planes, point: int) -> tuple[list[Number], Number]:
-    """(six metric entries, det(B)/512) of an integration point."""
-    first = FIRST_POINT + POINT_PLANES * point
-    return [plane(first + j) for j in range(6)], plane(first + 6)
+def derivatives_of(modes: Sequence[Vector], exocarp: bool) -> list[list[Vector]]:
+    """D = 8 dx/dxi at the points of an element type: [point][direction] -> vector."""
+    return gauss_derivatives(modes) + (centre_line_derivatives(modes) if exocarp else [])
+
+
+def fresh_derivatives(plane: Planes, exocarp: bool) -> list[list[Vector]]:
+    """D of the fresh element."""
+    modes = [[plane(GEOMETRY + 3 * (m - 1) + i) for i in range(3)] if m else [] for m in range(8)]
+    return derivatives_of(modes, exocarp)
+
+
+def point_metric(fresh: Sequence[Vector], weight: float) -> tuple[list[Number], Number]:
+    """(metric 11, 12, 13, 22, 23, 33 of `algebra`, det(B)/512) of a point with fresh derivatives D.
+
+    weight: quadrature weight / 512. With C the cofactors of D, B = 8 C / det(D), so that
+    w B B^T / 64 = weight C C^T / det(D).
+    """
+    cofactors = [cross(fresh[1], fresh[2]), cross(fresh[2], fresh[0]), cross(fresh[0], fresh[1])]
+    inverse_det = 1.0 / dot(fresh[0], cofactors[0])
+    factor = inverse_det * weight
+    scaled = [[factor * component for component in row] for row in cofactors]
+    return [dot(scaled[k], cofactors[m]) for k in range(3) for m in range(k, 3)], inverse_det
 
 
 def mean_volume(modes: Sequence[Vector], derivatives: Sequence[Sequence[Vector]], exocarp: bool) -> Number:
@@ -102,14 +121,20 @@ def mean_volume(modes: Sequence[Vector], derivatives: Sequence[Sequence[Vector]]
 
 
 def point_stress(
-    ar: Arithmetic, d: Sequence[Vector], plane: Planes, point: int, weight: float, pressure: Number, shrink: Shrinkage
+    ar: Arithmetic,
+    d: Sequence[Vector],
+    fresh: Sequence[Vector],
+    plane: Planes,
+    weight: float,
+    pressure: Number,
+    shrink: Shrinkage,
 ) -> list[Vector]:
     """Derivative of the element's energy by the three D_k of one point.
 
-    weight: quadrature weight / 512; pressure: kappa (Jbar/Jd - 1), the derivative of the volumetric energy by the
-    element's volume.
+    fresh: D_k of the fresh element. weight: quadrature weight / 512. pressure: kappa (Jbar/Jd - 1), the derivative of
+    the volumetric energy by the element's volume.
     """
-    metric, inverse_det = point_planes(plane, point)
+    metric, inverse_det = point_metric(fresh, weight)
     cofactors = [cross(d[1], d[2]), cross(d[2], d[0]), cross(d[0], d[1])]
     jacobian = dot(d[0], cofactors[0]) * inverse_det
     lowered, stretch = apply_metric(metric, d)
@@ -124,22 +149,25 @@ def point_stress(
 def _forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number, exocarp: bool) -> list[Vector]:
     modes = modes_of(positions)
     shrink = shrinkage_of(plane, theta)
-    derivatives = gauss_derivatives(modes) + (centre_line_derivatives(modes) if exocarp else [])
+    derivatives = derivatives_of(modes, exocarp)
+    fresh = fresh_derivatives(plane, exocarp)
     weights = EXOCARP_WEIGHTS if exocarp else CORE_WEIGHTS
     ratio = mean_volume(modes, derivatives, exocarp) * plane(INVERSE_VOLUME) * shrink.inverse
     pressure = plane(KAPPA) * (ratio - 1.0)
     stress = [
-        point_stress(ar, d, plane, q, weight / 512, pressure, shrink)
-        for q, (d, weight) in enumerate(zip(derivatives, weights, strict=True))
+        point_stress(ar, d, d0, plane, weight / 512, pressure, shrink)
+        for d, d0, weight in zip(derivatives, fresh, weights, strict=True)
     ]
     return nodal_from_modal(modal_from_points(stress))
 
 
 def core_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number) -> list[Vector]:
+    """Derivative of the energy of a fully integrated core element by its 8 nodal positions."""
     return _forces(ar, positions, plane, theta, exocarp=False)
 
 
 def exocarp_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number) -> list[Vector]:
+    """Derivative of the energy of an exocarp element by its 8 nodal positions."""
     return _forces(ar, positions, plane, theta, exocarp=True)
 
 
@@ -149,14 +177,15 @@ def energy(
     """(energy, least J/Jd over the points) of a core or exocarp element: what `core_forces` is the gradient of."""
     modes = modes_of(positions)
     shrink = shrinkage_of(plane, theta)
-    derivatives = gauss_derivatives(modes) + (centre_line_derivatives(modes) if exocarp else [])
+    derivatives = derivatives_of(modes, exocarp)
+    fresh = fresh_derivatives(plane, exocarp)
     weights = EXOCARP_WEIGHTS if exocarp else CORE_WEIGHTS
-    fresh = 1.0 / plane(INVERSE_VOLUME)
+    volume = 1.0 / plane(INVERSE_VOLUME)
     dilatation = mean_volume(modes, derivatives, exocarp) * plane(INVERSE_VOLUME) * shrink.inverse - 1.0
-    total = fresh * (0.5 * plane(KAPPA) * shrink.volume * (dilatation * dilatation) - 1.5 * shrink.mu)
+    total = volume * (0.5 * plane(KAPPA) * shrink.volume * (dilatation * dilatation) - 1.5 * shrink.mu)
     least: Number = None
-    for q, (d, weight) in enumerate(zip(derivatives, weights, strict=True)):
-        metric, inverse_det = point_planes(plane, q)
+    for d, d0, weight in zip(derivatives, fresh, weights, strict=True):
+        metric, inverse_det = point_metric(d0, weight / 512)
         jacobian = dot(d[0], cross(d[1], d[2])) * inverse_det
         ratio = jacobian * shrink.inverse
         overlap = barrier_overlap(ar, ratio)
@@ -181,7 +210,8 @@ class MeanShear(NamedTuple):
 
 
 def mean_shear(modes: Sequence[Vector], plane: Planes) -> MeanShear:
-    metric = [plane(FIRST_POINT + j) for j in range(6)]
+    """V0 I1 of the one-point element and its halved derivatives."""
+    metric = [plane(GEOMETRY + j) for j in range(6)]
     linear = [[plane(LINEAR_PLANES + 3 * h + k) for k in range(3)] for h in range(4)]
     mean = [[plane(MEAN_PLANES + 3 * h + k) for k in range(3)] for h in range(3)]
     affine = [modes[XI], modes[ETA], modes[ZETA]]
@@ -205,6 +235,7 @@ def mean_shear(modes: Sequence[Vector], plane: Planes) -> MeanShear:
 
 
 def one_point_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number) -> list[Vector]:
+    """Derivative of the energy of a one-point core element by its 8 nodal positions."""
     modes = modes_of(positions)
     shrink = shrinkage_of(plane, theta)
     volume, volume_gradient = hexahedron_volume(modes)

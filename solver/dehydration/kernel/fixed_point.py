@@ -18,7 +18,7 @@ REACH = 3.9
 
 def positions(state: NDArray[np.int32]) -> NDArray[np.float64]:
     """State (nn, 4) int32 -> positions (nn, 3) float64."""
-    return state[:, :3] * QUANTUM
+    return state[:, :3].astype(np.float64) * QUANTUM
 
 
 def place(state: NDArray[np.int32], where: ArrayLike) -> None:

@@ -6,8 +6,6 @@ lanes with nothing but affine indices, which LLVM's loop vectoriser turns into v
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import importlib.util
 import os
 import sys
@@ -15,6 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import TypeAlias
 
 from solver.dehydration.kernel.algebra import (
     CORE_PLANES,
@@ -37,11 +36,13 @@ class Trace:
         self.constants: dict[float, str] = {}
 
     def name(self, expression: str) -> Name:
+        """A new variable that holds the expression."""
         name = f"t{len(self.lines)}"
         self.lines.append(f"{name} = {expression}")
         return Name(self, name)
 
     def operand(self, value: Name | float) -> str:
+        """Text of an operand; floats become named float32 constants."""
         if isinstance(value, Name):
             return value.text
         return self.constants.setdefault(float(value), f"C{len(self.constants)}")
@@ -85,14 +86,17 @@ class TextArithmetic:
         self.trace = trace
 
     def minimum(self, a: Name, b: Name | float) -> Name:
+        """The smaller of two, as a conditional expression that LLVM turns into one instruction."""
         other = self.trace.operand(b)
         return self.trace.name(f"{a.text} if {a.text} < {other} else {other}")
 
     def maximum(self, a: Name, b: Name | float) -> Name:
+        """The larger of two, likewise."""
         other = self.trace.operand(b)
         return self.trace.name(f"{a.text} if {a.text} > {other} else {other}")
 
     def inverse_cube_root(self, a: Name) -> Number:
+        """a^(-1/3), from the guess of `bits`."""
         return refine_inverse_cube_root(a, self.trace.name(f"guess_inverse_cube_root({a.text})"))
 
 
@@ -162,7 +166,7 @@ def write_atomically(path: Path, text: str) -> None:
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(text)
-        os.replace(temporary, path)
+        Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
@@ -192,7 +196,8 @@ def load_generated() -> ModuleType:
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)

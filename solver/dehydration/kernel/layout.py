@@ -34,6 +34,7 @@ def aligned_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def aligned_copy(values: NDArray[Any], dtype: DTypeLike) -> NDArray[Any]:
+    """C-contiguous copy that starts on a cache line."""
     result = aligned_zeros(values.shape, dtype)
     result[...] = values
     return result
@@ -110,7 +111,12 @@ def _blocks(elements: NDArray[np.int64], planes_of: Any, planes: int, chunk: int
 
 
 def _checked(
-    positions: ArrayLike, connectivity: ArrayLike, is_exocarp: ArrayLike, mu: ArrayLike, kappa: ArrayLike, fixed: ArrayLike
+    positions: ArrayLike,
+    connectivity: ArrayLike,
+    is_exocarp: ArrayLike,
+    mu: ArrayLike,
+    kappa: ArrayLike,
+    fixed: ArrayLike,
 ) -> Iterator[NDArray[Any]]:
     """Inputs as arrays of the expected type and shape; ValueError names the first that does not fit."""
     nodes, count = len(np.asarray(positions)), len(np.asarray(connectivity))
@@ -148,8 +154,8 @@ def build_layout(
 ) -> Layout:
     """Prepare a mesh for `march`.
 
-    positions: (nn, 3) fresh positions, within +-3.9. connectivity: (ne, 8), local bits xi = 4, eta = 2, zeta = 1 with zeta radial,
-    right-handed. is_exocarp: (ne,). mu, kappa: (ne,) shear and bulk modulus, one unit of stress for both.
+    positions: (nn, 3) fresh positions, within +-3.9. connectivity: (ne, 8), local bits xi = 4, eta = 2, zeta = 1 with
+    zeta radial, right-handed. is_exocarp: (ne,). mu, kappa: (ne,) shear and bulk modulus, one unit of stress for both.
     fixed: (nn,) nodes that never move (the stone). safety: factor on the scaled masses against stiffening while the
     fruit deforms; the critical time step is at least sqrt(safety) at rest and a unit step is marched. Swelling to
     theta > 1 stiffens by theta: multiply safety by it. one_point: prepare the one-point core element as well.
@@ -202,5 +208,5 @@ def build_layout(
         exocarp_elements=np.where(strips.exocarp_real, strips.exocarp, -1),
         connectivity=connect,
         fresh=fresh,
-        mass=mass,
+        mass=mass.astype(np.float64, copy=False),
     )

@@ -7,6 +7,7 @@ depend on the number of threads.
 from __future__ import annotations
 
 import functools
+import importlib
 import logging
 import os
 from collections.abc import Callable
@@ -16,8 +17,8 @@ import numpy as np
 from numba import njit, prange, typeof, types
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.contact import make_contact
+from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.layout import ROW, Layout, aligned_zeros
 from solver.dehydration.kernel.skin import Skin, keep_apart, search, widen
@@ -36,7 +37,7 @@ update_node: Any = None
 
 _FLAT, _INDICES = types.float32[::1], types.int32[::1]
 _PLANES = types.float32[:, :, ::1]
-SEARCH_EVERY = 20
+SEARCH_EVERY = 10
 """Steps between two searches for contact pairs; a node moves about a hundredth of an element meanwhile."""
 
 
@@ -85,9 +86,11 @@ def _build(stamp: int) -> Callable[..., int]:
         boundscheck=False,
     )
     def advance(
-        steps, state, velocity, strips, face_offsets, core, one_point, exocarp, single,
-        row_start, rows, inverse_mass, theta0, theta1, damping, forces, record, squares, touching, skin,
-    ):  # fmt: skip
+        steps: int, state: State, velocity: Singles, strips: NDArray[np.int64], face_offsets: State, core: Singles,
+        one_point: Singles, exocarp: Singles, single: bool, row_start: State, rows: State, inverse_mass: Singles,
+        theta0: float, theta1: float, damping: float, forces: Singles, record: bool, squares: Singles,
+        touching: bool, skin: Skin,
+    ) -> int:  # fmt: skip
         source = stamp  # noqa: F841  a captured cell is part of numba's cache key
         keep = np.float32((1 - damping / 2) / (1 + damping / 2))
         push = np.float32(1 / (1 + damping / 2))
@@ -102,9 +105,7 @@ def _build(stamp: int) -> Callable[..., int]:
                 )  # fmt: skip
             if not record:
                 for node in prange(inverse_mass.shape[0]):
-                    update_node(
-                        forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(node)
-                    )
+                    update_node(forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(node))
                 if touching:
                     keep_apart(skin, state, velocity)
         return steps
@@ -117,10 +118,9 @@ def _build(stamp: int) -> Callable[..., int]:
 def compiled(backend: Backend) -> Callable[..., int]:
     """The time loop on one back end."""
     global strip_forces, update_node
-    if backend == "vector":
-        from solver.dehydration.kernel import vector_ir as functions
-    else:
-        from solver.dehydration.kernel import scalar as functions
+    functions: Any = importlib.import_module(
+        "solver.dehydration.kernel." + ("vector_ir" if backend == "vector" else "scalar")
+    )
     strip_forces, update_node = functions.strip_forces, functions.update_node
     return _build(int(source_digest(backend)[:15], 16))
 
@@ -129,8 +129,10 @@ def compiled(backend: Backend) -> Callable[..., int]:
 def default_backend() -> Backend:
     """The back end that `march` uses: WIZEN_KERNEL if it says vector or scalar, else vector if that builds here."""
     chosen = os.environ.get("WIZEN_KERNEL", "auto")
-    if chosen == "vector" or chosen == "scalar":
-        return chosen
+    if chosen == "vector":
+        return "vector"
+    if chosen == "scalar":
+        return "scalar"
     if chosen != "auto":
         raise ValueError(f"WIZEN_KERNEL must be auto, vector or scalar, not {chosen!r}")
     try:
@@ -197,7 +199,8 @@ def march(
     while left:
         made = run(
             left, _flat("state", state, np.int32, layout), _flat("velocity", velocity, np.float32, layout),
-            *_arrays(layout, one_point), begin, end, damping, forces, False, _NOTHING, skin is not None, skin or _NOBODY,
+            *_arrays(layout, one_point), begin, end, damping, forces, False, _NOTHING,
+            skin is not None, skin or _NOBODY,
         )  # fmt: skip
         begin += (end - begin) * made / left
         left -= made
@@ -218,11 +221,12 @@ class InternalForce(NamedTuple):
 
     @property
     def relative_residual(self) -> float:
+        """Norm over scale; 0 in a state without any stress."""
         return self.norm / self.scale if self.scale > 0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def _sum_rows(row_start, rows, forces, squares, nodal, total):
+def _sum_rows(row_start: State, rows: State, forces: Singles, squares: Singles, nodal: Floats, total: Floats) -> None:
     """Assemble force rows (float32) and their squares into (nodes, 3) and (nodes,) float64."""
     for node in range(len(row_start) - 1):
         for entry in range(row_start[node], row_start[node + 1]):

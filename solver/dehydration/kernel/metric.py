@@ -38,7 +38,7 @@ def shape_derivatives(points: Floats) -> Floats:
 
 
 def quadrature(exocarp: bool) -> tuple[Floats, Floats]:
-    """Local points (q, 3) and weights (q,) of an element type, in the order in which their planes are stored."""
+    """Local points (q, 3) and weights (q,) of an element type, in the order in which `elements` visits them."""
     if exocarp:
         return EXOCARP_POINTS, np.array(EXOCARP_WEIGHTS)
     return GAUSS_POINTS, np.array(CORE_WEIGHTS)
@@ -68,21 +68,16 @@ def refuse_inverted(corners: Floats, chunk: int = 4096) -> None:
         )
 
 
-def _metric_planes(inverse: Floats, volume: Floats) -> list[Floats]:
-    """volume/64 * B B^T as six planes 11, 12, 13, 22, 23, 33 for B (ne, 3, 3)."""
-    rows = inverse.transpose(1, 2, 0).copy()
-    return [(rows[k] * rows[l]).sum(axis=0) * (volume / 64) for k in range(3) for l in range(k, 3)]
+def _modes(corners: Floats) -> Any:
+    """Modes of `algebra` of corners (ne, 8, 3): [mode][component] -> (ne,)."""
+    return modes_of([[corners[:, a, i] for i in range(3)] for a in range(8)])
 
 
 def element_planes(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool) -> Floats:
     """Planes of the full core or the exocarp element, (planes, ne) float64."""
     points, weights = quadrature(exocarp)
-    inverse, determinants = inverse_jacobians(corners, points)
-    volumes = determinants * weights
-    planes: list[Floats] = [mu, kappa, 1.0 / volumes.sum(axis=1)]
-    for q in range(len(points)):
-        planes += [*_metric_planes(inverse[:, q], volumes[:, q]), 1.0 / (512.0 * determinants[:, q])]
-    return np.stack(planes)
+    volume = np.linalg.det(corners.transpose(0, 2, 1)[:, None] @ shape_derivatives(points)) @ weights
+    return np.stack([mu, kappa, 1.0 / volume, *(component for mode in _modes(corners)[1:] for component in mode)])
 
 
 class OnePoint(NamedTuple):
@@ -100,7 +95,7 @@ class OnePoint(NamedTuple):
 
 def one_point_geometry(corners: Floats) -> OnePoint:
     """The mean gradient is that of the exact volume: b_a = dV/dX_a, mean F = sum_a x_a b_a^T / V."""
-    modes: Any = modes_of([[corners[:, a, i] for i in range(3)] for a in range(8)])
+    modes = _modes(corners)
     inverse = inverse_jacobians(corners, np.zeros((1, 3)))[0][:, 0]
     scaled_volume, by_mode = hexahedron_volume(modes)
     affine = np.stack([np.stack(modes[m], axis=-1) for m in (XI, ETA, ZETA)], axis=1)
@@ -117,6 +112,6 @@ def one_point_geometry(corners: Floats) -> OnePoint:
 def one_point_planes(corners: Floats, mu: Floats, kappa: Floats) -> Floats:
     """Planes of the one-point core element, (planes, ne) float64."""
     geometry = one_point_geometry(corners)
-    upper = [geometry.metric[:, k, l] for k in range(3) for l in range(k, 3)]
+    upper = [geometry.metric[:, k, m] for k in range(3) for m in range(k, 3)]
     coefficients = [*geometry.linear.reshape(-1, 12).T, *geometry.mean.reshape(-1, 9).T]
     return np.stack([mu, kappa, 1.0 / geometry.volume, *upper, *coefficients])

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.generate import load_generated
 from solver.dehydration.kernel.strips import LANES
+
+Ints: TypeAlias = NDArray[np.int32]
+Table: TypeAlias = NDArray[np.int64]
+Singles: TypeAlias = NDArray[np.float32]
 
 _generated = load_generated()
 core_block = _generated.core_block
@@ -15,7 +22,12 @@ exocarp_block = _generated.exocarp_block
 one_point_block = _generated.one_point_block
 
 # A call that is not inlined counts references of its arrays, atomically: more work than one node's update.
-OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"}, "boundscheck": False, "forceinline": True}
+OPTIONS: Any = {
+    "error_model": "numpy",
+    "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"},
+    "boundscheck": False,
+    "forceinline": True,
+}
 # Unsigned offsets spare numba's handling of negative indices, which would keep loops from being vectorised.
 ONE, TWO = np.uint32(1), np.uint32(2)
 UNIT, QUANTA = np.float32(QUANTUM), np.float32(1 / QUANTUM)
@@ -24,7 +36,7 @@ VECTORS = 3 * LANES
 
 
 @njit(**OPTIONS)
-def _gather_face(state, offsets, face, side, quanta):
+def _gather_face(state: Ints, offsets: Ints, face: int, side: int, quanta: Ints) -> None:
     """Fixed-point positions of a face into the scratch of its side: 0 below, 1 above."""
     for corner in range(4):
         first = (2 * corner + side) * VECTORS
@@ -36,7 +48,7 @@ def _gather_face(state, offsets, face, side, quanta):
 
 
 @njit(**OPTIONS)
-def _from_first_node(quanta, positions):
+def _from_first_node(quanta: Ints, positions: Singles) -> None:
     """Positions relative to node 0, in units of length: only differences enter, and in integers they are exact."""
     for node in range(8):
         for k in range(VECTORS):
@@ -44,7 +56,7 @@ def _from_first_node(quanta, positions):
 
 
 @njit(**OPTIONS)
-def _store_rows(carried, face, forces):
+def _store_rows(carried: Singles, face: int, forces: Singles) -> None:
     """Write the rows of a face: 16 lanes of three floats per corner."""
     for corner in range(4):
         first = corner * VECTORS
@@ -57,7 +69,7 @@ def _store_rows(carried, face, forces):
 
 
 @njit(**OPTIONS)
-def _add_squares(nodal, face, squares):
+def _add_squares(nodal: Singles, face: int, squares: Singles) -> None:
     """Add the squared nodal forces of an element to the rows of its two faces."""
     for corner in range(4):
         for side in range(2):
@@ -68,7 +80,7 @@ def _add_squares(nodal, face, squares):
 
 
 @njit(**OPTIONS)
-def _carry_up(quanta, nodal, carried):
+def _carry_up(quanta: Ints, nodal: Singles, carried: Singles) -> None:
     """Make the face above the face below; its forces so far are those of the element just done."""
     for corner in range(4):
         low, high, first = 2 * corner * VECTORS, (2 * corner + 1) * VECTORS, corner * VECTORS
@@ -79,8 +91,19 @@ def _carry_up(quanta, nodal, carried):
 
 @njit(**OPTIONS)
 def strip_forces(
-    state, offsets, strips, strip, core, one_point, exocarp, single, theta, forces, record, squares
-):
+    state: Ints,
+    offsets: Ints,
+    strips: Table,
+    strip: int,
+    core: Singles,
+    one_point: Singles,
+    exocarp: Singles,
+    single: bool,
+    theta: float,
+    forces: Singles,
+    record: bool,
+    squares: Singles,
+) -> None:
     """Element forces of one strip; arguments as in `vector_ir.strip_forces`."""
     face, first_core, cores, first_exocarp, exocarps = strips[strip]
     core_flat = core.reshape(core.shape[0], core.shape[1] * LANES)
@@ -114,7 +137,17 @@ def strip_forces(
 # Inlined by numba, not by LLVM, whose inlining leaves the reference counts of a branch behind.
 # Without "reassoc": nodes sum about four rows, too few for the gathers LLVM would vectorise the sum with.
 @njit(inline="always")
-def update_node(forces, row_start, rows, inverse_mass, state, velocity, keep, push, node):
+def update_node(
+    forces: Singles,
+    row_start: Ints,
+    rows: Ints,
+    inverse_mass: Singles,
+    state: Ints,
+    velocity: Singles,
+    keep: float,
+    push: float,
+    node: int,
+) -> None:
     """Central-difference update of one node; arguments as in `vector_ir.update_node`."""
     x = y = z = np.float32(0)
     for entry in range(np.uint32(row_start[np.uint64(node)]), np.uint32(row_start[np.uint64(node + 1)])):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,7 +12,7 @@ from solver.dehydration.contact import PAIRS, Contact, find_pairs, grow, make_co
 from solver.dehydration.kernel.fixed_point import QUANTUM, positions
 from solver.dehydration.kernel.layout import Layout
 
-OPTIONS = {"cache": True, "error_model": "numpy"}
+OPTIONS: Any = {"cache": True, "error_model": "numpy"}
 UNIT = np.float32(QUANTUM)
 QUANTA = np.float32(1 / QUANTUM)
 
@@ -57,7 +57,7 @@ def widen(skin: Skin) -> Skin:
 
 
 @njit(**OPTIONS)
-def read_skin(skin, state, velocity):
+def read_skin(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32]) -> None:
     """Copy the skin's positions and velocities out of the flat state (4 nn,) int32 and velocity (4 nn,)."""
     for i in range(skin.rows.size):
         first = 4 * np.int64(skin.rows[i])
@@ -67,14 +67,14 @@ def read_skin(skin, state, velocity):
 
 
 @njit(**OPTIONS)
-def search(skin, state, velocity):
+def search(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32]) -> bool:
     """Look for pairs that may touch; False if there are more than the contact has room for."""
     read_skin(skin, state, velocity)
     return find_pairs(skin.contact, skin.position) <= skin.contact.pair_nodes.size
 
 
 @njit(**OPTIONS)
-def keep_apart(skin, state, velocity):
+def keep_apart(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32]) -> None:
     """Push touching skin apart in the step just made."""
     if skin.contact.counts[PAIRS] == 0:
         skin.deepest[0] = 0

@@ -24,6 +24,8 @@ FIRST_FACE, FIRST_CORE, CORE_COUNT, FIRST_EXOCARP, EXOCARP_COUNT = range(5)
 
 
 class Strips(NamedTuple):
+    """All strips of a mesh; core and exocarp blocks are numbered apart, in the order in which they are visited."""
+
     table: Ints
     """(strips, 5) int64: first face, first core block, core blocks, first exocarp block, exocarp blocks"""
     faces: Ints
