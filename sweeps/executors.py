@@ -28,6 +28,9 @@ _THREADS = (
     "VECLIB_MAXIMUM_THREADS",
 )
 
+#: How long a scheduler may take to answer.
+_PATIENCE = "10s"
+
 
 class NoScheduler(SweepError):
     """The Dask scheduler cannot be reached, or Dask is not installed."""
@@ -258,7 +261,7 @@ def _client(where: Any) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(where, timeout="10s", set_as_default=False)
+        client = Client(where, timeout=_PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         advice = "Start one with `dask scheduler`, and name it as in tcp://10.0.0.1:8786."
         raise NoScheduler(f"no Dask scheduler answers at {where} ({error}).", advice) from error

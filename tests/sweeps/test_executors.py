@@ -70,8 +70,9 @@ def test_options_that_contradict_each_other() -> None:
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://"])
-def test_nobody_answers(address: str) -> None:
+def test_nobody_answers(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr(executors, "_PATIENCE", "1s")
     with pytest.raises(SweepError, match="no Dask scheduler answers"), executors.choose(scheduler=address):
         pass
 
