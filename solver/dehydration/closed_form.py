@@ -28,7 +28,7 @@ def flat_film_wavelength(thickness: float, gamma: float) -> float:
 
 
 def flat_film_strain(gamma: float) -> float:
-    """Return the equi-biaxial compressive strain at which a flat film wrinkles, (1/6) (3 / gamma)^(2/3) (incompressible).
+    """Return the equi-biaxial strain at which a flat film wrinkles, (1/6) (3 / gamma)^(2/3) (incompressible).
 
     Valid for gamma >> 1; at gamma = 10 it is 0.075 where the exact sphere onset needs 0.075 to 0.08.
     """

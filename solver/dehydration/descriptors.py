@@ -83,9 +83,7 @@ class Surface:
         corners = nodes[self._mesh.sphere.quads]
         # a bilinear quad's flux is that of the mean of its two triangulations
         a, b, c, d = np.moveaxis(corners, 1, 0)
-        flux = sum(
-            np.einsum("qi,qi->q", p, np.cross(q, r)) for p, q, r in ((a, b, c), (a, c, d), (a, b, d), (b, c, d))
-        )
+        flux = sum(np.einsum("qi,qi->q", p, np.cross(q, r)) for p, q, r in ((a, b, c), (a, c, d), (a, b, d), (b, c, d)))
         return float(np.sum(flux) / 12)
 
     def _count(self, nodes: Array, roughness: float, degree: float) -> int:

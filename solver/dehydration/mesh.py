@@ -60,7 +60,9 @@ def cubed_sphere(n: int) -> CubedSphere:
     points = np.stack([axis + a[..., None] * u + b[..., None] * v for axis, u, v in _FACES]).reshape(-1, 3)
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     # nodes on shared edges coincide up to round-off; 1e-7 is far below any spacing in use
-    _, first, inverse = np.unique(np.round(points * 1e7).astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(
+        np.round(points * 1e7).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
     faces = inverse.reshape(6, n + 1, n + 1)
     quads = np.stack([faces[:, :-1, :-1], faces[:, 1:, :-1], faces[:, 1:, 1:], faces[:, :-1, 1:]], axis=-1)
     sphere = CubedSphere(n, points[first], faces, quads.reshape(-1, 4))

@@ -14,7 +14,19 @@ from numpy.typing import NDArray
 from ..contract import Context, Unstable
 from .contact import PAIRS
 from .imperfection import bumps
-from .kernel import build_layout, internal_force, make_skin, march, new_state, out_of_reach, positions
+from .kernel import (
+    Layout,
+    build_layout,
+    forget,
+    internal_force,
+    make_skin,
+    march,
+    new_state,
+    out_of_reach,
+    positions,
+    reweigh,
+    stiffness_bounds,
+)
 from .mesh import FruitMesh, build_mesh
 from .params import DehydrationParams
 from .settings import Settings
@@ -25,14 +37,18 @@ Array = NDArray[np.float64]
 Fixed = NDArray[np.int32]
 Single = NDArray[np.float32]
 
-#: Factor on the scaled masses: elements in a crease stiffen as they are squeezed, and below 2 a crease on a coarse
-#: mesh blows up at s = 0.22 where 2.5 carries it to 0.3 (te = 0.04, gamma = 10, n = 18).
-_SAFETY = 2.5
+#: Factor on the scaled masses, and the shrinkage after which they are taken anew.
+_SAFETY = 2.0
+_REWEIGH = 0.01
+
+#: Steps between two weighings while settling.
+_SETTLE_REWEIGH = 1000
 
 #: Steps over which the surface's drift is measured.
 _REST_STEPS = 200
 
-#: Element-steps between two looks at the observer: about a quarter of a second on one core.
+#: Element-steps between two looks at the observer: about a quarter of a second on one core. The march goes on in whole
+#: slices, whatever stages were asked for; what is left to a stage is done on its copy.
 _SLICE = 8_000_000
 
 
@@ -63,13 +79,13 @@ class Path:
         fade = (heights[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
         bumpy = mesh.positions + params.imperfection * fade * np.repeat(mesh.rays, mesh.levels, axis=0)
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)
+        self._moduli = mu, settings.kappa_ratio * mu
         self._layout = build_layout(
-            bumpy, mesh.connectivity, mesh.is_exocarp, mu, settings.kappa_ratio * mu, mesh.fixed, safety=_SAFETY, one_point=False
+            bumpy, mesh.connectivity, mesh.is_exocarp, *self._moduli, mesh.fixed, safety=_SAFETY, one_point=False
         )
-        quads = mesh.sphere.quads
-        self._skin = make_skin(
-            self._layout, mesh.surface_nodes, quads, settings.clearance * params.exocarp_thickness, params.exocarp_thickness
-        )
+        self._fresh_bound = stiffness_bounds(self._layout, self._layout.fresh, mesh.is_exocarp, *self._moduli)
+        te = params.exocarp_thickness
+        self._skin = make_skin(self._layout, mesh.surface_nodes, mesh.sphere.quads, settings.clearance * te, te)
         self._state, self._velocity = new_state(self._layout)
         self._steps = 0
         self._shrinkage = 0.0
@@ -94,12 +110,21 @@ class Path:
             Unstable: the state left the finite.
 
         """
-        if shrinkage > self._settings.start:
-            self._march(shrinkage, last)
-            state, velocity = self._state.copy(), self._velocity.copy()
-        else:
-            state, velocity = self._smooth(shrinkage)
+        settings = self._settings
+        if shrinkage <= settings.start:
+            return self._settle(*self._smooth(shrinkage), shrinkage)
+        target = int((shrinkage - settings.start) / settings.pace)
+        self._march(target, last)
+        state, velocity = self._state.copy(), self._velocity.copy()
+        if target > self._place:
+            self._advance(
+                state, velocity, target - self._place, self._at(self._place), self._at(target), settings.damping
+            )
         return self._settle(state, velocity, shrinkage)
+
+    def _at(self, place: int) -> float:
+        """Return the shrinkage after `place` steps of the march."""
+        return self._settings.start + place * self._settings.pace
 
     def _smooth(self, shrinkage: float) -> tuple[Fixed, Single]:
         """Return the start at `shrinkage`: the closed form along each ray, exact for spheres, at rest."""
@@ -115,26 +140,41 @@ class Path:
         )
         return new_state(self._layout, fresh * (moved.reshape(-1) / distance)[:, None])
 
-    def _march(self, shrinkage: float, last: float) -> None:
-        settings = self._settings
+    def _march(self, target: int, last: float) -> None:
+        """March in whole slices to at most `target` steps."""
+        settings, mesh = self._settings, self.mesh
         if not self._begun:
             self._state, self._velocity = self._smooth(settings.start)
             # the closed form is incompressible, the elements are nearly so: let the difference ring down
             self._advance(self._state, self._velocity, 400, settings.start, settings.start, 0.05)
-            self._begun, self._place = True, 0
-        target = int((shrinkage - settings.start) / settings.pace)
+            self._begun = True
         chunk = max(20, _SLICE // self.elements)
-        while self._place < target:
-            count = min(chunk, target - self._place)
-            a = settings.start + self._place * settings.pace
-            b = settings.start + (self._place + count) * settings.pace
-            self._advance(self._state, self._velocity, count, a, b, settings.damping)
-            self._place += count
+        every = max(1, round(_REWEIGH / (chunk * settings.pace)))
+        while self._place + chunk <= target:
+            if self._place // chunk % every == 0:
+                self._layout = self._weighed(self._state)
+            a, b = self._at(self._place), self._at(self._place + chunk)
+            self._advance(self._state, self._velocity, chunk, a, b, settings.damping)
+            self._place += chunk
             self._context.report(b / last if last else 1.0, f"shrinkage s = {b:.3f}")
 
-    def _advance(self, state: Fixed, velocity: Single, count: int, a: float, b: float, damping: float) -> None:
+    def _weighed(self, state: Fixed) -> Layout:
+        return reweigh(self._layout, state, self.mesh.is_exocarp, *self._moduli, self._fresh_bound, safety=_SAFETY)
+
+    def _advance(
+        self,
+        state: Fixed,
+        velocity: Single,
+        count: int,
+        a: float,
+        b: float,
+        damping: float,
+        layout: Layout | None = None,
+    ) -> None:
         self._context.check_cancelled()
-        skin = march(self._layout, state, velocity, count, theta=(1 - a, 1 - b), damping=damping, skin=self._skin)
+        layout = layout or self._layout
+        forget(self._skin, layout)
+        skin = march(layout, state, velocity, count, theta=(1 - a, 1 - b), damping=damping, skin=self._skin)
         assert skin is not None
         self._skin = skin
         self._steps += count
@@ -154,27 +194,31 @@ class Path:
         if shrinkage == 0:
             return State(surface, shrinkage, 0.0, 0.0, self._steps)  # free of stress: nothing to settle
         chunk = max(20, min(_REST_STEPS, _SLICE // self.elements))
+        layout, weigh_at = self._layout, 0
         spent, residual, drift = 0, np.inf, np.inf
         while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
+            if spent >= weigh_at:
+                layout, weigh_at = self._weighed(state), spent + _SETTLE_REWEIGH
             touching = self._skin.contact.counts[PAIRS] > 0
             damping = settings.touching_damping if touching else settings.settle_damping
-            self._advance(state, velocity, chunk, shrinkage, shrinkage, damping)
+            self._advance(state, velocity, chunk, shrinkage, shrinkage, damping, layout)
             spent += chunk
-            residual = self._residual(state, shrinkage)
+            residual = self._residual(state, shrinkage, layout)
             moved = positions(state[self.surface_nodes])
             speed = np.sqrt(np.square(moved - surface).sum(axis=1).mean()) / chunk
             drift = float(speed * _REST_STEPS / self._params.exocarp_thickness)
             surface = moved
         return State(surface, shrinkage, residual, drift, self._steps)
 
-    def _residual(self, state: Fixed, shrinkage: float) -> float:
+    def _residual(self, state: Fixed, shrinkage: float, layout: Layout) -> float:
         """Out-of-balance force, contact included: what one step from rest would do to the momentum.
 
         Relative to the root of the sum of squares of all elements' nodal forces.
         """
-        layout, theta = self._layout, 1 - shrinkage
+        theta = 1 - shrinkage
         scale = internal_force(layout, state, theta).scale
         moved, kick = state.copy(), np.zeros((layout.nodes, 4), np.float32)
+        forget(self._skin, layout)
         march(layout, moved, kick, 1, theta=(theta, theta), damping=0.0, skin=self._skin)
         momentum = (kick[:, :3] * layout.mass[:, None])[layout.free]
         return float(np.linalg.norm(momentum)) / scale if scale > 0 else 0.0

@@ -13,8 +13,8 @@ from ..fruit import azimuths, colatitudes, lattice
 from .descriptors import Descriptors, Surface
 from .mesh import Sampler
 from .params import DehydrationParams
-from .penetration import penetration
 from .path import Path, State
+from .penetration import penetration
 from .settings import Settings, choose
 
 __all__ = ["run"]

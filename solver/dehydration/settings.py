@@ -24,8 +24,8 @@ class Settings:
     n: elements per edge of the cubed sphere. core: fractions of the core's layer breakpoints. kappa_ratio: bulk over
     shear modulus. pace: shrinkage per step of the march. damping: per step, while marching, while
     settling, and while settling skin that touches (less lets contacts chatter).
-    residual, drift: at which a stage counts as settled (see `path.State`). settle_steps: after which it does not. clearance: gap
-    that self-contact keeps, in exocarp thicknesses.
+    residual, drift: at which a stage counts as settled (see `path.State`). settle_steps: after which it does not.
+    clearance: gap that self-contact keeps, in exocarp thicknesses.
     start: shrinkage below which the fruit is still smooth, where the march begins.
     """
 

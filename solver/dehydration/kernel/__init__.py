@@ -16,7 +16,8 @@ from solver.dehydration.kernel.march import (
     march,
     new_state,
 )
-from solver.dehydration.kernel.skin import Skin, make_skin
+from solver.dehydration.kernel.reweigh import reweigh, stiffness_bounds
+from solver.dehydration.kernel.skin import Skin, forget, make_skin
 
 __all__ = [
     "Backend",
@@ -27,6 +28,7 @@ __all__ = [
     "build_layout",
     "default_backend",
     "element_report",
+    "forget",
     "internal_force",
     "kinetic_energy",
     "make_skin",
@@ -35,5 +37,7 @@ __all__ = [
     "out_of_reach",
     "place",
     "positions",
+    "reweigh",
+    "stiffness_bounds",
     "strain_energy",
 ]

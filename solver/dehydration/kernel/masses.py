@@ -68,10 +68,10 @@ def _stiffness_bound(laplacian: Floats, gradient: Floats, volume: Floats, mu: Fl
     return bound
 
 
-def largest_stiffness(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool) -> Floats:
+def largest_stiffness(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool, *, one_point: bool = True) -> Floats:
     """Upper bound (ne,) of lambda_max of each element's stiffness at rest; corners (ne, 8, 3).
 
-    Core elements get the larger of the bounds of the 2x2x2 and the one-point element.
+    Core elements get the larger of the bounds of the 2x2x2 and, if `one_point`, the one-point element.
     """
     points, weights = quadrature(exocarp)
     derivatives = shape_derivatives(points)
@@ -87,8 +87,8 @@ def largest_stiffness(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool)
         laplacian = weighted.reshape(by_node) @ gradients.reshape(by_node).transpose(0, 2, 1)
         gradient = weighted.sum(axis=2)
         bound = _stiffness_bound(laplacian, gradient, volume, mu[part], kappa[part])
-        if not exocarp:
-            one_point = _one_point_laplacian(corners[part])
-            bound = np.maximum(bound, _stiffness_bound(one_point, gradient, volume, mu[part], kappa[part]))
+        if one_point and not exocarp:
+            single = _one_point_laplacian(corners[part])
+            bound = np.maximum(bound, _stiffness_bound(single, gradient, volume, mu[part], kappa[part]))
         result[part] = bound
     return result

@@ -51,6 +51,15 @@ def make_skin(layout: Layout, surface_nodes: ArrayLike, quads: ArrayLike, cleara
     )
 
 
+def forget(skin: Skin, layout: Layout) -> None:
+    """Drop all that earlier steps left behind and take the layout's masses: the next march depends on its state alone."""
+    skin.inverse_mass[:] = layout.inverse_mass[skin.rows]
+    skin.contact.searched[:] = 1e30
+    skin.contact.counts[:] = 0
+    skin.contact.feet[:] = 0
+    skin.deepest[:] = 0
+
+
 def widen(skin: Skin) -> Skin:
     """The same skin with room for all the pairs that the last search wanted."""
     return skin._replace(contact=grow(skin.contact, int(skin.contact.counts[1])))
