@@ -19,7 +19,8 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(BIN)/wizen sweep examples/fig7-right.toml --store $(STORE)
 	$(BIN)/wizen table build --store $(STORE)
-	$(BIN)/wizen map --store $(STORE) --out buckling-map.png --stages 0.1,0.15,0.2,0.3
+	test buckling-map.png -nt $(STORE)/tables/default/current.json || \
+	  $(BIN)/wizen map --store $(STORE) --out buckling-map.png --stages 0.1,0.15,0.2,0.3
 	$(BIN)/wizen serve --store $(STORE) --port $(PORT)
 
 ## test: everything quick; CI runs this

@@ -142,7 +142,7 @@ class Path:
 
     def _march(self, target: int, last: float) -> None:
         """March in whole slices to at most `target` steps."""
-        settings, mesh = self._settings, self.mesh
+        settings = self._settings
         if not self._begun:
             self._state, self._velocity = self._smooth(settings.start)
             # the closed form is incompressible, the elements are nearly so: let the difference ring down

@@ -50,7 +50,8 @@ def reweigh(
     """
     bound = np.maximum(fresh_bound, stiffness_bounds(layout, state, is_exocarp, mu, kappa))
     shares = np.repeat(safety * bound / 4, 8)
-    mass = np.bincount(layout.connectivity.ravel(), weights=shares, minlength=layout.nodes)
+    total = np.bincount(layout.connectivity.ravel(), weights=shares, minlength=layout.nodes)
+    mass: Floats = np.asarray(total, np.float64)
     inverse = np.zeros(layout.nodes, np.float32)
     inverse[layout.free] = 1 / mass[layout.free]
     return dataclasses.replace(layout, mass=mass, inverse_mass=inverse)

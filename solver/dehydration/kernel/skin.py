@@ -52,7 +52,7 @@ def make_skin(layout: Layout, surface_nodes: ArrayLike, quads: ArrayLike, cleara
 
 
 def forget(skin: Skin, layout: Layout) -> None:
-    """Drop all that earlier steps left behind and take the layout's masses: the next march depends on its state alone."""
+    """Take the layout's masses and drop all that earlier steps left: the next march depends on its state alone."""
     skin.inverse_mass[:] = layout.inverse_mass[skin.rows]
     skin.contact.searched[:] = 1e30
     skin.contact.counts[:] = 0
