@@ -19,7 +19,7 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(BIN)/wizen sweep examples/fig7-right.toml --store $(STORE)
 	$(BIN)/wizen table build --store $(STORE)
-	test buckling-map.png -nt $(STORE)/tables/default/current.json || \
+	test -f buckling-map.png -a -z "$$(find $(STORE)/shards -name '*.h5' -newer buckling-map.png)" || \
 	  $(BIN)/wizen map --store $(STORE) --out buckling-map.png --stages 0.1,0.15,0.2,0.3
 	$(BIN)/wizen serve --store $(STORE) --port $(PORT)
 

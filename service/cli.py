@@ -50,6 +50,7 @@ def serve(
     from pydantic import ValidationError
 
     from .app import create_app
+    from .hints import hints
     from .settings import Settings
 
     given: dict[str, Any] = {"store": store, "host": host, "port": port}
@@ -61,7 +62,10 @@ def serve(
         raise InvalidOption(f"WIZEN_{name}: {item['msg']}.") from None
     listener = _listen(settings.host, settings.port)
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
-    note(f"serving {settings.store} at http://{where}:{listener.getsockname()[1]}")
+    address = f"http://{where}:{listener.getsockname()[1]}"
+    note(f"serving {settings.store} at {address}")
+    for line in hints(settings.store, address):
+        note(line)
     with listener:
         uvicorn.Server(uvicorn.Config(create_app(settings), log_level="warning")).run(sockets=[listener])
 
