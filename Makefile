@@ -8,7 +8,7 @@ STAMP  := $(VENV)/.installed
 STORE  ?= demo
 PORT   ?= 8765
 
-.PHONY: demo test test-slow bench lint format clean
+.PHONY: demo test test-slow bench lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -31,9 +31,10 @@ test: $(STAMP)
 test-slow: $(STAMP)
 	$(BIN)/python -m pytest -m 'slow or not slow' --timeout 3600
 
-## bench: error against seconds, into docs/
+## bench: the kernel against the C prototype, the look-up per resolution; run it on an idle machine
 bench: $(STAMP)
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks.kernel
+	$(BIN)/python -m benchmarks.lookup
 
 ## lint: style, types, floors
 lint: $(STAMP)
