@@ -44,7 +44,8 @@ def analyse(field: Array, degree: int) -> NDArray[np.complex128]:
     """
     n = len(field)
     rings = np.fft.rfft(field, axis=1)[:, : degree + 1] * (np.pi / n)
-    return np.einsum("mlt,tm->ml", _legendre(n, degree), rings * quadrature(n)[:, None], optimize=True)
+    # without BLAS (no optimize): its rounding depends on the number of threads, and results must not
+    return np.einsum("mlt,tm->ml", _legendre(n, degree), rings * quadrature(n)[:, None])
 
 
 def power(coefficients: NDArray[np.complex128]) -> Array:

@@ -33,6 +33,8 @@ def bumps(directions: Array, generator: np.random.Generator, highest: float = HI
     total = np.zeros(len(directions))
     for start in range(0, len(directions), 4096):
         part = directions[start : start + 4096]
-        total[start : start + 4096] = np.cos(part @ vectors.T + phase[keep]).sum(axis=1)
+        # not `@`: BLAS rounds differently with another number of threads, and then every bit of the run would
+        heights = np.einsum("ni,wi->nw", part, vectors)
+        total[start : start + 4096] = np.cos(heights + phase[keep]).sum(axis=1)
     # a sum of many waves is Gaussian with variance WAVES / 2; its largest value over the sphere is about 4 sigma
     return total / (4 * np.sqrt(WAVES / 2))

@@ -1,6 +1,9 @@
 """Every registered solver is held to the contract of DESIGN.md."""
 
+import os
 import pickle
+import subprocess
+import sys
 import threading
 import time
 
@@ -101,6 +104,29 @@ def test_same_seed_same_bytes_and_another_seed_differs(solver):
     assert same(first, again)
     other = solver.solve(params.model_copy(update={"seed": params.seed + 1}), need)
     assert not same(first, other)
+
+
+PROBE = """
+import sys
+from tests.solver.test_contract import small
+from solver import registry
+from store.shards import digest
+solver = registry.get(sys.argv[1])
+params, need, _ = small(solver)
+print(digest(solver.solve(params, need)))
+"""
+
+
+def test_same_bytes_whatever_the_number_of_threads(solver):
+    """A sweep on one worker and on many stores the same results."""
+    digests = []
+    for threads in ("1", "2"):
+        names = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+        environment = os.environ | dict.fromkeys(names, threads)
+        command = [sys.executable, "-c", PROBE, solver.name]
+        run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        digests.append(run.stdout)
+    assert digests[0] == digests[1] != ""
 
 
 def test_an_unknown_field_is_refused_before_any_work(solver):

@@ -249,4 +249,4 @@ def internal_force(
     nodal, total = np.zeros((layout.nodes, 3)), np.zeros(layout.nodes)
     _sum_rows(layout.row_start, layout.rows, forces, squares, nodal, total)
     free = layout.free
-    return InternalForce(nodal, float(np.linalg.norm(nodal[free])), float(np.sqrt(total[free].sum())))
+    return InternalForce(nodal, float(np.sqrt(np.square(nodal[free]).sum())), float(np.sqrt(total[free].sum())))
