@@ -379,7 +379,11 @@ class Solver:
                 )
         quality: Quality = need.quality
         if need.tolerance is not None:
-            fit = [q for q in ("preview", "default", "fine") if self.tolerances[q] <= need.tolerance]
+            fit = [
+                q
+                for q in ("preview", "default", "fine")
+                if q in self.tolerances and self.tolerances[q] <= need.tolerance
+            ]
             if not fit:
                 best = min(self.tolerances.values())
                 raise InvalidInput(
