@@ -52,7 +52,8 @@ def test_solvers(client: httpx.Client) -> None:
     assert solver["axes"]["rs1"]["default"] == 0.4
     assert solver["stages"]["highest"] == 0.6
     assert solver["fields"]["position"]["units"] == "1"
-    assert solver["qualities"]["fine"] == {"relative_error": 0.05, "resolution": 128}
+    assert solver["qualities"]["default"] == {"relative_error": SOLVER.tolerances["default"], "resolution": 96}
+    assert set(solver["qualities"]) == set(SOLVER.tolerances)
     for preset in solver["presets"].values():
         SOLVER.params.parse(preset)
     assert set(solver["params"]["properties"]) == set(SOLVER.params.model_fields)
