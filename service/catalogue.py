@@ -101,8 +101,9 @@ def _solver(solver: Solver) -> Json:
         "default_fields": list(solver.default_fields),
         "presets": solver.presets,
         "qualities": {
-            name: {"relative_error": solver.tolerances[name], "resolution": solver.default_resolution[name]}
-            for name in solver.tolerances
+            # an error that was never measured is null, not a guess
+            name: {"relative_error": solver.tolerances.get(name), "resolution": resolution}
+            for name, resolution in solver.default_resolution.items()
         },
         "links": {"shapes": f"/v1/shapes/{solver.name}"},
     }
