@@ -1,0 +1,214 @@
+"""The onset of any fruit, elliptic equators too: triquadratic elements between the symmetry planes, all parities.
+
+Cost: three-dimensional. The part of the fruit between its planes is solved twice per look (two smooth states), then
+each parity costs a factorisation and some forty solves; unknowns grow with 1 / thickness^2.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import sph_harm_y
+
+from ...contract import Context, NotConverged
+from ..closed_form import flat_film_wavelength, onset_estimate
+from ..implicit import Equilibrium, Model, build_model, build_quadratic_mesh, equilibrium, natural_symmetry
+from ..implicit.buckling import Crossing, first_crossing, parities, stress_stiffness, tangent_at
+from ..implicit.hexahedron import shape
+from ..implicit.location import fold, locate
+from ..mesh import layer_fractions
+from ..params import DehydrationParams
+from .result import FieldMode, Method, Onset, Tie
+
+__all__ = ["onset_full"]
+
+Floats = NDArray[np.float64]
+
+#: Quadratic elements per wrinkle of the flat film on a unit sphere: s_cr of the sphere with te = 0.04 comes out 3.0,
+#: 1.7 and 0.9 % high with 1.5, 2 and 2.5 of them.
+PER_WAVELENGTH = {"preview": 1.5, "default": 2.5, "fine": 3.5}
+#: Core layer at the interface in wavelengths, and how fast layers grow inwards.
+FIRST_LAYER, LAYER_GROWTH = 0.17, 1.8
+#: Bulk over shear modulus that stands for incompressible; s_cr is off by about 2e-5, relative.
+PENALTY = 1e5
+#: Largest shrinkage that is looked at.
+SEARCHED = 0.6
+#: Fractions of the expected onset between which the tangent's slope is taken: a first look, then a close one.
+LOOKS = ((0.80, 0.86), (0.96, 0.985))
+#: Parities whose first look is this close to the best are looked at closely.
+RIVALS = 1.03
+#: Shrinkage of the small state whose stress the linear method scales.
+SMALL = 1e-4
+
+
+def onset_full(
+    params: DehydrationParams,
+    *,
+    method: Method,
+    kappa_ratio: float | None,
+    quality: str = "default",
+    context: Context | None = None,
+) -> Onset:
+    """Return the onset of any fruit.
+
+    method: "exact" is the first singular tangent on the shrunk state, "linear" Liu et al. 2014, Eq. 11. quality:
+    preview, default or fine (elements per wrinkle).
+
+    Raises:
+        NotConverged: no smooth state could be reached below the onset.
+        Cancelled: by the context.
+
+    """
+    begin, context = time.perf_counter(), context or Context()
+    model = _model(params, kappa_ratio, PER_WAVELENGTH[quality])
+    crossings = _exact(params, model, context) if method == "exact" else _linear(model, context)
+    settings = {"n": len(model.mesh.quad_of[0]), "layers": model.mesh.layers, "unknowns": int(model.free.sum())}
+    if not crossings:
+        return Onset(
+            None, None, None, "full", method, kappa_ratio, None, seconds=time.perf_counter() - begin, settings=settings,
+            searched=SEARCHED, reason=f"the smooth shape stays stable up to s = {SEARCHED:g}",
+        )  # fmt: skip
+    found = []
+    for crossing in crossings:
+        heights = _heights(params, model, crossing)
+        degree, wavenumber = _dominant(heights, 2 * len(model.mesh.quad_of[0]) * 2)
+        found.append((crossing.shrinkage, degree, wavenumber, heights))
+    s_cr, degree, wavenumber, heights = found[0]
+    return Onset(
+        s_cr, degree, wavenumber, "full", method, kappa_ratio, FieldMode(heights),
+        ties=tuple(Tie(s, d, m) for s, d, m, _ in found[1:]), seconds=time.perf_counter() - begin,
+        searched=SEARCHED, settings=settings,
+    )  # fmt: skip
+
+
+def _model(params: DehydrationParams, kappa_ratio: float | None, per_wavelength: float) -> Model:
+    wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
+    n = 2 * math.ceil(np.pi / 4 * per_wavelength / wavelength)
+    flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), 0.05)
+    core = layer_fractions(flesh, FIRST_LAYER * min(wavelength, 0.4), LAYER_GROWTH)
+    mesh = build_quadratic_mesh(params, max(n, 4), core, natural_symmetry(params))
+    return build_model(params, mesh, kappa_ratio or PENALTY)
+
+
+def _linear(model: Model, context: Context) -> list[Crossing]:
+    """All parities' first singular K0 + s K_sigma, sorted."""
+    fresh = equilibrium(model, 0.0, context=context)
+    small = equilibrium(model, SMALL, tolerance=1e-7, context=context)
+    base, slope = tangent_at(model, fresh), stress_stiffness(model, small) / SMALL
+    return _sorted(_all(model, base, slope, 0.0, context))
+
+
+def _exact(params: DehydrationParams, model: Model, context: Context) -> list[Crossing]:
+    expected = min(onset_estimate(params.modulus_ratio, min(params.stone)), SEARCHED)
+    at: Equilibrium | None = None
+    wanted: dict[tuple[int, ...], Floats | None] = {parity: None for parity, _ in parities(model)}
+    known: dict[tuple[int, ...], Crossing] = {}
+    lower = False
+    for _ in range(8):
+        look = LOOKS[-1] if known else LOOKS[0]
+        low, high = (expected * fraction for fraction in look)
+        ahead = at is not None and not lower and at.shrinkage <= low
+        first = at = equilibrium(model, low, start=at if ahead else None, context=context)
+        second = equilibrium(model, high, start=first, context=context)
+        base = tangent_at(model, first)
+        slope = (tangent_at(model, second) - base) / (high - low)
+        try:
+            found = _all(model, base, slope, low, context, wanted)
+        except _AlreadyUnstable:
+            expected, lower, known = 0.8 * low, True, {}
+            wanted = {parity: None for parity, _ in parities(model)}
+            continue
+        fresh_look = not known
+        known = {crossing.parity: crossing for crossing in found}
+        if not known:
+            return []
+        best = min(crossing.shrinkage for crossing in found)
+        if best > SEARCHED:
+            return []
+        close = abs(best / expected - 1) < 0.03
+        expected, lower = best, False
+        wanted = {c.parity: c.mode for c in found if c.shrinkage < RIVALS * best}
+        if not fresh_look and close:
+            return _sorted(found)
+    raise NotConverged(
+        "the onset was not bracketed.", advice="Ask for a finer quality.", last_stage=at.shrinkage if at else None
+    )
+
+
+class _AlreadyUnstable(Exception):
+    """The smooth state below the expected onset has a falling direction."""
+
+
+def _all(
+    model: Model, base: Floats, slope: Floats, start: float, context: Context,
+    wanted: dict[tuple[int, ...], Floats | None] | None = None,
+) -> list[Crossing]:  # fmt: skip
+    found = []
+    for number, (parity, free) in enumerate(parities(model)):
+        if wanted is not None and parity not in wanted:
+            continue
+        context.check_cancelled()
+        context.report(number / 2 ** len(parity), f"parity {parity}")
+        factor = model.factor(base, free)
+        if factor.negative:
+            raise _AlreadyUnstable
+        crossing = first_crossing(model, base, slope, start, parity, free, factor, (wanted or {}).get(parity))
+        if crossing is not None:
+            found.append(crossing)
+    return found
+
+
+def _sorted(found: list[Crossing]) -> list[Crossing]:
+    return sorted((c for c in found if c.shrinkage <= SEARCHED), key=lambda c: c.shrinkage)
+
+
+def _heights(params: DehydrationParams, model: Model, crossing: Crossing) -> Callable[[Floats], Floats]:
+    """The mode's height along the outward normal as a function of parametric directions, largest magnitude 1."""
+    mesh = model.mesh
+    nodal = np.zeros_like(mesh.positions)
+    nodal[model.pattern.free >= 0] = crossing.mode
+
+    def raw(towards: Floats) -> Floats:
+        colatitude, azimuth = np.arccos(np.clip(towards[:, 1], -1, 1)), np.arctan2(towards[:, 2], towards[:, 0])
+        points = params.surface(colatitude, azimuth)
+        folded, signs = fold(mesh, points)
+        element, local = locate(params, mesh, folded)
+        moved = signs * np.einsum("pa,pai->pi", shape(local), nodal[mesh.connectivity[element]])
+        for axis, parity in zip(mesh.planes, crossing.parity, strict=True):
+            if parity < 0:
+                moved *= signs[:, axis : axis + 1]
+        step = 1e-5
+        # one-sided where the pole is nearer than the step; the azimuthal tangent vanishes there, so go a little off it
+        inner = np.clip(colatitude, 1e-3, np.pi - 1e-3)
+        along = params.surface(inner + step, azimuth) - params.surface(inner - step, azimuth)
+        around = params.surface(inner, azimuth + step) - params.surface(inner, azimuth - step)
+        normal = np.cross(around, along)
+        normal *= np.sign(np.einsum("pi,pi->p", normal, points) / np.linalg.norm(normal, axis=1))[:, None]
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        return np.einsum("pi,pi->p", moved, normal)
+
+    theta, phi = np.meshgrid(np.linspace(0.01, np.pi - 0.01, 181), np.linspace(0, np.pi, 181), indexing="ij")
+    sample = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
+    values = raw(sample.reshape(-1, 3))
+    scale = values[np.argmax(np.abs(values))]
+    return lambda towards: raw(np.asarray(towards, dtype=float)) / scale
+
+
+def _dominant(heights: Callable[[Floats], Floats], highest: int) -> tuple[int, int]:
+    """Spherical-harmonic degree and azimuthal wavenumber that carry most of the mode's mean square."""
+    nodes, weights = np.polynomial.legendre.leggauss(highest + 8)
+    colatitude = np.arccos(nodes)
+    azimuth = np.arange(2 * highest + 2) * np.pi / (highest + 1)
+    theta, phi = np.meshgrid(colatitude, azimuth, indexing="ij")
+    points = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
+    waves = np.fft.rfft(heights(points.reshape(-1, 3)).reshape(theta.shape), axis=1)[:, : highest + 1]
+    power = np.zeros((highest + 1, highest + 1))
+    for m in range(highest + 1):
+        degrees = np.arange(m, highest + 1)
+        harmonics = sph_harm_y(degrees[:, None], m, colatitude[None, :], 0.0).real
+        power[m:, m] = np.abs((harmonics * weights) @ waves[:, m]) ** 2 * (1 if m == 0 else 2)
+    return int(power.sum(axis=1).argmax()), int(power.sum(axis=0).argmax())
