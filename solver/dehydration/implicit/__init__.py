@@ -1,0 +1,22 @@
+"""Implicit solution of the smooth shrunk fruit: hex27 displacements, trilinear pressures, symmetry, full Newton."""
+
+from __future__ import annotations
+
+from .base_state import BaseState, base_state
+from .mesh import QuadraticMesh, Symmetry, build_quadratic_mesh, graded_layers, natural_symmetry
+from .newton import Equilibrium, Loading, Model, build_model, equilibrium
+
+__all__ = [
+    "BaseState",
+    "Equilibrium",
+    "Loading",
+    "Model",
+    "QuadraticMesh",
+    "Symmetry",
+    "base_state",
+    "build_model",
+    "build_quadratic_mesh",
+    "equilibrium",
+    "graded_layers",
+    "natural_symmetry",
+]

@@ -1,0 +1,83 @@
+"""Where a fresh point of the fruit lies in the mesh: element and local coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...fruit import directions
+from ..mesh import _FACES as FACES
+from ..params import DehydrationParams
+from .hexahedron import shape, shape_gradients
+from .mesh import QuadraticMesh
+
+__all__ = ["fold", "locate"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_NUDGE = 1e-9
+"""Points on a symmetry plane are looked up this far inside, so that round-off does not put them beyond it."""
+
+
+def fold(mesh: QuadraticMesh, points: Floats) -> tuple[Floats, Floats]:
+    """Return points (k, 3) mirrored into the mesh's part of the fruit, and the signs (k, 3) that mirror back."""
+    signs = np.ones_like(points)
+    for axis in mesh.planes:
+        signs[:, axis] = np.where(points[:, axis] < 0, -1.0, 1.0)
+    return points * signs, signs
+
+
+def _parametric(params: DehydrationParams, points: Floats) -> Floats:
+    """Directions (k, 3) on the parametric sphere of the rays through points (k, 3)."""
+    squash = params.radii[7] / params.radii[3]
+    x, y, z = points[:, 0], points[:, 1], points[:, 2] / squash
+    table = np.linspace(0.0, np.pi, 2001)
+    gx, gy = params.generatrix(table)
+    # the outline seen from the centre turns one way (the fruit's validator): its polar angle can be inverted
+    polar = np.arctan2(np.maximum(gx, 0.0), gy)
+    colatitude = np.interp(np.arctan2(np.hypot(x, z), y), polar, table)
+    return directions(colatitude, np.arctan2(z, x))
+
+
+def _first_guess(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tuple[Ints, Floats]:
+    towards = _parametric(params, points)
+    for axis in mesh.planes:
+        towards[:, axis] = np.maximum(towards[:, axis], _NUDGE)
+    heights = towards @ FACES[:, 0].T
+    face = np.argmax(heights, axis=1)
+    axes = FACES[face]
+    angles = np.stack(
+        [np.arctan2(np.einsum("pi,pi->p", towards, axes[:, k]), heights.max(axis=1)) for k in (1, 2)], axis=-1
+    )
+    n = len(mesh.quad_of[0])
+    cells = (angles + np.pi / 4) * (2 * n / np.pi)
+    cell = np.clip(np.floor(cells).astype(np.int64), 0, n - 1)
+    stack = mesh.quad_of[face, cell[:, 0], cell[:, 1]]
+    distance = np.linalg.norm(points, axis=1)
+    rays = points / np.maximum(distance, 1e-300)[:, None]
+    stone = params.stone_distance(rays)
+    colatitude = np.arccos(np.clip(towards[:, 1], -1, 1))
+    outer = np.linalg.norm(params.sarcocarp(colatitude, np.arctan2(towards[:, 2], towards[:, 0])), axis=1)
+    depth = np.where(
+        distance <= outer, (distance - stone) / (outer - stone), 1 + (distance - outer) / params.exocarp_thickness
+    )
+    layer = np.clip(np.searchsorted(mesh.breaks, depth, side="right") - 1, 0, mesh.layers - 1)
+    low, high = mesh.breaks[layer], mesh.breaks[layer + 1]
+    local = np.concatenate([2 * (cells - cell) - 1, (2 * (depth - low) / (high - low) - 1)[:, None]], axis=1)
+    return stack * mesh.layers + layer, local
+
+
+def locate(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tuple[Ints, Floats]:
+    """Return element (k,) and local coordinates (k, 3) of fresh points (k, 3) inside the mesh's part (see `fold`).
+
+    The element is that of the point's ray and depth; local coordinates then solve X(xi) = point, and may reach a
+    little beyond +-1 where the polynomial faces miss the fruit's surface.
+    """
+    element, local = _first_guess(params, mesh, points)
+    corners = mesh.positions[mesh.connectivity[element]]
+    for _ in range(4):
+        gap = points - np.einsum("pa,pai->pi", shape(local), corners)
+        jacobian = np.einsum("pai,pak->pik", corners, shape_gradients(local))
+        local = np.clip(local + np.linalg.solve(jacobian, gap[..., None])[..., 0], -1.5, 1.5)
+    return element, local

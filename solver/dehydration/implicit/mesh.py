@@ -1,0 +1,113 @@
+"""Triquadratic mesh of a fruit: quads of the cubed sphere times radial layers, whole or the part between its planes.
+
+Every fruit is symmetric about x = 0 and z = 0; about y = 0 as well where r1 to r7 read the same backwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...contract import InvalidInput
+from ..mesh import CubedSphere, build_mesh
+from ..params import DehydrationParams
+
+__all__ = ["QuadraticMesh", "Symmetry", "build_quadratic_mesh", "graded_layers", "natural_symmetry"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Symmetry = Literal["octant", "quarter", "whole"]
+
+#: Planes (as normal axes) that bound each part.
+PLANES: dict[Symmetry, tuple[int, ...]] = {"octant": (0, 1, 2), "quarter": (0, 2), "whole": ()}
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticMesh:
+    """hex27 elements between stone and outer surface.
+
+    positions: (nn, 3) fresh; node = column * levels + level, level 0 on the stone, odd levels mid-layer.
+    connectivity: (ne, 27) in the order of `hexahedron`; element = stack * layers + layer. is_exocarp: (ne,).
+    stacks: (ns, 9) columns under each quad of the surface. planes: normal axes of the symmetry planes that bound the
+    mesh. quad_of: (6, n, n) stack of each quad of the cubed sphere, -1 where the part leaves it out.
+    breaks: (layers + 1,) radial breakpoints: fraction of the flesh up to 1, then 1 + fraction of the exocarp.
+    """
+
+    sphere: CubedSphere
+    positions: Floats
+    connectivity: Ints
+    is_exocarp: NDArray[np.bool_]
+    stacks: Ints
+    planes: tuple[int, ...]
+    quad_of: Ints
+    levels: int
+    breaks: Floats
+
+    @property
+    def columns(self) -> int:
+        """Number of radial lines of nodes."""
+        return len(self.positions) // self.levels
+
+    @property
+    def layers(self) -> int:
+        """Number of elements along a column."""
+        return (self.levels - 1) // 2
+
+
+def natural_symmetry(params: DehydrationParams) -> Symmetry:
+    """Return the smallest part that stands for the whole fruit under a uniform load."""
+    profile = params.radii[:7]
+    return "octant" if profile == profile[::-1] else "quarter"
+
+
+def graded_layers(count: int, growth: float) -> Floats:
+    """Return breakpoints 0..1 (count + 1,) of layers that grow inwards from the interface by the factor `growth`."""
+    thickness = growth ** np.arange(count, dtype=float)
+    return 1 - np.concatenate([[0.0], np.cumsum(thickness / thickness.sum())])[::-1]
+
+
+def _with_middles(breaks: Floats) -> Floats:
+    result = np.empty(2 * len(breaks) - 1)
+    result[::2], result[1::2] = breaks, (breaks[1:] + breaks[:-1]) / 2
+    return result
+
+
+def build_quadratic_mesh(
+    params: DehydrationParams, n: int, core: Floats, symmetry: Symmetry = "whole", exocarp_layers: int = 1
+) -> QuadraticMesh:
+    """Return the mesh with `n` quadratic elements per edge of the cubed sphere and core layers at fractions `core`.
+
+    Raises InvalidInput if a symmetric part is asked for with an odd `n`: its planes would cut elements in two.
+    """
+    planes = PLANES[symmetry]
+    if n < 1 or (planes and n % 2):
+        raise InvalidInput(
+            f"n = {n} elements per edge cannot be cut along the symmetry planes.", advice="Use an even n of 2 or more."
+        )
+    linear = build_mesh(params, 2 * n, _with_middles(core), 2 * exocarp_layers)
+    levels = linear.levels
+    grid = linear.sphere.faces
+    quads = np.stack([grid[:, i : i + 2 * n : 2, j : j + 2 * n : 2] for i in range(3) for j in range(3)], axis=-1)
+    inside = np.ones(len(linear.rays), dtype=bool)
+    for axis in planes:
+        inside &= linear.rays[:, axis] > -1e-9
+    kept = inside[quads].all(axis=-1)
+    quad_of = np.where(kept, np.cumsum(kept.ravel()).reshape(kept.shape) - 1, -1)
+    columns = np.unique(quads[kept])
+    number = np.full(len(linear.rays), -1)
+    number[columns] = np.arange(len(columns))
+    stacks = number[quads[kept]]
+    positions = linear.positions.reshape(-1, levels, 3)[columns].copy()
+    for axis in planes:
+        positions[np.abs(linear.rays[columns, axis]) < 1e-9, :, axis] = 0.0
+    layers = (levels - 1) // 2
+    level = 2 * np.arange(layers)[:, None] + np.arange(3)
+    connectivity = (stacks[:, None, :, None] * levels + level[None, :, None, :]).reshape(-1, 27)
+    is_exocarp = np.tile(np.arange(layers) >= len(core) - 1, len(stacks))
+    breaks = np.concatenate([core, 1 + np.arange(1, exocarp_layers + 1) / exocarp_layers])
+    return QuadraticMesh(
+        linear.sphere, positions.reshape(-1, 3), connectivity, is_exocarp, stacks, planes, quad_of, levels, breaks
+    )
