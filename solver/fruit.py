@@ -27,9 +27,11 @@ Array = NDArray[np.float64]
 MAX_DENT = 0.08
 #: Thinnest flesh between stone and exocarp, in units of r1.
 MIN_FLESH = 0.02
+#: Smallest half-axis of a stone, in units of r1; a fruit without a stone has (0, 0).
+MIN_STONE = 0.05
 
 Radius = Annotated[float, Field(ge=0.2, le=2.0)]
-StoneRadius = Annotated[float, Field(ge=0.05, le=1.5)]
+StoneRadius = Annotated[float, Field(ge=0.0, le=1.5)]
 
 
 class Fruit(Params):
@@ -49,7 +51,8 @@ class Fruit(Params):
     )
     stone: tuple[StoneRadius, StoneRadius] = Field(
         (0.4, 0.4),
-        description="Half-axes of the rigid stone: along the pole axis, and across it (the third follows from r8/r4)",
+        description="Half-axes of the rigid stone: along the pole axis, and across it (the third follows from r8/r4); "
+        "0, 0 for a fruit without a stone",
         json_schema_extra={"units": "r1", "axes": ["rs1", "rs2"]},
     )
     exocarp_thickness: float = Field(
@@ -65,6 +68,16 @@ class Fruit(Params):
     def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if value[0] != 1.0:
             raise ValueError("r1 is the unit of length and must be 1: divide every length by r1")
+        return value
+
+    @field_validator("stone")
+    @classmethod
+    def _whole(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if min(value) < MIN_STONE and max(value) > 0:
+            raise ValueError(
+                f"a stone needs both half-axes of at least {MIN_STONE}, and a fruit without one has both 0: "
+                "change rs1 and rs2 together"
+            )
         return value
 
     @model_validator(mode="after")
@@ -93,8 +106,13 @@ class Fruit(Params):
         return self
 
     @property
+    def has_stone(self) -> bool:
+        """Whether there is a stone at all."""
+        return self.stone[0] > 0
+
+    @property
     def is_sphere(self) -> bool:
-        """Whether fruit and stone are concentric spheres, for which closed forms exist."""
+        """Whether fruit and stone (if any) are concentric spheres, for which closed forms exist."""
         return len(set(self.radii)) == 1 and self.stone[0] == self.stone[1]
 
     @property
@@ -128,7 +146,9 @@ class Fruit(Params):
         return inner * (1 + self.exocarp_thickness / distance)
 
     def stone_distance(self, rays: Array) -> Array:
-        """Return the distance (...) from the centre to the stone's surface along unit rays (..., 3)."""
+        """Return the distance (...) from the centre to the stone's surface along unit rays (..., 3), 0 without one."""
+        if not self.has_stone:
+            return np.zeros(rays.shape[:-1])
         along, across = self.stone
         axes = np.array([across, along, across * self.radii[7] / self.radii[3]])
         return 1 / np.linalg.norm(rays / axes, axis=-1)

@@ -72,5 +72,8 @@ register(
         "1", "anisotropy of the wrinkle slope: +1 ridges along meridians, 0 reticular, -1 rings", "a"
     ),
     penetration=Quantity("1", "deepest self-penetration of the surface, in units of r1", "g"),
+    least_jacobian=Quantity("1", "least elastic volume ratio J/Jd of all integration points; inverted below 0", "J"),
+    strain_energy=Quantity("1", "strain energy of the settled fruit, in units of mu r1^3, mu of the sarcocarp", "E"),
+    released_energy=Quantity("1", "strain energy that settling released, in units of mu r1^3", "dE"),
     volume=Quantity("1", "volume enclosed by the outer surface, in units of r1^3", "V"),
 )

@@ -23,6 +23,7 @@ _DESCRIPTORS = (
     "buckle_count",
     "ridge_anisotropy",
     "penetration",
+    "least_jacobian",
 )
 
 
@@ -44,12 +45,19 @@ def _cost(params: DehydrationParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="dehydration",
-    version="1",
+    version="2",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
-    fields=("position", "displacement", *_DESCRIPTORS),
+    fields=("position", "displacement", *_DESCRIPTORS, "strain_energy", "released_energy"),
     default_fields=("displacement", *_DESCRIPTORS),
-    stages=StageAxis("s", "shrinkage s = 1 - theta of the sarcocarp", "1", 0.0, 0.6, (0.1, 0.15, 0.2, 0.25, 0.3)),
+    stages=StageAxis(
+        "s",
+        "shrinkage s = 1 - theta of the sarcocarp (negative: swelling)",
+        "1",
+        -0.3,
+        0.6,
+        (0.1, 0.15, 0.2, 0.25, 0.3),
+    ),
     default_resolution={"preview": 64, "default": 96, "fine": 128},
     # largest error of the roughness against a fine run, te = 0.04, gamma = 10 (docs/dehydration.md); fine has no finer
     tolerances={"preview": 0.16, "default": 0.11},

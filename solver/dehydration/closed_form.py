@@ -1,6 +1,7 @@
 """The spherical fruit before it buckles, in closed form (incompressible core and skin, rigid stone).
 
-Core: r^3 = A^3 + theta^3 (R^3 - A^3); skin: r^3 = r_i^3 + R^3 - R_i^3, with stone radius A and interface R_i.
+Core: r^3 = A^3 + theta^3 (R^3 - A^3); skin: r^3 = r_i^3 + R^3 - R_i^3, with stone radius A and interface R_i. Without a
+stone A = 0 and the core is r = theta R; swelling is theta > 1.
 Derived from Liu et al. 2014, Eq. 1-4, with F_d = theta I in the core; verified against the exact reference values.
 """
 

@@ -13,14 +13,19 @@ Longs = NDArray[np.int64]
 Single = np.float32
 Long = np.int64
 
-OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"reassoc", "nsz", "arcp", "contract"}}
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "arcp", "contract"}}
 
 OPPOSED = np.float32(-0.25)
 """Cosine between two outward normals below which skin faces skin (104 degrees)."""
-PAIRS, NEEDED, ACTIVE, SEARCHES = 0, 1, 2, 3
+ASKEW = 16
+"""Bit of `Contact.pair_own`: node and quad do not face each other, as at the mouth of a sulcus."""
+PAIRS, NEEDED, ACTIVE, SEARCHES, HITS = 0, 1, 2, 3, 4
 """Entries of `Contact.counts`."""
 ENTRIES = 16
 """Room for cell entries per quad; a quad grown by the reach overlaps about 8 cells."""
+
+NEAR = 64
+"""Room for the quads near one node; those beyond are left out."""
 
 
 class Contact(NamedTuple):
@@ -35,9 +40,11 @@ class Contact(NamedTuple):
     ellipsoid: Singles  # (2, 3) centre of the rest bounding box and its squared inverse half widths
     clearance: np.float32  # gap that contact keeps
     depth: np.float32  # a node deeper than this belongs to another part: left alone
+    shallow: np.float32  # the same where node and quad do not face each other
     margin: np.float32  # how far beyond the clearance candidates are collected
+    rings: Integers  # (ns, ring) nodes that share a quad with the node, filled up with -1
     size: np.float32  # mean rest edge length h
-    recovery: np.float32  # largest speed at which a penetrating node is led out
+    recovery: np.float32  # largest push, as lacking clearance
     normals: Singles  # (ns, 3) nodal normals at the last search
     searched: Singles  # (ns, 3) positions of the last search
     frames: Singles  # (nq, 8) quad centre (3), circumscribed radius, unit normal (3), unused
@@ -46,11 +53,13 @@ class Contact(NamedTuple):
     starts: Integers  # (buckets + 1,) first of each bucket in `order`; buckets is a power of two
     pair_nodes: Integers  # (capacity,) surface node of a pair, ascending
     pair_quads: Integers  # (capacity,)
+    pair_own: NDArray[np.uint8]  # (capacity,) bit k < 4: corner k of the quad lies on a quad of the node; ASKEW
     feet: Singles  # (capacity, 2) u, v of the last closest point, where the next search for it starts
-    counts: Longs  # (4,) PAIRS, NEEDED, ACTIVE, SEARCHES
+    counts: Longs  # (5,) PAIRS, NEEDED, ACTIVE, SEARCHES, HITS
     load: Singles  # (ns,) scratch: how much contact each node takes part in
-    hits: Integers  # (ns, 2) scratch: surface node and quad of the active contacts
-    hit_values: Singles  # (ns, 10) scratch: weights (4), direction (3), gap, lacking, onset
+    near: Singles  # (NEAR, 14) scratch: the quads near one node, as `hit_values`, and height, depth, quad
+    hits: Integers  # (4 ns, 2) surface node and quad of each contact of the last push
+    hit_values: Singles  # (4 ns, 12) shape functions (4), direction (3), gap, stiffness, impulse, clearance, weight
 
 
 def make_contact(
@@ -61,7 +70,7 @@ def make_contact(
     te: float,
     *,
     margin: float = 0.3,
-    recovery: float = 0.01,
+    recovery: float = 0.05,
     capacity: int = 0,
 ) -> Contact:
     """Allocate a contact for the skin with rest positions `rest` (nn, >= 3) and exocarp thickness te.
@@ -87,7 +96,9 @@ def make_contact(
         clearance=single(clearance),
         # two exocarps back to back are 2 te thick: half of that cannot be mistaken for the far side of a neck
         depth=single(min(0.6 * h, 0.75 * te)),
+        shallow=single(0.25 * min(0.6 * h, 0.75 * te)),
         margin=single(margin * h),
+        rings=_rings(faces, ns),
         size=single(h),
         recovery=single(recovery * h),
         normals=np.zeros((ns, 3), single),
@@ -98,11 +109,13 @@ def make_contact(
         starts=np.zeros(buckets + 1, integer),
         pair_nodes=np.zeros(pairs, integer),
         pair_quads=np.zeros(pairs, integer),
+        pair_own=np.zeros(pairs, np.uint8),
         feet=np.zeros((pairs, 2), single),
-        counts=np.zeros(4, np.int64),
+        counts=np.zeros(5, np.int64),
         load=np.zeros(ns, single),
-        hits=np.zeros((ns, 2), integer),
-        hit_values=np.zeros((ns, 10), single),
+        near=np.zeros((NEAR, 14), single),
+        hits=np.zeros((4 * ns, 2), integer),
+        hit_values=np.zeros((4 * ns, 12), single),
     )
 
 
@@ -112,5 +125,19 @@ def grow(contact: Contact, needed: int) -> Contact:
     contact.searched[:] = 1e30
     contact.counts[:3] = 0
     return contact._replace(
-        pair_nodes=np.zeros(room, np.int32), pair_quads=np.zeros(room, np.int32), feet=np.zeros((room, 2), np.float32)
+        pair_nodes=np.zeros(room, np.int32),
+        pair_quads=np.zeros(room, np.int32),
+        pair_own=np.zeros(room, np.uint8),
+        feet=np.zeros((room, 2), np.float32),
     )
+
+
+def _rings(faces: Integers, nodes: int) -> Integers:
+    """Nodes that share a quad with each node, (nodes, most), ascending, -1 where there are fewer."""
+    tails, heads = np.repeat(faces, 4, axis=1).ravel(), np.tile(faces, (1, 4)).ravel()
+    pairs = np.unique(np.stack([tails, heads], axis=1)[tails != heads], axis=0)
+    count = np.bincount(pairs[:, 0], minlength=nodes)
+    place = np.arange(len(pairs)) - np.repeat(np.cumsum(count) - count, count)
+    rings = np.full((nodes, int(count.max())), -1, np.int32)
+    rings[pairs[:, 0], place] = pairs[:, 1]
+    return rings

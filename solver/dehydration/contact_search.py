@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from solver.dehydration.contact_data import (
+    ASKEW,
     NEEDED,
     OPPOSED,
     OPTIONS,
@@ -28,6 +29,9 @@ from solver.dehydration.contact_data import (
 
 GENTLE = np.float32(0.7071)
 """Cosine to the ellipsoid's normal above which nothing faces anything: two such normals are within 90 degrees."""
+CREASED = np.float32(0.35)
+"""Length of the mean of the unit normals around a node below which the node lies in a closed crease (its walls are
+within 41 degrees of each other). Its own normal says nothing there, and its walls shield it: it touches nothing."""
 WORLD = np.float32(2**20)
 """Cells counted from the origin in each direction; what lies farther out (or is not finite) touches nothing."""
 
@@ -55,6 +59,7 @@ def update_normals(contact: Contact, x: Singles) -> Single:
     """
     normals, frames, corners = contact.normals, contact.frames, contact.quad_nodes
     normals[:] = np.float32(0)
+    contact.load[:] = np.float32(0)
     gentlest = np.float32(1)
     centre, scale = contact.ellipsoid[0], contact.ellipsoid[1]
     for q in range(corners.shape[0]):
@@ -74,6 +79,7 @@ def update_normals(contact: Contact, x: Singles) -> Single:
                 # unit normals: weighted by area, the larger wall of a sharp crease would turn the normal into the
                 # smaller one
                 normals[contact.quads[q, k], i] += frames[q, 4 + i]
+            contact.load[contact.quads[q, k]] += np.float32(1)
             radius = max(radius, square)
         frames[q, 3] = np.sqrt(radius)
         dot = square = level = np.float32(0)
@@ -88,6 +94,8 @@ def update_normals(contact: Contact, x: Singles) -> Single:
     for i in range(normals.shape[0]):
         square = normals[i, 0] ** 2 + normals[i, 1] ** 2 + normals[i, 2] ** 2
         inverse = np.float32(1) / np.sqrt(square + np.float32(1e-30))
+        if square < (CREASED * contact.load[i]) ** 2:
+            inverse = np.float32(0)
         for k in range(3):
             normals[i, k] *= inverse
     return gentlest
@@ -195,6 +203,17 @@ def _near(
 
 
 @njit(**OPTIONS)
+def _own_corners(contact: Contact, node: int, quad: int) -> int:
+    """Bits of the quad's corners that share another quad with the node."""
+    bits = 0
+    for k in range(4):
+        for other in contact.rings[node]:
+            if other == contact.quads[quad, k]:
+                bits |= 1 << k
+    return bits
+
+
+@njit(**OPTIONS)
 def find_pairs(contact: Contact, x: Singles) -> int:
     """Collect candidate pairs at positions x (nn, 4) float32; call every 20-40 steps.
 
@@ -227,23 +246,26 @@ def find_pairs(contact: Contact, x: Singles) -> int:
         if not max(abs(px), abs(py), abs(pz)) < WORLD * cell:
             continue
         nx, ny, nz = normals[node, 0], normals[node, 1], normals[node, 2]
+        if nx == 0 and ny == 0 and nz == 0:
+            continue
         key = cell_key(np.int64(np.floor(px / cell)), np.int64(np.floor(py / cell)), np.int64(np.floor(pz / cell)))
         bucket = bucket_of(key, starts.size - 1)
         for place in range(starts[bucket], starts[bucket + 1]):
             quad = order[place]
-            if nx * frames[quad, 4] + ny * frames[quad, 5] + nz * frames[quad, 6] > OPPOSED:
-                continue
+            opposed = nx * frames[quad, 4] + ny * frames[quad, 5] + nz * frames[quad, 6] < OPPOSED
             away = (px - frames[quad, 0]) ** 2 + (py - frames[quad, 1]) ** 2 + (pz - frames[quad, 2]) ** 2
             if away > (frames[quad, 3] + reach) ** 2 or keys[place] != key:
                 continue
             if node in (quads[quad, 0], quads[quad, 1], quads[quad, 2], quads[quad, 3]):
                 continue
-            near, u, v = _near(x, row, contact.quad_nodes, frames, quad, outward, contact.depth)
+            depth = contact.depth if opposed else contact.shallow
+            near, u, v = _near(x, row, contact.quad_nodes, frames, quad, outward, depth)
             if not near:
                 continue
             pair = counts[NEEDED]
             if pair < capacity:
                 contact.pair_nodes[pair], contact.pair_quads[pair] = node, quad
+                contact.pair_own[pair] = _own_corners(contact, node, quad) | (0 if opposed else ASKEW)
                 contact.feet[pair, 0], contact.feet[pair, 1] = u, v
             counts[NEEDED] += 1
     counts[PAIRS] = min(counts[NEEDED], contact.pair_nodes.size)

@@ -1,7 +1,7 @@
-"""The seeded bumps that break the fresh fruit's symmetry.
+"""The bumps that break the fresh fruit's symmetry: seeded random waves, or the first buckling mode.
 
-A sum of plane waves restricted to the parametric unit sphere. It depends on the seed alone, not on thickness or
-moduli, so that neighbours in parameter space start from the same bumps and their patterns can be compared.
+Random bumps are a sum of plane waves restricted to the parametric unit sphere. It depends on the seed alone, not on
+thickness or moduli, so that neighbours in parameter space start from the same bumps and their patterns can be compared.
 """
 
 from __future__ import annotations
@@ -9,13 +9,54 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bumps"]
+from ..contract import Cancelled, Context, InvalidInput
+from .loading import Loading
+from .params import DehydrationParams
+
+__all__ = ["bumps", "heights"]
 
 Array = NDArray[np.float64]
 
 WAVES = 400
 #: Wavenumbers on the unit sphere: from the coarsest buckles in use to those of a skin of 0.005.
 LOWEST, HIGHEST = 5.0, 130.0
+
+
+def heights(params: DehydrationParams, directions: Array, context: Context, highest: float = HIGHEST) -> Array:
+    """Return the heights (n,) of `params.imperfection_kind` at unit `directions` (n, 3), magnitude about one at most.
+
+    "waves": see `bumps`. "mode": the first buckling mode (Liu et al. 2014, Eq. 11), as it is; no seed enters.
+
+    Raises:
+        InvalidInput: the mode was asked for and the fruit does not buckle, or its drying is not homogeneous.
+        NotConverged: the mode was not found.
+        Cancelled: the observer asked to stop.
+
+    """
+    if params.imperfection_kind == "waves":
+        return bumps(directions, context.generator(params.seed), highest)
+    if not Loading(params).uniform:
+        raise InvalidInput(
+            "buckling modes are known for homogeneous, isotropic drying only.",
+            advice='Leave out wetness and anisotropy, or set imperfection_kind to "waves".',
+        )
+    from .onset import onset  # an eigenproblem: nothing that waves should pay for
+
+    def stop() -> bool:
+        try:
+            context.check_cancelled()
+        except Cancelled:
+            return True
+        return False
+
+    # its progress is not the run's
+    found = onset(params, quality="preview", context=Context(cancelled=stop))
+    if found.mode is None:
+        raise InvalidInput(
+            f"there is no buckling mode to start from: {found.reason or 'the smooth shape stays stable'}.",
+            advice='Set imperfection_kind to "waves".',
+        )
+    return found.mode(directions)
 
 
 def bumps(directions: Array, generator: np.random.Generator, highest: float = HIGHEST) -> Array:

@@ -1,21 +1,36 @@
-"""Parameters of a dehydration run: the fruit, the two moduli's ratio and the imperfection that starts the buckles."""
+"""Parameters of a dehydration run: the fruit, the moduli's ratio, how it dries and what starts the buckles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
 from ..fruit import Fruit
 
 __all__ = ["DehydrationParams"]
 
+Gradient = Annotated[float, Field(ge=-0.8, le=0.8)]
+Factor = Annotated[float, Field(ge=0.0, le=2.0)]
+
+#: Longest gradient of wetness, in 1/r1.
+STEEPEST = 0.8
+
 
 class DehydrationParams(Fruit):
-    """Liu et al. 2014: F = Fe Fd with Fd = (1 - s) I in the sarcocarp and I in the exocarp, rigid stone."""
+    """Liu et al. 2014: F = Fe Fd, Fd = I in the exocarp, rigid stone.
 
-    axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {**Fruit.axes, "gamma": ("modulus_ratio", None)}
+    In the sarcocarp Fd = diag(1 - a_i s (1 - g . X)): (1 - s) I unless wetness g or anisotropy a say otherwise.
+    """
+
+    axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {
+        **Fruit.axes,
+        "gamma": ("modulus_ratio", None),
+        **{f"w{x}": ("wetness", i) for i, x in enumerate("xyz")},
+        **{f"a{x}": ("anisotropy", i) for i, x in enumerate("xyz")},
+    }
 
     modulus_ratio: float = Field(
         10.0,
@@ -28,6 +43,47 @@ class DehydrationParams(Fruit):
         1e-3,
         ge=0.0,
         le=0.01,
-        description="Largest amplitude of the seeded smooth bumps on the fresh shape that start the buckles",
+        description="Largest amplitude of the smooth bumps on the fresh shape that start the buckles",
         json_schema_extra={"units": "r1"},
     )
+    imperfection_kind: Literal["waves", "mode"] = Field(
+        "waves",
+        description="What the bumps are: seeded random waves, or the first buckling mode of this fruit",
+        json_schema_extra={"units": "1"},
+    )
+    wetness: tuple[Gradient, Gradient, Gradient] = Field(
+        (0.0, 0.0, 0.0),
+        description="Gradient g of wetness across the fresh fruit (light, humidity, pressure): the local shrinkage is "
+        "s (1 - g . X), so that the side g points to dries less; at most 0.8 long",
+        json_schema_extra={"units": "1/r1", "axes": ["wx", "wy", "wz"]},
+    )
+    anisotropy: tuple[Factor, Factor, Factor] = Field(
+        (1.0, 1.0, 1.0),
+        description="Factors on the local shrinkage along x, y (the poles) and z; 1, 1, 1 is isotropic",
+        json_schema_extra={"units": "1", "axes": ["ax", "ay", "az"]},
+    )
+
+    @model_validator(mode="after")
+    def _dries(self) -> Self:
+        steep = float(np.linalg.norm(self.wetness))
+        if steep > STEEPEST * (1 + 1e-9):
+            raise ValueError(
+                f"wetness is {steep:.3g} long (at most {STEEPEST}): multiply wx, wy, wz by {STEEPEST / steep:.3g}"
+            )
+        wettest, _ = self.local_share
+        if wettest < 0:
+            raise ValueError(
+                f"the flesh would swell where it is wettest (local shrinkage {wettest:.3g} s): "
+                f"multiply wx, wy, wz by {1 / (1 - wettest):.2g}"
+            )
+        return self
+
+    @property
+    def local_share(self) -> tuple[float, float]:
+        """Least and largest 1 - g . X over the sarcocarp: local shrinkage over s, before anisotropy."""
+        if not any(self.wetness):
+            return 1.0, 1.0
+        # a linear function takes its extremes on the surface, and there on opposite sides of the centre
+        theta, phi = np.meshgrid(np.linspace(0, np.pi, 91), np.linspace(0, 2 * np.pi, 73), indexing="ij")
+        along = np.einsum("tpi,i->tp", self.sarcocarp(theta, phi), self.wetness)
+        return float(1 - along.max()), float(1 - along.min())

@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contract import Context, Unstable
-from .contact import PAIRS
-from .imperfection import bumps
+from .drive import Drive
+from .imperfection import heights
 from .kernel import (
+    ElementReport,
     Layout,
     build_layout,
+    element_report,
     forget,
     internal_force,
     make_skin,
@@ -44,6 +46,9 @@ _REWEIGH = 0.01
 #: Steps between two weighings while settling.
 _SETTLE_REWEIGH = 1000
 
+#: Settling turns from swinging to calming when the drift falls below this many times its limit.
+_CALM = 2.0
+
 #: Steps over which the surface's drift is measured.
 _REST_STEPS = 200
 
@@ -57,7 +62,8 @@ class State:
     """A settled stage: nodes of the outer surface (nc, 3), how settled it is, and the steps spent so far.
 
     residual: out-of-balance force over internal force. drift: rms motion of the surface in the last 200 steps, in
-    exocarp thicknesses.
+    exocarp thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy in mu r1^3, and
+    released: by how much settling lowered it, where that was asked for.
     """
 
     surface: Array
@@ -65,24 +71,37 @@ class State:
     residual: float
     drift: float
     steps: int
+    least_ratio: float
+    energy: float
+    released: float | None = None
 
 
 class Path:
     """One fruit's way from fresh to dry."""
 
-    def __init__(self, params: DehydrationParams, settings: Settings, context: Context) -> None:
+    def __init__(
+        self, params: DehydrationParams, settings: Settings, context: Context, *, with_release: bool = False
+    ) -> None:
+        self._with_release = with_release
         self._params, self._settings, self._context = params, settings, context
         self.mesh: FruitMesh = build_mesh(params, settings.n, settings.core)
         mesh = self.mesh
         # waves that the mesh cannot carry (fewer than four nodes) would be noise that depends on it
-        heights = bumps(mesh.sphere.directions, context.generator(params.seed), highest=settings.n)
-        fade = (heights[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
+        bumps = heights(params, mesh.sphere.directions, context, highest=settings.n)
+        fade = (bumps[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
         bumpy = mesh.positions + params.imperfection * fade * np.repeat(mesh.rays, mesh.levels, axis=0)
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)
         self._moduli = mu, settings.kappa_ratio * mu
         self._layout = build_layout(
-            bumpy, mesh.connectivity, mesh.is_exocarp, *self._moduli, mesh.fixed, safety=_SAFETY, one_point=False
+            bumpy,
+            mesh.connectivity,
+            mesh.is_exocarp,
+            *self._moduli,
+            mesh.fixed,
+            safety=_SAFETY,
+            full_levels=settings.full_levels,
         )
+        self._drive = Drive(params, mesh, self._layout)
         self._fresh_bound = stiffness_bounds(self._layout, self._layout.fresh, mesh.is_exocarp, *self._moduli)
         te = params.exocarp_thickness
         self._skin = make_skin(self._layout, mesh.surface_nodes, mesh.sphere.quads, settings.clearance * te, te)
@@ -107,7 +126,7 @@ class Path:
 
         Raises:
             Cancelled: the observer asked to stop.
-            Unstable: the state left the finite.
+            Unstable: the state left the finite, or elements turned inside out.
 
         """
         settings = self._settings
@@ -128,6 +147,8 @@ class Path:
 
     def _smooth(self, shrinkage: float) -> tuple[Fixed, Single]:
         """Return the start at `shrinkage`: the closed form along each ray, exact for spheres, at rest."""
+        if not self._drive.idle:
+            return new_state(self._layout, self._drive.smooth(shrinkage))
         mesh = self.mesh
         fresh = positions(self._layout.fresh)
         distance = np.linalg.norm(fresh, axis=1)
@@ -174,9 +195,22 @@ class Path:
         self._context.check_cancelled()
         layout = layout or self._layout
         forget(self._skin, layout)
-        skin = march(layout, state, velocity, count, theta=(1 - a, 1 - b), damping=damping, skin=self._skin)
-        assert skin is not None
-        self._skin = skin
+        for begin, end, steps in self._drive.pieces(a, b, count):
+            middle = (begin + end) / 2
+            self._drive.lead(state, middle)
+            loaded = self._drive.loaded(layout, middle)
+            skin = march(
+                loaded,
+                state,
+                velocity,
+                steps,
+                theta=(1 - begin, 1 - end),
+                damping=damping,
+                one_point=True,
+                skin=self._skin,
+            )
+            assert skin is not None
+            self._skin = skin
         self._steps += count
         if out_of_reach(state):
             raise Unstable(
@@ -188,38 +222,59 @@ class Path:
         """Hold the shrinkage until forces balance *and* the surface has come to rest.
 
         Just past the onset the forces nearly balance while buckles still grow, so the residual alone would stop there.
+        It swings, hardly damped, to where the energy leads (after the onset buckles go on merging for thousands of
+        steps), is calmed, and swings again if it was not there yet.
         """
         settings = self._settings
         surface = positions(state[self.surface_nodes])
         if shrinkage == 0:
-            return State(surface, shrinkage, 0.0, 0.0, self._steps)  # free of stress: nothing to settle
+            return State(surface, shrinkage, 0.0, 0.0, self._steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
         chunk = max(20, min(_REST_STEPS, _SLICE // self.elements))
+        before = float(self._report(state, shrinkage).energy.sum()) if self._with_release else None
         layout, weigh_at = self._layout, 0
-        spent, residual, drift = 0, np.inf, np.inf
+        spent, since, calm, residual, drift = 0, 0, False, np.inf, np.inf
         while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
             if spent >= weigh_at:
                 layout, weigh_at = self._weighed(state), spent + _SETTLE_REWEIGH
-            touching = self._skin.contact.counts[PAIRS] > 0
-            damping = settings.touching_damping if touching else settings.settle_damping
+            damping = settings.calm_damping if calm else settings.swing_damping
             self._advance(state, velocity, chunk, shrinkage, shrinkage, damping, layout)
-            spent += chunk
-            residual = self._residual(state, shrinkage, layout)
+            spent, since = spent + chunk, since + chunk
+            residual = self._residual(state, shrinkage, layout, damping)
             moved = positions(state[self.surface_nodes])
             speed = np.sqrt(np.square(moved - surface).sum(axis=1).mean()) / chunk
             drift = float(speed * _REST_STEPS / self._params.exocarp_thickness)
             surface = moved
-        return State(surface, shrinkage, residual, drift, self._steps)
+            there = drift < _CALM * settings.drift
+            if since >= (settings.calm_steps if calm else settings.swing_steps) or (there and not calm):
+                calm, since = not calm, 0
+        report = self._report(state, shrinkage)
+        least = float(report.least_ratio.min())
+        if least <= 0:
+            raise Unstable(
+                f"elements turned inside out at shrinkage s = {shrinkage:.3f} (least J {least:.2f}).",
+                advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
+                residual=residual,
+            )
+        energy = float(report.energy.sum())
+        released = before - energy if before is not None else None
+        return State(surface, shrinkage, residual, drift, self._steps, least, energy, released)
 
-    def _residual(self, state: Fixed, shrinkage: float, layout: Layout) -> float:
-        """Out-of-balance force, contact included: what one step from rest would do to the momentum.
+    def _report(self, state: Fixed, shrinkage: float) -> ElementReport:
+        layout = self._drive.loaded(self._layout, shrinkage)
+        return element_report(layout, state, 1 - shrinkage, one_point=True)
 
-        Relative to the root of the sum of squares of all elements' nodal forces.
+    def _residual(self, state: Fixed, shrinkage: float, layout: Layout, damping: float) -> float:
+        """Out-of-balance force, contact included: what one step from rest does to the momentum.
+
+        Relative to the root of the sum of squares of all elements' nodal forces. A step moves the nodes before contact
+        answers, and damping shortens that move: the balance is struck, and measured, with the damping it settles with.
         """
         theta = 1 - shrinkage
-        scale = internal_force(layout, state, theta).scale
+        layout = self._drive.loaded(layout, shrinkage)
+        scale = internal_force(layout, state, theta, one_point=True).scale
         moved, kick = state.copy(), np.zeros((layout.nodes, 4), np.float32)
         forget(self._skin, layout)
-        march(layout, moved, kick, 1, theta=(theta, theta), damping=0.0, skin=self._skin)
-        momentum = (kick[:, :3] * layout.mass[:, None])[layout.free]
+        march(layout, moved, kick, 1, theta=(theta, theta), damping=damping, one_point=True, skin=self._skin)
+        momentum = (1 + damping / 2) * (kick[:, :3] * layout.mass[:, None])[layout.free]
         # not `norm`: it is a BLAS dot product, whose rounding depends on the number of threads
         return float(np.sqrt(np.square(momentum).sum())) / scale if scale > 0 else 0.0

@@ -19,6 +19,8 @@ __all__ = ["penetration", "penetration_depths"]
 
 Doubles = NDArray[np.float64]
 Longs = NDArray[np.int64]
+CREASED = 0.35
+"""Length of the mean unit normal around a node below which the node lies in a closed crease: see `_normals`."""
 OPPOSED = -0.25
 """Cosine between outward normals below which skin faces skin."""
 LIFT = 0.01
@@ -159,16 +161,20 @@ def _depths(
 def _normals(corners: Doubles, faces: Longs, nodes: int) -> Doubles:
     """Outward nodal normals weighted by the quads' angles at the node (Baerentzen & Aanaes 2005), (nodes, 3).
 
-    Weighted by area, the larger wall of a sharp crease would turn them into the smaller one.
+    Weighted by area, the larger wall of a sharp crease would turn them into the smaller one. At the bottom of a closed
+    crease the walls' normals cancel and the node's own says nothing: it is 0, which keeps the node out of the measure.
+    Whether the walls cross is told by the nodes beside it.
     """
-    normals = np.zeros((nodes, 3))
+    normals, angles = np.zeros((nodes, 3)), np.zeros(nodes)
     for k in range(4):
         ahead, back = corners[:, (k + 1) % 4] - corners[:, k], corners[:, k - 1] - corners[:, k]
         area = np.cross(ahead, back)
         size = np.linalg.norm(area, axis=1)
         angle = np.arctan2(size, (ahead * back).sum(1))
         np.add.at(normals, faces[:, k], area * (angle / (size + 1e-300))[:, None])
-    return normals / (np.linalg.norm(normals, axis=1, keepdims=True) + 1e-300)
+        np.add.at(angles, faces[:, k], angle)
+    length = np.linalg.norm(normals, axis=1)
+    return normals * np.where(length > CREASED * angles, 1 / (length + 1e-300), 0.0)[:, None]
 
 
 def penetration_depths(positions: ArrayLike, quads: ArrayLike, limit: float | None = None) -> Doubles:

@@ -11,6 +11,7 @@ import xarray as xr
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, lattice
 from .descriptors import Descriptors, Surface
+from .loading import Loading
 from .mesh import Sampler
 from .params import DehydrationParams
 from .path import Path, State
@@ -60,6 +61,13 @@ class _Record:
             row.update({name: getattr(described, name) for name in self._descriptors})
         if "penetration" in self._need.fields:
             row["penetration"] = penetration(nodes, self._path.mesh.sphere.quads)
+        for name, value in (
+            ("least_jacobian", state.least_ratio),
+            ("strain_energy", state.energy),
+            ("released_energy", state.released),
+        ):
+            if name in self._need.fields:
+                row[name] = value
         self.rows.append(row)
 
     def dataset(self, attrs: dict[str, Any]) -> xr.Dataset:
@@ -104,13 +112,17 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     """Return displacement, position and descriptors of the wanted stages; see `solver.quantities` for units.
 
     Raises:
+        InvalidInput: a stage at which the driest flesh would be gone.
         Unstable: the state left the finite; carries the stages before.
         Cancelled: the observer asked to stop.
 
     """
+    loading = Loading(params)
+    loading.check(need.stages[0])
+    loading.check(need.stages[-1])
     settings = choose(params, need.quality)
     context.report(0.0, f"meshing {settings.elements} elements")
-    path = Path(params, settings, context)
+    path = Path(params, settings, context, with_release="released_energy" in need.fields)
     record = _Record(params, need, path)
     last = need.stages[-1]
     attrs = {
@@ -121,9 +133,11 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
         "kappa_over_mu": settings.kappa_ratio,
     }
     try:
-        for shrinkage in need.stages:
+        for done, shrinkage in enumerate(need.stages, 1):
             record.add(path.stage(shrinkage, last), settings)
-            context.report(shrinkage / last if last else 1.0, f"shrinkage s = {shrinkage:.3f} settled")
+            context.report(
+                shrinkage / last if last > 0 else done / len(need.stages), f"shrinkage s = {shrinkage:.3f} settled"
+            )
     except SolverError as error:
         if record.rows:
             error.partial = record.dataset(attrs)

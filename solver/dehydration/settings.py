@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..contract import Cost, Need
 from .closed_form import flat_film_wavelength, onset_estimate
-from .mesh import layer_fractions
+from .loading import Loading
+from .mesh import flesh_span, layer_fractions
 from .params import DehydrationParams
 
 __all__ = ["Settings", "choose", "expected_cost"]
@@ -22,9 +23,10 @@ class Settings:
     """Everything numerical about a run; follows from parameters and quality alone, so that results are repeatable.
 
     n: elements per edge of the cubed sphere. core: fractions of the core's layer breakpoints. kappa_ratio: bulk over
-    shear modulus. pace: shrinkage per step of the march. damping: per step, while marching, while
-    settling, and while settling skin that touches (less lets contacts chatter).
-    residual, drift: at which a stage counts as settled (see `path.State`). settle_steps: after which it does not.
+    shear modulus. pace: shrinkage per step of the march. damping: per step, while marching; swing_damping and
+    calm_damping: while a stage settles (see `path.Path`). full_levels: outermost core layers that are integrated fully.
+    residual, drift: at which a stage counts as settled (see `path.State`). swing_steps, calm_steps: longest
+    turn of each way of settling. settle_steps: after which a stage does not.
     clearance: gap that self-contact keeps, in exocarp thicknesses.
     start: shrinkage below which the fruit is still smooth, where the march begins.
     """
@@ -34,13 +36,16 @@ class Settings:
     kappa_ratio: float
     pace: float
     damping: float
-    settle_damping: float
-    touching_damping: float
+    swing_damping: float
+    calm_damping: float
     residual: float
     drift: float
+    swing_steps: int
+    calm_steps: int
     settle_steps: int
     start: float
     clearance: float = 0.1
+    full_levels: int = 1000
 
     @property
     def elements(self) -> int:
@@ -56,20 +61,26 @@ class _Quality:
     kappa_ratio: float
     residual: float
     drift: float
+    full_levels: int
 
 
+#: Under deep folds the three core layers below the skin turn inside out if they have one point each (s = 0.25 and
+#: later); the deeper ones keep J > 0.4, and one point there changes the roughness by less than another seed does.
 _QUALITIES = {
-    "preview": _Quality(4.2, 18, 48, 30.0, 5e-3, 2e-2),
-    "default": _Quality(6.0, 24, 96, 100.0, 2e-3, 1e-2),
-    "fine": _Quality(9.0, 36, 160, 100.0, 1e-3, 5e-3),
+    "preview": _Quality(4.2, 18, 48, 30.0, 2e-3, 2e-2, 3),
+    "default": _Quality(6.0, 24, 96, 100.0, 1e-3, 1e-2, 3),
+    "fine": _Quality(9.0, 36, 160, 100.0, 1e-3, 5e-3, 1000),
 }
 
 #: Steps from s = 0 to 0.3 that follow the quasi-static path at n = 24, kappa / mu = 30 (twice as many change the
 #: roughness by 1 % up to s = 0.17). More elements and a stiffer
 #: volume shorten the critical step, so their product with the step must be kept.
 _STEPS, _STEPS_N, _STEPS_KAPPA, _STEPS_SPAN = 16000.0, 24, 30.0, 0.3
-#: Damping per step at the same reference: low enough not to delay the onset.
-_DAMPING = 0.004
+#: Damping per step at the same reference: low enough not to delay the onset; and while a stage settles. The slowest
+#: modes keep their shape on every mesh, so per step they slow down as the step shrinks, and damping with them.
+_DAMPING, _SWING_DAMPING = 0.004, 0.008
+#: Longest turns of swinging (at the same reference) and calming, and most steps that a stage may settle for.
+_SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 1500, 400, 5000
 #: Thickness of the core layer at the interface, in wavelengths, and how fast layers grow inwards.
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
@@ -85,23 +96,28 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
     wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
     n = math.ceil(np.pi / 2 * q.per_wavelength / wavelength)
     n = min(max(n, q.fewest), q.most)
-    flesh = float(np.mean(params.radii[:7])) - max(params.stone)
+    # where flesh is more than twice as thick as on average, layers are counted on it
+    flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), flesh_span(params)[1] / 2)
     core = layer_fractions(max(flesh, 0.05), _FIRST_LAYER * min(wavelength, 0.4), _GROWTH)
     scale = (n / _STEPS_N) * math.sqrt(q.kappa_ratio / _STEPS_KAPPA)
-    margin = 0.75 if params.is_sphere else 0.5
+    loading = Loading(params)
+    margin = 0.75 if params.is_sphere and loading.uniform else 0.5
     onset = onset_estimate(params.modulus_ratio, min(params.stone))
     return Settings(
         n=n,
         core=core,
         kappa_ratio=q.kappa_ratio,
-        pace=_STEPS_SPAN / (_STEPS * scale),
+        pace=_STEPS_SPAN / (_STEPS * scale) / loading.peak,
         damping=_DAMPING / scale,
-        settle_damping=0.02,
-        touching_damping=0.1,
+        swing_damping=_SWING_DAMPING / scale,
+        calm_damping=0.06,
         residual=q.residual,
         drift=q.drift,
-        settle_steps=4000,
-        start=margin * onset,
+        swing_steps=round(_SWING_STEPS * scale),
+        calm_steps=_CALM_STEPS,
+        settle_steps=round(_SETTLE_STEPS * scale),
+        start=margin * onset / loading.peak,
+        full_levels=q.full_levels,
     )
 
 

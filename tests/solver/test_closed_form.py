@@ -32,3 +32,20 @@ def test_flat_film_wavelength_is_near_the_exact_degree(case):
 
 def test_flat_film_strain_is_the_known_value():
     assert flat_film_strain(3.0) == pytest.approx(1 / 6)
+
+
+@pytest.mark.parametrize("theta", [0.7, 1.3])
+def test_without_a_stone_the_core_is_scaled_and_the_skin_keeps_its_volume(theta):
+    fresh = np.array([0.0, 0.1, 0.5, 1.0, 1.02, 1.04])
+    radius = sphere_radius(fresh, theta, 0.0)
+    assert radius[:4] == pytest.approx(theta * fresh[:4], rel=1e-15)
+    assert np.diff(radius[3:] ** 3) == pytest.approx(np.diff(fresh[3:] ** 3))
+
+
+def test_swelling_is_the_inverse_of_shrinking():
+    """Flesh swollen to theta and shrunk by 1 / theta is the fresh flesh again."""
+    fresh = np.linspace(0.4, 1.0, 5)
+    swollen = sphere_radius(fresh, 1.3, 0.4)
+    assert (swollen[1:] > fresh[1:]).all()
+    back = sphere_radius(swollen, 1 / 1.3, 0.4, interface=float(swollen[-1]))
+    assert back == pytest.approx(fresh, rel=1e-13)

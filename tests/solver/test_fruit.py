@@ -53,6 +53,15 @@ def test_stone_is_the_ellipsoid_whose_third_axis_follows_the_equator():
     assert axes == pytest.approx([0.5, 0.6, 0.48 * 0.5 / 0.8])
 
 
+def test_a_fruit_may_have_no_stone():
+    f = fruit("sphere", stone=(0, 0))
+    assert not f.has_stone
+    assert f.is_sphere
+    assert (f.stone_distance(np.eye(3)) == 0).all()
+    assert fruit("sphere", rs1=0.0, rs2=0.0) == f
+    assert fruit("sphere").has_stone
+
+
 def test_lattice_avoids_the_poles_and_closes_in_azimuth():
     assert colatitudes(8)[0] == pytest.approx(np.pi / 16)
     assert np.diff(azimuths(8)) == pytest.approx(np.pi / 8)
@@ -64,6 +73,10 @@ def test_lattice_avoids_the_poles_and_closes_in_azimuth():
     [
         ({"rs1": 1.2}, InvalidGeometry, "pokes through"),
         ({"rs1": 0.99}, InvalidGeometry, "too little flesh"),
+        ({"rs1": 0.0}, InvalidInput, "both 0"),
+        ({"stone": (0.4, 0.0)}, InvalidInput, "both 0"),
+        ({"stone": (0.02, 0.02)}, InvalidInput, "at least 0.05"),
+        ({"stone": (-0.1, -0.1)}, InvalidInput, "stone"),
         ({"r4": 0.4}, InvalidGeometry, "concave"),
         ({"te": float("nan")}, InvalidInput, "finite"),
         ({"te": 0.5}, InvalidInput, "exocarp_thickness"),

@@ -189,11 +189,16 @@ def deformed(layout, rng, amount=0.01, theta=0.95):
 
 
 def assembled_twin(mesh, layout, state, theta, one_point):
-    """(nodal gradient (nn, 3), per-element gradients (ne, 8, 3), energy) from the twin in float64."""
+    """(nodal gradient (nn, 3), per-element gradients (ne, 8, 3), energy) from the twin in float64.
+
+    The mesh is a `block_mesh`: three elements a column, the core's two first.
+    """
     fresh, position = positions(layout.fresh), positions(state)
     nodal, each, energy = np.zeros_like(fresh), [], 0.0
-    for nodes, skin, mu, kappa in zip(mesh["connectivity"], mesh["is_exocarp"], mesh["mu"], mesh["kappa"], strict=True):
-        kind = "exocarp" if skin else "one_point" if one_point else "core"
+    elements = zip(mesh["connectivity"], mesh["is_exocarp"], mesh["mu"], mesh["kappa"], strict=True)
+    for e, (nodes, skin, mu, kappa) in enumerate(elements):
+        single = one_point and e % 3 < 2 - layout.full_levels
+        kind = "exocarp" if skin else "one_point" if single else "core"
         arguments = (fresh[nodes], position[nodes], kind, mu, kappa, 1.0 if skin else theta)
         each.append(twin_gradient(*arguments))
         energy += twin_energy(*arguments)
@@ -279,13 +284,13 @@ def test_patch_of_exocarp_parallelepipeds_carries_affine_deformation_exactly():
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-@pytest.mark.parametrize("one_point", [False, True])
+@pytest.mark.parametrize(("one_point", "full_levels"), [(False, 0), (True, 0), (True, 1), (True, 5)])
 @pytest.mark.parametrize("columns", [(1, 1), (4, 5)])
-def test_compiled_force_agrees_with_twin(backend, one_point, columns):
+def test_compiled_force_agrees_with_twin(backend, one_point, full_levels, columns):
     """One column fills a vector with 15 repetitions; 20 columns are a full strip and a quarter."""
     rng = np.random.default_rng(5)
     mesh = block_mesh(rng, columns)
-    layout = build_layout(**mesh)
+    layout = build_layout(**mesh, full_levels=full_levels)
     state, _ = deformed(layout, rng, 0.005)
     nodal, each, energy = assembled_twin(mesh, layout, state, 0.9, one_point)
     force = internal_force(layout, state, 0.9, one_point=one_point, backend=backend)

@@ -6,8 +6,17 @@ import skfem
 from scipy.special import sph_harm_y
 
 from solver import registry
+from solver.contract import InvalidGeometry
 from solver.dehydration.harmonics import analyse, power, quadrature, remove_low
-from solver.dehydration.mesh import Sampler, build_mesh, cubed_sphere, layer_fractions
+from solver.dehydration.mesh import (
+    Sampler,
+    build_mesh,
+    corner_ratios,
+    cubed_sphere,
+    flesh_span,
+    inner_distance,
+    layer_fractions,
+)
 from solver.fruit import directions, lattice
 
 
@@ -26,6 +35,71 @@ def test_elements_are_right_handed_and_fill_the_fruit(preset):
     assert solid.sum() == pytest.approx(4 * np.pi, rel=1e-12)
     expected = (solid * ((outer**3 - inner**3) / 3)[mesh.sphere.quads].mean(axis=1)).sum()
     assert basis.dx.sum() == pytest.approx(expected, rel=0.02)
+
+
+def prolate(r4, **values):
+    """An ellipsoid of revolution with equator r4, by its seven radii."""
+    latitude = np.radians(np.linspace(-90, 90, 7))
+    radii = 1 / np.sqrt(np.sin(latitude) ** 2 + (np.cos(latitude) / r4) ** 2)
+    return {"radii": (*np.round(radii, 6).tolist(), values.pop("r8", r4)), **values}
+
+
+#: Fruits of every kind and the least corner Jacobian ratio that their mesh was measured to have (n = 12, 6 layers).
+QUALITY = {
+    "sphere": ({}, 0.36),
+    "jujube1": ({}, 0.25),
+    "jujube2": ({}, 0.20),
+    "plum1": ({}, 0.6),
+    "plum2": ({}, 0.25),
+    "raisin": ({}, 0.2),
+    "wolfberry": ({}, 0.2),
+    "prolate": (prolate(0.3, stone=(0.4, 0.1)), 0.2),
+    "prolate and flat": (prolate(0.3, stone=(0.0, 0.0), r8=0.2), 0.03),
+    "flat": ({"r8": 0.2, "stone": (0.3, 0.3)}, 0.2),
+    "wide": ({"r8": 2.0, "stone": (0.3, 0.3)}, 0.2),
+    "stone near the skin": ({"stone": (0.97, 0.97)}, 0.8),
+    "stone near the poles": ({"stone": (0.97, 0.2)}, 0.05),
+    "disc": ({"stone": (0.1, 0.9)}, 0.03),
+    "needle": ({"stone": (0.95, 0.05)}, 0.004),
+    "no stone": ({"stone": (0.0, 0.0)}, 0.06),
+}
+
+
+@pytest.mark.parametrize("name", sorted(QUALITY))
+def test_corner_jacobians_stay_positive(name):
+    values, least = QUALITY[name]
+    solver = registry.get("dehydration")
+    mesh = build_mesh(solver.parse(values, preset=None if values else name), 12, layer_fractions(0.6, 0.05, 1.3))
+    assert corner_ratios(mesh.positions, mesh.connectivity).min() > least
+
+
+def test_a_mesh_inside_out_is_refused_with_advice():
+    fruit = registry.get("dehydration").parse({}, preset="sphere")
+    with pytest.raises(InvalidGeometry, match="Bring r2"):
+        build_mesh(fruit, 4, np.array([0.0, 0.6, 0.4, 1.0]))
+
+
+def test_corner_ratio_of_a_brick_is_one_and_of_a_mirrored_one_is_not_positive():
+    brick = np.array([[c >> 2 & 1, c >> 1 & 1, c & 1] for c in range(8)]) * [1.0, 2.0, 0.1]
+    assert corner_ratios(brick, np.arange(8)[None]) == pytest.approx(1.0)
+    crushed = brick.copy()
+    crushed[7] = [0.2, 0.2, 0.0]
+    assert corner_ratios(crushed, np.arange(8)[None])[0] < 0
+
+
+def test_without_a_stone_a_small_ball_is_left_out():
+    solver = registry.get("dehydration")
+    fruit = solver.parse({"stone": (0, 0)})
+    mesh = build_mesh(fruit, 6, np.linspace(0, 1, 5))
+    assert np.linalg.norm(mesh.positions[mesh.fixed], axis=1) == pytest.approx(0.1)
+    assert flesh_span(fruit) == pytest.approx((0.9, 0.9))
+    thin = solver.parse({"stone": (0, 0), "r8": 0.2})
+    assert inner_distance(thin, np.eye(3)) == pytest.approx(0.08, rel=0.05)
+
+
+def test_flesh_span_is_measured_along_rays():
+    fruit = registry.get("dehydration").parse({"stone": (0.9, 0.2)})
+    assert flesh_span(fruit) == pytest.approx((0.1, 0.8), abs=0.03)
 
 
 def _solid_angles(rays, quads):

@@ -56,10 +56,18 @@ def _chunks(
         yield part, nodes, planes[part].transpose(1, 0, 2).reshape(planes.shape[1], -1).astype(np.float64)
 
 
+def _deep(layout: Layout) -> NDArray[np.bool_]:
+    """(core blocks,) bool: blocks below the layout's full levels."""
+    deep = np.zeros(len(layout.core_elements), bool)
+    for _, first, cores, _, _ in layout.strips:
+        deep[first : first + max(cores - layout.full_levels, 0)] = True
+    return deep
+
+
 def element_report(layout: Layout, state: NDArray[np.int32], theta: float, *, one_point: bool = False) -> ElementReport:
     """Strain energy and least J/Jd of every element; state (nodes, 4) int32, see `fixed_point`.
 
-    With `one_point` the core's energy is the one-point element's; the ratio is always that of the full rule.
+    With `one_point` the energy of the deep core is the one-point element's; the ratio is always that of the full rule.
     """
     arithmetic = NumpyArithmetic()
     results: list[tuple[Floats, Floats]] = []
@@ -73,9 +81,10 @@ def element_report(layout: Layout, state: NDArray[np.int32], theta: float, *, on
             total, least = energy(arithmetic, nodes, stored.__getitem__, np.float64(factor), exocarp)
             energies[part], ratios[part] = total.reshape(shape), least.reshape(shape)
         if one_point and not exocarp:
-            for part, nodes, stored in _chunks(layout, state, elements, layout.one_point_planes):
+            deep = np.flatnonzero(_deep(layout))
+            for part, nodes, stored in _chunks(layout, state, elements[deep], layout.one_point_planes[deep]):
                 total = one_point_energy(arithmetic, nodes, stored.__getitem__, np.float64(theta))
-                energies[part] = total.reshape(elements[part].shape)
+                energies[deep[part]] = total.reshape(energies[deep[part]].shape)
         results.append((energies, ratios))
     (core_energy, core_ratio), (skin_energy, skin_ratio) = results
     return ElementReport(layout.lanes(core_energy, skin_energy), layout.lanes(core_ratio, skin_ratio))

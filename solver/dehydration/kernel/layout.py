@@ -22,6 +22,8 @@ Singles: TypeAlias = NDArray[np.float32]
 ALIGNMENT = 64
 ROW = 3
 """Floats per force row: one corner of one lane's face."""
+ALL = 1 << 30
+"""More levels than any mesh has."""
 
 
 def aligned_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
@@ -76,6 +78,8 @@ class Layout:
     """(nodes, 4): fresh positions as the kernel's state (see `fixed_point`); the fourth column is unused and 0"""
     mass: Floats
     """(nodes,): scaled mass, of fixed nodes too"""
+    full_levels: int
+    """outermost core levels that are integrated fully even where the one-point core is asked for"""
 
     @property
     def force_rows(self) -> int:
@@ -151,6 +155,7 @@ def build_layout(
     *,
     safety: float = 1.5,
     one_point: bool = True,
+    full_levels: int = 0,
 ) -> Layout:
     """Prepare a mesh for `march`.
 
@@ -159,6 +164,7 @@ def build_layout(
     fixed: (nn,) nodes that never move (the stone). safety: factor on the scaled masses against stiffening while the
     fruit deforms; the critical time step is at least sqrt(safety) at rest and a unit step is marched. Swelling to
     theta > 1 stiffens by theta: multiply safety by it. one_point: prepare the one-point core element as well.
+    full_levels: see `Layout`.
 
     Raises ValueError with what to change for inputs that are not a mesh.
     """
@@ -209,4 +215,5 @@ def build_layout(
         connectivity=connect,
         fresh=fresh,
         mass=mass.astype(np.float64, copy=False),
+        full_levels=full_levels,
     )

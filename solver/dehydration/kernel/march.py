@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from solver.dehydration.contact import make_contact
 from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.fixed_point import place
-from solver.dehydration.kernel.layout import ROW, Layout, aligned_zeros
+from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
 from solver.dehydration.kernel.skin import Skin, keep_apart, search, widen
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -59,7 +59,7 @@ _SIGNATURE = types.int64(
     _PLANES,  # core
     _PLANES,  # one-point core
     _PLANES,  # exocarp
-    types.boolean,  # use the one-point core
+    types.int64,  # outermost core levels that are integrated fully
     _INDICES,  # row start
     _INDICES,  # rows
     _FLAT,  # inverse mass
@@ -87,7 +87,7 @@ def _build(stamp: int) -> Callable[..., int]:
     )
     def advance(
         steps: int, state: State, velocity: Singles, strips: NDArray[np.int64], face_offsets: State, core: Singles,
-        one_point: Singles, exocarp: Singles, single: bool, row_start: State, rows: State, inverse_mass: Singles,
+        one_point: Singles, exocarp: Singles, full: int, row_start: State, rows: State, inverse_mass: Singles,
         theta0: float, theta1: float, damping: float, forces: Singles, record: bool, squares: Singles,
         touching: bool, skin: Skin,
     ) -> int:  # fmt: skip
@@ -100,7 +100,7 @@ def _build(stamp: int) -> Callable[..., int]:
             theta = np.float32(theta0 + (theta1 - theta0) * (step + 1) / steps)
             for strip in prange(strips.shape[0]):
                 strip_forces(
-                    state, face_offsets, strips, np.int64(strip), core, one_point, exocarp, single,
+                    state, face_offsets, strips, np.int64(strip), core, one_point, exocarp, full,
                     theta, forces, record, squares,
                 )  # fmt: skip
             if not record:
@@ -166,7 +166,7 @@ def _arrays(layout: Layout, one_point: bool) -> tuple[Any, ...]:
         raise ValueError("this layout was built without the one-point core; build it with one_point=True")
     return (
         layout.strips, layout.face_offsets, layout.core_planes, layout.one_point_planes, layout.exocarp_planes,
-        one_point, layout.row_start, layout.rows, layout.inverse_mass,
+        layout.full_levels if one_point else ALL, layout.row_start, layout.rows, layout.inverse_mass,
     )  # fmt: skip
 
 
@@ -186,7 +186,8 @@ def march(
 
     state: (nodes, 4) int32 positions. velocity: (nodes, 4) float32, displacement per step. theta: shrinkage of the
     core at the start and the end, linear between; the last step sees the end value. damping: per step (alpha of
-    m a + alpha m v = -f), 0 for none. one_point: use the one-point core element. skin: self-contact, or None.
+    m a + alpha m v = -f), 0 for none. one_point: use the one-point core element below the layout's
+    `full_levels`. skin: self-contact, or None.
     Returns the skin to use in the next call (it grows when more pairs touch than it has room for).
     A run that blows up leaves positions out of reach and raises nothing: the caller looks.
     """

@@ -98,7 +98,7 @@ def strip_forces(
     core: Singles,
     one_point: Singles,
     exocarp: Singles,
-    single: bool,
+    full: int,
     theta: float,
     forces: Singles,
     record: bool,
@@ -119,7 +119,7 @@ def strip_forces(
         _from_first_node(quanta, positions)
         if level >= cores:
             exocarp_block(positions, exocarp_flat, np.uint64(first_exocarp + level - cores), np.float32(1), nodal)
-        elif single:
+        elif level < cores - full:
             one_point_block(positions, one_point_flat, np.uint64(first_core + level), theta, nodal)
         else:
             core_block(positions, core_flat, np.uint64(first_core + level), theta, nodal)

@@ -12,7 +12,8 @@ from solver.dehydration.contact import PAIRS, Contact, find_pairs, grow, make_co
 from solver.dehydration.kernel.fixed_point import QUANTUM, positions
 from solver.dehydration.kernel.layout import Layout
 
-OPTIONS: Any = {"cache": True, "error_model": "numpy"}
+OPTIONS: Any = {"error_model": "numpy"}
+"""No cache of their own: numba would keep what they inline from other files. The loop that calls them is cached."""
 UNIT = np.float32(QUANTUM)
 QUANTA = np.float32(1 / QUANTUM)
 

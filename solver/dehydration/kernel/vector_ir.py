@@ -129,7 +129,7 @@ def strip_forces(
     core: Any,
     one_point: Any,
     exocarp: Any,
-    single: Any,
+    full: Any,
     theta: Any,
     forces: Any,
     record: Any,
@@ -138,12 +138,13 @@ def strip_forces(
     """Element forces of one strip.
 
     state: (4 nn,) float32 positions. offsets: (faces, 4, 16) int32. strips: (strips, 5) int64. strip: int64.
-    core, one_point, exocarp: planes, float32. single: bool, use the one-point core. theta: float32, of the core.
+    core, one_point, exocarp: planes, float32. full: int64, outermost core levels that are integrated fully; those below
+    take one point. theta: float32, of the core.
     forces: float32 rows, written. record: bool. squares: (faces * 64,) float32; if record, the squared nodal
     forces of each row's elements are added.
     """
     arrays = {0: state, 1: offsets, 2: strips, 4: core, 5: one_point, 6: exocarp, 9: forces, 11: squares}
-    others = {3: types.int64, 7: types.boolean, 8: types.float32, 10: types.boolean}
+    others = {3: types.int64, 7: types.int64, 8: types.float32, 10: types.boolean}
     signature = types.void(*(arrays.get(k) or others[k] for k in range(12)))
 
     def codegen(context: Any, build: Any, signature: Any, args: Any) -> Any:
@@ -154,7 +155,8 @@ def strip_forces(
         )
         one = ir.Constant(INT64, 1)
         wide_theta = splat(build, args[8], WIDE)
-        single_chosen = cgutils.as_bool_bit(build, args[7])
+        many = build.icmp_signed("<", args[7], cores)
+        deep = build.select(many, build.sub(cores, args[7]), ir.Constant(INT64, 0))
         sweep = _Sweep(build, data[0], data[1], data[9], data[11], cgutils.as_bool_bit(build, args[10]))
 
         def march(first: Any, count: Any, planes: Any, size: Any, forces_of: Any, factor: Any) -> Any:
@@ -163,11 +165,8 @@ def strip_forces(
                 sweep.element(forces_of, at(build, planes, place), factor)
 
         sweep.open(first_face)
-        with build.if_else(single_chosen) as (then, otherwise):
-            with then:
-                march(first_core, cores, data[5], ONE_POINT_PLANES, one_point_forces, wide_theta)
-            with otherwise:
-                march(first_core, cores, data[4], CORE_PLANES, core_forces, wide_theta)
+        march(first_core, deep, data[5], ONE_POINT_PLANES, one_point_forces, wide_theta)
+        march(build.add(first_core, deep), build.sub(cores, deep), data[4], CORE_PLANES, core_forces, wide_theta)
         march(first_exocarp, exocarps, data[6], EXOCARP_PLANES, exocarp_forces, constant(1.0))
         sweep.close()
         return context.get_dummy_value()
