@@ -8,7 +8,7 @@ STAMP  := $(VENV)/.installed
 STORE  ?= demo
 PORT   ?= 8765
 
-.PHONY: demo test test-slow bench lint format clean constraints
+.PHONY: demo test test-slow bench stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -35,6 +35,10 @@ test-slow: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.kernel
 	$(BIN)/python -m benchmarks.lookup
+
+## stress: every hostile corner of the parameters on tiny meshes; five minutes on two cores
+stress: $(STAMP)
+	$(BIN)/python -m benchmarks.stress
 
 ## lint: style, types, floors
 lint: $(STAMP)

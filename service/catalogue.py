@@ -127,6 +127,7 @@ def _table(info: TableInfo) -> Json:
             "description": axis.description if axis else name,
         }
     stage = solver.stages
+    lowest, highest = info.reach
     return {
         "name": info.name,
         "solver": info.solver,
@@ -138,7 +139,14 @@ def _table(info: TableInfo) -> Json:
         "dtype": info.dtype,
         "axes": axes,
         "fixed": info.fixed,
-        "stage": {"symbol": stage.symbol, "long_name": stage.long_name, "units": stage.units, "stored": info.stages},
+        "stage": {
+            "symbol": stage.symbol,
+            "long_name": stage.long_name,
+            "units": stage.units,
+            "lowest": lowest,
+            "highest": highest,
+            "stored": info.stages,
+        },
         "descriptors": {name: quantities.attrs(name) for name in info.descriptors if name in quantities.QUANTITIES},
         "links": {"self": f"/v1/tables/{info.name}", "shapes": f"/v1/shapes/{info.solver}?table={info.name}"},
     }

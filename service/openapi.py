@@ -111,7 +111,7 @@ def _examples(tables: LiveTables) -> dict[str, Json]:
         for name in tables.names():
             table = tables.get(name)
             symbol = vocabulary.solver_named(table.info.solver).stages.symbol
-            ends = {**table.axes, symbol: (0.0, table.stages[-1])}
+            ends = {**table.axes, symbol: table.reach}
             for axis, (low, high) in ends.items():
                 entry = found.setdefault(axis, {})
                 entry[f"{name}-lowest"] = {"summary": f"lowest in table {name}", "value": float(low)}

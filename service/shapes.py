@@ -93,7 +93,7 @@ def _words(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
         axes=table.axes,
         fixed=fixed,
         stage=solver.stages.symbol,
-        stages=(0.0, table.stages[-1]),
+        stages=table.reach,
         units={**units, solver.stages.symbol: solver.stages.units},
         max_resolution=max_resolution,
     )

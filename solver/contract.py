@@ -7,6 +7,7 @@ progress, cancellation and randomness, and every failure is a `SolverError` that
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple, Self
@@ -118,6 +119,24 @@ class Cancelled(SolverError):
 # --- parameters -----------------------------------------------------------------------------------------------
 
 
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
+
+
+def _named(values: object) -> Mapping[str, Any]:
+    """Return `values` if they are names and values.
+
+    Raises:
+        InvalidInput: they are not.
+
+    """
+    if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+        raise InvalidInput(
+            f"expected names and values, got {_SHORT.repr(values)}.", advice='Give an object such as {"te": 0.04}.'
+        )
+    return values
+
+
 def _say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     """Put pydantic's findings into one sentence per field, with the nearest name for a misspelt one."""
     parts = []
@@ -126,11 +145,11 @@ def _say(error: ValidationError, fields: Mapping[str, Any]) -> str:
         if item["type"] == "extra_forbidden":
             near = difflib.get_close_matches(where, list(fields), n=1)
             hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(sorted(fields))}"
-            parts.append(f"unknown name {where!r}{hint}")
+            parts.append(f"unknown name {_SHORT.repr(where)}{hint}")
         else:
             message = item["msg"].removeprefix("Value error, ")
             got = item.get("input")
-            shown = f" (got {got!r})" if where and not isinstance(got, dict) else ""
+            shown = f" (got {_SHORT.repr(got)})" if where and not isinstance(got, dict) else ""
             parts.append(f"{where + ': ' if where else ''}{message}{shown}")
     return "; ".join(parts)
 
@@ -162,6 +181,7 @@ class Params(BaseModel):
             InvalidGeometry: when the values contradict each other.
 
         """
+        values = _named(values)
         plain = {k: v for k, v in values.items() if k not in cls.axes}
         known = {**cls.model_fields, **dict.fromkeys(cls.axes)}
         try:
@@ -251,7 +271,7 @@ class Need(BaseModel):
 
         """
         try:
-            return cls.model_validate(dict(values))
+            return cls.model_validate(dict(_named(values)))
         except ValidationError as error:
             raise InvalidInput(f"{_say(error, cls.model_fields)}.") from None
 
@@ -353,7 +373,7 @@ class Solver:
                 )
             base = self.presets[preset]
         # a whole field given by hand replaces the preset's; a scalar axis replaces one entry of it
-        return self.params.parse({**base, **values})
+        return self.params.parse({**base, **_named(values)})
 
     def settle(self, need: Need) -> Need:
         """Fill in the defaults of `need` and refuse what this solver cannot give, before any work.

@@ -35,19 +35,20 @@ def settle(table: TableInfo, query: Mapping[str, float]) -> dict[str, float]:
 
 
 def settle_stage(table: TableInfo, stage: float) -> float:
-    """Return the stage, between the fresh 0 and the last stored one.
+    """Return the stage, between the first and the last of the stored ones and the fresh 0.
 
     Raises:
         OutsideTable: it is not.
 
     """
-    return _inside("stage", stage, 0.0, table.stages[-1], table)
+    return _inside("stage", stage, *table.reach, table)
 
 
 def describe(table: TableInfo) -> str:
     """Return a sentence with all axes and their bounds."""
     axes = [f"{name} {low:g} to {high:g}" for name, (low, high) in table.axes.items()]
-    return f"The table holds {', '.join([*axes, f'stage 0 to {table.stages[-1]:g}'])}."
+    low, high = table.reach
+    return f"The table holds {', '.join([*axes, f'stage {low:g} to {high:g}'])}."
 
 
 def check_names(kind: str, names: Iterable[str], known: list[str]) -> None:

@@ -2,8 +2,8 @@
 
 The spectra of the nearest samples are weighted by inverse distance, and one inverse FFT gives the displacement at any
 resolution. Weighting spectra is the same as weighting displacements; the spectrum buys the level of detail and the
-small table. Between stages the change is linear, from the fresh shape at s = 0. The fresh shape itself is not
-interpolated: it follows from the parameters.
+small table. Between stages the change is linear, and the fresh shape at s = 0 is one of them: swollen stages (s < 0)
+lead away from it as dried ones do. The fresh shape itself is not interpolated: it follows from the parameters.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ Array = NDArray[Any]
 
 #: Fields that a query may ask for.
 FIELDS = ("position", "displacement")
-#: Descriptors that are zero on the fresh shape; the others have no known value before the first stored stage.
+#: Stands for the fresh shape among the stored stages.
+_FRESH = -1
+#: Descriptors that are zero on the fresh shape; the others have no known value next to it.
 _ZERO_AT_FIRST = ("roughness", "buckle_count", "penetration")
 
 
@@ -104,7 +106,9 @@ class ShapeTable:
         self._descriptors = {name: columns[name] for name in table.descriptors}
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
         self._neighbours = None if values is None else Neighbours(values)
-        self._stages = np.array(table.stages)
+        stored = {stage: j for j, stage in enumerate(table.stages)}
+        self._knots = np.array(sorted({0.0, *stored}))
+        self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
 
     @classmethod
     def open(cls, path_or_store: Path | str | Store, name: str = "default", verify: bool = True) -> Self:
@@ -144,6 +148,11 @@ class ShapeTable:
     def stages(self) -> tuple[float, ...]:
         """Stored stages; the fresh stage 0 goes without saying."""
         return self.info.stages
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """First and last stage that can be asked for."""
+        return self.info.reach
 
     @property
     def digest(self) -> str:
@@ -189,9 +198,9 @@ class ShapeTable:
         if m < 1 or not eta > 0:
             raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
         near = self._near(values, m, eta)
-        below, part = self._bracket(s)
+        stages = self._bracket(s)
         fruit = self._fruit(values) if "position" in fields else None
-        waves = self._blend(near, below, part)
+        waves = self._blend(near, stages)
         position, displacement = _synthesize(waves, n, fruit, "displacement" in fields)
         poles = None
         if fruit is not None:
@@ -204,11 +213,11 @@ class ShapeTable:
             poles=poles,
             stage=s,
             parameters=values,
-            descriptors=self._describe(near, below, part),
+            descriptors=self._describe(near, stages),
             weights={self._keys[i]: float(w) for i, w in zip(near.samples, near.weights, strict=True)},
             nearest=near.nearest,
-            exact=s == 0 or (near.nearest == 0.0 and part in (0.0, 1.0)),
-            converged=self._has_converged(near, below, part),
+            exact=s == 0 or (near.nearest == 0.0 and len(stages) == 1),
+            converged=self._has_converged(near, stages),
             table=self.digest,
             units={name: self._units[name] for name in (*fields, *self.info.descriptors)},
         )
@@ -218,39 +227,43 @@ class ShapeTable:
             return Weighted(np.zeros(1, int), np.ones(1), 0.0)
         return self._neighbours.weigh(np.array(list(values.values())), m, eta)
 
-    def _bracket(self, stage: float) -> tuple[int, float]:
-        """Return (j, t): the stage is (1 - t) of stored stage j and t of the next; j = -1 is the fresh one."""
-        after = int(np.searchsorted(self._stages, stage, side="left"))
-        high = self._stages[after]
-        low = self._stages[after - 1] if after else 0.0
+    def _bracket(self, stage: float) -> dict[int, float]:
+        """Return the stages around one with their weights: stored ones by their place, and `_FRESH`."""
+        after = int(np.searchsorted(self._knots, stage, side="left"))
+        before = max(after - 1, 0)
+        low, high = self._knots[before], self._knots[after]
         part = (stage - low) / (high - low) if high > low else 1.0
-        return after - 1, (round(part) if abs(part - round(part)) < SAME else part)
+        if abs(part - round(part)) < SAME:
+            part = round(part)
+        # where the lowest stage is asked for, both are the same one
+        weights = {self._stored[before]: 1 - part, self._stored[after]: part}
+        return {j: float(weight) for j, weight in weights.items() if weight > 0}
 
-    def _terms(self, near: Weighted, below: int, part: float) -> list[tuple[int, int, float]]:
-        """Return (sample, stage, weight) of all that takes part; the fresh stage adds nothing."""
-        stages = [(j, t) for j, t in ((below, 1 - part), (below + 1, part)) if t > 0 and j >= 0]
-        return [(i, j, w * t) for i, w in zip(near.samples, near.weights, strict=True) for j, t in stages]
+    def _terms(self, near: Weighted, stages: Mapping[int, float]) -> list[tuple[int, int, float]]:
+        """Return (sample, stage, weight) of all that takes part; the fresh shape adds nothing."""
+        stored = [(j, t) for j, t in stages.items() if j != _FRESH]
+        return [(i, j, w * t) for i, w in zip(near.samples, near.weights, strict=True) for j, t in stored]
 
-    def _blend(self, near: Weighted, below: int, part: float) -> Array:
+    def _blend(self, near: Weighted, stages: Mapping[int, float]) -> Array:
         """Return the weighted spectrum (component, m, k)."""
         first = self._spectra[0, 0]
         # not by BLAS: its threads would wait for each other in a busy server, for a sum of a tenth of a millisecond
         total, scaled = np.zeros_like(first), np.empty_like(first)
-        for sample, stage, weight in self._terms(near, below, part):
+        for sample, stage, weight in self._terms(near, stages):
             total += np.multiply(self._spectra[sample, stage], first.dtype.type(weight), out=scaled)
         return total.view(np.result_type(first.dtype, np.complex64)).reshape(first.shape[:-1])
 
-    def _describe(self, near: Weighted, below: int, part: float) -> dict[str, float]:
-        terms = self._terms(near, below, part)
-        known = self._descriptors if below >= 0 or part == 1.0 else _ZERO_AT_FIRST
+    def _describe(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
+        terms = self._terms(near, stages)
+        known = _ZERO_AT_FIRST if _FRESH in stages else self._descriptors
         return {
             name: float(sum(w * self._descriptors[name][i, j] for i, j, w in terms))
             for name in known
             if name in self._descriptors
         }
 
-    def _has_converged(self, near: Weighted, below: int, part: float) -> bool:
-        terms = self._terms(near, below, part)
+    def _has_converged(self, near: Weighted, stages: Mapping[int, float]) -> bool:
+        terms = self._terms(near, stages)
         return self._converged is None or all(bool(self._converged[i, j]) for i, j, _ in terms)
 
     def _fruit(self, values: Mapping[str, float]) -> Fruit:

@@ -46,6 +46,11 @@ class TableInfo:
     keys: tuple[str, ...]
     created: str
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """First and last stage that can be asked for: those stored, and the fresh 0, which goes without saying."""
+        return min(0.0, self.stages[0]), max(0.0, self.stages[-1])
+
     def to_json(self) -> dict[str, Any]:
         """Return the manifest as JSON values."""
         return json.loads(json.dumps(asdict(self)))

@@ -170,7 +170,8 @@ def query(
     wanted = numbers(stages)
     table = ShapeTable.open(store, name)
     if not wanted:
-        raise InvalidOption("--stages is missing.", f"The table has stages 0 to {table.stages[-1]:g}.")
+        low, high = table.reach
+        raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
     fields: tuple[str, ...] = ()
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))

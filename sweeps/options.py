@@ -30,7 +30,7 @@ __all__ = [
 Preset = Annotated[str | None, typer.Option("--preset", help="Named parameters to start from (`wizen presets`).")]
 Set = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="A parameter, e.g. te=0.04 or radii=[1,1,...]. Repeatable."),
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter, e.g. te=0.04 or stone=0.4,0.3. Repeatable."),
 ]
 Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]
 Quality = Annotated[str | None, typer.Option("--quality", help="preview, default or fine.")]
@@ -42,7 +42,7 @@ TableName = Annotated[str, typer.Option("--name", help="Name of the table.")]
 
 
 def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
-    """Return the values of `--set NAME=VALUE` options; VALUE is TOML or JSON, or else plain text.
+    """Return the values of `--set NAME=VALUE` options; VALUE is TOML or JSON, a list without brackets, or plain text.
 
     Raises:
         InvalidOption: no NAME=, or a name given twice.
@@ -60,7 +60,10 @@ def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
-    for read in (lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)):
+    readers = [lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)]
+    if "," in text:
+        readers.append(lambda: tomllib.loads(f"value = [{text}]")["value"])
+    for read in readers:
         try:
             return read()
         except ValueError:  # both libraries' errors are ValueErrors

@@ -49,6 +49,9 @@ _SETTLE_REWEIGH = 1000
 #: Settling turns from swinging to calming when the drift falls below this many times its limit.
 _CALM = 2.0
 
+#: Strain below which forces count as round-off.
+_LEAST_STRAIN = 1e-4
+
 #: Steps over which the surface's drift is measured.
 _REST_STEPS = 200
 
@@ -102,7 +105,10 @@ class Path:
             full_levels=settings.full_levels,
         )
         self._drive = Drive(params, mesh, self._layout)
-        self._fresh_bound = stiffness_bounds(self._layout, self._layout.fresh, mesh.is_exocarp, *self._moduli)
+        self._fresh_bound = stiffness_bounds(
+            self._layout, self._layout.fresh, mesh.is_exocarp, *self._moduli, even_crushed=True
+        )
+        self._least_force = _LEAST_STRAIN * _unit_force(self._layout, mu)
         te = params.exocarp_thickness
         self._skin = make_skin(self._layout, mesh.surface_nodes, mesh.sphere.quads, settings.clearance * te, te)
         self._state, self._velocity = new_state(self._layout)
@@ -146,20 +152,8 @@ class Path:
         return self._settings.start + place * self._settings.pace
 
     def _smooth(self, shrinkage: float) -> tuple[Fixed, Single]:
-        """Return the start at `shrinkage`: the closed form along each ray, exact for spheres, at rest."""
-        if not self._drive.idle:
-            return new_state(self._layout, self._drive.smooth(shrinkage))
-        mesh = self.mesh
-        fresh = positions(self._layout.fresh)
-        distance = np.linalg.norm(fresh, axis=1)
-        columns = distance.reshape(-1, mesh.levels)
-        stone, interface = columns[:, :1], columns[:, np.argmax(mesh.depth) : np.argmax(mesh.depth) + 1]
-        moved = np.where(
-            mesh.depth[None, :] < 1,
-            np.cbrt(stone**3 + (1 - shrinkage) ** 3 * (columns**3 - stone**3)),
-            np.cbrt(stone**3 + (1 - shrinkage) ** 3 * (interface**3 - stone**3) + columns**3 - interface**3),
-        )
-        return new_state(self._layout, fresh * (moved.reshape(-1) / distance)[:, None])
+        """Return the smooth start at `shrinkage`, at rest."""
+        return new_state(self._layout, self._drive.smooth(shrinkage))
 
     def _march(self, target: int, last: float) -> None:
         """March in whole slices to at most `target` steps."""
@@ -169,7 +163,7 @@ class Path:
             # the closed form is incompressible, the elements are nearly so: let the difference ring down
             self._advance(self._state, self._velocity, 400, settings.start, settings.start, 0.05)
             self._begun = True
-        chunk = max(20, _SLICE // self.elements)
+        chunk = max(20, min(_SLICE // self.elements, round(_REWEIGH / settings.pace)))
         every = max(1, round(_REWEIGH / (chunk * settings.pace)))
         while self._place + chunk <= target:
             if self._place // chunk % every == 0:
@@ -276,5 +270,13 @@ class Path:
         forget(self._skin, layout)
         march(layout, moved, kick, 1, theta=(theta, theta), damping=damping, one_point=True, skin=self._skin)
         momentum = (1 + damping / 2) * (kick[:, :3] * layout.mass[:, None])[layout.free]
+        # a fruit without stress has nothing but round-off; that is no lack of balance
         # not `norm`: it is a BLAS dot product, whose rounding depends on the number of threads
-        return float(np.sqrt(np.square(momentum).sum())) / scale if scale > 0 else 0.0
+        return float(np.sqrt(np.square(momentum).sum())) / max(scale, self._least_force)
+
+
+def _unit_force(layout: Layout, mu: Array) -> float:
+    """Root of the sum of squares of the elements' nodal forces at about unit strain: mu times the mean face."""
+    corners = positions(layout.fresh)[layout.connectivity]
+    size = np.linalg.norm(corners[:, 7] - corners[:, 0], axis=1) / np.sqrt(3)
+    return float(np.sqrt(np.square(mu * size**2).sum()))

@@ -17,7 +17,7 @@ from solver.fruit import lattice
 from store.lookup import ShapeTable
 from store.store import Store
 
-from ..store.conftest import displacement
+from ..store.conftest import displacement, fill
 from .conftest import QUERY, SHAPE, build, client_of
 
 #: A stored sample at a stored stage, where interpolation adds nothing.
@@ -194,6 +194,26 @@ def test_outside_the_table(client: httpx.Client) -> None:
 @pytest.mark.parametrize("query", [{"format": "glb"}, {"format": "npz"}, {"format": "json"}])
 def test_the_fresh_fruit(client: httpx.Client, query: dict[str, Any]) -> None:
     assert ask(client, {**QUERY, **query, "s": 0}).status_code == 200
+
+
+def test_swollen_fruits(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store", create=True)
+    fill(store, te=[0.02, 0.06], stages=(-0.2, 0.2))
+    build(store)
+    with client_of(store.root) as client:
+        answer = ask(client, {"te": 0.02, "s": -0.1, "format": "npz"})
+        assert 's-0.1.npz"' in answer.headers["content-disposition"]
+        with np.load(io.BytesIO(answer.content)) as archive:
+            assert np.abs(archive["displacement"] - displacement(0.02, 10.0, -0.1, 16)).max() < 1e-6
+        off = ask(client, {"te": 0.02, "s": -0.21})
+        assert off.status_code == 422
+        assert "-0.2 to 0.2" in off.json()["advice"]
+        stage = client.get("/v1/tables/default").json()["stage"]
+        assert (stage["stored"], stage["lowest"], stage["highest"]) == ([-0.2, 0.2], -0.2, 0.2)
+        described = client.get("/openapi.json").json()["paths"][SHAPE.replace("dehydration", "{solver}")]["get"]
+        s = next(p for p in described["parameters"] if p["name"] == "s")
+        assert s["schema"]["minimum"] == SOLVER.stages.lowest
+        assert [s["examples"][f"default-{end}"]["value"] for end in ("lowest", "highest")] == [-0.2, 0.2]
 
 
 def test_tables_are_chosen_by_name(own: Store) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import time
 from pathlib import Path
 
 import httpx
@@ -15,6 +16,10 @@ from .conftest import QUERY, SHAPE, client_of
 def test_every_request_is_logged_once(client: httpx.Client, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, "wizen.service"):
         answer = client.get(SHAPE, params=QUERY)
+        # the server writes it once the answer is on its way
+        deadline = time.monotonic() + 5
+        while not any(r.name == "wizen.service" for r in caplog.records) and time.monotonic() < deadline:
+            time.sleep(0.01)
     (record,) = [r for r in caplog.records if r.name == "wizen.service"]
     assert record.request_id == answer.headers["x-request-id"]  # type: ignore[attr-defined]
     assert record.route == "/v1/shapes/{solver}"  # type: ignore[attr-defined]

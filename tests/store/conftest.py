@@ -28,7 +28,7 @@ MODES = ((3, 2), (5, 1), (6, 0))
 
 
 def displacement(te: float, gamma: float, stage: float, resolution: int) -> np.ndarray:
-    """Return u (n, 2n, 3): shrinkage, and three harmonics along the ray whose amplitudes are linear in te, gamma, s."""
+    """Return u (n, 2n, 3): shrinkage, and three harmonics along the ray with amplitudes linear in te, gamma, |s|."""
     theta, phi = lattice(resolution)
     radial = -0.5 * stage
     for i, (degree, order) in enumerate(MODES):
@@ -37,7 +37,7 @@ def displacement(te: float, gamma: float, stage: float, resolution: int) -> np.n
 
 
 def amplitude(i: int, te: float, gamma: float, stage: float) -> float:
-    return 0.1 * stage * (1 + i + 5 * te - 0.01 * gamma)
+    return 0.1 * abs(stage) * (1 + i + 5 * te - 0.01 * gamma)
 
 
 def question(

@@ -110,6 +110,29 @@ def test_linear_between_stages_and_from_the_fresh_shape(table: ShapeTable) -> No
     assert half == pytest.approx(whole / 2)
 
 
+@pytest.mark.parametrize("stages", [(-0.2, -0.1, 0.1, 0.3), (-0.2, 0.0, 0.3), (-0.3, -0.1), (0.1, 0.3), (0.0, 0.3)])
+def test_swelling_and_drying_both_start_at_the_fresh_shape(store: Store, stages: tuple[float, ...]) -> None:
+    fill(store, te=[0.03, 0.04], stages=stages)
+    tables.build(store, axes=AXES)
+    table = ShapeTable.open(store)
+    low, high = min(0.0, *stages), max(0.0, *stages)
+    assert (table.stages, table.reach) == (stages, (low, high))
+    for stage in (*stages, low, low / 1.9, low / 2.7, 0.0, high / 3.7, high):
+        shape = table.at({"te": 0.04}, stage, fields=("displacement", "position"))
+        truth = displacement(0.04, 10.0, stage, 16)
+        np.testing.assert_allclose(shape.displacement, truth, atol=1e-7)
+        np.testing.assert_allclose(shape.position, Fruit.parse({"te": 0.04}).surface(*lattice(16)) + truth, atol=3e-7)
+        roughness = np.hypot.reduce([amplitude(i, 0.04, 10.0, stage) for i in range(3)])
+        assert shape.descriptors["roughness"] == pytest.approx(roughness, abs=1e-12)
+        assert shape.exact == (stage in (*stages, 0.0))
+        # next to the fresh shape only what vanishes on it is known
+        between = any(x < stage < y for x, y in pairwise(stages) if x * y >= 0)
+        assert ("mean_radius" in shape.descriptors) == (stage in stages or between)
+    for off in (low - 0.01, high + 0.01):
+        with pytest.raises(OutsideTable, match=f"stage {low:g} to {high:g}"):
+            table.at({"te": 0.04}, off)
+
+
 def test_a_linear_truth_is_hit_at_the_centre_of_a_cell(table: ShapeTable) -> None:
     _, u = both(table, {"te": 0.035, "gamma": 15.0}, 0.3, m=4)
     np.testing.assert_allclose(u, displacement(0.035, 15.0, 0.3, 16), atol=2e-7)

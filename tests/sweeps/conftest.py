@@ -58,11 +58,13 @@ def store(tmp_path: Path) -> Store:
     return Store.open(tmp_path / "store", create=True)
 
 
-def write(path: Path, te: str = "[0.02, 0.03, 0.04]", gamma: str = "[10, 30]", more: str = "") -> Path:
+def write(
+    path: Path, te: str = "[0.02, 0.03, 0.04]", gamma: str = "[10, 30]", more: str = "", stages: str = "[0.1, 0.2]"
+) -> Path:
     """Write a plan of `shrinking`: six samples unless told otherwise."""
     path.write_text(
         f'solver = "shrinking"\n{"" if not more else "[set]"}\n{more}\n[axes]\nte = {te}\ngamma = {gamma}\n'
-        '[need]\nstages = [0.1, 0.2]\nquality = "preview"\n'
+        f'[need]\nstages = {stages}\nquality = "preview"\n'
     )
     return path
 

@@ -23,6 +23,7 @@ from typer.testing import CliRunner, Result
 from service.cli import app
 from store import seal
 from store.store import Store
+from sweeps.options import assignments
 
 Write = Callable[..., Path]
 
@@ -80,6 +81,25 @@ def test_version() -> None:
 def test_presets() -> None:
     assert document(wizen("presets", "--json"))["dehydration"]["presets"]["plum1"]["stone"] == [0.6, 0.5]
     assert "jujube1" in wizen("presets").stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0.4", 0.4),
+        ("[0.4, 0.3]", [0.4, 0.3]),
+        ("0.4,0.3", [0.4, 0.3]),
+        (" 1, 2 ,3", [1, 2, 3]),
+        ("-0.1,2e-3", [-0.1, 2e-3]),
+        ("null", None),
+        ("waves", "waves"),
+        ("waves, mode", "waves, mode"),
+        ("0.4,", [0.4]),
+        (",0.4", ",0.4"),
+    ],
+)
+def test_values_of_set(text: str, value: Any) -> None:
+    assert assignments([f"stone={text}"]) == {"stone": value}
 
 
 def test_solve_writes_a_shard(shrinking: Solves, tmp_path: Path) -> None:
@@ -170,6 +190,21 @@ def test_query(table: Path, tmp_path: Path) -> None:
     # every sample is a sphere that shrinks by s, so what is between them is one, too, up to the fresh shape's skin
     radius = np.linalg.norm(np.load(out)["position"], axis=-1)
     np.testing.assert_allclose(radius, 1.025 * 0.85, rtol=2e-3)
+
+
+def test_query_swollen(site: None, tmp_path: Path) -> None:
+    store, out = tmp_path / "store", tmp_path / "shape.npz"
+    plan = write(tmp_path / "swollen.toml", gamma="[10]", stages="[-0.2, -0.1]")
+    assert wizen("sweep", plan, "--store", store).exit_code == 0
+    assert wizen("table", "build", "--store", store, "--solver", "shrinking").exit_code == 0
+    query = ("query", "--store", store, "--set", "te=0.03")
+    said = document(wizen(*query, "--stages", "-0.15,-0.05,0", "--out", out, "--json"))
+    assert [stage["stage"] for stage in said["stages"]] == [-0.15, -0.05, 0.0]
+    radius = np.linalg.norm(np.load(out)["position"], axis=-1)
+    for i, scale in enumerate((1.15, 1.05, 1.0)):
+        np.testing.assert_allclose(radius[i], 1.03 * scale, rtol=1e-5)
+    assert "stage -0.2 to 0" in wizen(*query, "--stages", "0.1").stderr
+    assert "stages -0.2 to 0." in wizen(*query).stderr
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".glb", ".png", ".json"])

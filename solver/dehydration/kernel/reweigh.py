@@ -58,11 +58,20 @@ def reweigh(
 
 
 def stiffness_bounds(
-    layout: Layout, state: NDArray[np.int32], is_exocarp: NDArray[np.bool_], mu: Floats, kappa: Floats
+    layout: Layout,
+    state: NDArray[np.int32],
+    is_exocarp: NDArray[np.bool_],
+    mu: Floats,
+    kappa: Floats,
+    *,
+    even_crushed: bool = False,
 ) -> Floats:
-    """Upper bound (ne,) of each element's largest stiffness at `state`; 0 for elements too crushed to have one."""
+    """Upper bound (ne,) of each element's largest stiffness at `state`; 0 for elements too crushed to have one.
+
+    even_crushed: take it of those as well, as for a fresh mesh, which has slender but no inverted ones.
+    """
     corners = positions(state)[layout.connectivity]
-    sound = _sound(corners)
+    sound = np.ones(len(corners), bool) if even_crushed else _sound(corners)
     bound = np.zeros(layout.elements)
     for exocarp in (False, True):
         chosen = (is_exocarp == exocarp) & sound
