@@ -51,7 +51,8 @@ def patterns(root: Path, stage: float) -> list[Pattern]:
         store = Store.open(root)
     except StoreError:
         return []
-    return [_pattern(store.get(key).sel(stage=stage)) for key in store.keys()]
+    stored = list(store.keys())
+    return [_pattern(store.get(key).sel(stage=stage)) for key in stored]
 
 
 def _pattern(data: xr.Dataset) -> Pattern:

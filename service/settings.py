@@ -8,6 +8,8 @@ import platformdirs
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from store.starter import own_or_starter
+
 __all__ = ["Settings"]
 
 
@@ -17,8 +19,8 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="WIZEN_", frozen=True, extra="ignore")
 
     store: Path = Field(
-        default_factory=lambda: platformdirs.user_data_path("wizen") / "store",
-        description="Directory of the store whose tables are served",
+        default_factory=lambda: own_or_starter(platformdirs.user_data_path("wizen") / "store"),
+        description="Directory of the store whose tables are served; without one, the table that comes with wizen",
     )
     host: str = Field("127.0.0.1", description="Address to listen on")
     port: int = Field(8765, ge=0, le=65535, description="Port to listen on")

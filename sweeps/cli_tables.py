@@ -9,7 +9,7 @@ import typer
 
 from .console import emit, grid
 from .errors import InvalidOption
-from .options import As_json, Out, Quality, Set, Stages, StorePath, TableName, assignments, numbers
+from .options import As_json, Out, Quality, Set, Stages, StorePath, StoreToRead, TableName, assignments, numbers
 
 __all__ = ["add_to"]
 
@@ -62,7 +62,7 @@ def build(
 
 
 @table_app.command()
-def info(store: StorePath, name: TableName = "default", as_json: As_json = False) -> None:
+def info(store: StoreToRead = None, name: TableName = "default", as_json: As_json = False) -> None:
     """Say what a table holds: its axes with bounds, what is fixed, its stages.
 
     [bold]Examples[/bold]
@@ -71,10 +71,10 @@ def info(store: StorePath, name: TableName = "default", as_json: As_json = False
 
     wizen table info --store demo --name coarse --json
     """
-    from store import tables
+    from store import starter, tables
     from store.store import Store
 
-    opened = Store.open(store)
+    opened = Store.open(store or starter.ROOT)
     found = tables.info(opened, name)
     _show_table(found, tables.path_of(opened, found), as_json)
 
@@ -102,8 +102,8 @@ def verify(store: StorePath, name: TableName = "default", as_json: As_json = Fal
 
 
 def draw_map(
-    store: StorePath,
     out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="The picture.")],
+    store: StoreToRead = None,
     name: TableName = "default",
     x: Annotated[str | None, typer.Option("--x", metavar="AXIS", help="From left to right.")] = None,
     y: Annotated[str | None, typer.Option("--y", metavar="AXIS", help="From bottom to top.")] = None,
@@ -121,7 +121,7 @@ def draw_map(
 
     wizen map --store demo --out stages.png --stages 0.1,0.2,0.3
     """
-    from store import seal
+    from store import seal, starter
     from store.lookup import ShapeTable
     from store.store import Store
 
@@ -134,7 +134,7 @@ def draw_map(
     if stage is not None and stages is not None:
         raise InvalidOption("--stage and --stages exclude each other.", "Keep one of them.")
     outputs.check_suffix(out, False, 1)
-    opened = Store.open(store)
+    opened = Store.open(store or starter.ROOT)
     table = ShapeTable.open(opened, name)
     drawing = Map(opened, table, units_of(table.info.solver), assignments(set_), pixels)
     at = table.stages[-1] if stage is None else stage
@@ -145,7 +145,7 @@ def draw_map(
 
 
 def query(
-    store: StorePath,
+    store: StoreToRead = None,
     set_: Set = None,
     stages: Stages = None,
     name: TableName = "default",
@@ -157,10 +157,13 @@ def query(
 
     [bold]Examples[/bold]
 
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --out fruit.glb
+
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.2 --out shape.obj
 
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
+    from store import starter
     from store.lookup import ShapeTable
 
     from . import outputs
@@ -168,7 +171,7 @@ def query(
     from .plan import units_of
 
     wanted = numbers(stages)
-    table = ShapeTable.open(store, name)
+    table = ShapeTable.open(store or starter.ROOT, name)
     if not wanted:
         low, high = table.reach
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")

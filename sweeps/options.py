@@ -22,6 +22,7 @@ __all__ = [
     "Set",
     "Stages",
     "StorePath",
+    "StoreToRead",
     "TableName",
     "assignments",
     "numbers",
@@ -38,6 +39,15 @@ Seed = Annotated[int | None, typer.Option("--seed", help="Seed of everything ran
 Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Where the result goes; the suffix says how.")]
 As_json = Annotated[bool, typer.Option("--json", help="Print one JSON document; everything else goes to stderr.")]
 StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", envvar="WIZEN_STORE", help="The store's directory.")]
+StoreToRead = Annotated[
+    Path | None,
+    typer.Option(
+        "--store",
+        metavar="DIR",
+        envvar="WIZEN_STORE",
+        help="The store's directory; the package's own table if left out.",
+    ),
+]
 TableName = Annotated[str, typer.Option("--name", help="Name of the table.")]
 
 

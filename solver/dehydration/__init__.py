@@ -45,7 +45,7 @@ def _cost(params: DehydrationParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="dehydration",
-    version="2",
+    version="3",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", *_DESCRIPTORS, "strain_energy", "released_energy"),

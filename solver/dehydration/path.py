@@ -6,6 +6,7 @@ else was asked for never changes a stage's shape.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from .kernel import (
     ElementReport,
     Layout,
     build_layout,
+    dilatations,
     element_report,
     forget,
     internal_force,
@@ -26,6 +28,8 @@ from .kernel import (
     new_state,
     out_of_reach,
     positions,
+    rested,
+    rests,
     reweigh,
     stiffness_bounds,
 )
@@ -48,6 +52,9 @@ _SETTLE_REWEIGH = 1000
 
 #: Settling turns from swinging to calming when the drift falls below this many times its limit.
 _CALM = 2.0
+
+#: How fast rest volumes follow the pressure, as a share of what damping takes from a ringing volume.
+_FOLLOW = 0.125
 
 #: Strain below which forces count as round-off.
 _LEAST_STRAIN = 1e-4
@@ -94,7 +101,9 @@ class Path:
         fade = (bumps[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
         bumpy = mesh.positions + params.imperfection * fade * np.repeat(mesh.rays, mesh.levels, axis=0)
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)
-        self._moduli = mu, settings.kappa_ratio * mu
+        self._moduli = mu, settings.march_kappa_ratio * mu
+        self._rest = np.ones(len(mu))
+        self._made: tuple[Array, Layout] | None = None
         self._layout = build_layout(
             bumpy,
             mesh.connectivity,
@@ -137,15 +146,14 @@ class Path:
         """
         settings = self._settings
         if shrinkage <= settings.start:
-            return self._settle(*self._smooth(shrinkage), shrinkage)
+            return self._settle(*self._pressed(*self._smooth(shrinkage), shrinkage), shrinkage)
         target = int((shrinkage - settings.start) / settings.pace)
         self._march(target, last)
-        state, velocity = self._state.copy(), self._velocity.copy()
+        state, velocity, rest = self._state.copy(), self._velocity.copy(), self._rest
         if target > self._place:
-            self._advance(
-                state, velocity, target - self._place, self._at(self._place), self._at(target), settings.damping
-            )
-        return self._settle(state, velocity, shrinkage)
+            a, b = self._at(self._place), self._at(target)
+            rest = self._advance(state, velocity, rest, target - self._place, a, b, settings.damping)
+        return self._settle(state, velocity, rest, shrinkage)
 
     def _at(self, place: int) -> float:
         """Return the shrinkage after `place` steps of the march."""
@@ -155,13 +163,19 @@ class Path:
         """Return the smooth start at `shrinkage`, at rest."""
         return new_state(self._layout, self._drive.smooth(shrinkage))
 
+    def _pressed(self, state: Fixed, velocity: Single, shrinkage: float) -> tuple[Fixed, Single, Array]:
+        """Let a smooth state, which knows no pressure yet, ring down; returns it with its rest volumes."""
+        rest = self._rest
+        for _ in range(6):
+            rest = self._advance(state, velocity, rest, 150, shrinkage, shrinkage, self._settings.calm_damping)
+        return state, velocity, rest
+
     def _march(self, target: int, last: float) -> None:
         """March in whole slices to at most `target` steps."""
         settings = self._settings
         if not self._begun:
             self._state, self._velocity = self._smooth(settings.start)
-            # the closed form is incompressible, the elements are nearly so: let the difference ring down
-            self._advance(self._state, self._velocity, 400, settings.start, settings.start, 0.05)
+            self._state, self._velocity, self._rest = self._pressed(self._state, self._velocity, settings.start)
             self._begun = True
         chunk = max(20, min(_SLICE // self.elements, round(_REWEIGH / settings.pace)))
         every = max(1, round(_REWEIGH / (chunk * settings.pace)))
@@ -169,9 +183,12 @@ class Path:
             if self._place // chunk % every == 0:
                 self._layout = self._weighed(self._state)
             a, b = self._at(self._place), self._at(self._place + chunk)
-            self._advance(self._state, self._velocity, chunk, a, b, settings.damping)
+            self._push(chunk, a, b, settings.damping)
             self._place += chunk
             self._context.report(b / last if last else 1.0, f"shrinkage s = {b:.3f}")
+
+    def _push(self, count: int, a: float, b: float, damping: float) -> None:
+        self._rest = self._advance(self._state, self._velocity, self._rest, count, a, b, damping)
 
     def _weighed(self, state: Fixed) -> Layout:
         return reweigh(self._layout, state, self.mesh.is_exocarp, *self._moduli, self._fresh_bound, safety=_SAFETY)
@@ -180,19 +197,21 @@ class Path:
         self,
         state: Fixed,
         velocity: Single,
+        rest: Array,
         count: int,
         a: float,
         b: float,
         damping: float,
         layout: Layout | None = None,
-    ) -> None:
+    ) -> Array:
+        """March from shrinkage a to b under rest volumes `rest`, and return those that go with the new pressures."""
         self._context.check_cancelled()
         layout = layout or self._layout
         forget(self._skin, layout)
         for begin, end, steps in self._drive.pieces(a, b, count):
             middle = (begin + end) / 2
             self._drive.lead(state, middle)
-            loaded = self._drive.loaded(layout, middle)
+            loaded = self._ready(layout, middle, rest)
             skin = march(
                 loaded,
                 state,
@@ -211,8 +230,24 @@ class Path:
                 f"the run blew up at shrinkage s = {b:.3f}.",
                 advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             )
+        settings = self._settings
+        if settings.kappa_ratio == settings.march_kappa_ratio:
+            return rest
+        loaded = self._ready(layout, b, rest)
+        goal = rests(dilatations(loaded, state, 1 - b), settings.march_kappa_ratio, settings.kappa_ratio)
+        # volumes ring for 2 / damping steps; following faster than that feeds what rings
+        share = 1 - np.exp(-_FOLLOW * damping * count)
+        following: Array = rest * (goal / rest) ** share
+        return following
 
-    def _settle(self, state: Fixed, velocity: Single, shrinkage: float) -> State:
+    def _ready(self, layout: Layout, shrinkage: float, rest: Array) -> Layout:
+        """Return `layout` with the targets at `shrinkage` and the rest volumes; the last one made is kept."""
+        if self._made is None or self._made[0] is not rest or not self._drive.loading.uniform:
+            self._made = rest, rested(self._drive.loaded(self._layout, shrinkage), rest)
+        planes = self._made[1]
+        return dataclasses.replace(planes, mass=layout.mass, inverse_mass=layout.inverse_mass)
+
+    def _settle(self, state: Fixed, velocity: Single, rest: Array, shrinkage: float) -> State:
         """Hold the shrinkage until forces balance *and* the surface has come to rest.
 
         Just past the onset the forces nearly balance while buckles still grow, so the residual alone would stop there.
@@ -224,24 +259,26 @@ class Path:
         if shrinkage == 0:
             return State(surface, shrinkage, 0.0, 0.0, self._steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
         chunk = max(20, min(_REST_STEPS, _SLICE // self.elements))
-        before = float(self._report(state, shrinkage).energy.sum()) if self._with_release else None
+        before = float(self._report(state, rest, shrinkage).energy.sum()) if self._with_release else None
         layout, weigh_at = self._layout, 0
         spent, since, calm, residual, drift = 0, 0, False, np.inf, np.inf
         while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
             if spent >= weigh_at:
                 layout, weigh_at = self._weighed(state), spent + _SETTLE_REWEIGH
             damping = settings.calm_damping if calm else settings.swing_damping
-            self._advance(state, velocity, chunk, shrinkage, shrinkage, damping, layout)
+            # rest volumes stay: under some that go on following, forces have no potential and hardly balance
+            self._advance(state, velocity, rest, chunk, shrinkage, shrinkage, damping, layout)
             spent, since = spent + chunk, since + chunk
-            residual = self._residual(state, shrinkage, layout, damping)
+            residual = self._residual(state, rest, shrinkage, layout, damping)
             moved = positions(state[self.surface_nodes])
             speed = np.sqrt(np.square(moved - surface).sum(axis=1).mean()) / chunk
             drift = float(speed * _REST_STEPS / self._params.exocarp_thickness)
             surface = moved
             there = drift < _CALM * settings.drift
-            if since >= (settings.calm_steps if calm else settings.swing_steps) or (there and not calm):
-                calm, since = not calm, 0
-        report = self._report(state, shrinkage)
+            last = spent + settings.calm_steps >= settings.settle_steps
+            if last or since >= (settings.calm_steps if calm else settings.swing_steps) or (there and not calm):
+                calm, since = last or not calm, 0
+        report = self._report(state, rest, shrinkage)
         least = float(report.least_ratio.min())
         if least <= 0:
             raise Unstable(
@@ -253,18 +290,18 @@ class Path:
         released = before - energy if before is not None else None
         return State(surface, shrinkage, residual, drift, self._steps, least, energy, released)
 
-    def _report(self, state: Fixed, shrinkage: float) -> ElementReport:
-        layout = self._drive.loaded(self._layout, shrinkage)
+    def _report(self, state: Fixed, rest: Array, shrinkage: float) -> ElementReport:
+        layout = self._ready(self._layout, shrinkage, rest)
         return element_report(layout, state, 1 - shrinkage, one_point=True)
 
-    def _residual(self, state: Fixed, shrinkage: float, layout: Layout, damping: float) -> float:
+    def _residual(self, state: Fixed, rest: Array, shrinkage: float, layout: Layout, damping: float) -> float:
         """Out-of-balance force, contact included: what one step from rest does to the momentum.
 
         Relative to the root of the sum of squares of all elements' nodal forces. A step moves the nodes before contact
         answers, and damping shortens that move: the balance is struck, and measured, with the damping it settles with.
         """
         theta = 1 - shrinkage
-        layout = self._drive.loaded(layout, shrinkage)
+        layout = self._ready(layout, shrinkage, rest)
         scale = internal_force(layout, state, theta, one_point=True).scale
         moved, kick = state.copy(), np.zeros((layout.nodes, 4), np.float32)
         forget(self._skin, layout)

@@ -22,18 +22,20 @@ __all__ = ["Settings", "choose", "expected_cost"]
 class Settings:
     """Everything numerical about a run; follows from parameters and quality alone, so that results are repeatable.
 
-    n: elements per edge of the cubed sphere. core: fractions of the core's layer breakpoints. kappa_ratio: bulk over
-    shear modulus. pace: shrinkage per step of the march. damping: per step, while marching; swing_damping and
-    calm_damping: while a stage settles (see `path.Path`). full_levels: outermost core layers that are integrated fully.
-    residual, drift: at which a stage counts as settled (see `path.State`). swing_steps, calm_steps: longest
-    turn of each way of settling. settle_steps: after which a stage does not.
-    clearance: gap that self-contact keeps, in exocarp thicknesses.
-    start: shrinkage below which the fruit is still smooth, where the march begins.
+    n: elements per edge of the cubed sphere. core: fractions of the core's layer breakpoints. full_levels: outermost
+    core layers that are integrated fully, the others take one point.
+    kappa_ratio: bulk over shear modulus; march_kappa_ratio: the one that is marched with (see `kernel.bulk`).
+    start: shrinkage below which the fruit is still smooth, where the march begins. pace: shrinkage per step of the
+    march. damping: per step, while marching; swing_damping and calm_damping: while a stage settles (see `path.Path`).
+    residual, drift: at which a stage counts as settled (see `path.State`). swing_steps, calm_steps: longest turn of
+    each way of settling. settle_steps: after which a stage does not settle. clearance: gap that self-contact keeps, in
+    exocarp thicknesses.
     """
 
     n: int
     core: NDArray[np.float64]
     kappa_ratio: float
+    march_kappa_ratio: float
     pace: float
     damping: float
     swing_damping: float
@@ -58,7 +60,7 @@ class _Quality:
     per_wavelength: float
     fewest: int
     most: int
-    kappa_ratio: float
+    march_kappa_ratio: float
     residual: float
     drift: float
     full_levels: int
@@ -68,8 +70,8 @@ class _Quality:
 #: later); the deeper ones keep J > 0.4, and one point there changes the roughness by less than another seed does.
 _QUALITIES = {
     "preview": _Quality(4.2, 18, 48, 30.0, 2e-3, 2e-2, 3),
-    "default": _Quality(6.0, 24, 96, 100.0, 1e-3, 1e-2, 3),
-    "fine": _Quality(9.0, 36, 160, 100.0, 1e-3, 5e-3, 1000),
+    "default": _Quality(6.0, 24, 96, 30.0, 1e-3, 1e-2, 3),
+    "fine": _Quality(9.0, 36, 160, 30.0, 1e-3, 5e-3, 1000),
 }
 
 #: Steps from s = 0 to 0.3 that follow the quasi-static path at n = 24, kappa / mu = 30 (twice as many change the
@@ -81,6 +83,8 @@ _STEPS, _STEPS_N, _STEPS_KAPPA, _STEPS_SPAN = 16000.0, 24, 30.0, 0.3
 _DAMPING, _SWING_DAMPING = 0.004, 0.008
 #: Longest turns of swinging (at the same reference) and calming, and most steps that a stage may settle for.
 _SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 1500, 400, 5000
+#: Bulk over shear modulus that all qualities stand for: off by 1e-4 from incompressible in radius.
+_KAPPA = 1000.0
 #: Thickness of the core layer at the interface, in wavelengths, and how fast layers grow inwards.
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
@@ -99,14 +103,15 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
     # where flesh is more than twice as thick as on average, layers are counted on it
     flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), flesh_span(params)[1] / 2)
     core = layer_fractions(max(flesh, 0.05), _FIRST_LAYER * min(wavelength, 0.4), _GROWTH)
-    scale = (n / _STEPS_N) * math.sqrt(q.kappa_ratio / _STEPS_KAPPA)
+    scale = (n / _STEPS_N) * math.sqrt(q.march_kappa_ratio / _STEPS_KAPPA)
     loading = Loading(params)
     margin = 0.75 if params.is_sphere and loading.uniform else 0.5
     onset = onset_estimate(params.modulus_ratio, min(params.stone))
     return Settings(
         n=n,
         core=core,
-        kappa_ratio=q.kappa_ratio,
+        kappa_ratio=_KAPPA,
+        march_kappa_ratio=q.march_kappa_ratio,
         pace=_STEPS_SPAN / (_STEPS * scale) / loading.peak,
         damping=_DAMPING / scale,
         swing_damping=_SWING_DAMPING / scale,

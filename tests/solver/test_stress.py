@@ -49,10 +49,10 @@ def test_broken_promises_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         state[path.surface_nodes[0], 1] -= 2**25
         return found
 
-    def late(path: Path, state: Any, velocity: Any, shrinkage: float) -> Any:
+    def late(path: Path, state: Any, velocity: Any, rest: Any, shrinkage: float) -> Any:
         if shrinkage > 0.01:
             raise Unstable("it blew up.", advice="Ask for less.")
-        return settle(path, state, velocity, shrinkage)
+        return settle(path, state, velocity, rest, shrinkage)
 
     def defect(*_: Any) -> Any:
         raise ZeroDivisionError

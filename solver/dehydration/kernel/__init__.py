@@ -5,6 +5,7 @@
 `scalar` are its two compiled back ends (chosen by WIZEN_KERNEL = auto, vector or scalar).
 """
 
+from solver.dehydration.kernel.bulk import dilatations, rested, rests
 from solver.dehydration.kernel.diagnostics import ElementReport, element_report, kinetic_energy, strain_energy
 from solver.dehydration.kernel.fixed_point import out_of_reach, place, positions
 from solver.dehydration.kernel.layout import Layout, build_layout
@@ -27,6 +28,7 @@ __all__ = [
     "Skin",
     "build_layout",
     "default_backend",
+    "dilatations",
     "element_report",
     "forget",
     "internal_force",
@@ -37,6 +39,8 @@ __all__ = [
     "out_of_reach",
     "place",
     "positions",
+    "rested",
+    "rests",
     "reweigh",
     "stiffness_bounds",
     "strain_energy",

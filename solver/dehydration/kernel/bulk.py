@@ -1,0 +1,105 @@
+"""A bulk modulus larger than the one that is marched with: augmented Lagrangian, element by element.
+
+The critical step falls with the root of kappa, so marching at kappa/mu = 1000 costs six times what it costs at 30. The
+pressure p = kappa (J/(g Jd) - 1) does not know what part of it is compression and what the rest volume g holds: with
+
+    g = (1 + p / kappa_wanted) / (1 + p / kappa)
+
+in equilibrium J/Jd = 1 + p / kappa_wanted, as if the modulus were the wanted one. g follows p by the same rule, taken
+from the state every now and then (Uzawa's iteration; it contracts by about mu / kappa).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from solver.dehydration.kernel.algebra import EXOCARP_WEIGHTS, INVERSE_VOLUME, MU
+from solver.dehydration.kernel.fixed_point import QUANTUM
+from solver.dehydration.kernel.layout import Layout, aligned_copy
+from solver.dehydration.kernel.metric import EXOCARP_POINTS, GAUSS_POINTS, shape_derivatives
+
+__all__ = ["dilatations", "rested", "rests"]
+
+Floats = NDArray[np.float64]
+
+
+#: dN_a/dxi_k (points, 8, 3) and weights of the exocarp's rule; the core's rule is exact for a trilinear hexahedron.
+_SKIN = shape_derivatives(EXOCARP_POINTS)
+_SKIN_WEIGHTS = np.array(EXOCARP_WEIGHTS)
+_CORE = shape_derivatives(GAUSS_POINTS)
+_CORE_WEIGHTS = np.ones(len(GAUSS_POINTS))
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _volumes(
+    state: NDArray[np.int32],
+    connectivity: NDArray[np.int64],
+    elements: NDArray[np.int64],
+    slopes: Floats,
+    weights: Floats,
+) -> Floats:
+    """Volume of each of `elements` by a rule with shape derivatives `slopes` (q, 8, 3), in quanta cubed."""
+    result = np.empty(elements.size)
+    for place in prange(elements.size):
+        nodes = connectivity[elements[place]]
+        total = 0.0
+        for q in range(weights.size):
+            f = np.zeros((3, 3))
+            for a in range(8):
+                for i in range(3):
+                    for k in range(3):
+                        f[i, k] += state[nodes[a], i] * slopes[q, a, k]
+            total += weights[q] * (
+                f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
+                - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
+                + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
+            )
+        result[place] = total
+    return result
+
+
+def dilatations(layout: Layout, state: NDArray[np.int32], theta: float) -> Floats:
+    """J / Jd - 1 of every element, (ne,), as the kernel's volumetric energy sees it; state (nodes, 4).
+
+    5 ms at 40,560 elements on one core.
+    """
+    inverse = layout.lanes(layout.core_planes[:, INVERSE_VOLUME], layout.exocarp_planes[:, INVERSE_VOLUME])
+    ratio = np.empty(layout.elements)
+    for held, slopes, weights, cube in (
+        (layout.core_elements, _CORE, _CORE_WEIGHTS, theta**3),
+        (layout.exocarp_elements, _SKIN, _SKIN_WEIGHTS, 1.0),
+    ):
+        elements = held[held >= 0]
+        volume = _volumes(state, layout.connectivity, elements, slopes, weights) * QUANTUM**3
+        ratio[elements] = volume * inverse[elements] / cube
+    return ratio - 1
+
+
+def rests(dilatation: Floats, kappa: float, wanted: float) -> Floats:
+    """Rest volumes g (ne,) that go with the pressure kappa times `dilatation` (ne,), measured under the g before.
+
+    A pressure beyond kappa / 4 is that of an element about to be crushed: only that much of it is taken.
+    """
+    strain = np.clip(dilatation, -0.25, 0.25)
+    g: Floats = (1 + strain * kappa / wanted) / (1 + strain)
+    return g
+
+
+def rested(layout: Layout, g: Floats) -> Layout:
+    """`layout`, as built or reloaded, with the rest volumes g (ne,) of its elements."""
+    core, skin = ((g[elements]).astype(np.float32) for elements in (layout.core_elements, layout.exocarp_elements))
+    core_planes, skin_planes, single = (
+        aligned_copy(planes, np.float32)
+        for planes in (layout.core_planes, layout.exocarp_planes, layout.one_point_planes)
+    )
+    core_planes[:, INVERSE_VOLUME] /= core
+    skin_planes[:, INVERSE_VOLUME] /= skin
+    if len(single):
+        # one volume ratio serves both terms of this element: the shear's share is taken out of its modulus
+        single[:, INVERSE_VOLUME] /= core
+        single[:, MU] /= np.cbrt(core) ** 2
+    return dataclasses.replace(layout, core_planes=core_planes, exocarp_planes=skin_planes, one_point_planes=single)

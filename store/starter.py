@@ -1,0 +1,18 @@
+"""The table that comes with the package, so that a fresh install has shapes to serve.
+
+A store like any other, without its shards: `store/starter/README.md` says which runs it was built from.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["ROOT", "own_or_starter"]
+
+#: The store in the package. Read only.
+ROOT = Path(__file__).parent / "starter"
+
+
+def own_or_starter(root: Path | None) -> Path:
+    """Return `root` if there is a store in it, else the starter's."""
+    return root if root is not None and (root / "shards").is_dir() else ROOT

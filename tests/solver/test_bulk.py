@@ -1,0 +1,103 @@
+"""Rest volumes that stand for a larger bulk modulus: exact for uniform states, and right for a whole fruit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from solver.contract import Context
+from solver.dehydration.kernel import (
+    build_layout,
+    dilatations,
+    internal_force,
+    new_state,
+    place,
+    positions,
+    rested,
+    rests,
+)
+from solver.dehydration.mesh import build_mesh
+from solver.dehydration.params import DehydrationParams
+from solver.dehydration.path import Path
+from solver.dehydration.settings import choose
+
+KAPPA, WANTED, THETA = 30.0, 1000.0, 0.9
+
+
+def sphere(n: int = 4):
+    params = DehydrationParams.parse({"te": 0.1, "imperfection": 0.0})
+    mesh = build_mesh(params, n, np.array([0.0, 0.5, 1.0]))
+    mu = np.where(mesh.is_exocarp, 10.0, 1.0)
+    layout = build_layout(
+        mesh.positions, mesh.connectivity, mesh.is_exocarp, mu, KAPPA * mu, np.zeros(len(mesh.positions), bool)
+    )
+    return mesh, layout
+
+
+def stretched(layout, factor):
+    state, _ = new_state(layout)
+    place(state, positions(layout.fresh) * factor)
+    return state
+
+
+def test_dilatation_of_a_uniform_stretch_is_its_cube() -> None:
+    mesh, layout = sphere()
+    found = dilatations(layout, stretched(layout, 1.02), THETA)
+    assert_allclose(found[mesh.is_exocarp], 1.02**3 - 1, atol=2e-6)
+    assert_allclose(found[~mesh.is_exocarp], (1.02 / THETA) ** 3 - 1, atol=2e-6)
+
+
+@pytest.mark.parametrize("one_point", [False, True])
+def test_an_element_at_its_rest_volume_is_free_of_stress(one_point: bool) -> None:
+    mesh, layout = sphere()
+    g = np.where(mesh.is_exocarp, 1.05, 1.05)
+    held = rested(layout, g)
+    state = stretched(layout, np.cbrt(1.05))
+    scale = internal_force(held, stretched(layout, 1.05), 1.0, one_point=one_point).scale
+    assert internal_force(held, state, 1.0, one_point=one_point).norm < 1e-4 * scale
+    assert internal_force(layout, state, 1.0, one_point=one_point).norm > 1e-2 * scale
+
+
+def test_shear_does_not_see_the_rest_volume() -> None:
+    """Both core elements: a volume-preserving stretch of the rested block is that of the plain one, scaled."""
+    _, layout = sphere()
+    stretch = np.array([1.1, 1.0, 1 / 1.1])
+    plain, _ = new_state(layout)
+    place(plain, positions(layout.fresh) * stretch)
+    held = rested(layout, np.full(layout.elements, 1.03))
+    for one_point in (False, True):
+        # the difference is the pressure alone: kappa (1/g - 1) on every face, whatever the shear
+        a = internal_force(layout, plain, 1.0, one_point=one_point).nodal
+        b = internal_force(held, plain, 1.0, one_point=one_point).nodal
+        still, _ = new_state(layout)
+        free_a = internal_force(layout, still, 1.0, one_point=one_point).nodal
+        free_b = internal_force(held, still, 1.0, one_point=one_point).nodal
+        assert np.abs(free_a).max() < 1e-4 * np.abs(free_b).max()
+        # nodal forces of a uniform pressure transform as areas do: by the stretch's cofactor
+        assert_allclose(b - a, free_b / stretch, atol=2e-3 * np.abs(free_b).max())
+
+
+def test_the_fixed_point_has_the_wanted_modulus() -> None:
+    pressure = np.array([-2.0, -0.1, 0.0, 0.1, 2.0])
+    g = rests(pressure / KAPPA, KAPPA, WANTED)
+    ratio = g * (1 + pressure / KAPPA)
+    assert_allclose(WANTED * (ratio - 1), pressure, atol=1e-12)
+    assert_allclose(rests(pressure / KAPPA, KAPPA, KAPPA), 1.0)
+
+
+@pytest.mark.parametrize("shrinkage", [-0.1, 0.05])
+def test_a_whole_fruit_is_as_stiff_in_volume_as_it_says(shrinkage: float) -> None:
+    """Against the incompressible closed form: kappa/mu = 30 alone would be off by 2e-3 at s = 0.05."""
+    params = DehydrationParams.parse({"imperfection": 0.0})
+    errors = []
+    for kappa_ratio in (KAPPA, WANTED):
+        settings = dataclasses.replace(choose(params, "preview"), n=10, kappa_ratio=kappa_ratio)
+        state = Path(params, settings, Context()).stage(shrinkage, shrinkage)
+        assert state.residual < 2e-3
+        outer = (0.4**3 + (1 - shrinkage) ** 3 * (1 - 0.4**3) + 1.04**3 - 1) ** (1 / 3)
+        errors.append(abs(np.linalg.norm(state.surface, axis=1).mean() / outer - 1))
+    assert errors[1] < 2e-4 * max(1, abs(shrinkage) / 0.05)
+    assert errors[1] < errors[0] / 5
