@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from solver.dehydration import SOLVER, DehydrationParams
-from solver.dehydration.onset import onset
+from solver.dehydration.bifurcation import onset
 
 REFERENCE = Path(__file__).parents[1] / "tests" / "solver" / "core_shell_sphere.json"
 AXISYMMETRIC = ("raisin", "wolfberry", "jujube1", "jujube2")

@@ -59,8 +59,7 @@ def onset(
     if mode_out is not None:
         _check(mode_out)
     from solver.contract import Context
-    from solver.dehydration import SOLVER, DehydrationParams
-    from solver.dehydration import onset as onsets
+    from solver.dehydration import SOLVER, DehydrationParams, bifurcation
 
     from . import progress
 
@@ -69,7 +68,7 @@ def onset(
     found = {}
     with progress.one_run("onset") as observe, progress.stopping() as stop:
         for each in asked:
-            found[each] = onsets.onset(
+            found[each] = bifurcation.onset(
                 params,
                 method=each,  # type: ignore[arg-type]
                 kappa_ratio=kappa_ratio,

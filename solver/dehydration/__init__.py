@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
 from ..fruit import PRESETS
@@ -12,7 +12,9 @@ from .params import DehydrationParams
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SOLVER", "DehydrationParams"]
+    from .bifurcation import Onset
+
+__all__ = ["SOLVER", "DehydrationParams", "onset"]
 
 _DESCRIPTORS = (
     "mean_radius",
@@ -41,6 +43,13 @@ def _cost(params: DehydrationParams, need: Need) -> Cost:
     from .settings import expected_cost
 
     return expected_cost(params, need)
+
+
+def onset(params: DehydrationParams, **options: Any) -> Onset:
+    """Return where the fruit starts to buckle, and its first mode; options and errors: `bifurcation.onset`."""
+    from . import bifurcation
+
+    return bifurcation.onset(params, **options)
 
 
 SOLVER = Solver(

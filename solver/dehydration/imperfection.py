@@ -40,7 +40,7 @@ def heights(params: DehydrationParams, directions: Array, context: Context, high
             "buckling modes are known for homogeneous, isotropic drying only.",
             advice='Leave out wetness and anisotropy, or set imperfection_kind to "waves".',
         )
-    from .onset import onset  # an eigenproblem: nothing that waves should pay for
+    from .bifurcation import onset  # an eigenproblem: nothing that waves should pay for
 
     def stop() -> bool:
         try:

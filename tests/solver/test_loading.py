@@ -300,7 +300,7 @@ def test_a_mode_comes_from_the_onset(monkeypatch):
     params = parse(imperfection_kind="mode")
     rays = cubed_sphere(4).directions
     found = SimpleNamespace(mode=lambda directions: directions[:, 1] ** 2, reason="")
-    monkeypatch.setattr("solver.dehydration.onset.onset", lambda asked, **_: found, raising=False)
+    monkeypatch.setattr("solver.dehydration.bifurcation.onset", lambda asked, **_: found, raising=False)
     assert (heights(params, rays, Context()) == rays[:, 1] ** 2).all()
     found.mode, found.reason = None, "the skin is too soft"
     with pytest.raises(InvalidInput, match="too soft"):

@@ -12,15 +12,15 @@ from scipy.special import eval_legendre, sph_harm_y
 
 from solver.contract import Cancelled, Context, InvalidInput
 from solver.dehydration import SOLVER, DehydrationParams
+from solver.dehydration.bifurcation import AxisymmetricMode, Onset, base_state, onset
+from solver.dehydration.bifurcation.banded import pattern
+from solver.dehydration.bifurcation.base import Meridian
+from solver.dehydration.bifurcation.meridional_elements import deformation, forces, moduli, tangents, volume_rates
+from solver.dehydration.bifurcation.pencil import Pencil, Perturbations
+from solver.dehydration.bifurcation.radial_elements import radial_mesh, smooth
+from solver.dehydration.bifurcation.result import dominant_degree
+from solver.dehydration.bifurcation.search import Valley
 from solver.dehydration.closed_form import sphere_radius
-from solver.dehydration.onset import AxisymmetricMode, Onset, base_state, onset
-from solver.dehydration.onset.banded import pattern
-from solver.dehydration.onset.base import Meridian
-from solver.dehydration.onset.meridional_elements import deformation, forces, moduli, tangents, volume_rates
-from solver.dehydration.onset.pencil import Pencil, Perturbations
-from solver.dehydration.onset.radial_elements import radial_mesh, smooth
-from solver.dehydration.onset.result import dominant_degree
-from solver.dehydration.onset.search import Valley
 from solver.fruit import directions
 
 REFERENCE = json.loads((Path(__file__).parent / "core_shell_sphere.json").read_text())
@@ -269,3 +269,10 @@ def test_banded_solves_agree_with_dense_ones() -> None:
     right = rng.normal(size=4)
     np.testing.assert_allclose(stored.solve(entries, right), np.linalg.solve(dense, right))
     assert stored.factor(-np.abs(entries)) is None
+
+
+def test_the_solver_answers_it_as_well() -> None:
+    import solver.dehydration
+
+    found = solver.dehydration.onset(DehydrationParams.parse({"te": 0.04}), kappa_ratio=1000.0)
+    assert found.s_cr == pytest.approx(0.08054538543842547, rel=1e-6)

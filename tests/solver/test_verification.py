@@ -10,6 +10,8 @@ import numba
 import numpy as np
 import pytest
 
+from solver.dehydration.bifurcation.full import onset_full
+from solver.dehydration.bifurcation.radial import onset_radial
 from solver.dehydration.implicit import base_state
 from solver.dehydration.kernel import (
     build_layout,
@@ -22,8 +24,6 @@ from solver.dehydration.kernel import (
     strain_energy,
 )
 from solver.dehydration.mesh import build_mesh
-from solver.dehydration.onset.full import onset_full
-from solver.dehydration.onset.radial import onset_radial
 from solver.dehydration.params import DehydrationParams
 
 from .implicit_twin import block, rotation
