@@ -31,10 +31,12 @@ test: $(STAMP)
 test-slow: $(STAMP)
 	$(BIN)/python -m pytest -m 'slow or not slow' --timeout 3600
 
-## bench: the kernel against the C prototype, the look-up per resolution; run it on an idle machine
+## bench: the kernel against the C prototype, the look-up per resolution, the solver's error over time in short; run it
+## on an idle machine
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.kernel
 	$(BIN)/python -m benchmarks.lookup
+	$(BIN)/python -m benchmarks.dehydration --short --no-peers
 
 ## stress: every hostile corner of the parameters on tiny meshes; five minutes on two cores
 stress: $(STAMP)

@@ -86,7 +86,7 @@ def explicit(theta: float, n: int, layers: int) -> dict[str, Any]:
         state, velocity = new_state(layout)
         march(layout, state, velocity, int((1 - theta) / settings.pace), theta=(1.0, theta), damping=settings.damping)
         for _ in range(40):
-            march(layout, state, velocity, 100, theta=(theta, theta), damping=settings.settle_damping)
+            march(layout, state, velocity, 100, theta=(theta, theta), damping=settings.calm_damping)
             residual = internal_force(layout, state, theta).relative_residual
             if residual < settings.residual:
                 break

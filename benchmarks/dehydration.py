@@ -1,0 +1,62 @@
+"""Error over CPU time of the dehydration solver: python -m benchmarks.dehydration [--part a|b|c|skips] [--json FILE].
+
+a: the smooth sphere before buckling, ours and other codes (`precision.spheres`; which are missing is said).
+b: descriptors after buckling by quality (`precision.buckled`): minutes per run, so runs that the file has are kept.
+c: cost against the number of elements (`precision.scaling`).
+skips: what each thing that a need leaves out saves, and the error it adds (`precision.skips`).
+
+Everything runs on one thread, one run at a time. a, c and skips run anew each time, since only CPU seconds of one
+session compare. Without --part: a and c. A picture is drawn from whatever the file holds.
+The file says with which version of the solver each part ran.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from solver.dehydration import SOLVER
+
+from .precision import buckled, scaling, skips, spheres
+from .precision.record import ROOT, Record
+
+RESULTS = ROOT / "benchmarks" / "results" / "dehydration.json"
+#: te, quality, seeds; the thin skin takes minutes per run at preview already and is left to --thin.
+PLAN = ((0.04, "preview", 3), (0.04, "default", 2), (0.04, "fine", 2))
+THIN = ((0.02, "preview", 2), (0.02, "default", 1))
+#: Meshes of the short form.
+SHORT_EDGES = (12, 20, 32)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--part", action="append", choices=("a", "b", "c", "skips"), help="may be repeated")
+    parser.add_argument("--json", type=Path, help=f"where the figures are kept (part b: {RESULTS.relative_to(ROOT)})")
+    parser.add_argument("--picture", type=Path, help="draw the work-precision diagram here")
+    parser.add_argument("--no-peers", action="store_true", help="part a without other codes")
+    parser.add_argument("--short", action="store_true", help="theta 0.95 and few meshes; keeps no file unless told to")
+    parser.add_argument("--thin", action="store_true", help="part b: te = 0.02 as well")
+    parser.add_argument("--limit", type=float, default=120.0, help="seconds per run of part a")
+    parser.add_argument("--redraw", action="store_true", help="run nothing, only draw")
+    options = parser.parse_args()
+    parts = () if options.redraw else tuple(options.part or ("a", "c"))
+    record = Record(options.json or (None if options.short else RESULTS))
+    for part in parts:
+        record.parts.setdefault("solver_version", {})[part] = SOLVER.version
+    if "a" in parts:
+        thetas = spheres.THETAS[:1] if options.short else spheres.THETAS
+        spheres.measure(record, thetas=thetas, peers=not options.no_peers, short=options.short, limit=options.limit)
+    if "b" in parts:
+        buckled.measure(record, (*PLAN, *(THIN if options.thin else ())))
+    if "c" in parts:
+        scaling.measure(record, SHORT_EDGES if options.short else scaling.EDGES)
+    if "skips" in parts:
+        skips.measure(record)
+    if options.picture:
+        from .precision.picture import draw
+
+        draw(record.parts, options.picture)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Parts of `benchmarks.dehydration`: error over CPU time, one file per part."""
