@@ -90,7 +90,7 @@ def test_the_fixed_point_has_the_wanted_modulus() -> None:
 
 @pytest.mark.parametrize(("shrinkage", "start"), [(-0.1, 0.06), (0.05, 0.06), (0.05, 0.0)])
 def test_a_whole_fruit_is_as_stiff_in_volume_as_it_says(shrinkage: float, start: float) -> None:
-    """Taken from the closed form or marched to, against the incompressible closed form; kappa/mu = 30 alone would be off by 2e-3 at s = 0.05."""
+    """Started from or marched to, against the incompressible closed form; kappa/mu = 30 alone is off by 2e-3."""
     params = DehydrationParams.parse({"imperfection": 0.0})
     errors = []
     for kappa_ratio in (KAPPA, WANTED):
