@@ -86,6 +86,8 @@ def stone_size(found: Sequence[Pattern]) -> Claim:
         for te, row in rows.items()
     ]
     growth = [row[-1].elongation / row[0].elongation - 1 for row in rows.values()]
+    if len(growth) < 2:
+        return Claim("C3", "a larger stone makes strips, most for thin te", "; ".join(parts), "unclear: one skin only")
     thin, thick = growth[0], growth[-1]
     verdict = "holds" if thin > CLEAR and thin > thick else "unclear" if abs(thin) < CLEAR else "does not hold"
     return Claim("C3", "a larger stone makes strips, most for thin te", "; ".join(parts), verdict)

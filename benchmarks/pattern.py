@@ -80,7 +80,7 @@ def _pattern(data: xr.Dataset) -> Pattern:
         return float((b - a) / (b + a))
 
     return Pattern(
-        name=_name(params),
+        name=name_of(params),
         te=params.exocarp_thickness,
         gamma=params.modulus_ratio,
         stone=params.stone,
@@ -97,7 +97,8 @@ def _pattern(data: xr.Dataset) -> Pattern:
     )
 
 
-def _name(params: DehydrationParams) -> str:
+def name_of(params: DehydrationParams) -> str:
+    """Name of the preset with these radii and stone, or nothing."""
     for name, preset in PRESETS.items():
         if tuple(preset["radii"]) == params.radii and tuple(preset["stone"]) == params.stone:
             return name
