@@ -66,11 +66,12 @@ class _Quality:
     full_levels: int
 
 
-#: Under deep folds the three core layers below the skin turn inside out if they have one point each (s = 0.25 and
-#: later); the deeper ones keep J > 0.4, and one point there changes the roughness by less than another seed does.
+#: Under deep folds core layers with one point each turn inside out: the three below the skin at gamma = 10 (s = 0.25),
+#: the fourth at gamma = 50 (s = 0.3). Below five, J stays above 0.6; one point there changes the roughness by less than
+#: another seed does.
 _QUALITIES = {
-    "preview": _Quality(4.2, 18, 48, 30.0, 2e-3, 2e-2, 3),
-    "default": _Quality(6.0, 24, 96, 30.0, 1e-3, 1e-2, 3),
+    "preview": _Quality(4.2, 18, 48, 30.0, 2e-3, 2e-2, 5),
+    "default": _Quality(6.0, 24, 96, 30.0, 1e-3, 1e-2, 5),
     "fine": _Quality(9.0, 36, 160, 30.0, 1e-3, 5e-3, 1000),
 }
 
