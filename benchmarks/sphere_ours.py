@@ -1,10 +1,9 @@
-"""Our solvers on the peers' common case before buckling: python -m benchmarks.sphere_ours --kind implicit --json.
+"""Our implicit solver on the peers' common case before buckling: python -m benchmarks.sphere_ours --json.
 
-Sphere with skin 1 to 1.04, rigid stone 0.4, mu 1 and 10, kappa = 1000 mu, core shrunk by theta in one load step (the
-case of ../shared/peers/sphere). Implicit: one octant, as the peers. Explicit: the shipped march's kernel on the whole
-sphere, at the kappa of the shipped quality, shrunk and settled. Errors are of the radius at all nodes, and for the
-implicit solver also at random points between them, against the radial reference at the same kappa and against the
-incompressible closed form. "cold" is the first solution in this process, loading of compiled code included.
+Sphere with skin 1 to 1.04, rigid stone 0.4, mu 1 and 10, kappa = 1000 mu, core shrunk by theta in one load step on
+one octant, as the peers. Errors are of the radius at all nodes and at random points between them, against the radial
+reference at the same kappa and against the incompressible closed form. "cold" is the first solution in this process,
+loading of compiled code included.
 """
 
 from __future__ import annotations
@@ -27,10 +26,7 @@ import numpy as np
 
 from solver.dehydration.closed_form import sphere_radius
 from solver.dehydration.implicit import base_state
-from solver.dehydration.kernel import build_layout, internal_force, march, new_state, positions
-from solver.dehydration.mesh import build_mesh
 from solver.dehydration.params import DehydrationParams
-from solver.dehydration.settings import choose
 from tests.solver.radial_reference import radial_reference
 
 FRUIT = DehydrationParams()
@@ -73,47 +69,15 @@ def implicit(theta: float, n: int, layers: int) -> dict[str, Any]:
     }
 
 
-def explicit(theta: float, n: int, layers: int) -> dict[str, Any]:
-    settings = choose(FRUIT, "default")
-    mesh = build_mesh(FRUIT, n, np.linspace(0, 1, layers + 1))
-    mu = np.where(mesh.is_exocarp, FRUIT.modulus_ratio, 1.0)
-
-    def run() -> Any:
-        layout = build_layout(
-            mesh.positions, mesh.connectivity, mesh.is_exocarp, mu, settings.kappa_ratio * mu, mesh.fixed,
-            one_point=False,
-        )  # fmt: skip
-        state, velocity = new_state(layout)
-        march(layout, state, velocity, int((1 - theta) / settings.pace), theta=(1.0, theta), damping=settings.damping)
-        for _ in range(40):
-            march(layout, state, velocity, 100, theta=(theta, theta), damping=settings.calm_damping)
-            residual = internal_force(layout, state, theta).relative_residual
-            if residual < settings.residual:
-                break
-        return positions(state), residual
-
-    (_, cold), ((deformed, residual), warm) = timed(run), timed(run)
-    return {
-        "unknowns": 3 * int((~mesh.fixed).sum()),
-        "kappa_ratio": settings.kappa_ratio,
-        "residual": residual,
-        "cold": cold,
-        "warm": warm,
-        **errors(mesh.positions, deformed, theta, settings.kappa_ratio),
-    }
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--theta", type=float, default=0.95)
-    parser.add_argument("--kind", choices=("implicit", "explicit"), default="implicit")
     parser.add_argument("--n", type=int, default=8, help="elements per edge of the cubed sphere")
     parser.add_argument("--layers", type=int, default=4, help="core layers")
     parser.add_argument("--json", action="store_true", help="one line of JSON")
     options = parser.parse_args()
-    solve = implicit if options.kind == "implicit" else explicit
-    row = {"kind": options.kind, "theta": options.theta, "n": options.n, "layers": options.layers}
-    row |= solve(options.theta, options.n, options.layers)
+    row = {"theta": options.theta, "n": options.n, "layers": options.layers}
+    row |= implicit(options.theta, options.n, options.layers)
     print(json.dumps(row) if options.json else "\n".join(f"{key}: {value}" for key, value in row.items()))
 
 

@@ -20,7 +20,7 @@ The eigenvalues of M^-1 B k B^T stay within [0, STIFFNESS], clear of what the ma
 
     k_c = STIFFNESS / sum_j |b_cj| minv_j S_j,   S_j = sum_d r_d |b_dj|,
 
-over all contacts that may become active before the next search, the rows of k (B^T M^-1 B) weighted by r sum to at
+over all quads within reach, touched or not, the rows of k (B^T M^-1 B) weighted by r sum to at
 most STIFFNESS (Gershgorin). r rises from 0 for those farthest off, so that none appears with a jump. A lone contact
 is resolved in about one step, crowded nodes share. No tuning by mass or mesh is left.
 
@@ -72,7 +72,7 @@ NEARLY = np.float32(0.25)
 OPENING = np.float32(0.3)
 """Least slope between a quad and the next that contact keeps open, where they share an edge."""
 SLACK = np.float32(0.25)
-"""Of the margin: how far beyond the clearance a quad may be touched before the next search."""
+"""Of the margin: how far beyond the clearance a quad begins to share the load."""
 SQUARELY = np.float32(0.7)
 """Least cosine between a penetrated quad's normal and the line to its closest point."""
 
@@ -223,7 +223,7 @@ def _weight(contact: Contact, i: int, best: int) -> Single:
 
 @njit(**OPTIONS)
 def _collect(contact: Contact, x: Singles, v: Singles) -> int:
-    """Quads that may touch each node before the next search, seen as the step began, into `hits`; returns how many."""
+    """Quads within reach of each node, seen as the step began, into `hits`; returns how many."""
     clearance = contact.clearance + SLACK * contact.margin
     on_skin = np.float32(1e-3) * contact.size
     near, pair, hits = contact.near, 0, 0

@@ -125,7 +125,6 @@ class Path:
         self._skin = make_skin(self._layout, mesh.surface_nodes, mesh.sphere.quads, settings.clearance * te, te)
         self._state, self._velocity = new_state(self._layout)
         self._steps = 0
-        self._shrinkage = 0.0
         self._place = 0
         self._begun = False
 

@@ -131,6 +131,7 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     """Return expected wall seconds on this machine's cores and bytes of memory."""
     settings = choose(params, need.quality)
     last = max(need.stages, default=0.0)
-    steps = max(last - settings.start, 0.0) / settings.pace + 1500 * len(need.stages)
+    # most stages settle for two thirds of the steps they may take
+    steps = max(last - settings.start, 0.0) / settings.pace + 2 / 3 * settings.settle_steps * len(need.stages)
     seconds = steps * settings.elements * _SECONDS_PER_ELEMENT_STEP / (os.cpu_count() or 1)
     return Cost(seconds, settings.elements * 1200 + 150_000_000)

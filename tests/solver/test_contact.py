@@ -204,7 +204,7 @@ def test_force_is_continuous_when_a_node_slides_across_an_edge(fold):
             push_apart(contact, x, v, minv)
             pushes.append(v[9, :3].copy())
         size = np.linalg.norm(pushes, axis=1)
-        assert size.min() > 0.01
+        assert size.min() > 0.01  # lacking 0.04 of a clearance of 0.1: phi pushes by 0.016 where one quad is near
         turn = np.linalg.norm(np.diff(np.array(pushes) / size[:, None], axis=0), axis=1)
         jumps.append((abs(np.diff(size)).max() / size.max(), turn.max()))
     # what is continuous jumps less the finer it is sampled
