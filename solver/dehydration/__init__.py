@@ -54,7 +54,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="4",
+    version="5",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", *_DESCRIPTORS, "strain_energy", "released_energy"),

@@ -47,11 +47,8 @@ Single = NDArray[np.float32]
 _SAFETY = 2.0
 _REWEIGH = 0.01
 
-#: Steps between two weighings while settling.
-_SETTLE_REWEIGH = 1000
-
-#: Settling turns from swinging to calming when the drift falls below this many times its limit.
-_CALM = 2.0
+#: Looks at the kinetic energy per swing.
+_LOOKS = 30
 
 #: How fast rest volumes follow the pressure, as a share of what damping takes from a ringing volume.
 _FOLLOW = 0.125
@@ -181,9 +178,6 @@ class Path:
         settings = self._settings
         if not self._begun:
             self._state, self._velocity = self._smooth(settings.start)
-            self._state, self._velocity, self._rest = self._pressed(
-                self._state, self._velocity, self._rest, settings.start
-            )
             self._begun = True
         chunk = max(20, min(_SLICE // self.elements, round(_REWEIGH / settings.pace)))
         every = max(1, round(_REWEIGH / (chunk * settings.pace)))
@@ -210,9 +204,31 @@ class Path:
         a: float,
         b: float,
         damping: float,
-        layout: Layout | None = None,
     ) -> Array:
         """March from shrinkage a to b under rest volumes `rest`, and return those that go with the new pressures."""
+        self._run(state, velocity, rest, count, a, b, damping)
+        settings = self._settings
+        if settings.kappa_ratio == settings.march_kappa_ratio:
+            return rest
+        loaded = self._ready(self._layout, b, rest)
+        goal = rests(dilatations(loaded, state, 1 - b), settings.march_kappa_ratio, settings.kappa_ratio)
+        # volumes ring for 2 / damping steps; following faster than that feeds what rings
+        share = 1 - np.exp(-_FOLLOW * damping * count)
+        following: Array = rest * (goal / rest) ** share
+        return following
+
+    def _run(
+        self,
+        state: Fixed,
+        velocity: Single,
+        rest: Array,
+        count: int,
+        a: float,
+        b: float,
+        damping: float,
+        layout: Layout | None = None,
+    ) -> None:
+        """March from shrinkage a to b under rest volumes `rest`; state and velocity change in place."""
         self._context.check_cancelled()
         layout = layout or self._layout
         forget(self._skin, layout)
@@ -238,15 +254,6 @@ class Path:
                 f"the run blew up at shrinkage s = {b:.3f}.",
                 advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             )
-        settings = self._settings
-        if settings.kappa_ratio == settings.march_kappa_ratio:
-            return rest
-        loaded = self._ready(layout, b, rest)
-        goal = rests(dilatations(loaded, state, 1 - b), settings.march_kappa_ratio, settings.kappa_ratio)
-        # volumes ring for 2 / damping steps; following faster than that feeds what rings
-        share = 1 - np.exp(-_FOLLOW * damping * count)
-        following: Array = rest * (goal / rest) ** share
-        return following
 
     def _ready(self, layout: Layout, shrinkage: float, rest: Array) -> Layout:
         """Return `layout` with the targets at `shrinkage` and the rest volumes; the last one made is kept."""
@@ -259,33 +266,35 @@ class Path:
         """Hold the shrinkage until forces balance *and* the surface has come to rest.
 
         Just past the onset the forces nearly balance while buckles still grow, so the residual alone would stop there.
-        It swings, hardly damped, to where the energy leads (after the onset buckles go on merging for thousands of
-        steps), is calmed, and swings again if it was not there yet.
+        It swings to where the energy leads: after the onset buckles go on merging for thousands of steps, along ways so
+        soft that damping would only delay them. Kinetic damping knows no rate (Day 1965, Cundall 1976): all stands still
+        whenever the kinetic energy begins to fall, for there the potential was about least. Then it is calmed, and swings
+        again if it was not there yet.
         """
         settings = self._settings
         surface = positions(state[self.surface_nodes])
         if shrinkage == 0:
             return State(surface, shrinkage, 0.0, 0.0, self._steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
-        chunk = max(20, min(_REST_STEPS, _SLICE // self.elements))
         before = float(self._report(state, rest, shrinkage).energy.sum()) if self._with_release else None
-        layout, weigh_at = self._layout, 0
-        spent, since, calm, residual, drift = 0, 0, False, np.inf, np.inf
+        spent, residual, drift = 0, np.inf, np.inf
         while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
-            if spent >= weigh_at:
-                layout, weigh_at = self._weighed(state), spent + _SETTLE_REWEIGH
-            damping = settings.calm_damping if calm else settings.swing_damping
-            # rest volumes stay: under some that go on following, forces have no potential and hardly balance
-            self._advance(state, velocity, rest, chunk, shrinkage, shrinkage, damping, layout)
-            spent, since = spent + chunk, since + chunk
-            residual = self._residual(state, rest, shrinkage, layout, damping)
-            moved = positions(state[self.surface_nodes])
-            speed = np.sqrt(np.square(moved - surface).sum(axis=1).mean()) / chunk
-            drift = float(speed * _REST_STEPS / self._params.exocarp_thickness)
-            surface = moved
-            there = drift < _CALM * settings.drift
-            last = spent + settings.calm_steps >= settings.settle_steps
-            if last or since >= (settings.calm_steps if calm else settings.swing_steps) or (there and not calm):
-                calm, since = last or not calm, 0
+            layout = self._weighed(state)
+            if spent or shrinkage > settings.start:
+                self._swing(state, velocity, rest, shrinkage, layout)
+                spent += settings.swing_steps
+            rested = 0
+            while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
+                surface = positions(state[self.surface_nodes])
+                # rest volumes stay: under some that go on following, forces have no potential and hardly balance
+                count = min(_REST_STEPS, max(20, _SLICE // self.elements))
+                self._run(
+                    state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping, layout
+                )
+                rested += count
+                residual = self._residual(state, rest, shrinkage, layout, settings.calm_damping)
+                moved = np.square(positions(state[self.surface_nodes]) - surface).sum(axis=1).mean()
+                drift = float(np.sqrt(moved) / count * _REST_STEPS / self._params.exocarp_thickness)
+            spent += rested
         report = self._report(state, rest, shrinkage)
         least = float(report.least_ratio.min())
         if least <= 0:
@@ -296,7 +305,20 @@ class Path:
             )
         energy = float(report.energy.sum())
         released = before - energy if before is not None else None
+        surface = positions(state[self.surface_nodes])
         return State(surface, shrinkage, residual, drift, self._steps, least, energy, released)
+
+    def _swing(self, state: Fixed, velocity: Single, rest: Array, shrinkage: float, layout: Layout) -> None:
+        """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy."""
+        settings = self._settings
+        count = settings.swing_steps // _LOOKS
+        last = 0.0
+        for _ in range(_LOOKS):
+            self._run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping, layout)
+            energy = float((layout.mass * np.square(velocity[:, :3]).sum(axis=1, dtype=np.float64))[layout.free].sum())
+            if energy < last:
+                velocity[:] = energy = 0.0
+            last = energy
 
     def _report(self, state: Fixed, rest: Array, shrinkage: float) -> ElementReport:
         layout = self._ready(self._layout, shrinkage, rest)
