@@ -286,9 +286,11 @@ class Context:
         self,
         observe: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
+        library: Callable[[str], xr.Dataset | None] | None = None,
     ) -> None:
         self._observe = observe
         self._cancelled = cancelled
+        self._library = library
         self._fraction = 0.0
 
     def report(self, fraction: float, message: str = "") -> None:
@@ -306,6 +308,26 @@ class Context:
         """
         if self._cancelled is not None and self._cancelled():
             raise Cancelled("the run was cancelled.")
+
+    def result(self, key: str) -> xr.Dataset:
+        """Return an earlier result by its key, for runs that start from one.
+
+        Raises:
+            InvalidInput: there is none, or this run is not tied to a store.
+
+        """
+        if self._library is None:
+            raise InvalidInput(
+                f"the run starts from the stored result {_SHORT.repr(key)}, and there is no store here.",
+                advice="Run it by a sweep or as a job, beside that result.",
+            )
+        found = self._library(key)
+        if found is None:
+            raise InvalidInput(
+                f"the run starts from the stored result {_SHORT.repr(key)}, which is not in the store.",
+                advice="Run that one first.",
+            )
+        return found
 
     @staticmethod
     def generator(seed: int) -> np.random.Generator:

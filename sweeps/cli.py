@@ -182,13 +182,20 @@ def sweep(
         opened = Store.open(store, create=True)
         left_out = f", {read.skipped} impossible ones left out" if read.skipped else ""
         note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
-        with progress.stopping() as stop, progress.sweep(read.name, readers(read)) as observe:
-            report = run_plan(read, opened, pool, observe, stop=stop, again=retry_failed)
+        reports = []
+        for part in read.parts():
+            with progress.stopping() as stop, progress.sweep(part.name, readers(part)) as observe:
+                reports.append(run_plan(part, opened, pool, observe, stop=stop, again=retry_failed))
+            if reports[-1].stopped or (part is read.first and not reports[-1].complete):
+                break
+    report = next((r for r in reports if r.plan == read.name), reports[-1])
     document = report_document(report) | {"store": str(store), "skipped": read.skipped, "repeated": read.repeated}
-    emit(document, as_json, lambda console: show_report(console, report, store))
-    if report.stopped:
+    document["parts"] = [report_document(r) for r in reports]
+
+    emit(document, as_json, lambda console: show_report(console, report, store, read.name if read.first else ""))
+    if any(r.stopped for r in reports):
         raise typer.Exit(130)
-    if not report.complete:
+    if not all(r.complete for r in reports):
         raise typer.Exit(1)
 
 

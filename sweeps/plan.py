@@ -44,7 +44,8 @@ class Plan:
     """Validated samples and a settled need.
 
     `axes` are the names that vary; `skipped` counts the impossible combinations that were left out, `repeated` the
-    samples that were listed more than once.
+    samples that were listed more than once. `first` is the plan of the pattern that the samples start from, `controls`
+    that of the samples that are run without it as well.
     """
 
     name: str
@@ -54,6 +55,8 @@ class Plan:
     axes: tuple[str, ...]
     skipped: int = 0
     repeated: int = 0
+    first: Plan | None = None
+    controls: Plan | None = None
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
@@ -98,16 +101,26 @@ class Plan:
                 repeated += samples.setdefault(params.model_dump_json(), params) is not params
         if not samples:
             raise PlanError(f"none of the {skipped} combinations is possible.", "Change the ranges under [axes].")
+        name = written.name or name
+        first = controls = None
+        if written.pattern is not None:
+            first, controls, samples = _from_pattern(written, written.pattern, solver, need, name, samples)
         varied = written.axes or dict.fromkeys(itertools.chain.from_iterable(written.samples))
         return cls(
-            name=written.name or name,
+            name=name,
             solver=solver,
             samples=tuple(samples.values()),
             need=need,
             axes=tuple(varied),
             skipped=skipped,
             repeated=repeated,
+            first=first,
+            controls=controls,
         )
+
+    def parts(self) -> tuple[Plan, ...]:
+        """Return the plans to run, one after the other: what the samples start from, the samples, the controls."""
+        return tuple(plan for plan in (self.first, self, self.controls) if plan is not None)
 
     def jobs(self) -> list[JobSpec]:
         """Return one job per sample, in the plan's order, with distinct keys."""
@@ -141,10 +154,36 @@ def units_of(solver: str) -> dict[str, str]:
     }
 
 
+def _from_pattern(
+    written: PlanFile, pattern: planfile.Pattern, solver: Solver, need: Need, name: str, samples: Mapping[str, Params]
+) -> tuple[Plan, Plan | None, dict[str, Params]]:
+    """Return the plan of the pattern, that of the controls, and the samples that start from the pattern."""
+    axes = tuple(dict.fromkeys(itertools.chain.from_iterable([pattern.sample, *pattern.controls])))
+    try:
+        origin = solver.parse({**written.set, **pattern.sample}, written.preset)
+        early = solver.settle(need.model_copy(update={"stages": (pattern.stage,), "fields": ()}))
+        cold = tuple(solver.parse({**written.set, **values}, written.preset) for values in pattern.controls)
+        start = {"key": job(solver, origin, early).key, "stage": pattern.stage, "amplitude": pattern.amplitude}
+        warm = {
+            shown: solver.parse({**params.model_dump(mode="json"), "pattern": start})
+            for shown, params in samples.items()
+        }
+    except InvalidInput as error:
+        raise PlanError(f"[pattern]: {error.message}", error.advice) from None
+    first = Plan(f"{name}-pattern", solver, (origin,), early, axes)
+    controls = Plan(f"{name}-controls", solver, cold, need, axes) if cold else None
+    return first, controls, warm
+
+
 def _check_names(written: PlanFile, solver: Solver) -> None:
     """Refuse names that the solver does not have, and values given twice."""
     known = {*solver.params.model_fields, *solver.params.axes}
     places = {"set": written.set, "axes": written.axes}
+    if written.pattern is not None:
+        if "pattern" not in solver.params.model_fields:
+            raise PlanError(f"[pattern]: runs of {solver.name} do not start from others.", "Leave it out.")
+        places |= {"pattern.sample": written.pattern.sample}
+        places |= {f"pattern.controls {i}": values for i, values in enumerate(written.pattern.controls, start=1)}
     places |= {f"samples {i}": sample for i, sample in enumerate(written.samples, start=1)}
     for place, values in places.items():
         for name in values:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 
 from .errors import PlanError
 
-__all__ = ["Axis", "PlanFile", "Range", "Sampling", "load", "parse", "suggest"]
+__all__ = ["Axis", "Pattern", "PlanFile", "Range", "Sampling", "load", "parse", "suggest"]
 
 
 class _Strict(BaseModel):
@@ -64,6 +64,15 @@ class Sampling(_Strict):
         return self
 
 
+class Pattern(_Strict):
+    """The sample that runs first, and whose wrinkles at one stage all others start from."""
+
+    sample: dict[str, Any] = Field(description="Its values of the swept names")
+    stage: float = Field(description="Stage whose wrinkles are taken: soon after the onset")
+    amplitude: float = Field(0.2, description="Their largest height in the others, in exocarp thicknesses")
+    controls: tuple[dict[str, Any], ...] = Field((), description="Samples that are run without it as well")
+
+
 class PlanFile(_Strict):
     """A plan as it is written; `sweeps.plan.Plan` is what it means."""
 
@@ -74,6 +83,7 @@ class PlanFile(_Strict):
     axes: dict[str, Axis] = Field(default_factory=dict, description="Values that are swept")
     sampling: Sampling = Field(default_factory=Sampling, description="How the axes are filled")
     samples: tuple[dict[str, Any], ...] = Field((), description='The samples of kind = "list"')
+    pattern: Pattern | None = Field(None, description="A run that all samples start from, so that they buckle alike")
     need: dict[str, Any] = Field(default_factory=dict, description="What to compute: stages, quality, fields, ...")
 
     @model_validator(mode="after")
@@ -141,7 +151,7 @@ def _findings(error: ValidationError) -> Iterable[str]:
             del place[2:3]  # the tag of the union's branch
         where = ".".join(place)
         if item["type"] == "extra_forbidden":
-            inner: dict[str, type[BaseModel]] = {"sampling": Sampling, "axes": Range}
+            inner: dict[str, type[BaseModel]] = {"sampling": Sampling, "axes": Range, "pattern": Pattern}
             table = inner.get(place[0], PlanFile) if len(place) > 1 else PlanFile
             yield f"unknown name {where!r}: {suggest(place[-1], _names(table)).rstrip('.')}"
         elif place[:1] == ["axes"] and item["type"] == "tuple_type":

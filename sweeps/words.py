@@ -65,8 +65,8 @@ def report_document(report: Report) -> dict[str, Any]:
     return asdict(report) | {"complete": report.complete}
 
 
-def show_report(console: Any, report: Report, store: Path) -> None:
-    """Print what a sweep achieved, and what to do next."""
+def show_report(console: Any, report: Report, store: Path, plan: str = "") -> None:
+    """Print what a sweep achieved, and what to do next, with `plan` where the store holds others beside it."""
     for failure in report.failed:
         error = failure.error
         console.print(f"failed {failure.key[:12]}: {error.get('message')} {error.get('advice', '')}", markup=False)
@@ -82,4 +82,5 @@ def show_report(console: Any, report: Report, store: Path) -> None:
     ]
     console.print(f"{report.plan}: {', '.join(parts)} of {report.total}, in {report.seconds:.1f} s")
     if report.complete:
-        console.print(f"next: wizen table build --store {store}", markup=False)
+        only = f" --plan {plan}" if plan else ""
+        console.print(f"next: wizen table build --store {store}{only}", markup=False)

@@ -91,7 +91,7 @@ def work(task: Task) -> Outcome:
         if digest is not None:
             return _report(store, task, Outcome(job.key, "done", digest, reused=True))
         with _Heart(task, store) as heart:
-            digest = store.put(job.key, _solve(task, heart))
+            digest = store.put(job.key, _solve(task, heart, store))
         return _report(store, task, Outcome(job.key, "done", digest, time.perf_counter() - start))
     except Cancelled:
         return Outcome(job.key, "stopped")
@@ -134,9 +134,11 @@ def _solver(job: JobSpec) -> Solver:
     return solver
 
 
-def _solve(task: Task, heart: _Heart) -> xr.Dataset:
+def _solve(task: Task, heart: _Heart, store: Store) -> xr.Dataset:
     solver = _solver(task.job)
-    context = Context(observe=heart.note, cancelled=heart.lost.is_set)
+    context = Context(
+        observe=heart.note, cancelled=heart.lost.is_set, library=lambda key: store.get(key) if store.has(key) else None
+    )
     return solver.solve(solver.parse(task.job.params), Need.parse(task.job.need), context)
 
 

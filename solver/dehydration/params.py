@@ -6,17 +6,27 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ..fruit import Fruit
 
-__all__ = ["DehydrationParams"]
+__all__ = ["DehydrationParams", "Pattern"]
 
 Gradient = Annotated[float, Field(ge=-0.8, le=0.8)]
 Factor = Annotated[float, Field(ge=0.0, le=2.0)]
 
 #: Longest gradient of wetness, in 1/r1.
 STEEPEST = 0.8
+
+
+class Pattern(BaseModel):
+    """A stage of a stored run whose wrinkles another run starts from."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    key: str = Field(pattern="^[0-9a-f]{64}$", description="Key of the stored run")
+    stage: float = Field(description="Stage of it [1]")
+    amplitude: float = Field(0.2, gt=0, le=0.5, description="Largest height, in exocarp thicknesses")
 
 
 class DehydrationParams(Fruit):
@@ -49,6 +59,11 @@ class DehydrationParams(Fruit):
     imperfection_kind: Literal["waves", "mode"] = Field(
         "waves",
         description="What the bumps are: seeded random waves, or the first buckling mode of this fruit",
+        json_schema_extra={"units": "1"},
+    )
+    pattern: Pattern | None = Field(
+        None,
+        description="A stored run whose wrinkles are added to the bumps, so that a table's samples buckle alike",
         json_schema_extra={"units": "1"},
     )
     wetness: tuple[Gradient, Gradient, Gradient] = Field(
