@@ -40,6 +40,36 @@ def test_shared_samples_share_keys() -> None:
     assert keys[2] < keys[0]
 
 
+PATTERN = {"sample": {"te": 0.03}, "stage": 0.1, "controls": [{"te": 0.02}]}
+
+
+def test_a_pattern_runs_first_and_is_part_of_the_samples_keys() -> None:
+    axes = {"te": [0.02, 0.04]}
+    read, cold = plan(axes=axes, pattern=PATTERN), plan(axes=axes)
+    assert [part.name for part in read.parts()] == ["plan-pattern", "plan", "plan-controls"]
+    first, samples, controls = (part.jobs() for part in read.parts())
+    assert first[0].need["stages"] == [0.1]
+    assert all(job.params["pattern"] == {"key": first[0].key, "stage": 0.1, "amplitude": 0.2} for job in samples)
+    assert not {job.key for job in samples} & {job.key for job in cold.jobs()}
+    assert {job.key for job in controls} < {job.key for job in cold.jobs()}
+    assert cold.parts() == (cold,)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "message"),
+    [
+        (PATTERN | {"sample": {"tee": 0.03}}, r"\[pattern.sample\]: dehydration has no parameter 'tee'"),
+        (PATTERN | {"controls": [{"x": 1}]}, r"\[pattern.controls 1\]"),
+        (PATTERN | {"stage": 3.0}, r"\[pattern\]: stage 3 lies outside"),
+        (PATTERN | {"amplitude": 7.0}, r"\[pattern\]: pattern.amplitude"),
+        (PATTERN | {"stge": 3.0}, "unknown name 'pattern.stge'"),
+    ],
+)
+def test_wrong_patterns_are_refused(pattern: dict[str, Any], message: str) -> None:
+    with pytest.raises(PlanError, match=message):
+        plan(axes={"te": [0.02]}, pattern=pattern)
+
+
 def test_jobs_are_repeatable_and_distinct() -> None:
     read = plan(axes={"te": [0.02, 0.02, 0.03], "seed": [0, 1]})
     assert [job.key for job in read.jobs()] == [job.key for job in read.jobs()]
