@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 import mimeparse
@@ -165,7 +166,7 @@ def _shape(store: Store, job: Job, stage: float | None, chosen: Format) -> bytes
         advice = f"Ask for {NETCDF}; a job whose need has the field 'position' and no region is a shape."
         raise NotAcceptable("this result is not a whole surface.", advice=advice)
     axes = vocabulary.axes(job.solver)
-    shape = of_result(run, {name: params.axis(name) for name in axes}, near)
+    shape = replace(of_result(run, {name: params.axis(name) for name in axes}, near), table=str(job.digest))
     symbol = solver.stages.symbol
     units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}
     return chosen.encode(shape, About(job.solver, "", {}, symbol, units))
