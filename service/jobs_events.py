@@ -33,10 +33,16 @@ _LONGEST = 600.0
 #: Milliseconds after which a client that lost its stream comes back.
 _RETRY = 1000
 
+_TEXT = {"type": "string"}
+#: One event, with the job as JSON in `data`.
+_EVENT: dict[str, Any] = {
+    "type": "object",
+    "properties": {"id": _TEXT, "event": _TEXT, "data": _TEXT, "retry": {"type": "integer"}},
+}
 _STREAM: dict[str, Any] = {
     "description": "Events `state` and `progress`, each with the job as GET /v1/jobs/{id} has it; the last one has a "
     "state that is done, failed or cancelled",
-    "content": {"text/event-stream": {"schema": {"type": "string"}}},
+    "content": {"text/event-stream": {"schema": _EVENT}},
 }
 
 

@@ -63,7 +63,10 @@ def _job_request(schemas: Json) -> Json:
             "properties": {
                 **common["properties"],
                 "solver": {"const": name, "title": solver.title},
-                "preset": {"enum": [*solver.presets, None], "description": common["properties"]["preset"]["description"]},
+                "preset": {
+                    "enum": [*solver.presets, None],
+                    "description": common["properties"]["preset"]["description"],
+                },
                 "params": params,
                 "need": _need(schemas["Need"], solver),
             },
@@ -83,7 +86,10 @@ def _need(general: Json, solver: Solver) -> Json:
     axis = solver.stages
     stage = {"type": "number", "minimum": axis.lowest, "maximum": axis.highest}
     properties["fields"] = {**properties["fields"], "items": {"enum": list(solver.fields)}}
-    properties["stages"] = {**properties["stages"], "items": {**stage, "description": f"{axis.long_name} [{axis.units}]"}}
+    properties["stages"] = {
+        **properties["stages"],
+        "items": {**stage, "description": f"{axis.long_name} [{axis.units}]"},
+    }
     return {**general, "properties": properties}
 
 

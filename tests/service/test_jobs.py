@@ -161,7 +161,10 @@ def test_results_by_accept(store: Store, queue_only: httpx.Client, tmp_path: Pat
     said = queue_only.get(result, params={"format": "json"}).json()
     assert said["stage"]["value"] == 0.2
     assert said["digest"] in whole.headers["etag"]
-    assert "0.1, 0.2" in checked(queue_only.get(result, params={"stage": 0.15, "format": "glb"}), 422, "invalid-query")["advice"]
+    assert (
+        "0.1, 0.2"
+        in checked(queue_only.get(result, params={"stage": 0.15, "format": "glb"}), 422, "invalid-query")["advice"]
+    )
     checked(queue_only.get(result, headers={"Accept": "text/html"}), 406, "not-acceptable")
     checked(queue_only.get(result, params={"format": "doc"}), 422, "invalid-query")
     part = {**body(), "need": {"stages": [0.1], "fields": ["volume"]}}
@@ -191,10 +194,9 @@ def test_results_by_accept(store: Store, queue_only: httpx.Client, tmp_path: Pat
         ({"need": {"fields": ["colour"]}}, 422, "invalid-input"),
         ({"need": {"quality": "superb"}}, 422, "invalid-query"),
         ({"extra": 1}, 422, "invalid-query"),
-        ({"params": {"\ud800": 1}}, 422, "invalid-input"),
-        ({"solver": "\ud800"}, 422, "invalid-query"),
+        ({"solver": "\ud800"}, 404, "unknown-solver"),
         ({"params": []}, 422, "invalid-query"),
-        ({"need": {"resolution": 1024, "stages": [i / 1000 for i in range(100)]}}, 422, "too-costly"),
+        ({"need": {"resolution": 1024, "stages": [i / 1000 for i in range(200)]}}, 422, "too-costly"),
     ],
 )
 def test_what_cannot_be_is_refused_before_any_work(
