@@ -15,14 +15,15 @@ from . import problems, vocabulary
 from .formats import FORMATS
 from .live import LiveTables
 
-__all__ = ["router"]
+__all__ = ["open_router", "router"]
 
-router = APIRouter(tags=["catalogue"])
+#: Pages that need no token ever, and the others.
+open_router, router = APIRouter(tags=["catalogue"]), APIRouter(tags=["catalogue"])
 
 Json = dict[str, Any]
 
 
-@router.get("/", summary="Where to go from here")
+@open_router.get("/", summary="Where to go from here")
 def index(request: Request) -> Json:
     """List the service's pages."""
     return {
@@ -32,6 +33,7 @@ def index(request: Request) -> Json:
             "tables": "/v1/tables",
             "solvers": "/v1/solvers",
             "shapes": "/v1/shapes/{solver}",
+            "jobs": "/v1/jobs",
             "health": "/healthz",
             "documentation": "/docs",
             "schema": "/openapi.json",
@@ -40,7 +42,7 @@ def index(request: Request) -> Json:
     }
 
 
-@router.get("/healthz", summary="Whether shapes can be served", responses=problems.responses(503))
+@open_router.get("/healthz", summary="Whether shapes can be served", responses=problems.responses(503))
 def health(request: Request) -> Json:
     """Open every table; 200 only if the store and all its tables can be read.
 

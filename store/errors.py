@@ -12,14 +12,19 @@ __all__ = [
     "CorruptLedger",
     "CorruptShard",
     "CorruptTable",
+    "CorruptTokens",
     "EmptyTable",
+    "InvalidToken",
     "MissingStore",
     "MixedSamples",
     "OutsideTable",
+    "QueueFull",
+    "ReadOnlyStore",
     "StorageFull",
     "StoreError",
     "UnknownJob",
     "UnknownTable",
+    "UnknownToken",
     "full_disk",
 ]
 
@@ -88,6 +93,18 @@ class MixedSamples(StoreError):
     code = "mixed-samples"
 
 
+class QueueFull(StoreError):
+    """As many jobs wait as may."""
+
+    code = "queue-full"
+
+
+class ReadOnlyStore(StoreError):
+    """A store that takes nothing new: the one in the package, or one that belongs to somebody else."""
+
+    code = "read-only-store"
+
+
 class StorageFull(StoreError):
     """The disk or a quota is full. Nothing half-written stays."""
 
@@ -98,6 +115,24 @@ class UnknownJob(StoreError):
     """No job or result has that key."""
 
     code = "unknown-job"
+
+
+class CorruptTokens(StoreError):
+    """The file of access tokens is damaged."""
+
+    code = "corrupt-tokens"
+
+
+class InvalidToken(StoreError):
+    """A token that cannot be made as asked for."""
+
+    code = "invalid-option"
+
+
+class UnknownToken(StoreError):
+    """No token has that name."""
+
+    code = "unknown-token"
 
 
 @contextmanager

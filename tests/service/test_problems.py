@@ -37,6 +37,11 @@ EXPECTED: dict[type[Exception], int] = {
     stored.MixedSamples: 503,
     stored.StorageFull: 507,
     stored.UnknownJob: 404,
+    stored.QueueFull: 429,
+    stored.ReadOnlyStore: 409,
+    stored.CorruptTokens: 503,
+    stored.InvalidToken: 422,
+    stored.UnknownToken: 404,
     errors.ServiceError: 500,
     errors.InvalidQuery: 422,
     errors.OutsideRanges: 422,
@@ -46,6 +51,13 @@ EXPECTED: dict[type[Exception], int] = {
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,
     errors.TimedOut: 503,
+    errors.Unauthorized: 401,
+    errors.Forbidden: 403,
+    errors.TooCostly: 422,
+    errors.NotDone: 409,
+    errors.JobFailed: 409,
+    errors.JobEnded: 409,
+    errors.TooManyListeners: 429,
 }
 
 
