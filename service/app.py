@@ -11,7 +11,7 @@ from fastapi import FastAPI
 
 from solver import __version__
 
-from . import catalogue, problems, shapes
+from . import catalogue, page, problems, shapes
 from .limits import Limits
 from .live import LiveTables
 from .openapi import Documented
@@ -43,6 +43,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version=__version__,
         summary="Physically based shapes that can be asked for",
         lifespan=_lifespan,
+        docs_url=None,  # both of FastAPI's load scripts from elsewhere; `page` serves our own copy
+        redoc_url=None,
     )
     app.state.settings = settings
     app.state.tables = LiveTables(settings.store, settings.reload_interval)
@@ -50,6 +52,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     problems.install(app)
     for part in (catalogue, shapes):
         app.include_router(part.router)
+    page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
     # the last one added is the outermost

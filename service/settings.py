@@ -10,6 +10,8 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from store.starter import own_or_starter
 
+from .page import BUILT
+
 __all__ = ["Settings"]
 
 
@@ -31,4 +33,5 @@ class Settings(BaseSettings):
     threads: int = Field(8, ge=1, le=256, description="Shapes computed at the same time; each holds its arrays")
     reload_interval: float = Field(0.5, ge=0, description="How often a table's manifest is looked at, at most [s]")
     cache_age: int = Field(60, ge=0, description="How long a client may reuse a shape without asking again [s]")
+    page: Path = Field(BUILT, description="Directory of the built web page; `make page` makes it")
     metrics: bool = Field(True, description="Serve /metrics in Prometheus' text format")
