@@ -37,7 +37,9 @@ class Format(NamedTuple):
 FORMATS: Mapping[str, Format] = {
     f.name: f
     for f in (
-        Format("points", "application/vnd.wizen.points", ".wzp", "positions for live views", ("position",), points.encode),
+        Format(
+            "points", "application/vnd.wizen.points", ".wzp", "positions for live views", ("position",), points.encode
+        ),
         Format("obj", "model/obj", ".obj", "Wavefront OBJ", ("position",), obj.encode),
         Format("npz", "application/x-npz", ".npz", "NumPy archive", ("position", "displacement"), npz.encode),
         Format("glb", "model/gltf-binary", ".glb", "binary glTF 2.0", ("position",), glb.encode),

@@ -38,6 +38,7 @@ export interface About {
   converged: boolean;
   nearest: number;
   digest: string;
+  stage: { symbol: string; value: number };
   weights: Record<string, number>;
   descriptors: Record<string, Described>;
   lattice: { colatitude: number; azimuth: number };

@@ -48,15 +48,15 @@ const looks: Record<string, Look> = {
     },
     skins: {
       jujube: {
-        ridge: ["#a8381c", "#7a1d10"],
-        furrow: ["#7d2412", "#2c0706"],
+        ridge: ["#8e3220", "#6b2115"],
+        furrow: ["#6f2416", "#2a0b08"],
         roughness: [0.3, 0.46],
         coat: 0.35,
         bloom: "#ffb08a",
         bloomAmount: 0.08,
       },
       plum: {
-        ridge: ["#54264f", "#33192f"],
+        ridge: ["#56304f", "#3a2233"],
         furrow: ["#3d1a3c", "#120810"],
         roughness: [0.42, 0.5],
         coat: 0.2,
@@ -72,7 +72,7 @@ const looks: Record<string, Look> = {
         bloomAmount: 0.22,
       },
       wolfberry: {
-        ridge: ["#dc4416", "#a3200f"],
+        ridge: ["#c4461c", "#96270f"],
         furrow: ["#c03310", "#4d0a08"],
         roughness: [0.26, 0.42],
         coat: 0.5,

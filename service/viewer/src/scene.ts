@@ -8,6 +8,8 @@ import {
   CircleGeometry,
   Color,
   DirectionalLight,
+  HemisphereLight,
+  type Light,
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
@@ -23,8 +25,8 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Fruit } from "./fruit";
 
-const HOME = new Spherical(6.1, 1.26, 0.55);
-const TARGET = new Vector3(0, 0.84, 0);
+const HOME = new Spherical(6.3, 1.24, 0.55);
+const TARGET = new Vector3(0, 0.86, 0);
 
 export class Studio {
   private readonly renderer: WebGLRenderer;
@@ -130,20 +132,22 @@ export class Studio {
   }
 }
 
-function lights(): DirectionalLight[] {
-  const key = new DirectionalLight("#ffe6cb", 3.6);
-  key.position.set(-3.4, 4.0, 1.5);
+function lights(): Light[] {
+  const key = new DirectionalLight("#ffe6cb", 3.1);
+  key.position.set(-3.2, 3.9, 2.2);
   key.castShadow = true;
   key.shadow.mapSize.set(2048, 2048);
   Object.assign(key.shadow.camera, { left: -2.4, right: 2.4, top: 2.4, bottom: -2.4, near: 1, far: 12 });
-  key.shadow.radius = 5;
+  key.shadow.radius = 7;
   key.shadow.bias = -0.0006;
-  key.shadow.normalBias = 0.012;
+  key.shadow.normalBias = 0.03;
   key.target.position.copy(TARGET);
   key.target.updateMatrixWorld();
   const rim = new DirectionalLight("#a9c6ff", 1.5);
   rim.position.set(3.6, 2.2, -3.2);
-  return [key, rim];
+  // what the table throws back: without it the underside is a hole
+  const bounce = new HemisphereLight("#8f9bb0", "#c09a84", 0.75);
+  return [key, rim, bounce];
 }
 
 /** A round table top that fades into the background. */
@@ -162,11 +166,12 @@ function table(): Mesh {
   const top = new Mesh(
     new CircleGeometry(6, 64),
     new MeshStandardMaterial({
-      color: "#45464a",
+      color: "#3c3d41",
       roughness: 0.85,
       alphaMap: new CanvasTexture(canvas),
       transparent: true,
       envMapIntensity: 0.5,
+      dithering: true, // a slow gradient in the dark shows its steps
     }),
   );
   top.rotation.x = -Math.PI / 2;

@@ -31,7 +31,7 @@ export class SkinMaterial extends MeshPhysicalMaterial {
     uBloom: { value: new Color() },
     uBloomAmount: { value: 0 },
     uScale: { value: 0.05 },
-    uPores: { value: 0.12 },
+    uPores: { value: 0.045 },
   };
 
   constructor() {
@@ -62,15 +62,15 @@ export class SkinMaterial extends MeshPhysicalMaterial {
           `#include <normal_fragment_maps>
           {
             // pores fade out before they get smaller than a pixel
-            vec3 pore = noised(vRest * 46.0).yzw + 0.5 * noised(vRest * 101.0).yzw;
-            float fade = 1.0 - smoothstep(0.25, 0.8, length(fwidth(vRest)) * 60.0);
+            vec3 pore = noised(vRest * 38.0).yzw + 0.6 * noised(vRest * 83.0).yzw;
+            float fade = 1.0 - smoothstep(0.2, 1.2, length(fwidth(vRest)) * 40.0);
             vec3 slope = mat3(viewMatrix) * pore;
             normal = normalize(normal - fade * uPores * (slope - dot(slope, normal) * normal));
           }`,
         )
         .replace(
           "#include <aomap_fragment>",
-          `float shade = mix(0.35, 1.0, open);
+          `float shade = mix(0.4, 1.0, open);
           reflectedLight.indirectDiffuse *= shade;
           reflectedLight.indirectSpecular *= shade * shade;
           reflectedLight.directSpecular *= mix(0.5, 1.0, open);`,

@@ -13,6 +13,9 @@ function verdict(about: About): Verdict {
   if (about.inside === false) {
     return { level: "poor", text: "outside the runs", why: "No runs surround this point: the shape is a guess." };
   }
+  if (about.exact && about.stage.value === 0) {
+    return { level: "good", text: "the fresh shape, exact", why: "It follows from the parameters alone." };
+  }
   if (about.exact) {
     return about.converged
       ? { level: "good", text: "a stored run", why: "Computed, not interpolated." }
