@@ -5,6 +5,7 @@ Needs `make page`, Chromium and playwright (`pip install -e '.[browser]'`); draw
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -18,7 +19,10 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import httpx
+import numpy as np
 import pytest
+from matplotlib import image
+from numpy.typing import NDArray
 
 from service.page import BUILT
 from solver import __version__
@@ -94,6 +98,11 @@ class Visit:
         return self.page.locator("#view").screenshot()
 
 
+def pixels(picture: bytes) -> NDArray[np.float32]:
+    """Return a screenshot's colours (rows, columns, 3), 0 to 1."""
+    return image.imread(io.BytesIO(picture))[..., :3]
+
+
 @pytest.fixture
 def visit(browser: Browser) -> Iterator[Visit]:
     found = Visit(browser, viewport={"width": 1000, "height": 640})
@@ -101,7 +110,7 @@ def visit(browser: Browser) -> Iterator[Visit]:
     found.page.close()
 
 
-def test_a_slider_changes_the_mesh(visit: Visit, address: str, tmp_path: Path) -> None:
+def test_a_slider_changes_the_mesh(visit: Visit, address: str) -> None:
     visit.page.goto(f"{address}/#s=0&te=0.035&gamma=20")
     fresh = visit.shown("shown.n >= 192")
     assert fresh == {"n": 192, "s": 0, "te": 0.035, "gamma": 20}
@@ -116,13 +125,11 @@ def test_a_slider_changes_the_mesh(visit: Visit, address: str, tmp_path: Path) -
     assert wrinkled != smooth
     assert "interpolated" in visit.page.locator(".badge").inner_text()
     assert slider.get_attribute("aria-valuetext") == "0.3"
-    (tmp_path / "wrinkled.png").write_bytes(wrinkled)
-    # wrinkles are detail, and detail does not compress
-    assert len(wrinkled) > 1.05 * len(smooth)
+    assert np.abs(pixels(wrinkled) - pixels(smooth)).mean() > 0.05
 
     visit.page.get_by_label("Skin stiffness γ", exact=True).press("ArrowRight")
     assert visit.shown("shown.n >= 192 && shown.gamma != 20")["gamma"] > 20
-    assert "gamma=20.0" in visit.page.url or "gamma=20." in visit.page.url
+    assert re.search(r"gamma=20\.\d", visit.page.url)
     assert visit.complaints == []
     assert {urlsplit(url).netloc for url in visit.asked} == {urlsplit(address).netloc}
 

@@ -37,7 +37,7 @@ export class Slider {
     this.root = el(
       "div",
       { class: "slider" },
-      el("label", { for: id, title: about }, word.name, el("var", {}, word.symbol)),
+      el("label", { for: id, title: about }, `${word.name} `, el("var", {}, word.symbol)),
       el("span", { class: "value" }, this.number, units),
       el("div", { class: "track" }, this.range, marks),
       el("div", { class: "ends", "aria-hidden": "true" }, el("span", {}, digits(scale.lowest)), el("span", {}, digits(scale.highest))),

@@ -20,6 +20,7 @@ export class Fruit extends Mesh<BufferGeometry, SkinMaterial> {
     super(new BufferGeometry(), new SkinMaterial());
     this.castShadow = this.receiveShadow = true;
     this.frustumCulled = false;
+    this.visible = false; // drawn without normals once, its material would stay faceted
   }
 
   /** Show these points. Of the same resolution they are eased in; the last step is exactly what was given. */
@@ -27,6 +28,7 @@ export class Fruit extends Mesh<BufferGeometry, SkinMaterial> {
     const same = n === this.n;
     if (!same) this.build(n);
     this.target = points;
+    this.visible = true;
     if (same && ease) {
       this.moving = true;
     } else {

@@ -120,12 +120,15 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
     changed();
   };
 
-  const play = button("▶ Dry", () => player.toggle(shareOf(stage, point[stage.name])), { class: "play" });
+  const play = button("▶ Dry", () => player.toggle(shareOf(stage, point[stage.name])), {
+    class: "play",
+    "aria-label": "Dry",
+  });
   const player = new Player(
     (share) => set({ [stage.name]: at(stage, share) }),
     (on) => {
       play.textContent = on ? "❚❚ Stop" : "▶ Dry";
-      play.setAttribute("aria-pressed", String(on));
+      play.setAttribute("aria-label", on ? "Stop" : "Dry");
     },
   );
 

@@ -61,9 +61,9 @@ export class SkinMaterial extends MeshPhysicalMaterial {
           "#include <normal_fragment_maps>",
           `#include <normal_fragment_maps>
           {
-            // pores fade out before they get smaller than a pixel
+            // pores fade out with the distance, before they are smaller than a pixel (by derivatives, triangles would show)
             vec3 pore = noised(vRest * 38.0).yzw + 0.6 * noised(vRest * 83.0).yzw;
-            float fade = 1.0 - smoothstep(0.2, 1.2, length(fwidth(vRest)) * 40.0);
+            float fade = 1.0 - smoothstep(5.0, 13.0, vViewPosition.z);
             vec3 slope = mat3(viewMatrix) * pore;
             normal = normalize(normal - fade * uPores * (slope - dot(slope, normal) * normal));
           }`,
