@@ -13,7 +13,7 @@ from fastapi import Depends, FastAPI
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, jobs, jobs_events, jobs_results, problems, shapes
+from . import catalogue, jobs, jobs_events, jobs_results, page, problems, shapes
 from .jobs_runner import JobRunner
 from .limits import Limits
 from .live import LiveTables
@@ -55,6 +55,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version=__version__,
         summary="Physically based shapes that can be asked for",
         lifespan=_lifespan,
+        docs_url=None,  # both of FastAPI's load scripts from elsewhere; `page` serves our own copy
+        redoc_url=None,
     )
     app.state.settings = settings
     app.state.tables = LiveTables(settings.store, settings.reload_interval)
@@ -69,6 +71,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for router in (catalogue.router, shapes.router, jobs.reading, jobs_events.router, jobs_results.router):
         app.include_router(router, dependencies=guards, responses=declared)
     app.include_router(jobs.writing)
+    page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
     # the last one added is the outermost

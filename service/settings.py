@@ -10,6 +10,8 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from store.starter import own_or_starter
 
+from .page import BUILT
+
 __all__ = ["Settings"]
 
 
@@ -41,4 +43,5 @@ class Settings(BaseSettings):
     max_job_seconds: float = Field(3600.0, gt=0, description="Longest expected time of one job [s]")
     max_job_bytes: float = Field(8e9, gt=0, description="Largest expected memory or result of one job [bytes]")
     max_listeners: int = Field(64, ge=1, description="Most open streams of job events")
+    page: Path = Field(BUILT, description="Directory of the built web page; `make page` makes it")
     metrics: bool = Field(True, description="Serve /metrics in Prometheus' text format")
