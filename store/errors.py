@@ -18,6 +18,7 @@ __all__ = [
     "OutsideTable",
     "StorageFull",
     "StoreError",
+    "TooUncertain",
     "UnknownJob",
     "UnknownTable",
     "full_disk",
@@ -80,6 +81,12 @@ class OutsideTable(StoreError):
     """A query that the table cannot answer: off its axes or stages, or for something that it does not hold."""
 
     code = "outside-table"
+
+
+class TooUncertain(StoreError):
+    """The answer would be worse than the query allows."""
+
+    code = "too-uncertain"
 
 
 class MixedSamples(StoreError):
