@@ -257,7 +257,7 @@ class ShapeTable:
         return self._samples.weigh(method.weighting, point, m, eta)
 
     def _expect(self, near: Weighted, stages: Mapping[int, float], method: methods.Method) -> dict[str, float] | None:
-        if near.nearest == 0.0 and len(stages) == 1:
+        if stages.keys() == {_FRESH} or (near.nearest == 0.0 and len(stages) == 1):
             return dict.fromkeys(Measures._fields, 0.0)
         if self._trust is None or self._trust.method != str(method):
             return None
