@@ -224,7 +224,7 @@ class ShapeTable:
         expected = self._expect(near, stages, how)
         if max_error is not None:
             trust.refuse(expected, max_error, inside)
-        fruit = self._fruit(values) if "position" in fields else None
+        fruit = self.fruit(values) if "position" in fields else None
         position = displacement = poles = None
         if fields:
             blend = self._blend(point, near, stages, how, n)
@@ -250,6 +250,38 @@ class ShapeTable:
             table=self.digest,
             units={name: self._units[name] for name in (*fields, *self.info.descriptors)},
         )
+
+    def sample(self, i: int) -> dict[str, float]:
+        """Return the varying parameters of a sample."""
+        values = [] if self._samples is None else self._samples.values[i].tolist()
+        return dict(zip(self.info.axes, values, strict=True))
+
+    def left_out(self, i: int, stage: float, method: str = methods.DEFAULT, resolution: int | None = None) -> Array:
+        """Return the displacement (n, 2n, 3) that the other samples predict for sample `i` at a stored stage.
+
+        Raises:
+            OutsideTable: the stage is not stored, there are no other samples, or there is no such method.
+
+        """
+        how = methods.parse(method)
+        if self._samples is None or stage not in self.stages:
+            raise OutsideTable("nothing can be left out there.", "Name a stored stage of a table with several samples.")
+        others, j = self._samples.without(i, how.weighting), self.stages.index(stage)
+        blend = self._blender(self._samples.values[i], others.samples, others.weights, {j: 1.0}, how)
+        found = _synthesize(blend, resolution or self.resolution, None, True)[1]
+        assert found is not None
+        return found
+
+    @cached_property
+    def neighbour_correlation(self) -> dict[float, float]:
+        """Mean correlation of the radial wrinkles of neighbouring samples by stage: what blending can rely on.
+
+        Read from the spectra when first asked for. Empty for a single sample.
+        """
+        if self._samples is None:
+            return {}
+        fruits = [self.fruit(self.sample(i)) for i in range(self.size)]
+        return dict(zip(self.stages, trust.correlations(self._spectra, self._samples, fruits).tolist(), strict=True))
 
     def _near(self, point: Array | None, method: methods.Method, m: int, eta: float) -> Weighted:
         if self._samples is None or point is None:
@@ -300,8 +332,19 @@ class ShapeTable:
         terms = self._terms(near, stages)
         return self._converged is None or all(bool(self._converged[i, j]) for i, j, _ in terms)
 
-    def _fruit(self, values: Mapping[str, float]) -> Fruit:
-        params = insert(self.info.template, self.info.places, values)
+    def at_parameters(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """Return the solver's parameters of a point on the varying axes."""
+        return insert(self.info.template, self.info.places, values)
+
+    def fruit(self, values: Mapping[str, float]) -> Fruit:
+        """Return the fruit at a point on the varying axes.
+
+        Raises:
+            OutsideTable: the table is not of fruits.
+            InvalidGeometry: no fruit has these parameters.
+
+        """
+        params = self.at_parameters(values)
         try:
             radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
         except KeyError:

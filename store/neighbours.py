@@ -61,6 +61,14 @@ class Neighbours:
         weights = (nearest / distance[:-1] * np.maximum(1 - distance[:-1] / reach, 1e-12)) ** eta
         return Weighted(samples[:-1], weights / weights.sum(), nearest)
 
+    def without(self, i: int, m: int) -> Weighted:
+        """Weigh the `m` nearest others of sample `i` by distance^-2."""
+        distance = np.linalg.norm(self._scaled - self._scaled[i], axis=1)
+        others = np.argsort(distance, kind="stable")
+        others = others[others != i][:m]
+        weights = distance[others] ** -2.0
+        return Weighted(others, weights / weights.sum(), float(distance[others[0]]))
+
     @property
     def spacing(self) -> Array:
         """Scaled distance (count,) from each sample to the nearest other one; infinite where there is none."""

@@ -46,7 +46,7 @@ def leave_one_out(blender: Blender, stored: Array, samples: Samples, fruits: lis
     """
     rows = []
     for i, fruit in enumerate(fruits):
-        others, start = samples.without(i), fresh(fruit)
+        others, start = samples.without(i, method.weighting), fresh(fruit)
         rows.append(
             [
                 compare(

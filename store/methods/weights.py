@@ -82,22 +82,23 @@ class Samples:
         """Distance (count,) from each sample to the nearest other one, scaled as `Weighted.nearest` is."""
         return self._idw.spacing
 
-    def without(self, i: int) -> Weighted:
+    def without(self, i: int, weighting: str = "linear") -> Weighted:
         """Weigh the others for sample `i`, as if it were not there.
 
-        On a grid it lies between its neighbours on both sides along all axes where it has both. At a corner there
-        are none, and all that is left is extrapolation, by the scattered scheme.
+        On a grid, `linear` takes its neighbours on both sides along all axes where it has both. At a corner there are
+        none, and all that is left is extrapolation by inverse distance.
+
+        Raises:
+            ValueError: there are no others.
+
         """
-        if self._grid is not None:
+        if len(self.points) == 1:
+            raise ValueError("a single sample cannot be predicted from others")
+        if weighting == "linear" and self._grid is not None:
             found = self._grid.without(i)
             if found is not None:
                 return found
-        others = np.delete(np.arange(len(self.points)), i)
-        if len(others) == 1:
-            return Weighted(others, np.ones(1), float(self.spacing[i]))
-        distance = np.linalg.norm(self.points[others] - self.points[i], axis=1)
-        weights = 1 / distance**2
-        return Weighted(others, weights / weights.sum(), float(self.spacing[i]))
+        return self._idw.without(i, 1 if weighting == "nearest" else 6)
 
     def adjacent(self) -> list[tuple[int, int]]:
         """Return the pairs of neighbouring samples: along the lines of a grid, else each with its nearest."""
