@@ -34,6 +34,11 @@ class Neighbours:
         self._scaled = (values - self._low) / self._span
         self._tree = cKDTree(self._scaled)
 
+    def distance(self, query: Array) -> float:
+        """Return the scaled distance to the nearest sample; 0 where it is hit."""
+        found = float(self._tree.query((query - self._low) / self._span)[0])
+        return found if found >= SAME else 0.0
+
     def weigh(self, query: Array, m: int, eta: float) -> Weighted:
         """Weigh the `m` nearest samples by distance^-eta; a sample that is hit takes all."""
         scaled = (query - self._low) / self._span

@@ -7,6 +7,7 @@ smooth factor on the wrinkles; the shape of the fruit keeps its own.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ def factor(mean: Array, wanted: Array, total: float | None = None) -> Array:
         mean, wanted = (field * (total / (area @ field + _NOTHING)) for field in (mean, wanted))
     least = _FAINT * (area @ wanted) + _NOTHING
     ratio = np.sqrt((wanted + least) / (mean + least))
-    return spectra.spectrum(np.clip(ratio, 1 / _MOST, _MOST).reshape(COARSE, 2 * COARSE))
+    return (np.clip(ratio, 1 / _MOST, _MOST) @ _analysis()).view(complex).reshape(COARSE + 1, COARSE + 1)
 
 
 def take_low(waves: Array, low: Array) -> None:
@@ -53,12 +54,22 @@ def apply(planes: Array, ratio: Array, low: Array) -> None:
         spectra.fill(plan.coefficients, ratio[None].astype(plan.coefficients.dtype))
         planes *= plan.run()
     lines = np.einsum("cml,mlt->ctm", low, legendre(harmonics.LOWEST - 1, n))
-    angle = np.outer(np.arange(harmonics.LOWEST), np.arange(2 * n) * np.pi / n)
-    for c in range(3):
-        row = lines[c].real @ _twice(np.cos(angle)) - lines[c].imag @ _twice(np.sin(angle))
-        planes[c] += row.astype(planes.dtype)
+    sides = np.concatenate([lines.real, lines.imag], axis=-1).astype(planes.dtype)
+    planes += sides @ _around(n).astype(planes.dtype, copy=False)
 
 
-def _twice(waves: Array) -> Array:
-    waves[1:] *= 2
-    return waves
+@lru_cache(maxsize=1)
+def _analysis() -> Array:
+    """Return the matrix (places, parts) from fields on the coarse lattice to spectra: cheaper than small transforms."""
+    places = 2 * COARSE * COARSE
+    waves = spectra.spectrum(np.eye(places).reshape(places, COARSE, 2 * COARSE))
+    return np.ascontiguousarray(waves.reshape(places, -1)).view(float)
+
+
+@lru_cache(maxsize=16)
+def _around(n: int) -> Array:
+    """Return the waves (real and imaginary part of m, azimuth) of a real field's harmonics."""
+    m = np.arange(harmonics.LOWEST)
+    angle = np.outer(m, np.arange(2 * n) * np.pi / n)
+    twice = np.where(m == 0, 1.0, 2.0)[:, None]
+    return np.concatenate([twice * np.cos(angle), -twice * np.sin(angle)])

@@ -56,7 +56,7 @@ class Samples:
             found = self._grid.weigh(self.scale(query))
         else:
             found = self._scattered(self.scale(query), m, eta)
-        nearest = self._idw.weigh(query, 1, eta).nearest
+        nearest = self._idw.distance(query)
         if nearest == 0.0:
             return Weighted(found.samples[[int(np.argmax(found.weights))]], np.ones(1), 0.0)
         return Weighted(*found[:2], nearest)
