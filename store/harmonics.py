@@ -12,11 +12,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 
 from solver.fruit import colatitudes
 
-__all__ = ["LOWEST", "area", "degrees", "legendre", "low_series", "power", "without_low"]
+__all__ = ["LOWEST", "area", "degrees", "legendre", "low_series", "power", "shares", "without_low"]
 
 Array = NDArray[Any]
 
@@ -57,6 +58,22 @@ def without_low(spectrum: Array) -> Array:
     rest = spectrum.copy()
     rest[..., :LOWEST, :] -= np.einsum("...ml,mlk->...mk", low, low_series(band)).astype(rest.dtype)
     return rest
+
+
+def shares(band: int) -> Array:
+    """Return what part (l, m, k) of the mean square of degree l a mode (m, k) carries: each degree sums to 1.
+
+    Degrees are taken with random phases. Modes are not orthogonal over the sphere, so small parts are negative.
+    """
+    n = 2 * band + 2
+    functions = legendre(band, n)
+    series = np.zeros((band + 1, band + 1, band + 1))
+    series[0::2] = scipy.fft.dct(functions[0::2], 2, axis=2)[..., : band + 1] / n
+    series[0::2, :, 0] /= 2
+    series[1::2, :, 1:] = scipy.fft.dst(functions[1::2], 2, axis=2)[..., :band] / n
+    both = np.where(np.arange(band + 1) == 0, 1.0, 2.0)
+    found = np.einsum("m,mlk->lmk", both, series * _matrices(band))
+    return found / (2 * np.arange(band + 1) + 1)[:, None, None]
 
 
 @lru_cache(maxsize=8)

@@ -37,6 +37,7 @@ class Bands:
     """Bands of degrees `LOWEST`..`highest`; `first` (bands,) is each one's first degree, `edges` those of ln l."""
 
     def __init__(self, highest: int) -> None:
+        self.highest = highest
         octaves = np.log2((highest + 1) / harmonics.LOWEST)
         ends = harmonics.LOWEST * 2 ** (np.arange(max(int(octaves * _PER_OCTAVE), 1) + 1) / _PER_OCTAVE)
         self.first = np.unique(np.ceil(ends[ends <= highest] - 1e-9).astype(int))
@@ -113,13 +114,31 @@ def _slopes(points: Array, values: Array, fitted: bool) -> Array:
 def multiplier(gains: Array, bands: Bands, band: int) -> Array:
     """Return the factor (m, k), m, k <= `band`, on amplitudes of the double Fourier sphere for gains by degree.
 
-    A mode's degree is taken as hypot(m, k), its wavenumber where it is at home. That is not the true degree near the
-    poles, but gains change slowly from band to band, and applying them by true degree would cost more than all else.
-    The shape of the fruit, below `LOWEST`, keeps the factor 1.
+    A factor by hypot(m, k), the degree of a mode where it is at home, costs one product; by true degree it would cost
+    more than all else. A harmonic has modes below its degree too, so that gains leak into the bands above: what leaks
+    is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
     """
+    sharp = np.clip(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST, _MOST)
+    return _spread(sharp, bands, band).astype(np.float32)
+
+
+def _spread(gains: Array, bands: Bands, band: int) -> Array:
+    """Return gains (bands,) as a factor (m, k) that is linear in ln hypot(m, k) between the bands' centres."""
     ends = np.concatenate([[1.0], gains, [gains[-1]]])
     upper, part = _places(band, tuple(bands.centres.tolist()))
-    return (ends[upper - 1] * (1 - part) + ends[upper] * part).astype(np.float32)
+    return ends[upper - 1] * (1 - part) + ends[upper] * part
+
+
+@lru_cache(maxsize=8)
+def _unleak(highest: int) -> Array:
+    """Return the matrix (bands, bands) from gains by degree to gains by hypot(m, k), both less 1."""
+    bands, shares = Bands(highest), harmonics.shares(highest)
+    size = np.diff([*bands.first, highest + 1])
+    leak = np.empty((len(size), len(size)))
+    for i, gains in enumerate(np.eye(len(size))):
+        passed = (shares * (_spread(1 + gains, bands, highest) - 1)).sum(axis=(1, 2))
+        leak[:, i] = np.add.reduceat(passed, bands.first) / size
+    return np.linalg.inv(leak)
 
 
 @lru_cache(maxsize=16)
