@@ -1,4 +1,6 @@
-"""Time of one look-up on one core, by resolution, by what is asked for and by method: python -m benchmarks.lookup [--json PATH].
+"""Time of one look-up on one core: python -m benchmarks.lookup [--json PATH].
+
+Rows go by resolution, by what is asked for (in the default method), and by method (positions).
 
 The table is synthetic (30 samples, 5 stages, 96 waves of random smooth displacement), because only its size matters
 here; errors against finite-element runs are measured elsewhere.

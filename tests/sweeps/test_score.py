@@ -4,14 +4,19 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from service.cli import app
+from solver.contract import Need, finish
+from solver.dehydration import SOLVER
+from solver.fruit import azimuths, colatitudes
 from store import methods, starter
 from store.lookup import ShapeTable
 from store.store import Store
-from sweeps import score
+from sweeps import plan, score
 from sweeps.errors import InvalidOption
 
 
@@ -31,6 +36,40 @@ def test_samples_predicted_from_each_other(tmp_path: Path) -> None:
     assert late["linear+LL+env"]["W1"] < late["idw"]["W1"] / 2
     assert all(0 < row["correlation"] < 0.8 for row in document["neighbour_correlation"])
     assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def held_out(root: Path, table: ShapeTable) -> Store:
+    """Return runs between the samples whose shape is by construction what `linear` says, one more with another seed."""
+    store = Store.open(root, create=True)
+    values, n = {"te": 0.034, "gamma": 22.0}, 64
+    u = np.stack([table.at(values, s, fields=("displacement",), method="linear").displacement for s in table.stages])
+    for seed in (0, 1):
+        params = SOLVER.parse({**table.at_parameters(values), "seed": seed})
+        need = SOLVER.settle(Need(fields=("displacement",), stages=table.stages, resolution=n))
+        job = plan.job(SOLVER, params, need)
+        turned = np.roll(u, 64 * seed, axis=2) * ([-1, 1, -1] if seed else [1, 1, 1])  # by half a turn about y
+        data = {"displacement": (("stage", "colatitude", "azimuth", "component"), turned.astype(np.float32))}
+        coords = {"stage": list(table.stages), "colatitude": colatitudes(n), "azimuth": azimuths(n)}
+        result = finish(xr.Dataset(data, {**coords, "component": ["x", "y", "z"]}), SOLVER, params, need)
+        store.ledger.want([job])
+        store.ledger.done(job.key, store.put(job.key, result), 1.0)
+    return store
+
+
+def test_held_out_runs_and_the_floor_of_another_seed(tmp_path: Path) -> None:
+    table = ShapeTable.open(starter.ROOT)
+    runs = held_out(tmp_path / "held", table)
+    found, pairs = score.cases(Store.open(starter.ROOT), table, runs.root)
+    assert [case.label for case in found] == ["te = 0.034, gamma = 22"]
+    report = score.score(table, found, pairs, ("linear", "nearest"))
+    assert report.seeds == 1
+    rows = {(row.method, row.stage): row.measures for row in report.rows}
+    np.testing.assert_allclose(rows["linear", 0.2], (1, 0, 0, 0, 0, 0, 1), atol=2e-2)
+    assert rows["nearest", 0.2].ang > 10
+    # the other seed is the same fruit turned: as rough, as fine, as steep, and elsewhere
+    floor = rows["seed", 0.2]
+    np.testing.assert_allclose(floor[:4], (1, 0, 0, 0), atol=1e-2)
+    assert floor.corr < 0.5
 
 
 def test_the_table_for_people() -> None:
