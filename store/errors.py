@@ -22,6 +22,7 @@ __all__ = [
     "ReadOnlyStore",
     "StorageFull",
     "StoreError",
+    "TooUncertain",
     "UnknownJob",
     "UnknownTable",
     "UnknownToken",
@@ -85,6 +86,12 @@ class OutsideTable(StoreError):
     """A query that the table cannot answer: off its axes or stages, or for something that it does not hold."""
 
     code = "outside-table"
+
+
+class TooUncertain(StoreError):
+    """The answer would be worse than the query allows."""
+
+    code = "too-uncertain"
 
 
 class MixedSamples(StoreError):
