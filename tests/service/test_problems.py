@@ -34,6 +34,7 @@ EXPECTED: dict[type[Exception], int] = {
     stored.UnknownTable: 404,
     stored.EmptyTable: 503,
     stored.OutsideTable: 422,
+    stored.TooUncertain: 422,
     stored.MixedSamples: 503,
     stored.StorageFull: 507,
     stored.UnknownJob: 404,
