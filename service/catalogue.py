@@ -5,42 +5,50 @@ from __future__ import annotations
 from typing import Any
 
 from fastapi import APIRouter, Path, Request
+from starlette.responses import JSONResponse, Response
 
 from solver import __version__, quantities, registry
 from solver.contract import Solver
 from store.errors import CorruptTable
 from store.tables import TableInfo
 
-from . import problems, vocabulary
+from . import page, problems, vocabulary
 from .formats import FORMATS
 from .live import LiveTables
 
-__all__ = ["router"]
+__all__ = ["open_router", "router"]
 
-router = APIRouter(tags=["catalogue"])
+#: Pages that need no token ever, and the others.
+open_router, router = APIRouter(tags=["catalogue"]), APIRouter(tags=["catalogue"])
 
 Json = dict[str, Any]
 
 
-@router.get("/", summary="Where to go from here")
-def index(request: Request) -> Json:
-    """List the service's pages."""
-    return {
-        "name": "wizen",
-        "version": __version__,
-        "links": {
-            "tables": "/v1/tables",
-            "solvers": "/v1/solvers",
-            "shapes": "/v1/shapes/{solver}",
-            "health": "/healthz",
-            "documentation": "/docs",
-            "schema": "/openapi.json",
-        },
-        "formats": {f.name: {"media_type": f.media_type, "title": f.title} for f in FORMATS.values()},
+@open_router.get(
+    "/",
+    summary="Where to go from here",
+    response_class=Response,
+    responses={200: {"content": {"application/json": {"schema": {"type": "object"}}, "text/html": {}}}},
+)
+def index(request: Request) -> Response:
+    """List the service's pages; a browser is shown the viewer."""
+    if page.wanted(request.headers.get("accept")):
+        return page.answer(request)
+    links = {
+        "tables": "/v1/tables",
+        "solvers": "/v1/solvers",
+        "shapes": "/v1/shapes/{solver}",
+        "jobs": "/v1/jobs",
+        "health": "/healthz",
+        "documentation": "/docs",
+        "schema": "/openapi.json",
     }
+    formats = {f.name: {"media_type": f.media_type, "title": f.title} for f in FORMATS.values()}
+    body = {"name": "wizen", "version": __version__, "links": links, "formats": formats}
+    return JSONResponse(body, headers={"Vary": "Accept"})
 
 
-@router.get("/healthz", summary="Whether shapes can be served", responses=problems.responses(503))
+@open_router.get("/healthz", summary="Whether shapes can be served", responses=problems.responses(503))
 def health(request: Request) -> Json:
     """Open every table; 200 only if the store and all its tables can be read.
 

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main"]
 
+#: Seconds that answers under way get when the service stops; streams of events would go on for ever.
+_PATIENCE = 5
+
 
 class PortInUse(SweepError):
     """Another program listens where the service should."""
@@ -67,7 +70,9 @@ def serve(
     for line in hints(settings.store, address):
         note(line)
     with listener:
-        uvicorn.Server(uvicorn.Config(create_app(settings), log_level="warning")).run(sockets=[listener])
+        uvicorn.Server(
+            uvicorn.Config(create_app(settings), log_level="warning", timeout_graceful_shutdown=_PATIENCE)
+        ).run(sockets=[listener])
 
 
 def main() -> None:

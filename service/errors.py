@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, NamedTuple, Self
 
 __all__ = [
     "AmbiguousTable",
     "BodyTooLarge",
+    "Forbidden",
     "InvalidQuery",
+    "JobEnded",
+    "JobFailed",
     "NotAcceptable",
+    "NotDone",
     "OutsideRanges",
     "QueryTooLong",
     "ServiceError",
     "TimedOut",
+    "TooCostly",
+    "TooManyListeners",
+    "Unauthorized",
     "UnknownSolver",
     "Wrong",
 ]
@@ -28,15 +35,21 @@ class Wrong(NamedTuple):
 
 
 class ServiceError(Exception):
-    """Something asked for that cannot be answered. `advice` says what to change; `wrong` lists every culprit."""
+    """Something asked for that cannot be answered. `advice` says what to change; `wrong` lists every culprit.
+
+    `headers` are for the answer that reports it.
+    """
 
     code: ClassVar[str] = "service-error"
 
-    def __init__(self, message: str, *, advice: str = "", wrong: Sequence[Wrong] = ()) -> None:
+    def __init__(
+        self, message: str, *, advice: str = "", wrong: Sequence[Wrong] = (), headers: Mapping[str, str] | None = None
+    ) -> None:
         super().__init__(message)
         self.message = message
         self.advice = advice
         self.wrong = tuple(wrong)
+        self.headers = dict(headers or {})
 
     def __str__(self) -> str:
         return f"{self.message} {self.advice}".strip()
@@ -95,3 +108,45 @@ class TimedOut(ServiceError):
     """An answer that did not begin in time."""
 
     code = "timed-out"
+
+
+class Unauthorized(ServiceError):
+    """No token, or one that is not known or no longer good."""
+
+    code = "unauthorized"
+
+
+class Forbidden(ServiceError):
+    """A good token that is not good for this."""
+
+    code = "forbidden"
+
+
+class TooCostly(ServiceError):
+    """A job that would take longer, or hold more, than an operator allows."""
+
+    code = "too-costly"
+
+
+class NotDone(ServiceError):
+    """The result of a job that waits or runs."""
+
+    code = "job-not-done"
+
+
+class JobFailed(ServiceError):
+    """The result of a job that was given up."""
+
+    code = "job-failed"
+
+
+class JobEnded(ServiceError):
+    """A job that cannot be cancelled any more."""
+
+    code = "job-ended"
+
+
+class TooManyListeners(ServiceError):
+    """As many event streams are open as may be."""
+
+    code = "too-many-listeners"

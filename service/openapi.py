@@ -11,6 +11,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from solver import registry
+from solver.contract import Solver
 from store.errors import StoreError
 
 from . import problems, vocabulary
@@ -38,9 +39,58 @@ class Documented(FastAPI):
             schemas.update(problem.pop("$defs", {}), Problem=problem)
             get = document["paths"]["/v1/shapes/{solver}"]["get"]
             get["parameters"] = [*get["parameters"], *_parameters(self.state.settings, examples)]
+            schemas["JobRequest"] = _job_request(schemas)
             _replace_validation(document)
             document["x-examples"] = examples
         return self.openapi_schema  # type: ignore[return-value]
+
+
+def _job_request(schemas: Json) -> Json:
+    """Return the body that asks for a job: one form per solver, with its own parameters, fields and stages."""
+    common = schemas["JobRequest"]
+    forms = {}
+    for name in registry.names():
+        solver = vocabulary.solver_named(name)
+        params = solver.params.model_json_schema(ref_template="#/components/schemas/{model}")
+        schemas.update(params.pop("$defs", {}))
+        axes = {axis.name: _axis(axis, {}) for axis in vocabulary.axes(name).values()}
+        scalars = {axis: {**said["schema"], "description": said["description"]} for axis, said in axes.items()}
+        params["properties"] = {**params["properties"], **scalars}
+        form = f"JobRequest_{name}"
+        schemas[form] = {
+            **common,
+            "title": form,
+            "properties": {
+                **common["properties"],
+                "solver": {"const": name, "title": solver.title},
+                "preset": {
+                    "enum": [*solver.presets, None],
+                    "description": common["properties"]["preset"]["description"],
+                },
+                "params": params,
+                "need": _need(schemas["Need"], solver),
+            },
+        }
+        forms[name] = f"#/components/schemas/{form}"
+    return {
+        "title": "JobRequest",
+        "description": common.get("description", ""),
+        "oneOf": [{"$ref": form} for form in forms.values()],
+        "discriminator": {"propertyName": "solver", "mapping": forms},
+    }
+
+
+def _need(general: Json, solver: Solver) -> Json:
+    """Return a need's schema with the fields and the stages that a solver knows."""
+    properties = dict(general["properties"])
+    axis = solver.stages
+    stage = {"type": "number", "minimum": axis.lowest, "maximum": axis.highest}
+    properties["fields"] = {**properties["fields"], "items": {"enum": list(solver.fields)}}
+    properties["stages"] = {
+        **properties["stages"],
+        "items": {**stage, "description": f"{axis.long_name} [{axis.units}]"},
+    }
+    return {**general, "properties": properties}
 
 
 def _replace_validation(document: Json) -> None:

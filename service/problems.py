@@ -24,10 +24,10 @@ from store import errors as stored
 
 from . import errors
 
-__all__ = ["MEDIA_TYPE", "STATUS", "Culprit", "Problem", "install", "of", "responses", "unforeseen"]
+__all__ = ["MEDIA_TYPE", "STATUS", "URN", "Culprit", "Problem", "install", "of", "responses", "unforeseen"]
 
 MEDIA_TYPE = "application/problem+json"
-_URN = "urn:wizen:problem:"
+URN = "urn:wizen:problem:"
 
 #: Exception class -> status; a class that is not listed has its nearest ancestor's.
 STATUS: Mapping[type[Exception], int] = {
@@ -44,9 +44,15 @@ STATUS: Mapping[type[Exception], int] = {
     stored.UnknownTable: 404,
     stored.EmptyTable: 503,
     stored.OutsideTable: 422,
+    stored.TooUncertain: 422,
     stored.MixedSamples: 503,
     stored.StorageFull: 507,
     stored.UnknownJob: 404,
+    stored.QueueFull: 429,
+    stored.ReadOnlyStore: 409,
+    stored.CorruptTokens: 503,
+    stored.InvalidToken: 422,
+    stored.UnknownToken: 404,
     errors.ServiceError: 500,
     errors.InvalidQuery: 422,
     errors.NotAcceptable: 406,
@@ -54,9 +60,16 @@ STATUS: Mapping[type[Exception], int] = {
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,
     errors.TimedOut: 503,
+    errors.Unauthorized: 401,
+    errors.Forbidden: 403,
+    errors.TooCostly: 422,
+    errors.NotDone: 409,
+    errors.JobFailed: 409,
+    errors.JobEnded: 409,
+    errors.TooManyListeners: 429,
 }
 
-_RETRY = {503: "5"}
+_RETRY = {429: "10", 503: "5"}
 
 
 class Culprit(BaseModel):
@@ -72,7 +85,7 @@ class Problem(BaseModel):
 
     model_config = ConfigDict(json_schema_extra={"description": "An error as RFC 9457 describes it, with advice"})
 
-    type: str = Field(description="What kind of problem this is", examples=[f"{_URN}outside-table"])
+    type: str = Field(description="What kind of problem this is", examples=[f"{URN}outside-table"])
     title: str = Field(description="The kind in words")
     status: int = Field(description="The HTTP status")
     detail: str = Field(description="What happened this time")
@@ -92,6 +105,7 @@ def of(error: Exception, scope: Scope) -> Response:
         str(getattr(error, "message", error)),
         str(getattr(error, "advice", "")),
         [Culprit(**wrong._asdict()) for wrong in getattr(error, "wrong", ())],
+        getattr(error, "headers", None),
     )
 
 
@@ -173,7 +187,7 @@ def _response(
 ) -> Response:
     query = scope.get("query_string", b"").decode("latin-1")
     problem = Problem(
-        type=_URN + code,
+        type=URN + code,
         title=code.replace("-", " ").capitalize(),
         status=status,
         detail=detail,

@@ -10,6 +10,8 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from store.starter import own_or_starter
 
+from .page import BUILT
+
 __all__ = ["Settings"]
 
 
@@ -31,4 +33,15 @@ class Settings(BaseSettings):
     threads: int = Field(8, ge=1, le=256, description="Shapes computed at the same time; each holds its arrays")
     reload_interval: float = Field(0.5, ge=0, description="How often a table's manifest is looked at, at most [s]")
     cache_age: int = Field(60, ge=0, description="How long a client may reuse a shape without asking again [s]")
+    public_read: bool = Field(True, description="Serve shapes, tables, solvers and the state of jobs without a token")
+    jobs_workers: int = Field(
+        1, ge=0, le=1024, description="Processes that run jobs; 0 leaves them to `wizen work` or another service"
+    )
+    scheduler: str | None = Field(None, description="A Dask scheduler whose workers run jobs, e.g. tcp://10.0.0.1:8786")
+    max_jobs: int = Field(1000, ge=1, description="Most jobs that wait or run at once")
+    max_jobs_per_token: int = Field(100, ge=1, description="Most jobs of one token that wait or run at once")
+    max_job_seconds: float = Field(3600.0, gt=0, description="Longest expected time of one job [s]")
+    max_job_bytes: float = Field(8e9, gt=0, description="Largest expected memory or result of one job [bytes]")
+    max_listeners: int = Field(64, ge=1, description="Most open streams of job events")
+    page: Path = Field(BUILT, description="Directory of the built web page; `make page` makes it")
     metrics: bool = Field(True, description="Serve /metrics in Prometheus' text format")

@@ -58,7 +58,7 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
     tag = _tag(chosen, name, table.digest, query, resolution)
     headers = {
         "ETag": tag,
-        "Cache-Control": f"public, max-age={settings.cache_age}",
+        "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
         "Vary": "Accept",
     }
     if _matches(request.headers.get("if-none-match", ""), tag):

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import CorruptLedger, StorageFull
+from .errors import CorruptLedger, ReadOnlyStore, StorageFull
 
 __all__ = ["Database"]
 
@@ -23,7 +23,10 @@ _inherited: list[sqlite3.Connection] = []
 
 
 class Database:
-    """A connection that opens itself on first use, in every process anew."""
+    """A connection that opens itself on first use, in every process anew.
+
+    `schema` is a list of statements that may be said again: `CREATE ... IF NOT EXISTS`.
+    """
 
     def __init__(self, path: Path, schema: str) -> None:
         self._path = path
@@ -60,6 +63,7 @@ class Database:
 
         Raises:
             CorruptLedger: the file is no database, or one of another version.
+            ReadOnlyStore: it may not be written.
             StorageFull: the disk is full.
 
         """
@@ -95,12 +99,13 @@ class Database:
             connection.execute("PRAGMA synchronous = FULL")  # what was reported as done survives a power cut
             connection.execute("BEGIN IMMEDIATE")
             found = connection.execute("PRAGMA user_version").fetchone()[0]
-            if found == 0:
-                for statement in self._schema.split(";"):
-                    connection.execute(statement)
-                connection.execute(f"PRAGMA user_version = {_VERSION}")
-            elif found != _VERSION:
+            if found not in (0, _VERSION):
                 raise self._unreadable(f"has version {found}, this program reads {_VERSION}")
+            # what is there already stays: a table that a later program added appears in older files too
+            for statement in self._schema.split(";"):
+                connection.execute(statement)
+            if found == 0:
+                connection.execute(f"PRAGMA user_version = {_VERSION}")
             connection.execute("COMMIT")
         except BaseException:
             connection.close()
@@ -116,6 +121,8 @@ class Database:
             name = getattr(error, "sqlite_errorname", "")
             if name == "SQLITE_FULL":
                 raise StorageFull(f"there is no space left to write {self._path}.", "Free space and go on.") from error
+            if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")):
+                raise ReadOnlyStore(f"{self._path} cannot be written.", "Name a store of your own.") from error
             if name in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
                 raise self._unreadable(f"is not a sound database ({error})") from error
             raise

@@ -12,14 +12,20 @@ __all__ = [
     "CorruptLedger",
     "CorruptShard",
     "CorruptTable",
+    "CorruptTokens",
     "EmptyTable",
+    "InvalidToken",
     "MissingStore",
     "MixedSamples",
     "OutsideTable",
+    "QueueFull",
+    "ReadOnlyStore",
     "StorageFull",
     "StoreError",
+    "TooUncertain",
     "UnknownJob",
     "UnknownTable",
+    "UnknownToken",
     "full_disk",
 ]
 
@@ -82,10 +88,28 @@ class OutsideTable(StoreError):
     code = "outside-table"
 
 
+class TooUncertain(StoreError):
+    """The answer would be worse than the query allows."""
+
+    code = "too-uncertain"
+
+
 class MixedSamples(StoreError):
     """Results that differ in something that is not an axis cannot be interpolated in one table."""
 
     code = "mixed-samples"
+
+
+class QueueFull(StoreError):
+    """As many jobs wait as may."""
+
+    code = "queue-full"
+
+
+class ReadOnlyStore(StoreError):
+    """A store that takes nothing new: the one in the package, or one that belongs to somebody else."""
+
+    code = "read-only-store"
 
 
 class StorageFull(StoreError):
@@ -98,6 +122,24 @@ class UnknownJob(StoreError):
     """No job or result has that key."""
 
     code = "unknown-job"
+
+
+class CorruptTokens(StoreError):
+    """The file of access tokens is damaged."""
+
+    code = "corrupt-tokens"
+
+
+class InvalidToken(StoreError):
+    """A token that cannot be made as asked for."""
+
+    code = "invalid-option"
+
+
+class UnknownToken(StoreError):
+    """No token has that name."""
+
+    code = "unknown-token"
 
 
 @contextmanager

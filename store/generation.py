@@ -20,13 +20,16 @@ from numpy.typing import NDArray
 from solver import quantities
 from solver.fruit import Fruit
 
-from . import shards, spectra
+from . import methods, shards, spectra, trust
+from .blend import Blender, powers
 from .canonical import canonical
 from .errors import CorruptTable, MixedSamples, StorageFull
+from .measures import UNITS, Measures
+from .methods.weights import Samples as Points
 from .samples import Samples
 from .store import Store
 
-__all__ = ["CONVERGENCE", "DIMS", "Written", "digest", "map_spectra", "open", "write"]
+__all__ = ["CONVERGENCE", "DIMS", "Written", "digest", "left_out", "map_spectra", "open", "write"]
 
 DIMS = ("sample", "stage", "component", "m", "k", "part")
 
@@ -82,6 +85,7 @@ def write(
             target[i] = block
             rows.append(_rows(result))
     small = _small(samples, rows, solver, band, units)
+    small = small.assign(_judge(map_spectra(path), samples))
     content = _combine(small, total.hexdigest())
     small.attrs["digest"] = content
     encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
@@ -141,6 +145,56 @@ def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Ma
         "Conventions": "CF-1.11",
     }
     return xr.Dataset(data, coords, attrs)
+
+
+def _judge(stored: NDArray[Any], samples: Samples) -> dict[str, xr.Variable]:
+    """Return what look-ups want to know of the spectra: power by degree, errors, likeness of neighbours."""
+    power = _rounded(powers(stored))
+    found = {
+        "degree_power": xr.Variable(
+            ("sample", "stage", "degree"),
+            power,
+            {"units": "1", "long_name": "mean square displacement by spherical-harmonic degree, in units of r1^2"},
+        )
+    }
+    points, fruits = samples.points(), samples.fruits()
+    if points is None or fruits is None:
+        return found
+    scattered, method = Points(points), methods.parse(methods.DEFAULT)
+    blender = Blender(stored, scattered, power)
+    errors = trust.leave_one_out(blender, stored, scattered, fruits, method)
+    found |= {
+        f"left_out_{name}": xr.Variable(
+            ("sample", "stage"),
+            _rounded(errors[..., i]),
+            {
+                "units": UNITS[name],
+                "long_name": f"{name} of the sample predicted from the others",
+                "method": str(method),
+            },
+        )
+        for i, name in enumerate(Measures._fields)
+    }
+    likeness = trust.correlations(stored, scattered, fruits)
+    about = {"units": "1", "long_name": "mean correlation of the radial wrinkles of neighbouring samples"}
+    return found | {"neighbour_correlation": xr.Variable("stage", _rounded(likeness), about)}
+
+
+def _rounded(values: NDArray[Any]) -> NDArray[Any]:
+    """Keep five digits: the last bits of sums differ between processors, and the digest should not."""
+    scale = 10.0 ** (4 - np.floor(np.log10(np.maximum(np.abs(values), 1e-300))))
+    return (np.round(values * scale) / scale).astype(np.float32)
+
+
+def left_out(opened: xr.Dataset) -> tuple[NDArray[Any], str] | None:
+    """Return the measures (sample, stage, measure) of samples predicted from the others, and by which method.
+
+    None for a table of one sample, of no fruits, or built before they were stored.
+    """
+    names = [f"left_out_{name}" for name in Measures._fields]
+    if names[0] not in opened:
+        return None
+    return np.stack([opened[name].values for name in names], axis=-1), str(opened[names[0]].attrs["method"])
 
 
 def _axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, NDArray[Any], dict[str, str]]:

@@ -6,7 +6,11 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from sqlite3 import Row
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Self, get_args
+
+from solver.contract import Need, Params, Solver
+
+from . import keys
 
 __all__ = ["STATES", "Job", "JobSpec", "State", "read_row"]
 
@@ -25,10 +29,24 @@ class JobSpec:
     params: Mapping[str, Any]
     need: Mapping[str, Any]
 
+    @classmethod
+    def of(cls, solver: Solver, params: Params, need: Need) -> Self:
+        """Return the job that computes `need` (settled) of `params`; its key is the same whoever asks."""
+        return cls(
+            key=keys.key(solver.name, solver.version, params, need),
+            solver=solver.name,
+            version=solver.version,
+            params=params.model_dump(mode="json"),
+            need=need.model_dump(mode="json"),
+        )
+
 
 @dataclass(frozen=True)
 class Job(JobSpec):
-    """A job in the ledger. Times are seconds since the epoch; `seconds` is the wall time of a finished run."""
+    """A job in the ledger. Times are seconds since the epoch; `seconds` is the wall time of a finished run.
+
+    `message` is what its run said last, where it says anything.
+    """
 
     plan: str
     state: State
@@ -41,11 +59,13 @@ class Job(JobSpec):
     created: float
     updated: float
     progress: float
+    message: str = ""
 
 
-def read_row(row: Row) -> Job:
+def read_row(row: Row | Mapping[str, Any]) -> Job:
     """Return the job in a row of the ledger's table `jobs`."""
     values = dict(row)
+    values["message"] = values.get("message") or ""
     values.update(params=json.loads(values["params"]), need=json.loads(values["need"]))
     values["error"] = None if values["error"] is None else json.loads(values["error"])
     return Job(**values)

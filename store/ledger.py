@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from sqlite3 import Connection
 from typing import TYPE_CHECKING, Any
@@ -27,16 +27,21 @@ __all__ = ["Job", "JobSpec", "Ledger", "State"]
 MAX_LOST = 5
 
 _SCHEMA = """
-CREATE TABLE jobs (
+CREATE TABLE IF NOT EXISTS jobs (
     key TEXT PRIMARY KEY, solver TEXT NOT NULL, version TEXT NOT NULL, params TEXT NOT NULL, need TEXT NOT NULL,
     plan TEXT NOT NULL DEFAULT '', state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, worker TEXT,
     lease_until REAL, digest TEXT, error TEXT, seconds REAL, created REAL NOT NULL, updated REAL NOT NULL,
     progress REAL NOT NULL DEFAULT 0
 );
-CREATE INDEX jobs_state ON jobs (state, created);
+CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
 -- a job may belong to several plans, of which jobs.plan is the one that asked first
-CREATE TABLE plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) WITHOUT ROWID;
+-- what a running job says of itself
+CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) WITHOUT ROWID
 """
+
+#: Reads whole jobs.
+SELECT = "SELECT jobs.*, notes.message FROM jobs LEFT JOIN notes ON notes.key = jobs.key"
 
 _LOST = {
     "code": "worker-lost",
@@ -50,34 +55,25 @@ class Ledger:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        self._database = Database(self.path, _SCHEMA)
+        self.database = Database(self.path, _SCHEMA)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path,)
 
     def close(self) -> None:
         """Close the connection; the next call opens it again."""
-        self._database.close()
+        self.database.close()
 
     def want(self, jobs: Iterable[JobSpec], plan: str = "", again: bool = False) -> int:
         """Ask for jobs; return how many now wait that did not before. Asking twice changes nothing.
 
         What is done stays done. What was cancelled waits again; what failed for good only with `again=True`.
         """
-        revived = ("cancelled", "failed") if again else ("cancelled",)
-        now, count = time.time(), 0
-        with self._database.write() as connection:
+        revived: tuple[State, ...] = ("cancelled", "failed") if again else ("cancelled",)
+        count = 0
+        with self.database.write() as connection:
             for job in jobs:
-                texts = canonical(job.params).decode(), canonical(job.need).decode()
-                count += connection.execute(
-                    "INSERT INTO jobs (key, solver, version, params, need, plan, state, created, updated) "
-                    "VALUES (?, ?, ?, ?, ?, ?, 'wanted', ?, ?) ON CONFLICT (key) DO UPDATE SET "
-                    "state = 'wanted', attempts = 0, error = NULL, worker = NULL, progress = 0, "
-                    f"updated = excluded.updated WHERE state IN ({','.join('?' * len(revived))})",
-                    (job.key, job.solver, job.version, *texts, plan, now, now, *revived),
-                ).rowcount
-                if plan:
-                    connection.execute("INSERT OR IGNORE INTO plans VALUES (?, ?)", (plan, job.key))
+                count += enter(connection, job, plan, revived)
         return count
 
     def claim(self, worker: str, lease: float, keys: Collection[str] | None = None) -> Job | None:
@@ -89,7 +85,7 @@ class Ledger:
         now = time.time()
         among = "" if keys is None else "AND key IN (SELECT value FROM json_each(?))"
         listed = () if keys is None else (json.dumps(sorted(keys)),)
-        with self._database.write() as connection:
+        with self.database.write() as connection:
             connection.execute(
                 "UPDATE jobs SET state = 'failed', error = ?, worker = NULL, lease_until = NULL, updated = ? "
                 "WHERE state = 'running' AND lease_until < ? AND attempts >= ?",
@@ -107,20 +103,23 @@ class Ledger:
                 "progress = 0, updated = ? WHERE key = ?",
                 (worker, now + lease, now, row["key"]),
             )
-            return _get(connection, row["key"])
+            connection.execute("DELETE FROM notes WHERE key = ?", (row["key"],))
+            return get(connection, row["key"])
 
-    def renew(self, key: str, worker: str, lease: float, progress: float | None = None) -> bool:
-        """Keep a claimed job for `lease` [s] more and note its progress, 0 to 1.
+    def renew(self, key: str, worker: str, lease: float, progress: float | None = None, message: str = "") -> bool:
+        """Keep a claimed job for `lease` [s] more and note its progress, 0 to 1, and what it says.
 
         False means that the job is no longer `worker`'s (cancelled, or taken over): it should stop.
         """
         now = time.time()
-        with self._database.write() as connection:
+        with self.database.write() as connection:
             changed = connection.execute(
                 "UPDATE jobs SET lease_until = ?, progress = coalesce(?, progress), updated = ? "
                 "WHERE key = ? AND worker = ? AND state = 'running'",
                 (now + lease, progress, now, key, worker),
             ).rowcount
+            if changed and message:
+                connection.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (key, message))
         return changed == 1
 
     def done(self, key: str, digest: str, seconds: float) -> None:
@@ -141,8 +140,8 @@ class Ledger:
             UnknownJob: nobody asked for it.
 
         """
-        with self._database.write() as connection:
-            job = _get(connection, key)
+        with self.database.write() as connection:
+            job = get(connection, key)
             if job.state not in ("running", "wanted"):
                 return job.state
             state: State = "failed" if job.attempts >= max_attempts else "wanted"
@@ -167,7 +166,7 @@ class Ledger:
 
     def cancel(self, keys: Iterable[str]) -> int:
         """Give up jobs that wait or run; return how many. A running worker learns of it when it renews."""
-        with self._database.write() as connection:
+        with self.database.write() as connection:
             return sum(
                 connection.execute(
                     "UPDATE jobs SET state = 'cancelled', worker = NULL, lease_until = NULL, updated = ? "
@@ -184,22 +183,22 @@ class Ledger:
             UnknownJob: nobody asked for it.
 
         """
-        with self._database.read() as connection:
-            return _get(connection, key)
+        with self.database.read() as connection:
+            return get(connection, key)
 
     def jobs(self, state: State | None = None, plan: str | None = None) -> list[Job]:
         """Return the jobs of a state and a plan (None: any), oldest first."""
         where, values = _among(plan)
         if state is not None:
             where, values = f"{where} AND state = ?", (*values, state)
-        with self._database.read() as connection:
-            rows = connection.execute(f"SELECT * FROM jobs WHERE {where} ORDER BY created, rowid", values)
+        with self.database.read() as connection:
+            rows = connection.execute(f"{SELECT} WHERE {where} ORDER BY created, jobs.rowid", values)
             return [read_row(row) for row in rows]
 
     def counts(self, plan: str | None = None) -> dict[str, int]:
         """Return how many jobs (of a plan) are in each state; every state is listed."""
         where, values = _among(plan)
-        with self._database.read() as connection:
+        with self.database.read() as connection:
             rows = connection.execute(f"SELECT state, count(*) FROM jobs WHERE {where} GROUP BY state", values)
             return {**dict.fromkeys(STATES, 0), **{row[0]: row[1] for row in rows}}
 
@@ -217,7 +216,7 @@ class Ledger:
                 continue
             attrs, now = dataset.attrs, time.time()
             seconds = float(dataset["seconds"].max()) if "seconds" in dataset else None
-            with self._database.write() as connection:
+            with self.database.write() as connection:
                 connection.execute(
                     "INSERT INTO jobs (key, solver, version, params, need, state, digest, seconds, created, updated, "
                     "progress) VALUES (?, ?, ?, ?, ?, 'done', ?, ?, ?, ?, 1) ON CONFLICT (key) DO UPDATE SET "
@@ -236,7 +235,7 @@ class Ledger:
                     ),
                 )
             good.append(key)
-        with self._database.write() as connection:
+        with self.database.write() as connection:
             connection.execute(
                 "UPDATE jobs SET state = 'wanted', attempts = 0, digest = NULL, progress = 0, updated = ? "
                 "WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
@@ -246,8 +245,8 @@ class Ledger:
 
     def _set(self, key: str, change: str, *values: Any, only: State | None = None) -> None:
         """Apply `change` to one job, which thereby has no worker any more."""
-        with self._database.write() as connection:
-            job = _get(connection, key)
+        with self.database.write() as connection:
+            job = get(connection, key)
             if only is None or job.state == only:
                 connection.execute(
                     f"UPDATE jobs SET {change}, worker = NULL, lease_until = NULL, updated = ? WHERE key = ?",
@@ -255,12 +254,37 @@ class Ledger:
                 )
 
 
-def _get(connection: Connection, key: str) -> Job:
-    row = connection.execute("SELECT * FROM jobs WHERE key = ?", (key,)).fetchone()
+def enter(connection: Connection, job: JobSpec, plan: str, revived: Sequence[State]) -> int:
+    """Ask for a job within a transaction; return 1 if it waits now and did not before.
+
+    A job in one of the states `revived` waits again.
+    """
+    now = time.time()
+    texts = canonical(job.params).decode(), canonical(job.need).decode()
+    count = connection.execute(
+        "INSERT INTO jobs (key, solver, version, params, need, plan, state, created, updated) "
+        "VALUES (?, ?, ?, ?, ?, ?, 'wanted', ?, ?) ON CONFLICT (key) DO UPDATE SET "
+        "state = 'wanted', attempts = 0, error = NULL, worker = NULL, progress = 0, "
+        f"updated = excluded.updated WHERE state IN ({','.join('?' * len(revived))})",
+        (job.key, job.solver, job.version, *texts, plan, now, now, *revived),
+    ).rowcount
+    if plan:
+        connection.execute("INSERT OR IGNORE INTO plans VALUES (?, ?)", (plan, job.key))
+    return count
+
+
+def get(connection: Connection, key: str) -> Job:
+    """Return a job within a transaction.
+
+    Raises:
+        UnknownJob: nobody asked for it.
+
+    """
+    row = connection.execute(f"{SELECT} WHERE jobs.key = ?", (key,)).fetchone()
     if row is None:
-        raise UnknownJob(f"there is no job {key}.", "`jobs()` lists what was asked for.")
+        raise UnknownJob(f"there is no job {key}.", "Ask for it first.")
     return read_row(row)
 
 
 def _among(plan: str | None) -> tuple[str, tuple[Any, ...]]:
-    return ("1", ()) if plan is None else ("key IN (SELECT key FROM plans WHERE plan = ?)", (plan,))
+    return ("1", ()) if plan is None else ("jobs.key IN (SELECT key FROM plans WHERE plan = ?)", (plan,))

@@ -1,9 +1,10 @@
-"""Look-up: the shape of a fruit between the samples of a table (Liu et al. 2014, section 5.4, Eq. 13-14).
+"""Look-up: the shape of a fruit between the samples of a table (after Liu et al. 2014, section 5.4, Eq. 13-14).
 
-The spectra of the nearest samples are weighted by inverse distance, and one inverse FFT gives the displacement at any
-resolution. Weighting spectra is the same as weighting displacements; the spectrum buys the level of detail and the
-small table. Between stages the change is linear, and the fresh shape at s = 0 is one of them: swollen stages (s < 0)
-lead away from it as dried ones do. The fresh shape itself is not interpolated: it follows from the parameters.
+The spectra of the samples around are weighted, what their mean has lost of the wrinkles is given back (see
+`store.methods`), and one inverse FFT gives the displacement at any resolution. Weighting spectra is the same as
+weighting displacements; the spectrum buys the level of detail and the small table. Between stages the change is
+linear, and the fresh shape at s = 0 is one of them: swollen stages (s < 0) lead away from it as dried ones do. The
+fresh shape itself is not interpolated: it follows from the parameters.
 """
 
 from __future__ import annotations
@@ -19,10 +20,13 @@ from numpy.typing import NDArray
 
 from solver.fruit import Fruit, azimuths, colatitudes
 
-from . import asking, generation, seal, spectra, surface, transforms
+from . import asking, generation, methods, seal, surface, transforms, trust
+from .blend import Blend, Blender
 from .errors import CorruptTable, OutsideTable
 from .manifest import TableInfo
-from .neighbours import SAME, Neighbours, Weighted
+from .measures import Measures
+from .methods.weights import Samples
+from .neighbours import SAME, Weighted
 from .samples import insert
 from .store import Store
 from .tables import info, path_of
@@ -45,8 +49,10 @@ class Shape:
 
     `position` and `displacement` are (n, 2n, 3), `poles` (2, 3) the positions at colatitude 0 and pi, all in units of
     r1 and in the table's precision. `weights` says which results it was made of, `nearest` how far (scaled) the
-    nearest one is, and `exact` that the query is a stored result at a stored stage (or fresh). `converged` is false
-    if a stage that it was made of had not reached its residual.
+    nearest one is, `inside` whether the query lies in the samples' convex hull, and `exact` that it is a stored result
+    at a stored stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
+    `expected_error` says by measure (`store.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape may be off
+    the true one; None where the table does not know, as for any method but the one it was built for.
     """
 
     colatitude: Array = field(repr=False)
@@ -63,6 +69,9 @@ class Shape:
     converged: bool
     table: str
     units: Mapping[str, str] = field(repr=False, default_factory=dict)
+    inside: bool = True
+    expected_error: Mapping[str, float] | None = None
+    method: str = ""
 
     @property
     def normals(self) -> Array:
@@ -103,9 +112,15 @@ class ShapeTable:
             self._keys = [str(key) for key in opened["key"].values]
             self._units = {name: str(opened[name].attrs.get("units", "")) for name in table.descriptors}
             self._units |= dict.fromkeys(FIELDS, str(opened["spectrum"].attrs["units"]))
+            power = opened["degree_power"].values if "degree_power" in opened else None
+            found = generation.left_out(opened)
         self._descriptors = {name: columns[name] for name in table.descriptors}
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
-        self._neighbours = None if values is None else Neighbours(values)
+        self._samples = None if values is None else Samples(values)
+        self._blender = Blender(self._spectra, self._samples, power)
+        self._trust = None
+        if found is not None and self._samples is not None:
+            self._trust = trust.Trust(*found, self._samples)
         stored = {stage: j for j, stage in enumerate(table.stages)}
         self._knots = np.array(sorted({0.0, *stored}))
         self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
@@ -176,16 +191,20 @@ class ShapeTable:
         *,
         resolution: int | None = None,
         fields: Sequence[str] = ("position",),
+        method: str = methods.DEFAULT,
         m: int = 6,
         eta: float = 2.0,
+        max_error: float | Mapping[str, float] | None = None,
     ) -> Shape:
         """Return the shape at parameters and a stage, on the lattice of `resolution` (None: the table's own).
 
-        `fields` are position and/or displacement; nothing else is computed. The `m` nearest samples take part, with
-        weights distance^-eta.
+        `fields` are position and/or displacement; nothing else is computed. `method` is named as in `store.methods`;
+        in `idw`, and where the samples form no grid, the `m` nearest take part, with weights distance^-eta.
+        `max_error` limits the expected error, of the roughness or by measure.
 
         Raises:
-            OutsideTable: the table does not reach there, or does not hold that.
+            OutsideTable: the table does not reach there, or does not hold that, or has no such method.
+            TooUncertain: the expected error is above `max_error`, or the table does not know it.
             InvalidGeometry: no fruit has these parameters, though each lies within the table's bounds.
 
         """
@@ -197,14 +216,21 @@ class ShapeTable:
             raise OutsideTable(f"a resolution of {n} is out of reach.", "Ask for 4 to 1024 colatitudes.")
         if m < 1 or not eta > 0:
             raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
-        near = self._near(values, m, eta)
+        how = methods.parse(method)
+        point = np.array(list(values.values())) if self._samples is not None else None
+        near = self._near(point, how, m, eta)
         stages = self._bracket(s)
-        fruit = self._fruit(values) if "position" in fields else None
-        waves = self._blend(near, stages)
-        position, displacement = _synthesize(waves, n, fruit, "displacement" in fields)
-        poles = None
-        if fruit is not None:
-            poles = (surface.fresh_poles(fruit) + spectra.poles(np.moveaxis(waves, 0, -1))).astype(waves.real.dtype)
+        inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
+        expected = self._expect(near, stages, how)
+        if max_error is not None:
+            trust.refuse(expected, max_error, inside)
+        fruit = self.fruit(values) if "position" in fields else None
+        position = displacement = poles = None
+        if fields:
+            blend = self._blend(point, near, stages, how, n)
+            position, displacement = _synthesize(blend, n, fruit, "displacement" in fields)
+            if fruit is not None:
+                poles = (surface.fresh_poles(fruit) + blend.poles()).astype(blend.waves.real.dtype)
         return Shape(
             colatitude=colatitudes(n),
             azimuth=azimuths(n),
@@ -216,16 +242,58 @@ class ShapeTable:
             descriptors=self._describe(near, stages),
             weights={self._keys[i]: float(w) for i, w in zip(near.samples, near.weights, strict=True)},
             nearest=near.nearest,
+            inside=inside,
             exact=s == 0 or (near.nearest == 0.0 and len(stages) == 1),
             converged=self._has_converged(near, stages),
+            expected_error=expected,
+            method=str(how),
             table=self.digest,
             units={name: self._units[name] for name in (*fields, *self.info.descriptors)},
         )
 
-    def _near(self, values: Mapping[str, float], m: int, eta: float) -> Weighted:
-        if self._neighbours is None:
+    def sample(self, i: int) -> dict[str, float]:
+        """Return the varying parameters of a sample."""
+        values = [] if self._samples is None else self._samples.values[i].tolist()
+        return dict(zip(self.info.axes, values, strict=True))
+
+    def left_out(self, i: int, stage: float, method: str = methods.DEFAULT, resolution: int | None = None) -> Array:
+        """Return the displacement (n, 2n, 3) that the other samples predict for sample `i` at a stored stage.
+
+        Raises:
+            OutsideTable: the stage is not stored, there are no other samples, or there is no such method.
+
+        """
+        how = methods.parse(method)
+        if self._samples is None or stage not in self.stages:
+            raise OutsideTable("nothing can be left out there.", "Name a stored stage of a table with several samples.")
+        others, j = self._samples.without(i, how.weighting), self.stages.index(stage)
+        blend = self._blender(self._samples.values[i], others.samples, others.weights, {j: 1.0}, how)
+        found = _synthesize(blend, resolution or self.resolution, None, True)[1]
+        assert found is not None
+        return found
+
+    @cached_property
+    def neighbour_correlation(self) -> dict[float, float]:
+        """Mean correlation of the radial wrinkles of neighbouring samples by stage: what blending can rely on.
+
+        Read from the spectra when first asked for. Empty for a single sample.
+        """
+        if self._samples is None:
+            return {}
+        fruits = [self.fruit(self.sample(i)) for i in range(self.size)]
+        return dict(zip(self.stages, trust.correlations(self._spectra, self._samples, fruits).tolist(), strict=True))
+
+    def _near(self, point: Array | None, method: methods.Method, m: int, eta: float) -> Weighted:
+        if self._samples is None or point is None:
             return Weighted(np.zeros(1, int), np.ones(1), 0.0)
-        return self._neighbours.weigh(np.array(list(values.values())), m, eta)
+        return self._samples.weigh(method.weighting, point, m, eta)
+
+    def _expect(self, near: Weighted, stages: Mapping[int, float], method: methods.Method) -> dict[str, float] | None:
+        if stages.keys() == {_FRESH} or (near.nearest == 0.0 and len(stages) == 1):
+            return dict.fromkeys(Measures._fields, 0.0)
+        if self._trust is None or self._trust.method != str(method):
+            return None
+        return self._trust.expect(near, _stored(stages))
 
     def _bracket(self, stage: float) -> dict[int, float]:
         """Return the stages around one with their weights: stored ones by their place, and `_FRESH`."""
@@ -241,17 +309,15 @@ class ShapeTable:
 
     def _terms(self, near: Weighted, stages: Mapping[int, float]) -> list[tuple[int, int, float]]:
         """Return (sample, stage, weight) of all that takes part; the fresh shape adds nothing."""
-        stored = [(j, t) for j, t in stages.items() if j != _FRESH]
+        stored = _stored(stages).items()
         return [(i, j, w * t) for i, w in zip(near.samples, near.weights, strict=True) for j, t in stored]
 
-    def _blend(self, near: Weighted, stages: Mapping[int, float]) -> Array:
-        """Return the weighted spectrum (component, m, k)."""
-        first = self._spectra[0, 0]
-        # not by BLAS: its threads would wait for each other in a busy server, for a sum of a tenth of a millisecond
-        total, scaled = np.zeros_like(first), np.empty_like(first)
-        for sample, stage, weight in self._terms(near, stages):
-            total += np.multiply(self._spectra[sample, stage], first.dtype.type(weight), out=scaled)
-        return total.view(np.result_type(first.dtype, np.complex64)).reshape(first.shape[:-1])
+    def _blend(
+        self, point: Array | None, near: Weighted, stages: Mapping[int, float], method: methods.Method, n: int
+    ) -> Blend:
+        # waves that the lattice cannot hold are not even read
+        band = min(self.resolution, n)
+        return self._blender(point, near.samples, near.weights, _stored(stages), method, band)
 
     def _describe(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
         terms = self._terms(near, stages)
@@ -266,8 +332,19 @@ class ShapeTable:
         terms = self._terms(near, stages)
         return self._converged is None or all(bool(self._converged[i, j]) for i, j, _ in terms)
 
-    def _fruit(self, values: Mapping[str, float]) -> Fruit:
-        params = insert(self.info.template, self.info.places, values)
+    def at_parameters(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """Return the solver's parameters of a point on the varying axes."""
+        return insert(self.info.template, self.info.places, values)
+
+    def fruit(self, values: Mapping[str, float]) -> Fruit:
+        """Return the fruit at a point on the varying axes.
+
+        Raises:
+            OutsideTable: the table is not of fruits.
+            InvalidGeometry: no fruit has these parameters.
+
+        """
+        params = self.at_parameters(values)
         try:
             radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
         except KeyError:
@@ -284,12 +361,15 @@ def _check_fruit(radii: tuple[float, ...], stone: tuple[float, ...]) -> None:
     Fruit.parse({"radii": radii, "stone": stone})
 
 
-def _synthesize(waves: Array, n: int, fruit: Fruit | None, displaced: bool) -> tuple[Array | None, Array | None]:
+def _stored(stages: Mapping[int, float]) -> dict[int, float]:
+    """Return the stored ones of stages with weights: the fresh shape adds nothing to a displacement."""
+    return {j: t for j, t in stages.items() if j != _FRESH}
+
+
+def _synthesize(blend: Blend, n: int, fruit: Fruit | None, displaced: bool) -> tuple[Array | None, Array | None]:
     """Return positions and displacements (n, 2n, 3), each only if wanted."""
-    if fruit is None and not displaced:
-        return None, None
+    waves = blend.waves
     with transforms.borrow(n, min(waves.shape[1] - 1, n), len(waves), waves.real.dtype) as plan:
-        spectra.fill(plan.coefficients, waves)
-        planes = plan.run()
+        planes = blend.fields(plan)
         position = None if fruit is None else surface.add_fresh(fruit, planes)
         return position, np.stack(list(planes), axis=-1) if displaced else None

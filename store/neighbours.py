@@ -31,7 +31,13 @@ class Neighbours:
         self._low = values.min(axis=0)
         self._span = values.max(axis=0) - self._low
         self._count = len(values)
-        self._tree = cKDTree((values - self._low) / self._span)
+        self._scaled = (values - self._low) / self._span
+        self._tree = cKDTree(self._scaled)
+
+    def distance(self, query: Array) -> float:
+        """Return the scaled distance to the nearest sample; 0 where it is hit."""
+        found = float(self._tree.query((query - self._low) / self._span)[0])
+        return found if found >= SAME else 0.0
 
     def weigh(self, query: Array, m: int, eta: float) -> Weighted:
         """Weigh the `m` nearest samples by distance^-eta; a sample that is hit takes all."""
@@ -43,3 +49,41 @@ class Neighbours:
             return Weighted(samples[:1], np.ones(1), 0.0)
         weights = (nearest / distance) ** eta  # scaled by the nearest: no overflow however close it is
         return Weighted(samples, weights / weights.sum(), nearest)
+
+    def fade(self, query: Array, m: int, eta: float) -> Weighted:
+        """Weigh the `m` nearest samples by ((R - d) / (R d))^eta, R the distance of the next one.
+
+        Franke and Nielson (1980): like inverse distance close to a sample, but a sample that leaves the set of the
+        nearest has no weight left when it does. Where all samples take part, this is inverse distance.
+        """
+        if m >= self._count:
+            return self.weigh(query, m, eta)
+        found = self._tree.query((query - self._low) / self._span, k=np.arange(1, m + 2))
+        distance, samples = np.asarray(found[0]), np.asarray(found[1])
+        nearest, reach = float(distance[0]), float(distance[-1])
+        if nearest < SAME:
+            return Weighted(samples[:1], np.ones(1), 0.0)
+        weights = (nearest / distance[:-1] * np.maximum(1 - distance[:-1] / reach, 1e-12)) ** eta
+        return Weighted(samples[:-1], weights / weights.sum(), nearest)
+
+    def without(self, i: int, m: int) -> Weighted:
+        """Weigh the `m` nearest others of sample `i` by distance^-2."""
+        distance = np.linalg.norm(self._scaled - self._scaled[i], axis=1)
+        others = np.argsort(distance, kind="stable")
+        others = others[others != i][:m]
+        weights = distance[others] ** -2.0
+        return Weighted(others, weights / weights.sum(), float(distance[others[0]]))
+
+    @property
+    def spacing(self) -> Array:
+        """Scaled distance (count,) from each sample to the nearest other one; infinite where there is none."""
+        if self._count == 1:
+            return np.full(1, np.inf)
+        return np.asarray(self._tree.query(self._scaled, k=[2])[0])[:, 0]
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Return each sample with the one nearest to it."""
+        if self._count == 1:
+            return []
+        nearest = np.asarray(self._tree.query(self._scaled, k=[2])[1])[:, 0]
+        return [(i, int(j)) for i, j in enumerate(nearest)]

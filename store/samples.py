@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from solver.fruit import Fruit
 
 from .canonical import canonical
@@ -36,6 +39,23 @@ class Samples(NamedTuple):
     def varying(self) -> list[str]:
         """Names of the axes that take more than one value."""
         return [name for name in self.axes if name not in self.fixed]
+
+    def points(self) -> NDArray[Any] | None:
+        """Return the samples' places (sample, axes) on the varying axes; None for a single one."""
+        names = self.varying
+        return np.array([[values[name] for name in names] for values in self.values]) if names else None
+
+    def fruits(self) -> list[Fruit] | None:
+        """Return the fruit of each sample, whose fresh shape is known; None where they are no fruits."""
+        found = []
+        for values in self.values:
+            params = insert(self.template, self.axes, values)
+            try:
+                radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
+            except KeyError:
+                return None
+            found.append(Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te))
+        return found
 
 
 def collect(

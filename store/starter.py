@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["ROOT", "own_or_starter"]
+from .errors import ReadOnlyStore
+
+__all__ = ["ROOT", "check_own", "own_or_starter"]
 
 #: The store in the package. Read only.
 ROOT = Path(__file__).parent / "starter"
@@ -16,3 +18,16 @@ ROOT = Path(__file__).parent / "starter"
 def own_or_starter(root: Path | None) -> Path:
     """Return `root` if there is a store in it, else the starter's."""
     return root if root is not None and (root / "shards").is_dir() else ROOT
+
+
+def check_own(root: Path) -> None:
+    """Refuse to write into the package.
+
+    Raises:
+        ReadOnlyStore: `root` is the starter's.
+
+    """
+    if root.resolve() == ROOT.resolve():
+        raise ReadOnlyStore(
+            "the table that comes with wizen takes nothing new.", "Name a store of your own with --store DIR."
+        )

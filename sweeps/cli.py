@@ -13,7 +13,7 @@ import typer
 
 from solver import __version__
 
-from . import cli_onset, cli_tables
+from . import cli_onset, cli_queue, cli_tables
 from .console import Root, emit, grid, note
 from .options import As_json, Out, Preset, Quality, Seed, Set, Stages, StorePath, assignments, numbers
 
@@ -238,4 +238,5 @@ def status(store: StorePath, as_json: As_json = False) -> None:
 
 
 cli_onset.add_to(app)
+cli_queue.add_to(app)
 cli_tables.add_to(app)

@@ -1,4 +1,4 @@
-"""The commands about tables: build, verify, info, map and query."""
+"""The commands about tables: build, verify, info, score, map and query."""
 
 from __future__ import annotations
 
@@ -99,6 +99,70 @@ def verify(store: StorePath, name: TableName = "default", as_json: As_json = Fal
     emit({"table": name, "sound": not findings, "findings": findings}, as_json, show)
     if findings:
         raise typer.Exit(1)
+
+
+@table_app.command()
+def score(
+    store: StoreToRead = None,
+    name: TableName = "default",
+    held_out: Annotated[
+        Path | None,
+        typer.Option("--held-out", metavar="PLAN|STORE", help="Runs to predict; without, each sample from the others."),
+    ] = None,
+    methods_: Annotated[str | None, typer.Option("--methods", metavar="M,M,...", help="Only these methods.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Truth, the paper's and the default.")
+    ] = None,
+    stage: Annotated[float, typer.Option("--stage", help="The picture's stage: the stored one next to it.")] = 0.2,
+    as_json: As_json = False,
+) -> None:
+    """Score the look-up methods by stage: against runs that the table has not seen, or leaving out its own.
+
+    rgh: roughness over the true one. dB: error of band powers. W1: slopes' distributions [degree]. patch: variation of
+    local slope energy. L2nr, ang [degree] and corr: point by point. The method "seed" is the floor: how two runs
+    differ whose seeds alone do.
+
+    [bold]Examples[/bold]
+
+    wizen table score --store demo
+
+    wizen table score --store demo --held-out held.toml --picture score.png
+
+    wizen table score --store demo --held-out other-store --methods idw,linear+LL+env --json
+    """
+    from store import methods, seal, starter
+    from store.lookup import ShapeTable
+    from store.store import Store
+
+    from . import score as scores
+
+    if picture is not None and picture.suffix != ".png":
+        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+    names = methods.NAMED if methods_ is None else [str(methods.parse(part)) for part in methods_.split(",")]
+    opened = Store.open(store or starter.ROOT)
+    table = ShapeTable.open(opened, name)
+    cases, pairs = scores.cases(opened, table, held_out)
+    report = scores.score(table, cases, pairs, names, held_out is not None)
+    if picture is not None:
+        near = min(table.stages, key=lambda stored: abs(stored - stage))
+        seal.publish(picture, scores.picture(cases, near))
+    document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
+
+    def show(console: Any) -> None:
+        kind = "held-out runs" if report.held_out else "samples, each predicted from the others"
+        console.print(f"table {name}: {len(cases)} {kind}; {len(pairs)} pairs of seeds; * default", markup=False)
+        rows = [
+            [row.method + " *" * (row.method == methods.DEFAULT), f"{row.stage:g}"]
+            + [f"{value:.3g}" for value in row.measures]
+            for row in report.rows
+        ]
+        grid(console, ["method", "s", *report.rows[0].measures._fields], rows)
+        likeness = [[f"{s:g}", f"{value:.3f}"] for s, value in report.correlation.items()]
+        grid(console, ["s", "correlation of neighbours"], likeness)
+        if picture is not None:
+            console.print(f"drawn to {picture}", markup=False)
+
+    emit(document, as_json, show)
 
 
 def draw_map(

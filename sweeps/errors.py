@@ -8,7 +8,15 @@ __all__ = ["BAD_INPUT", "InvalidOption", "PlanError", "SweepError", "describe", 
 
 #: Codes that mean "what was asked for is wrong", as opposed to "it could not be done".
 BAD_INPUT = frozenset(
-    {"invalid-input", "invalid-geometry", "invalid-plan", "invalid-option", "invalid-query", "outside-table"}
+    {
+        "invalid-input",
+        "invalid-geometry",
+        "invalid-plan",
+        "invalid-option",
+        "invalid-query",
+        "outside-table",
+        "too-uncertain",
+    }
 )
 
 

@@ -23,7 +23,6 @@ from scipy.stats import qmc
 
 from solver import registry
 from solver.contract import InvalidGeometry, InvalidInput, Need, Params, Solver
-from store import keys
 from store.ledger import JobSpec
 
 from . import planfile
@@ -129,13 +128,7 @@ class Plan:
 
 def job(solver: Solver, params: Params, need: Need) -> JobSpec:
     """Return the job that computes `need` (settled) of `params`; its key is the same whoever asks."""
-    return JobSpec(
-        key=keys.key(solver.name, solver.version, params, need),
-        solver=solver.name,
-        version=solver.version,
-        params=params.model_dump(mode="json"),
-        need=need.model_dump(mode="json"),
-    )
+    return JobSpec.of(solver, params, need)
 
 
 def units_of(solver: str) -> dict[str, str]:

@@ -6,6 +6,7 @@ notes the first kind as done without solving, and solves the second. Several run
 
 from __future__ import annotations
 
+import math
 import os
 import secrets
 import socket
@@ -16,6 +17,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from typing import Any
 
 from store.ledger import Job, JobSpec
+from store.queue import Queue
 from store.store import Store
 
 from .errors import SweepError
@@ -23,7 +25,7 @@ from .plan import Plan
 from .report import Event, Failure, Kind, Report
 from .work import Outcome, Task, beat, stop_mark, work
 
-__all__ = ["run_jobs", "run_plan"]
+__all__ = ["run_jobs", "run_plan", "run_queue"]
 
 #: How often a job is tried; what cannot succeed (invalid input) is tried once.
 ATTEMPTS = 2
@@ -82,6 +84,27 @@ def run_jobs(
     return _Run(list(jobs), store, executor, name, observe, lease, stop or threading.Event()).run(again)
 
 
+def run_queue(
+    store: Store,
+    executor: Executor,
+    stop: threading.Event,
+    patience: float = math.inf,
+    observe: Callable[[Event], None] | None = None,
+    lease: float = LEASE,
+) -> int:
+    """Run what is asked for in the store's queue, as it comes; return how many jobs were solved.
+
+    Ends when `stop` is set (running solves then wait for the next run), or when nothing has come for `patience` [s].
+    Jobs of a runner that died are taken over at once if it was on this host, else when their lease has run out.
+
+    Raises:
+        StoreError: the disk is full or the ledger damaged. Running jobs wait for the next run.
+        SweepError: the cluster went away.
+
+    """
+    return _Run([], store, executor, "", observe, lease, stop).drain(patience)
+
+
 class _Run:
     def __init__(
         self,
@@ -93,7 +116,7 @@ class _Run:
         lease: float,
         stop: threading.Event,
     ) -> None:
-        self._jobs = {job.key: job for job in jobs}
+        self._jobs: Mapping[str, JobSpec] = {job.key: job for job in jobs}
         self._store, self._ledger = store, store.ledger
         self._executor, self._name, self._observe = executor, name, observe
         self._lease, self._stop = lease, stop
@@ -118,6 +141,31 @@ class _Run:
             self._land()
         return self._report(time.monotonic() - start)
 
+    def drain(self, patience: float) -> int:
+        queue = Queue(self._ledger)
+        busy = time.monotonic()
+        try:
+            while not self._stop.is_set():
+                waiting = queue.waiting()
+                self._jobs = {job.key: job for job in waiting}
+                self._free(waiting)
+                self._launch()
+                if self._flying:
+                    busy = time.monotonic()
+                elif time.monotonic() - busy >= patience:
+                    break
+                self._collect(beat(self._lease))
+                self._attend()
+        finally:
+            self._land()
+        return self._solved
+
+    def _free(self, jobs: Iterable[Job]) -> None:
+        """Take back jobs of runners that are known to be dead."""
+        for job in jobs:
+            if job.state == "running" and _is_dead(job.worker):
+                self._ledger.release(job.key)
+
     def _prepare(self, again: bool) -> None:
         """Enter the jobs, take back those of dead runners, and make the ledger agree with the shards."""
         self._ledger.want(self._jobs.values(), self._name, again=again)
@@ -125,9 +173,7 @@ class _Run:
         if any(job.state == "done" and not self._store.has(job.key) for job in before.values()):
             self._ledger.rebuild(self._store)  # shards were deleted by hand
             before = self._states()
-        for job in before.values():
-            if job.state == "running" and _is_dead(job.worker):
-                self._ledger.release(job.key)
+        self._free(before.values())
         self._finished = {key for key, job in before.items() if job.state in ("done", "failed")}
 
     def _launch(self) -> None:
@@ -179,6 +225,8 @@ class _Run:
 
     def _take(self, job: Job, outcome: Outcome) -> None:
         self._suspects.discard(job.key)
+        if not self._shares_ledger:
+            stop_mark(self._store.root, job.key).unlink(missing_ok=True)
         if outcome.state == "stopped":
             self._ledger.release(job.key)
             self._tell("lost", job)
@@ -214,11 +262,18 @@ class _Run:
         """Keep the books for workers that cannot, and show how far the running jobs are."""
         if not self._shares_ledger:
             for job in self._flying.values():
-                self._ledger.renew(job.key, self._id, self._lease)
+                if not self._ledger.renew(job.key, self._id, self._lease):
+                    self._call_off(job.key)
         if self._observe is not None:
             for job in self._ledger.jobs("running"):
                 if job.key in self._jobs and job.worker == self._id:
                     self._tell("progress", job, fraction=job.progress)
+
+    def _call_off(self, key: str) -> None:
+        """Tell a worker that cannot see the ledger that its job is no longer wanted."""
+        mark = stop_mark(self._store.root, key)
+        mark.parent.mkdir(exist_ok=True)
+        mark.touch()
 
     def _elsewhere(self) -> bool:
         """Return whether another runner works on one of our jobs; if it dies, we shall claim it."""
@@ -228,10 +283,8 @@ class _Run:
         """Give back what still runs: its workers notice at their next heartbeat."""
         if not self._flying:
             return
-        mark = stop_mark(self._store.root, self._id)
         if not self._shares_ledger:
-            mark.parent.mkdir(exist_ok=True)
-            mark.touch()
+            self._call_off(self._id)
         for future, job in self._flying.items():
             future.cancel()
             self._ledger.release(job.key)
@@ -241,7 +294,7 @@ class _Run:
             if not future.cancelled() and future.exception() is None and future.result().state == "done":
                 self._take(self._flying[future], future.result())
         self._flying.clear()
-        mark.unlink(missing_ok=True)
+        stop_mark(self._store.root, self._id).unlink(missing_ok=True)
 
     def _states(self) -> dict[str, Job]:
         return {job.key: job for job in self._ledger.jobs() if job.key in self._jobs}

@@ -66,9 +66,9 @@ def beat(lease: float) -> float:
     return min(0.5, lease / 4)
 
 
-def stop_mark(root: Path, run: str) -> Path:
-    """Return the file whose presence asks the workers of `run` to stop."""
-    return root / "stopping" / run
+def stop_mark(root: Path, name: str) -> Path:
+    """Return the file whose presence asks the workers of a run, or that of a job's key, to stop."""
+    return root / "stopping" / name
 
 
 def quarantine_path(root: Path, key: str) -> Path:
@@ -165,14 +165,14 @@ class _Heart:
 
     def __init__(self, task: Task, store: Store) -> None:
         self._task, self._store = task, store
-        self._fraction = 0.0
+        self._said = 0.0, ""
         self._finished = threading.Event()
         self._thread = threading.Thread(target=self._run, name="wizen-heartbeat", daemon=True)
         self.lost = threading.Event()
 
     def note(self, fraction: float, message: str) -> None:
         """Remember the progress for the next beat."""
-        self._fraction = fraction
+        self._said = fraction, message
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -194,5 +194,5 @@ class _Heart:
     def _alive(self) -> bool:
         task = self._task
         if not task.shares_ledger:
-            return not stop_mark(task.root, task.run).exists()
-        return self._store.ledger.renew(task.job.key, task.run, task.lease, self._fraction)
+            return not any(stop_mark(task.root, name).exists() for name in (task.run, task.job.key))
+        return self._store.ledger.renew(task.job.key, task.run, task.lease, *self._said)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import mimeparse
 
 from ..errors import InvalidQuery, NotAcceptable, Wrong
-from . import glb, metadata, npz, obj
+from . import glb, metadata, npz, obj, points
 from .about import About
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ class Format(NamedTuple):
 FORMATS: Mapping[str, Format] = {
     f.name: f
     for f in (
+        Format(
+            "points", "application/vnd.wizen.points", ".wzp", "positions for live views", ("position",), points.encode
+        ),
         Format("obj", "model/obj", ".obj", "Wavefront OBJ", ("position",), obj.encode),
         Format("npz", "application/x-npz", ".npz", "NumPy archive", ("position", "displacement"), npz.encode),
         Format("glb", "model/gltf-binary", ".glb", "binary glTF 2.0", ("position",), glb.encode),

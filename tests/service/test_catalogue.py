@@ -22,7 +22,7 @@ def test_index_links_lead_somewhere(client: httpx.Client) -> None:
     index = client.get("/").json()
     for name in ("tables", "solvers", "health", "documentation", "schema"):
         assert client.get(index["links"][name]).status_code == 200
-    assert set(index["formats"]) == {"glb", "obj", "npz", "json"}
+    assert set(index["formats"]) == {"glb", "obj", "npz", "json", "points"}
 
 
 def test_tables(client: httpx.Client, built: Path) -> None:
@@ -98,6 +98,7 @@ def test_openapi_is_valid_and_explains_the_query(built: Path, client: httpx.Clie
     assert parameters["s"]["schema"]["maximum"] == 0.6
     assert set(get["responses"]["200"]["content"]) == {
         "application/json",
+        "application/vnd.wizen.points",
         "application/x-npz",
         "model/gltf-binary",
         "model/obj",

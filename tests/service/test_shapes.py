@@ -82,7 +82,7 @@ def test_json_is_the_default_and_links_to_the_files(client: httpx.Client) -> Non
     assert document["nearest"] > 0
     assert document["stage"] == {"symbol": "s", "value": 0.25}
     assert document["descriptors"]["mean_radius"]["units"] == "1"
-    assert set(document["links"]) == {"glb", "obj", "npz"}
+    assert set(document["links"]) == {"glb", "obj", "npz", "points"}
     for kind, link in document["links"].items():
         linked = client.get(link)
         assert linked.status_code == 200

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import contextlib
 import pickle
+import sqlite3
 import threading
 import time
 from pathlib import Path
@@ -223,3 +225,11 @@ def test_rebuilding_takes_back_what_is_gone(store: Store) -> None:
     store.shard_path(keys[1]).unlink()
     assert store.ledger.rebuild(store) == 1
     assert [store.ledger.get(name).state for name in keys] == ["done", "wanted"]
+
+
+def test_an_older_file_gains_what_was_added_since(tmp_path: Path) -> None:
+    path = tmp_path / "ledger.sqlite"
+    Ledger(path).counts()
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.execute("DROP TABLE notes")
+    assert Ledger(path).jobs() == []

@@ -77,7 +77,7 @@ def test_any_resolution_in_closed_form(table: ShapeTable, n: int) -> None:
 
 def test_weighting_spectra_is_weighting_displacements(table: ShapeTable) -> None:
     query, stage, n = {"te": 0.0327, "gamma": 17.0}, 0.2, 16
-    shape = table.at(query, stage, fields=("displacement",), m=6)
+    shape = table.at(query, stage, fields=("displacement",), method="idw", m=6)
     points = {make(te=te, gamma=g)[0]: (te, g) for te in TE for g in GAMMA}
     distance = {k: np.hypot((te - 0.0327) / 0.02, (g - 17.0) / 20) for k, (te, g) in points.items()}
     nearest = sorted(distance, key=distance.__getitem__)[:6]
@@ -96,7 +96,7 @@ def test_weighting_spectra_is_weighting_displacements(table: ShapeTable) -> None
 
 def test_linear_between_stages_and_from_the_fresh_shape(table: ShapeTable) -> None:
     query = {"te": 0.036, "gamma": 14.0}
-    u = {s: both(table, query, s)[1] for s in (0.0, 0.05, 0.1, 0.17, 0.2, 0.3)}
+    u = {s: both(table, query, s, method="idw")[1] for s in (0.0, 0.05, 0.1, 0.17, 0.2, 0.3)}
     assert not u[0.0].any()
     np.testing.assert_allclose(u[0.05], u[0.1] / 2, atol=1e-7)
     np.testing.assert_allclose(u[0.17], 0.3 * u[0.1] + 0.7 * u[0.2], atol=1e-7)
@@ -118,7 +118,7 @@ def test_swelling_and_drying_both_start_at_the_fresh_shape(store: Store, stages:
     low, high = min(0.0, *stages), max(0.0, *stages)
     assert (table.stages, table.reach) == (stages, (low, high))
     for stage in (*stages, low, low / 1.9, low / 2.7, 0.0, high / 3.7, high):
-        shape = table.at({"te": 0.04}, stage, fields=("displacement", "position"))
+        shape = table.at({"te": 0.04}, stage, fields=("displacement", "position"), method="linear")
         truth = displacement(0.04, 10.0, stage, 16)
         np.testing.assert_allclose(shape.displacement, truth, atol=1e-7)
         np.testing.assert_allclose(shape.position, Fruit.parse({"te": 0.04}).surface(*lattice(16)) + truth, atol=3e-7)
@@ -134,7 +134,7 @@ def test_swelling_and_drying_both_start_at_the_fresh_shape(store: Store, stages:
 
 
 def test_a_linear_truth_is_hit_at_the_centre_of_a_cell(table: ShapeTable) -> None:
-    _, u = both(table, {"te": 0.035, "gamma": 15.0}, 0.3, m=4)
+    _, u = both(table, {"te": 0.035, "gamma": 15.0}, 0.3, method="idw", m=4)
     np.testing.assert_allclose(u, displacement(0.035, 15.0, 0.3, 16), atol=2e-7)
     assert amplitude(0, 0.035, 15.0, 0.3) > 0
 
@@ -222,12 +222,14 @@ def test_round_off_is_forgiven(table: ShapeTable) -> None:
 def test_continuous_at_a_sample(table: ShapeTable) -> None:
     _, at = both(table, {"te": 0.04, "gamma": 20.0}, 0.2)
     for step in (1e-4, 1e-5, 1e-6):
-        _, near = both(table, {"te": 0.04, "gamma": 20.0 + 20 * step}, 0.2)
+        _, near = both(table, {"te": 0.04, "gamma": 20.0 + 20 * step}, 0.2, method="idw")
         assert np.abs(near - at).max() <= 2 * step**2 + 2e-8
 
 
 def test_larger_eta_trusts_the_nearest_more(table: ShapeTable) -> None:
-    weights = [max(table.at({"te": 0.041, "gamma": 21}, 0.2, eta=e).weights.values()) for e in (1, 2, 4, 200)]
+    weights = [
+        max(table.at({"te": 0.041, "gamma": 21}, 0.2, method="idw", eta=e).weights.values()) for e in (1, 2, 4, 200)
+    ]
     assert all(a < b for a, b in pairwise(weights))
     assert weights[-1] == pytest.approx(1)
 

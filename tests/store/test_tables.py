@@ -34,7 +34,15 @@ def test_a_table_explains_itself(filled: Store) -> None:
     path = tables.path_of(store, info)
     assert path.read_bytes()[:4] == b"\x89HDF"
     with xr.open_dataset(path, engine="h5netcdf") as opened:
-        assert dict(opened.sizes) == {"sample": 9, "stage": 3, "component": 3, "m": 17, "k": 17, "part": 2}
+        assert dict(opened.sizes) == {
+            "sample": 9,
+            "stage": 3,
+            "component": 3,
+            "m": 17,
+            "k": 17,
+            "part": 2,
+            "degree": 17,
+        }
         assert set(opened.coords) >= {"te", "gamma", "stage", "m", "k", "component", "part", "key"}
         assert opened.spectrum.dtype == np.float32
         assert all(opened[name].attrs["units"] for name in ("te", "spectrum", "stage", "mean_radius", "roughness"))

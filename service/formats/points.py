@@ -1,0 +1,34 @@
+"""Points alone, for a client that builds the triangles itself: what a slider moves, a quarter of a GLB's size.
+
+Little-endian: `WIZP`, the version 1, the colatitude samples n and the length of the JSON that follows (three uint32);
+the JSON that `format=json` sends, padded with blanks to four bytes; then 2n^2 + 2 positions (float32 x, y, z) in units
+of r1: n rows of 2n lattice points, the pole at colatitude 0, the pole at pi. `service.formats.mesh.triangles(n)` says
+which of them make a triangle.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from . import mesh, metadata
+from .about import About
+
+if TYPE_CHECKING:
+    from store.lookup import Shape
+
+__all__ = ["MAGIC", "encode"]
+
+MAGIC = b"WIZP"
+_VERSION = 1
+
+
+def encode(shape: Shape, about: About) -> bytes:
+    """Return header, JSON and positions; equal shapes give equal bytes: timings and links are left out."""
+    position, ends = mesh.surface(shape)
+    text = metadata.encode(shape, replace(about, timings={}, links={}))
+    text += b" " * (-len(text) % 4)
+    points = mesh.vertices(position, ends)
+    head = struct.pack("<4sIII", MAGIC, _VERSION, position.shape[0], len(text))
+    return b"".join([head, text, points.astype("<f4", copy=False).tobytes()])

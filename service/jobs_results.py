@@ -1,0 +1,182 @@
+"""`GET /v1/jobs/{id}/result`: the whole run as netCDF, or one stage of it as a shape, by `Accept`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+import mimeparse
+from fastapi import APIRouter, Query, Request
+from starlette.responses import FileResponse, Response
+
+from solver import registry
+from solver.contract import Params, Solver, SolverError
+from store import seal
+from store.errors import CorruptShard, UnknownJob
+from store.jobs import Job
+from store.store import Store
+
+from . import problems, vocabulary
+from .errors import InvalidQuery, JobFailed, NotAcceptable, NotDone, Wrong
+from .formats import FORMATS, About, Format, negotiate
+from .jobs import JobId, stored_job
+
+__all__ = ["router"]
+
+router = APIRouter(tags=["jobs"])
+
+NETCDF = "application/x-netcdf"
+_NAMES = ("netcdf", *FORMATS)
+_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_CONTENT = {NETCDF: _BINARY} | {
+    f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()
+}
+
+
+@router.get(
+    "/v1/jobs/{id}/result",
+    summary="A job's result",
+    response_class=Response,
+    responses={
+        200: {"description": "The result", "content": _CONTENT},
+        304: {"description": "The result that the asker has is the one"},
+        **problems.responses(404, 406, 409, 422, 503),
+    },
+)
+def result(
+    request: Request,
+    id: JobId,
+    stage: Annotated[
+        float | None, Query(allow_inf_nan=False, description="Which stage, for a shape; the last one if left out")
+    ] = None,
+    format: Annotated[
+        str | None,
+        Query(description="Representation; goes before the Accept header", json_schema_extra={"enum": list(_NAMES)}),
+    ] = None,
+) -> Response:
+    """Fetch what a job computed: the whole run as netCDF-4/HDF5, or one stage's surface in any format of the shapes.
+
+    netCDF opens with `xarray.open_dataset(path, engine="h5netcdf")` and answers who accepts anything.
+    """
+    job = stored_job(request, id)
+    chosen = _negotiate(request.headers.get("accept"), format)
+    _check_done(job)
+    store: Store = request.app.state.tables.store
+    name = chosen.name if chosen else "netcdf"
+    settings = request.app.state.settings
+    tag = f'"{job.digest}-{name}{"" if stage is None or chosen is None else f"-{stage!r}"}"'
+    headers = {
+        "ETag": tag,
+        "Vary": "Accept",
+        "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
+    }
+    if tag in {part.strip().removeprefix("W/") for part in request.headers.get("if-none-match", "").split(",")}:
+        return Response(status_code=304, headers=headers)
+    if chosen is None:
+        return _shard(store, job, headers)
+    body = _shape(store, job, stage, chosen)
+    if chosen.name != "json":
+        headers["Content-Disposition"] = f'attachment; filename="{job.solver}-{job.key[:12]}{chosen.suffix}"'
+    return Response(body, headers=headers, media_type=chosen.media_type)
+
+
+def _negotiate(accept: str | None, explicit: str | None) -> Format | None:
+    """Return the format asked for; None is netCDF.
+
+    Raises:
+        InvalidQuery: `explicit` names no format.
+        NotAcceptable: nothing in `accept` can be had.
+
+    """
+    if explicit is not None:
+        if explicit == "netcdf":
+            return None
+        if explicit not in FORMATS:
+            advice = f"Formats: {', '.join(_NAMES)}."
+            raise InvalidQuery.of([Wrong("format", f"there is no format {explicit[:40]!r}", advice)])
+        return FORMATS[explicit]
+    offered = [*(f.media_type for f in FORMATS.values()), NETCDF]
+    try:
+        best = mimeparse.best_match(offered, (accept or "").strip().lower() or "*/*")
+    except mimeparse.MimeTypeParseException:
+        best = ""
+    if best == NETCDF:
+        return None
+    if not best:
+        listed = f"{NETCDF} (format=netcdf), " + ", ".join(
+            f"{f.media_type} (format={f.name})" for f in FORMATS.values()
+        )
+        raise NotAcceptable(f"no representation fits Accept: {accept}.", advice=f"Ask for one of {listed}.")
+    return negotiate(best)
+
+
+def _check_done(job: Job) -> None:
+    if job.state == "failed":
+        error = job.error or {}
+        raise JobFailed(
+            f"this job failed: {error.get('message', 'nobody knows why.')}", advice=str(error.get("advice", ""))
+        )
+    if job.state == "cancelled":
+        raise NotDone("this job was cancelled.", advice="Ask for it again with POST /v1/jobs.")
+    if job.state != "done":
+        raise NotDone(
+            f"this job is {job.state} ({job.progress:.0%}).",
+            advice=f"Follow /v1/jobs/{job.key}/events until it is done.",
+        )
+
+
+def _shard(store: Store, job: Job, headers: dict[str, str]) -> Response:
+    path = store.shard_path(job.key)
+    try:
+        whole = seal.is_whole(path)
+    except FileNotFoundError:
+        raise UnknownJob("the result is no longer stored.", "Ask for it again with POST /v1/jobs.") from None
+    if not whole:
+        raise CorruptShard("the stored result is damaged.", "Delete its file; then ask for it again.")
+    return FileResponse(path, headers=headers, media_type=NETCDF, filename=f"{job.solver}-{job.key[:12]}.h5")
+
+
+def _shape(store: Store, job: Job, stage: float | None, chosen: Format) -> bytes:
+    """Return one stage of a run in a format of the shapes.
+
+    Raises:
+        NotAcceptable: the result is no whole surface.
+        InvalidQuery: it has no such stage.
+
+    """
+    # the batch floor is not loaded for those who look up shapes
+    from sweeps.outputs import of_result
+
+    run = store.get(job.key)
+    solver = vocabulary.solver_named(job.solver)
+    params = _params(solver, job)
+    stages = [float(value) for value in run["stage"].values]
+    wanted = stages[-1] if stage is None else stage
+    near = min(range(len(stages)), key=lambda i: abs(stages[i] - wanted))
+    if abs(stages[near] - wanted) > 1e-9 * max(1.0, abs(wanted)):
+        advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
+        raise InvalidQuery.of([Wrong("stage", f"the result has no stage {wanted:g}", advice)])
+    whole = job.need.get("region") is None and {"colatitude", "azimuth"} <= set(run.dims)
+    if whole and "position" not in run and "displacement" in run and hasattr(params, "surface"):
+        from solver.fruit import lattice
+
+        fresh = params.surface(*lattice(run.sizes["colatitude"]))
+        run["position"] = run["displacement"] + fresh.astype(run["displacement"].dtype)
+    if not whole or "position" not in run:
+        advice = f"Ask for {NETCDF}; a job whose need has the field 'position' and no region is a shape."
+        raise NotAcceptable("this result is not a whole surface.", advice=advice)
+    axes = vocabulary.axes(job.solver)
+    shape = replace(of_result(run, {name: params.axis(name) for name in axes}, near), table=str(job.digest))
+    symbol = solver.stages.symbol
+    units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}
+    return chosen.encode(shape, About(job.solver, "", {}, symbol, units))
+
+
+def _params(solver: Solver, job: Job) -> Params:
+    try:
+        return registry.get(solver.name).parse(job.params)
+    except SolverError:
+        raise NotAcceptable(
+            f"the result is of version {job.version} of {solver.name}, whose parameters were others.",
+            advice=f"Ask for {NETCDF}.",
+        ) from None

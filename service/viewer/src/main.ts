@@ -1,0 +1,198 @@
+// The page: catalogue -> sliders -> questions -> mesh. Each part is its own module and knows nothing of the others.
+
+import { Actions } from "./actions";
+import { Problem, shape, solver as askSolver, tables as askTables, type Answer, type Point, type Table } from "./api";
+import { Choice, Slider } from "./controls";
+import { Detail } from "./detail";
+import { button, byId, el } from "./dom";
+import { Fruit } from "./fruit";
+import { Latest } from "./live";
+import { lookOf } from "./looks";
+import { Player } from "./play";
+import { Studio } from "./scene";
+import { at, clamp, fromHash, presetsIn, scales, shareOf, toHash, type Scale } from "./state";
+import { showFacts, showTrust } from "./trust";
+
+const REST = 160; // [ms] without a change after which the finest shape is asked for
+const AGAIN = 3000; // [ms] until a silent service is asked again
+
+interface Question {
+  table: Table;
+  point: Point;
+  resolution: number;
+  moving: boolean;
+}
+
+const canvas = byId<HTMLCanvasElement>("view");
+const problem = byId("problem");
+
+function complain(error: unknown): void {
+  const detail = error instanceof Problem ? error.detail : "This page met an error that it did not foresee.";
+  const advice = error instanceof Problem ? error.advice : String(error);
+  problem.replaceChildren(el("strong", {}, detail), " ", advice);
+  problem.hidden = false;
+}
+
+async function start(): Promise<void> {
+  const all = await askTables();
+  const usable = all.filter((table) => !table.complaint);
+  if (!usable.length) {
+    throw new Problem(
+      all[0]?.complaint ?? "There is no table yet.",
+      "Run a sweep and `wizen table build`; this page shows it as soon as it is there.",
+    );
+  }
+  const wanted = fromHash();
+  const table = usable.find((t) => t.name === wanted.table) ?? usable.find((t) => t.name === "default") ?? usable[0];
+  await page(table, usable, wanted);
+}
+
+async function page(table: Table, all: Table[], wanted: Record<string, string>): Promise<void> {
+  const solver = await askSolver(table.solver);
+  const look = lookOf(solver.name);
+  const axes = scales(table);
+  const stage = axes[0];
+  const point: Point = {};
+  for (const scale of axes) {
+    const given = wanted[scale.name] === undefined ? NaN : Number(wanted[scale.name]);
+    point[scale.name] = Number.isFinite(given) ? clamp(scale, given) : at(scale, scale === stage ? 0.8 : 0.35);
+  }
+  let skin = wanted.skin in look.skins ? wanted.skin : Object.keys(look.skins)[0];
+
+  const fruit = new Fruit();
+  const studio = new Studio(canvas, fruit);
+  const detail = new Detail();
+  const actions = new Actions(byId("actions"), () => ({ table, point, resolution: detail.finest }));
+  let resting = 0;
+
+  const questions = new Latest<Question, Answer>(
+    (q) => shape(q.table, q.point, q.resolution),
+    (answer, q, last) => {
+      problem.hidden = true;
+      if (q.moving) detail.learn(q.resolution, answer.milliseconds);
+      fruit.wear(look.skins[skin], shareOf(stage, q.point[stage.name]));
+      fruit.show(answer.points, answer.n, q.moving);
+      studio.reshaped();
+      const speed = `${answer.milliseconds.toFixed(0)} ms, ${(answer.bytes / 1024).toFixed(0)} kB`;
+      showTrust(byId("trust"), answer.about, speed);
+      showFacts(byId("facts").querySelector("div") as HTMLElement, answer.about);
+      canvas.dataset.shown = JSON.stringify({ n: answer.n, ...q.point });
+      if (last && q.moving) rest();
+    },
+    (error, q) => {
+      if (error instanceof Problem && error.detail.startsWith("resolution:") && detail.refuse(q.resolution)) {
+        rest();
+        return;
+      }
+      complain(error);
+      setTimeout(rest, AGAIN);
+    },
+  );
+  const ask = (moving: boolean): void => {
+    questions.put({ table, point: { ...point }, resolution: detail.of(moving), moving });
+  };
+  const rest = (): void => {
+    clearTimeout(resting);
+    resting = window.setTimeout(() => ask(false), REST);
+  };
+  const changed = (): void => {
+    ask(true);
+    rest();
+    actions.refresh();
+    toHash(table.name, skin, point);
+  };
+
+  const sliders = axes.map(
+    (scale) =>
+      new Slider(scale, look, (value) => {
+        if (scale === stage) player.stop();
+        places.mark(undefined);
+        point[scale.name] = value;
+        changed();
+      }),
+  );
+  const set = (values: Point): void => {
+    for (const slider of sliders) {
+      const { name } = slider.scale;
+      if (name in values) point[name] = clamp(slider.scale, values[name]);
+      slider.set(point[name]);
+    }
+    changed();
+  };
+
+  const play = button("▶ Dry", () => player.toggle(shareOf(stage, point[stage.name])), {
+    class: "play",
+    "aria-label": "Dry",
+  });
+  const player = new Player(
+    (share) => set({ [stage.name]: at(stage, share) }),
+    (on) => {
+      play.textContent = on ? "❚❚ Stop" : "▶ Dry";
+      play.setAttribute("aria-label", on ? "Stop" : "Dry");
+    },
+  );
+
+  const presets = presetsIn(table, solver);
+  const spots: Record<string, Point> = Object.fromEntries(
+    look.places.map((place) => [place.name, { ...shares(axes, place.shares), [stage.name]: place.stage }]),
+  );
+  const places = new Choice("Looks", [...Object.keys(spots), ...Object.keys(presets)], (name) => {
+    player.stop();
+    set(spots[name] ?? presets[name]);
+    places.mark(name);
+  });
+  const skins = new Choice(
+    "Skin",
+    Object.keys(look.skins),
+    (name) => {
+      skin = name;
+      skins.mark(name);
+      fruit.wear(look.skins[skin], shareOf(stage, point[stage.name]));
+      studio.invalidate();
+      toHash(table.name, skin, point);
+    },
+    (name, made) => {
+      const swatch = el("i", { class: "swatch", "aria-hidden": "true" });
+      swatch.style.setProperty("--fresh", look.skins[name].ridge[0]);
+      swatch.style.setProperty("--dry", look.skins[name].ridge[1]);
+      made.prepend(swatch);
+    },
+  );
+  skins.mark(skin);
+
+  byId("subject").textContent = `${solver.title} · ${table.samples} runs`;
+  byId("controls").replaceChildren(
+    ...(all.length > 1 ? [tableChoice(all, table)] : []),
+    ...sliders.slice(0, 1).map((slider) => slider.root),
+    el("div", { class: "row" }, play, button("Reset view", () => studio.home())),
+    ...sliders.slice(1).map((slider) => slider.root),
+    places.root,
+    skins.root,
+  );
+  set({});
+}
+
+const shares = (axes: Scale[], given: Record<string, number>): Point =>
+  Object.fromEntries(axes.filter((axis) => axis.name in given).map((axis) => [axis.name, at(axis, given[axis.name])]));
+
+function tableChoice(all: Table[], current: Table): HTMLElement {
+  const select = el("select", { id: "table" }, ...all.map((t) => el("option", { value: t.name }, `${t.name} (${t.solver})`)));
+  select.value = current.name;
+  select.addEventListener("change", () => {
+    location.hash = new URLSearchParams({ table: select.value }).toString();
+    location.reload();
+  });
+  return el("div", { class: "choice" }, el("label", { for: "table" }, "Table"), select);
+}
+
+async function keepTrying(): Promise<void> {
+  try {
+    await start();
+    problem.hidden = true;
+  } catch (error) {
+    complain(error);
+    setTimeout(() => void keepTrying(), AGAIN);
+  }
+}
+
+void keepTrying();

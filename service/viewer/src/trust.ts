@@ -1,0 +1,80 @@
+// How far to trust a shape: what its answer says of itself, in words. What an answer does not say is not shown.
+
+import type { About } from "./api";
+import { digits, el } from "./dom";
+
+interface Verdict {
+  level: "good" | "fair" | "poor";
+  text: string;
+  why: string;
+}
+
+function verdict(about: About): Verdict {
+  if (about.inside === false) {
+    return { level: "poor", text: "outside the runs", why: "No runs surround this point: the shape is a guess." };
+  }
+  if (about.exact && about.stage.value === 0) {
+    return { level: "good", text: "the fresh shape, exact", why: "It follows from the parameters alone." };
+  }
+  if (about.exact) {
+    return about.converged
+      ? { level: "good", text: "a stored run", why: "Computed, not interpolated." }
+      : { level: "fair", text: "a stored run, still settling", why: "Computed, but a stage had not come to rest." };
+  }
+  const error = leading(about.expected_error);
+  if (error !== undefined) {
+    const level = error < 0.05 ? "good" : error < 0.2 ? "fair" : "poor";
+    return { level, text: `expected error ${percent(error)}`, why: "Measured by leaving runs out of the table." };
+  }
+  const level = about.nearest > 0.5 ? "poor" : "fair";
+  const text = level === "poor" ? "interpolated, far from any run" : "interpolated, near a run";
+  return { level, text, why: "Between stored runs; 0 is on a run, 1 a whole range away from it." };
+}
+
+/** The figure that stands for an expected error: itself, or the largest of several. */
+function leading(error: About["expected_error"]): number | undefined {
+  if (typeof error === "number") return error;
+  const numbers = Object.values(error ?? {}).filter((value): value is number => typeof value === "number");
+  return numbers.length ? Math.max(...numbers) : undefined;
+}
+
+const percent = (share: number): string => `${digits(Number((100 * share).toPrecision(2)))} %`;
+
+export function showTrust(root: HTMLElement, about: About, speed: string): void {
+  const { level, text, why } = verdict(about);
+  const rows: [string, string | Node][] = [["Nearest run", digits(about.nearest)]];
+  if (about.inside !== undefined) rows.push(["Between runs", about.inside ? "yes" : "no"]);
+  if (typeof about.expected_error === "object" && about.expected_error !== null) {
+    for (const [name, value] of Object.entries(about.expected_error)) {
+      if (typeof value === "number") rows.push([`Error, ${name.replaceAll("_", " ")}`, percent(value)]);
+    }
+  }
+  rows.push(["Settled", about.converged ? "yes" : "not every stage it is made of"]);
+  rows.push(["Made of", bars(about.weights)]);
+  rows.push(["Answered in", speed]);
+  root.replaceChildren(
+    el("p", { class: `badge ${level}`, title: why }, text),
+    el("dl", {}, ...rows.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)])),
+  );
+}
+
+/** One bar per stored run, as long as its weight. */
+function bars(weights: Record<string, number>): HTMLElement {
+  const own = Object.entries(weights).filter(([, weight]) => weight > 1e-4);
+  const text = own.length === 1 ? "1 run" : `${own.length} runs`;
+  const row = el("span", { class: "weights" });
+  for (const [key, weight] of own) {
+    const bar = el("i", { title: `${percent(weight)} of run ${key.slice(0, 8)}` });
+    bar.style.setProperty("--weight", String(weight));
+    row.append(bar);
+  }
+  return el("span", { class: "made" }, row, text);
+}
+
+export function showFacts(root: HTMLElement, about: About): void {
+  const rows = Object.values(about.descriptors).flatMap(({ value, units, long_name }) => [
+    el("dt", {}, long_name),
+    el("dd", {}, units === "1" ? digits(value) : `${digits(value)} ${units}`),
+  ]);
+  root.replaceChildren(el("dl", {}, ...rows));
+}

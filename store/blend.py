@@ -1,0 +1,133 @@
+"""From weights to a surface: the weighted mean of spectra, corrected, and its way back to the lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import harmonics, spectra, transforms
+from .methods import Method, bands, envelope
+from .methods.cells import Cells
+from .methods.weights import Samples
+
+__all__ = ["Blend", "Blender", "complex_view", "powers"]
+
+Array = NDArray[Any]
+
+
+class Blend(NamedTuple):
+    """Waves (3, m, k) of the displacement; with a `ratio`, of its wrinkles alone, which are to be multiplied by it on
+    the lattice before the shape `low` of the fruit is added.
+    """
+
+    waves: Array
+    ratio: Array | None = None
+    low: Array | None = None
+
+    def fields(self, plan: transforms.Synthesis) -> Array:
+        """Return the displacement (3, n, 2n) in the memory of a borrowed plan."""
+        spectra.fill(plan.coefficients, self.waves)
+        planes = plan.run()
+        if self.ratio is not None and self.low is not None:
+            envelope.apply(planes, self.ratio, self.low)
+        return planes
+
+    def poles(self) -> Array:
+        """Return the displacement (2, 3) of the two poles."""
+        ends = spectra.poles(np.moveaxis(self.waves, 0, -1))
+        if self.ratio is None or self.low is None:
+            return ends
+        # the harmonics of order 0 alone reach a pole, with sqrt(2 l + 1) (-1)^l
+        at_north = np.sqrt(2 * np.arange(harmonics.LOWEST) + 1)
+        at_south = at_north * (1 - 2 * (np.arange(harmonics.LOWEST) % 2))
+        shape = self.low[:, 0].real @ np.stack([at_north, at_south], axis=-1)
+        return ends * spectra.poles(self.ratio)[:, None] + shape.T
+
+
+class Blender:
+    """Blends the spectra (sample, stage, component, m, k, part) of a table.
+
+    `power` (sample, stage, l) by degree is read from the spectra where a table does not say.
+    """
+
+    def __init__(self, stored: Array, samples: Samples | None, power: Array | None = None) -> None:
+        self._stored = stored
+        self._samples = samples
+        self._given = power
+
+    def __call__(
+        self,
+        query: Array | None,
+        samples: Array,
+        weights: Array,
+        stages: Mapping[int, float],
+        method: Method,
+        band: int | None = None,
+    ) -> Blend:
+        """Blend samples at stored stages (place -> weight; what is missing to 1 is the fresh shape's).
+
+        `query` is the point that the corrections aim at. Waves beyond `band` are left out.
+        """
+        cut = slice(None if band is None else band + 1)
+        waves = self._mean(samples, weights, stages, cut)
+        terms = len(samples) * len(stages)
+        if terms <= 1 or not method.corrections or query is None:
+            # one sample at one stage, or on its way there from the fresh shape: nothing was lost
+            return Blend(waves)
+        targets, cells, known = self._tools
+        cell = cells.of(tuple(samples.tolist()), tuple(stages))
+        parts = np.outer(weights, list(stages.values())).ravel()
+        total = None
+        if "LL" in method.corrections:
+            mean = _form(parts, cell.power)
+            gains = targets.gains(known.scale(query), samples, weights, dict(stages), mean)
+            waves *= bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
+            total = float((gains**2 * mean).sum())
+        if "env" not in method.corrections:
+            return Blend(waves)
+        ratio = envelope.factor(_form(parts, cell.local), parts @ cell.amplitude, total)
+        low = np.tensordot(parts, cell.low, 1)
+        envelope.take_low(waves, low)
+        return Blend(waves, ratio, low)
+
+    @property
+    def power(self) -> Array:
+        """Power by degree (sample, stage, l) of the displacement's three components together."""
+        return self._given if self._given is not None else powers(self._stored)
+
+    @cached_property
+    def _tools(self) -> tuple[bands.Targets, Cells, Samples]:
+        assert self._samples is not None
+        targets = bands.Targets(self.power, self._samples)
+        return targets, Cells(self._stored, targets.bands), self._samples
+
+    def _mean(self, samples: Array, weights: Array, stages: Mapping[int, float], cut: slice) -> Array:
+        first = self._stored[0, 0][:, cut, cut]
+        # not by BLAS: its threads would wait for each other in a busy server, for a sum of a tenth of a millisecond
+        total, scaled = np.zeros_like(first), np.empty_like(first)
+        for i, w in zip(samples, weights, strict=True):
+            for j, t in stages.items():
+                total += np.multiply(self._stored[i, j][:, cut, cut], first.dtype.type(w * t), out=scaled)
+        return complex_view(total)
+
+
+def complex_view(parts: Array) -> Array:
+    """Return contiguous (..., part) as complex (...)."""
+    return parts.view(np.result_type(parts.dtype, np.complex64))[..., 0]
+
+
+def powers(stored: Array) -> Array:
+    """Return the power by degree (sample, stage, l) of spectra (sample, stage, component, m, k, part)."""
+    return np.array(
+        [[harmonics.power(harmonics.degrees(complex_view(stage))).sum(axis=0) for stage in sample] for sample in stored]
+    )
+
+
+def _form(parts: Array, products: Array) -> Array:
+    """Return the quadratic form (...) of terms (T,) and their products (T, T, ...)."""
+    count = len(parts)
+    return parts @ (parts @ products.reshape(count, -1)).reshape(count, -1)

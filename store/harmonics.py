@@ -1,0 +1,128 @@
+"""Degrees of a surface field: from its double-Fourier-sphere spectrum to spherical harmonics.
+
+A double-Fourier mode (m, k) has no degree of its own: cos k theta is a different wave at the equator and at the pole.
+Power by degree therefore comes from the true harmonics, one small matrix per azimuthal wavenumber m from k to the
+degree l. The integrals over colatitude are Fejer's first rule, exact for all products that occur. Harmonics are
+normalised to mean square 1 over the unit sphere, so that powers add up to the field's mean square.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from solver.fruit import colatitudes
+
+__all__ = ["LOWEST", "area", "degrees", "legendre", "low_series", "power", "shares", "without_low"]
+
+Array = NDArray[Any]
+
+#: Degrees below this are the shape of the fruit (size, shift, ellipticity), not wrinkles.
+LOWEST = 3
+
+
+def area(n: int) -> Array:
+    """Return the share (n, 1) that each cell of the lattice of `n` has in the unit sphere; all cells sum to 1."""
+    return _fejer(n)[:, None] / (4 * n)
+
+
+def degrees(spectrum: Array) -> Array:
+    """Return the harmonics (..., m, l) of spectra (..., m, k), for 0 <= m, l <= B; zero where l < m.
+
+    Of a spectrum that is not smooth at the poles only the part that harmonics can hold is returned.
+    """
+    band = spectrum.shape[-1] - 1
+    matrices = _matrices(band)
+    lead = spectrum.shape[:-2]
+    lines = np.moveaxis(spectrum.reshape(-1, band + 1, band + 1), 0, -1)
+    parts = np.ascontiguousarray(lines).astype(complex).view(float)
+    found = np.ascontiguousarray(matrices @ parts).view(complex)
+    return np.moveaxis(found, -1, 0).reshape(*lead, band + 1, band + 1)
+
+
+def power(harmonics: Array, other: Array | None = None) -> Array:
+    """Return the mean product by degree (..., l) of two fields' harmonics (..., m, l), or the mean square of one."""
+    other = harmonics if other is None else other
+    products = harmonics.real * other.real + harmonics.imag * other.imag
+    return 2 * products.sum(axis=-2) - products[..., 0, :]
+
+
+def without_low(spectrum: Array) -> Array:
+    """Return spectra (..., m, k) without their harmonics below `LOWEST`: what is left are the wrinkles."""
+    band = spectrum.shape[-1] - 1
+    low = degrees(spectrum)[..., :LOWEST, :LOWEST]
+    rest = spectrum.copy()
+    rest[..., :LOWEST, :] -= np.einsum("...ml,mlk->...mk", low, low_series(band)).astype(rest.dtype)
+    return rest
+
+
+def shares(band: int) -> Array:
+    """Return what part (l, m, k) of the mean square of degree l a mode (m, k) carries: each degree sums to 1.
+
+    Degrees are taken with random phases. Modes are not orthogonal over the sphere, so small parts are negative.
+    """
+    n = 2 * band + 2
+    functions = legendre(band, n)
+    series = np.zeros((band + 1, band + 1, band + 1))
+    series[0::2] = scipy.fft.dct(functions[0::2], 2, axis=2)[..., : band + 1] / n
+    series[0::2, :, 0] /= 2
+    series[1::2, :, 1:] = scipy.fft.dst(functions[1::2], 2, axis=2)[..., :band] / n
+    both = np.where(np.arange(band + 1) == 0, 1.0, 2.0)
+    found = np.einsum("m,mlk->lmk", both, series * _matrices(band))
+    return found / (2 * np.arange(band + 1) + 1)[:, None, None]
+
+
+@lru_cache(maxsize=8)
+def legendre(highest: int, n: int) -> Array:
+    """Return the normalised associated Legendre functions (m, l, n) at the lattice's colatitudes, m, l <= `highest`."""
+    x, y = np.cos(colatitudes(n)), np.sin(colatitudes(n))
+    found = np.zeros((highest + 1, highest + 1, n))
+    found[0, 0] = 1
+    for m in range(1, highest + 1):
+        found[m, m] = np.sqrt((2 * m + 1) / (2 * m)) * y * found[m - 1, m - 1]
+    for m in range(highest + 1):
+        for j in range(m + 1, highest + 1):
+            a = np.sqrt((4 * j**2 - 1) / (j**2 - m**2))
+            found[m, j] = a * x * found[m, j - 1]
+            if j > m + 1:
+                b = np.sqrt((2 * j + 1) * (j - 1 + m) * (j - 1 - m) / ((2 * j - 3) * (j**2 - m**2)))
+                found[m, j] -= b * found[m, j - 2]
+    return found
+
+
+def _fejer(n: int) -> Array:
+    """Return Fejer's weights (n,), which sum to 2."""
+    k = np.arange(1, n // 2 + 1)
+    # at k = n/2 the cosine vanishes on every node
+    return (2 / n) * (1 - 2 * (np.cos(2 * np.outer(colatitudes(n), k)) / (4 * k**2 - 1)).sum(axis=1))
+
+
+@lru_cache(maxsize=4)
+def _matrices(band: int) -> Array:
+    """Return the matrices (m, l, k) from amplitudes of the spectrum to harmonics."""
+    n = 2 * band + 2
+    angles = np.outer(np.arange(band + 1), colatitudes(n))
+    weighted = legendre(band, n) * _fejer(n) / 2
+    found = np.empty((band + 1, band + 1, band + 1))
+    found[0::2] = weighted[0::2] @ np.cos(angles).T
+    found[1::2] = weighted[1::2] @ np.sin(angles).T
+    return found
+
+
+@lru_cache(maxsize=8)
+def low_series(band: int) -> Array:
+    """Return the amplitudes (m, l, k) of the harmonics below `LOWEST`."""
+    from .spectra import spectrum
+
+    n = band
+    found = np.zeros((LOWEST, LOWEST, band + 1))
+    phi = np.arange(2 * n) * np.pi / n
+    for m in range(LOWEST):
+        for j in range(m, LOWEST):
+            field = legendre(LOWEST - 1, n)[m, j][:, None] * np.cos(m * phi)
+            found[m, j] = spectrum(field)[m].real * (1 if m == 0 else 2)
+    return found

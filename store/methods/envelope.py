@@ -1,0 +1,75 @@
+"""env: give every place the local amplitude of the wrinkles that its samples have there.
+
+Where samples happen to agree their mean is strong, where they cancel it is faint, and the eye sees patches. The
+envelope (rms amplitude in a window of 20 degrees) of the mean is brought to the mean of the samples' envelopes by a
+smooth factor on the wrinkles; the shape of the fruit keeps its own.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import harmonics, spectra, transforms
+from ..harmonics import legendre
+from .cells import COARSE
+
+__all__ = ["apply", "factor", "take_low"]
+
+Array = NDArray[Any]
+
+#: Share of the mean square below which a place counts as smooth, and the power [r1^2] of nothing.
+_FAINT, _NOTHING = 1e-2, 1e-10
+_MOST = 3.0
+
+
+def factor(mean: Array, wanted: Array, total: float | None = None) -> Array:
+    """Return the spectrum (m, k) of the factor on the wrinkles.
+
+    `mean` (places,) is the local mean square of the weighted mean, `wanted` the local amplitude it should have. With
+    a `total` (mean square) both are scaled to it first: power has been settled, only its places are left to.
+    """
+    area = np.repeat(harmonics.area(COARSE), 2 * COARSE)
+    mean, wanted = np.maximum(mean, 0), wanted**2
+    if total is not None:
+        mean, wanted = (field * (total / (area @ field + _NOTHING)) for field in (mean, wanted))
+    least = _FAINT * (area @ wanted) + _NOTHING
+    ratio = np.sqrt((wanted + least) / (mean + least))
+    return (np.clip(ratio, 1 / _MOST, _MOST) @ _analysis()).view(complex).reshape(COARSE + 1, COARSE + 1)
+
+
+def take_low(waves: Array, low: Array) -> None:
+    """Subtract harmonics below `LOWEST`, `low` (3, m, l), from spectra (3, m, k)."""
+    series = harmonics.low_series(waves.shape[-1] - 1)
+    waves[:, : harmonics.LOWEST] -= np.einsum("cml,mlk->cmk", low, series).astype(waves.dtype)
+
+
+def apply(planes: Array, ratio: Array, low: Array) -> None:
+    """Multiply wrinkles (3, n, 2n) by the factor with spectrum `ratio`, and add `low` (3, m, l): all in place."""
+    n = planes.shape[1]
+    with transforms.borrow(n, min(COARSE, n), 1, planes.dtype) as plan:
+        spectra.fill(plan.coefficients, ratio[None].astype(plan.coefficients.dtype))
+        planes *= plan.run()
+    lines = np.einsum("cml,mlt->ctm", low, legendre(harmonics.LOWEST - 1, n))
+    sides = np.concatenate([lines.real, lines.imag], axis=-1).astype(planes.dtype)
+    planes += sides @ _around(n).astype(planes.dtype, copy=False)
+
+
+@lru_cache(maxsize=1)
+def _analysis() -> Array:
+    """Return the matrix (places, parts) from fields on the coarse lattice to spectra: cheaper than small transforms."""
+    places = 2 * COARSE * COARSE
+    waves = spectra.spectrum(np.eye(places).reshape(places, COARSE, 2 * COARSE))
+    return np.ascontiguousarray(waves.reshape(places, -1)).view(float)
+
+
+@lru_cache(maxsize=16)
+def _around(n: int) -> Array:
+    """Return the waves (real and imaginary part of m, azimuth) of a real field's harmonics."""
+    m = np.arange(harmonics.LOWEST)
+    angle = np.outer(m, np.arange(2 * n) * np.pi / n)
+    twice = np.where(m == 0, 1.0, 2.0)[:, None]
+    return np.concatenate([twice * np.cos(angle), -twice * np.sin(angle)])

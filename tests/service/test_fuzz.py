@@ -1,0 +1,50 @@
+"""The OpenAPI page taken at its word: what it allows and what it forbids is sent, and no answer breaks it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.app import create_app
+from service.settings import Settings
+from store.store import Store
+from store.tokens import Tokens
+
+from ..store.conftest import fill
+from .conftest import AXES, build, served
+
+#: Not checked is whether all that the page allows is accepted: numbers that are fine one by one may make no fruit, or
+#: lie off the table, and no schema can say that.
+CHECKS = (
+    "not_a_server_error",
+    "status_code_conformance",
+    "content_type_conformance",
+    "response_headers_conformance",
+    "response_schema_conformance",
+    "negative_data_rejection",
+    "unsupported_method",
+    "ignored_auth",
+)
+
+
+@pytest.mark.slow
+def test_every_answer_is_as_the_page_says(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store", create=True)
+    fill(store, **AXES)
+    build(store)
+    secret = Tokens(store.root).create("fuzz", ["run"])[1]
+    many = {"max_jobs": 10**6, "max_jobs_per_token": 10**6}
+    # its jobs stay in the queue
+    app = create_app(Settings(store=store.root, jobs_workers=0, max_resolution=64, **many))
+    with served(app) as client:
+        command = [sys.executable, "-m", "schemathesis.cli", "run", f"{client.base_url}/openapi.json"]
+        command += ["--header", f"Authorization: Bearer {secret}", "--checks", ",".join(CHECKS)]
+        command += ["--max-examples", os.environ.get("WIZEN_FUZZ_EXAMPLES", "200"), "--phases", "coverage,fuzzing"]
+        command += ["--continue-on-failure", "--seed", "1", "--no-color"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    print(done.stdout)
+    assert done.returncode == 0, done.stdout[-20000:] + done.stderr

@@ -1,0 +1,230 @@
+"""The built page in a real browser over a real `wizen serve` on the table that comes with wizen.
+
+Needs `make page`, Chromium and playwright (`pip install -e '.[browser]'`); draws in software, so no GPU is needed.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import httpx
+import numpy as np
+import pytest
+from matplotlib import image
+from numpy.typing import NDArray
+
+from service.page import BUILT
+from solver import __version__
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+ROOT = BUILT.parents[2]
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium"),
+    pytest.mark.skipif(not (BUILT / "index.html").exists(), reason="the page is not built: make page"),
+]
+
+
+@contextmanager
+def serving(data: Path, *options: str, **environment: str) -> Iterator[str]:
+    """Run `wizen serve` with `data` as the user's data directory and return its address."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_DATA_HOME": str(data), **environment}
+    env.pop("WIZEN_STORE", None)
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=env, text=True) as server:
+        try:
+            assert server.stdout is not None
+            for line in server.stdout:
+                if found := re.search(r"http://\S+:\d+$", line.strip()):
+                    yield found[0]
+                    break
+            else:
+                pytest.fail("the server did not say where it listens")
+        finally:
+            server.terminate()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with serving(tmp_path_factory.mktemp("data")) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install -e '.[browser]'")
+    with api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+class Visit:
+    """A page, what its console said, and whom it asked."""
+
+    def __init__(self, browser: Browser, **options: Any) -> None:
+        self.page: Page = browser.new_page(**options)
+        self.complaints: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None)
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+
+    def shown(self, condition: str = "true") -> dict[str, float]:
+        """Return what is shown as soon as it meets a condition on `shown`: n, the stage and the axes."""
+        script = "() => { const t = document.getElementById('view').dataset.shown; if (!t) return false; "
+        script += f"const shown = JSON.parse(t); return ({condition}) && t; }}"
+        return json.loads(self.page.wait_for_function(script, timeout=60_000).json_value())
+
+    def picture(self) -> bytes:
+        """Return the canvas as drawn, two frames after now."""
+        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        return self.page.locator("#view").screenshot()
+
+
+def pixels(picture: bytes) -> NDArray[np.float32]:
+    """Return a screenshot's colours (rows, columns, 3), 0 to 1."""
+    return image.imread(io.BytesIO(picture))[..., :3]
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Visit]:
+    found = Visit(browser, viewport={"width": 1000, "height": 640})
+    yield found
+    found.page.close()
+
+
+def test_a_slider_changes_the_mesh(visit: Visit, address: str) -> None:
+    visit.page.goto(f"{address}/#s=0&te=0.035&gamma=20")
+    fresh = visit.shown("shown.n >= 192")
+    assert fresh == {"n": 192, "s": 0, "te": 0.035, "gamma": 20}
+    smooth = visit.picture()
+    assert "exact" in visit.page.locator(".badge").inner_text()
+
+    slider = visit.page.get_by_label("Shrinkage s", exact=True)
+    slider.focus()
+    visit.page.keyboard.press("End")
+    assert visit.shown("shown.n >= 192 && shown.s > 0")["s"] == 0.3
+    wrinkled = visit.picture()
+    assert wrinkled != smooth
+    assert "interpolated" in visit.page.locator(".badge").inner_text()
+    assert slider.get_attribute("aria-valuetext") == "0.3"
+    assert np.abs(pixels(wrinkled) - pixels(smooth)).mean() > 0.05
+
+    visit.page.get_by_label("Skin stiffness γ", exact=True).press("ArrowRight")
+    assert visit.shown("shown.n >= 192 && shown.gamma != 20")["gamma"] > 20
+    assert re.search(r"gamma=20\.\d", visit.page.url)
+    assert visit.complaints == []
+    assert {urlsplit(url).netloc for url in visit.asked} == {urlsplit(address).netloc}
+
+
+def test_drying_is_a_film(visit: Visit, address: str) -> None:
+    visit.page.goto(f"{address}/#s=0")
+    visit.shown()
+    visit.page.get_by_role("button", name="Dry", exact=True).click()
+    seen = [visit.shown(f"shown.s > {s}")["s"] for s in (0.02, 0.1, 0.2)]
+    assert seen == sorted(seen)
+    visit.page.get_by_role("button", name="Stop").click()
+    still = visit.shown("shown.n >= 192")
+    assert visit.page.get_by_label("Shrinkage, exactly").input_value() == f"{still['s']:.4g}"
+    assert visit.complaints == []
+
+
+def test_looks_and_skins(visit: Visit, address: str) -> None:
+    visit.page.goto(address)
+    visit.shown("shown.n >= 192")
+    visit.page.get_by_role("button", name="Furrowed").click()
+    assert visit.shown("shown.n >= 192 && shown.s == 0.25")["gamma"] == 50
+    before = visit.picture()
+    visit.page.get_by_role("button", name="Plum").click()
+    assert visit.picture() != before
+    assert "skin=plum" in visit.page.url
+    assert visit.page.get_by_role("button", name="Plum").get_attribute("aria-pressed") == "true"
+    assert visit.complaints == []
+
+
+def test_the_view_turns_with_the_keys(visit: Visit, address: str) -> None:
+    visit.page.goto(address)
+    visit.shown("shown.n >= 192")
+    before = visit.picture()
+    visit.page.locator("#view").focus()
+    visit.page.keyboard.press("ArrowRight")
+    assert visit.picture() != before
+
+
+def test_what_people_take_away_works(visit: Visit, address: str) -> None:
+    visit.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    visit.page.goto(f"{address}/#s=0.2&te=0.035&gamma=20")
+    visit.shown("shown.n >= 192")
+    visit.page.get_by_role("button", name="Copy as curl").click()
+    visit.page.get_by_text("Command copied.").wait_for()
+    command = visit.page.evaluate("navigator.clipboard.readText()")
+    (url,) = re.findall("'(.+)'", command)
+    assert command.startswith("curl ")
+    body = httpx.get(url).content
+    assert body[:4] == b"glTF"
+    with visit.page.expect_download() as download:
+        visit.page.get_by_role("link", name="Download GLB").click()
+    assert download.value.path().read_bytes() == body
+    assert download.value.suggested_filename == "dehydration-te0.035-gamma20-s0.2.glb"
+
+
+def test_a_narrow_screen_needs_no_sideways_scrolling(browser: Browser, address: str) -> None:
+    visit = Visit(browser, viewport={"width": 360, "height": 740}, has_touch=True)
+    visit.page.goto(address)
+    visit.shown()
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= 360
+    view = visit.page.locator("#view").bounding_box()
+    slider = visit.page.get_by_label("Shrinkage s", exact=True).bounding_box()
+    assert view is not None
+    assert slider is not None
+    assert view["height"] > 300
+    assert slider["y"] + slider["height"] < 740  # the fruit and its first slider are seen together
+    visit.page.close()
+
+
+def test_errors_of_the_service_are_shown_with_advice_until_they_pass(browser: Browser, tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    with serving(tmp_path, "--store", str(store)) as address:
+        visit = Visit(browser)
+        visit.page.goto(address)
+        problem = visit.page.get_by_role("alert")
+        problem.wait_for()
+        assert "there is no store" in problem.inner_text()
+        shutil.copytree(ROOT / "store" / "starter", store)
+        visit.shown()
+        assert problem.is_hidden()
+        visit.page.close()
+
+
+def test_a_service_that_allows_little_detail_is_asked_for_less(browser: Browser, tmp_path: Path) -> None:
+    with serving(tmp_path, WIZEN_MAX_RESOLUTION="100") as address:
+        visit = Visit(browser)
+        visit.page.goto(address)
+        assert visit.shown("shown.n == 96")["n"] == 96
+        assert visit.page.get_by_role("alert").is_hidden()
+        visit.page.close()
+
+
+def test_the_documentation_is_our_own(visit: Visit, address: str) -> None:
+    visit.page.goto(f"{address}/docs")
+    visit.page.get_by_text("One shape, interpolated from a table").wait_for()
+    assert __version__ in visit.page.locator(".version").first.inner_text()
+    assert {urlsplit(url).netloc for url in visit.asked if not url.startswith("data:")} == {urlsplit(address).netloc}
+    assert visit.complaints == []

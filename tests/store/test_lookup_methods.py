@@ -1,0 +1,335 @@
+"""Methods of look-up: weights, what corrections give back, and what a query may be told of its error."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.special import sph_harm_y
+
+from solver.contract import finish
+from solver.dehydration import SOLVER, DehydrationParams
+from solver.fruit import azimuths, colatitudes, directions, lattice
+from store import harmonics, methods, spectra, starter, tables
+from store.errors import OutsideTable, TooUncertain
+from store.lookup import ShapeTable
+from store.measures import Measures
+from store.methods.bands import Bands, Targets, add_up, multiplier
+from store.methods.weights import Samples
+from store.store import Store
+
+from .conftest import GAMMA, STAGES, TE, _spec, fill, question
+
+AXES = DehydrationParams.axes
+N = 32
+CORRECTED = ("linear+LL", "linear+env", "linear+LL+env", "idw+LL+env", "scattered+LL+env")
+
+
+def pattern(seed: int, middle: float, rms: float) -> np.ndarray:
+    """Return radial wrinkles (N, 2N) of random phases around a degree."""
+    rng = np.random.default_rng(seed)
+    theta, phi = lattice(N)
+    field = np.zeros_like(theta)
+    for degree in range(4, 18):
+        size = np.exp(-(((degree - middle) / 2) ** 2))
+        for order in range(degree + 1):
+            turn = rng.uniform(0, 2 * np.pi)
+            field += size * rng.standard_normal() * sph_harm_y(degree, order, theta, phi + turn).real
+    return field * rms / np.sqrt((harmonics.area(N) * field**2).sum())
+
+
+def wrinkled(store: Store, onset: float = 0.0) -> dict[tuple[float, float], np.ndarray]:
+    """Fill a store with patterns that have nothing in common but how rough and how fine they are."""
+    theta, phi = lattice(N)
+    fields = {}
+    for i, te in enumerate(TE):
+        for j, gamma in enumerate(GAMMA):
+            radial = pattern(10 * i + j, 0.3 / te, 0.9 * te)
+            u = np.stack([(max(s - onset, 0) * radial - 0.5 * s)[..., None] * directions(theta, phi) for s in STAGES])
+            params, need = question(te=te, gamma=gamma, resolution=N)
+            coords = {"stage": list(STAGES), "colatitude": colatitudes(N), "azimuth": azimuths(N)}
+            data = {"displacement": (("stage", "colatitude", "azimuth", "component"), u.astype(np.float32))}
+            result = finish(xr.Dataset(data, {**coords, "component": ["x", "y", "z"]}), SOLVER, params, need)
+            job = _spec(params, need)
+            store.ledger.want([job])
+            store.ledger.done(job.key, store.put(job.key, result), 1.0)
+            fields[te, gamma] = u
+    return fields
+
+
+@pytest.fixture(scope="module")
+def rough(tmp_path_factory: pytest.TempPathFactory) -> ShapeTable:
+    store = Store.open(tmp_path_factory.mktemp("rough"), create=True)
+    wrinkled(store)
+    tables.build(store, axes=AXES)
+    return ShapeTable.open(store)
+
+
+def found(table: ShapeTable, te: float, gamma: float, stage: float, method: str, n: int = N) -> np.ndarray:
+    shape = table.at({"te": te, "gamma": gamma}, stage, fields=("displacement",), method=method, resolution=n)
+    assert shape.displacement is not None
+    return shape.displacement
+
+
+def radial_power(u: np.ndarray) -> np.ndarray:
+    n = len(u)
+    radial = np.einsum("tpi,tpi->tp", u.astype(float), directions(*lattice(n)))
+    power = harmonics.power(harmonics.degrees(spectra.spectrum(radial)))
+    power[: harmonics.LOWEST] = 0
+    return power
+
+
+# --- weights ----------------------------------------------------------------------------------------------------
+
+
+def grid() -> Samples:
+    te, gamma = np.meshgrid([0.02, 0.04, 0.08], [10.0, 100.0], indexing="ij")
+    return Samples(np.stack([te.ravel(), gamma.ravel()], axis=-1))
+
+
+def test_linear_is_linear_in_the_logarithms() -> None:
+    samples = grid()
+    assert samples.is_grid
+    for te, gamma in ((0.025, 17.0), (0.05, 90.0), (0.08, 33.0)):
+        near = samples.weigh("linear", np.array([te, gamma]), 6, 2.0)
+        assert near.weights.sum() == pytest.approx(1)
+        assert (near.weights > 0).all()
+        logs = near.weights @ np.log(samples.values[near.samples])
+        np.testing.assert_allclose(np.exp(logs), [te, gamma], rtol=1e-12)
+
+
+def test_every_weighting_hits_its_samples() -> None:
+    samples = grid()
+    for i, value in enumerate(samples.values):
+        for weighting in methods.WEIGHTINGS:
+            near = samples.weigh(weighting, value, 6, 2.0)
+            assert (near.samples.tolist(), near.weights.tolist(), near.nearest) == ([i], [1.0], 0.0)
+
+
+def test_scattered_weights_have_no_jumps() -> None:
+    rng = np.random.default_rng(1)
+    samples = Samples(rng.uniform(1, 2, (40, 2)))
+    assert not samples.is_grid
+
+    def dense(weighting: str, x: float) -> np.ndarray:
+        near = samples.weigh(weighting, np.array([x, 1.5]), 6, 2.0)
+        return np.bincount(near.samples, near.weights, 40)
+
+    def largest(weighting: str, steps: int) -> float:
+        rows = np.array([dense(weighting, x) for x in np.linspace(1.1, 1.9, steps)])
+        return float(np.abs(np.diff(rows, axis=0)).max())
+
+    assert largest("linear", 4001) < 0.3 * largest("linear", 1001)  # falls with the step
+    assert largest("idw", 4001) > 0.5 * largest("idw", 1001)  # the paper's does not
+
+
+def test_an_axis_through_zero_is_not_taken_by_logarithm() -> None:
+    samples = Samples(np.array([[-1.0, 0.0], [1.0, 0.0], [-1.0, 2.0], [1.0, 2.0]]))
+    near = samples.weigh("linear", np.array([0.0, 0.5]), 6, 2.0)
+    np.testing.assert_allclose(near.weights @ samples.values[near.samples], [0, 0.5])
+
+
+def test_the_hull_of_scattered_samples() -> None:
+    samples = Samples(np.exp(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])))
+    assert samples.contains(np.exp([0.3, 0.3]))
+    assert samples.contains(np.exp([0.5, 0.5]))
+    assert not samples.contains(np.exp([0.6, 0.6]))
+
+
+def test_left_out_from_both_sides() -> None:
+    samples = grid()
+    middle = int(np.flatnonzero((samples.values == [0.04, 10.0]).all(axis=1))[0])
+    near = samples.without(middle)
+    np.testing.assert_allclose(samples.values[near.samples], [[0.02, 10], [0.08, 10]])
+    np.testing.assert_allclose(near.weights, 0.5)
+    corner = samples.without(0)
+    assert 0 not in corner.samples
+    assert corner.weights.sum() == pytest.approx(1)
+    assert len(samples.adjacent()) == 3 + 4
+
+
+@pytest.mark.parametrize("name", ["liner", "idw+LLL", "linear+env+env", "", "LL"])
+def test_unknown_methods(name: str, rough: ShapeTable) -> None:
+    with pytest.raises(OutsideTable, match="method"):
+        rough.at({"te": 0.04, "gamma": 20}, 0.2, method=name)
+
+
+def test_corrections_are_composed_in_their_order() -> None:
+    assert str(methods.parse("linear+env+LL")) == "linear+LL+env"
+    assert {str(methods.parse(name)) for name in methods.NAMED} == set(methods.NAMED)
+    assert methods.DEFAULT in methods.NAMED
+
+
+# --- corrections ------------------------------------------------------------------------------------------------
+
+
+def test_incoherent_patterns_lose_half_and_get_it_back(rough: ShapeTable) -> None:
+    te, gamma = np.sqrt(0.03 * 0.04), np.sqrt(10 * 20.0)
+    wanted = 0.9 * te * 0.2
+    rms = {m: np.sqrt(radial_power(found(rough, te, gamma, 0.2, m)).sum()) for m in ("linear", "idw", *CORRECTED)}
+    assert rms["linear"] < 0.6 * wanted
+    assert rms["idw"] < 0.6 * wanted
+    for method in ("linear+LL", "linear+LL+env", "idw+LL+env"):
+        assert rms[method] == pytest.approx(wanted, rel=0.06)
+    # and the waves are as long as they should be, between those of the samples
+    power = radial_power(found(rough, te, gamma, 0.2, "linear+LL+env"))
+    assert (np.arange(N + 1) * power).sum() / power.sum() == pytest.approx(0.3 / te, rel=0.08)
+
+
+@pytest.mark.parametrize("method", CORRECTED)
+def test_samples_stay_as_they_are_and_so_does_the_fresh_shape(rough: ShapeTable, method: str) -> None:
+    theta, phi = lattice(N)
+    for i, te in enumerate(TE):
+        radial = pattern(10 * i + 1, 0.3 / te, 0.9 * te)
+        truth = (0.2 * radial - 0.1)[..., None] * directions(theta, phi)
+        np.testing.assert_allclose(found(rough, te, 20.0, 0.2, method), truth, atol=1e-6)
+    assert not found(rough, 0.033, 17.0, 0.0, method).any()
+
+
+@pytest.mark.parametrize("method", CORRECTED)
+def test_no_jump_at_samples_cells_or_stages(rough: ShapeTable, method: str) -> None:
+    places = [(0.04, 20.0, 0.2), (0.04, 14.0, 0.2), (0.036, 20.0, 0.15), (0.036, 14.0, 0.2), (0.036, 14.0, 1e-5)]
+    for te, gamma, stage in places:
+        at = found(rough, te, gamma, stage, method)
+        for step in ((1e-8, 0, 0), (-1e-8, 0, 0), (0, 1e-5, 0), (0, -1e-5, 0), (0, 0, 1e-6), (0, 0, -1e-6)):
+            moved = found(rough, te + step[0], gamma + step[1], stage + step[2], method)
+            assert np.abs(moved - at).max() < 1e-5
+
+
+def test_smooth_stages_are_left_alone(tmp_path: Path) -> None:
+    # no wrinkles before s = 0.2: nothing to correct, and nothing to divide by
+    store = Store.open(tmp_path, create=True)
+    wrinkled(store, onset=0.2)
+    tables.build(store, axes=AXES)
+    table = ShapeTable.open(store)
+    for stage in (1e-9, 0.05, 0.1, 0.2):
+        for method in CORRECTED:
+            u = found(table, 0.034, 13.0, stage, method)
+            assert np.isfinite(u).all()
+            np.testing.assert_allclose(u, -0.5 * stage * directions(*lattice(N)), atol=2e-6)
+    assert np.isfinite(found(table, 0.034, 13.0, 0.2001, "linear+LL+env")).all()
+
+
+@pytest.mark.parametrize("n", [8, 33, 96])
+def test_corrections_at_any_resolution(rough: ShapeTable, n: int) -> None:
+    shape = rough.at({"te": 0.034, "gamma": 13.0}, 0.17, resolution=n, fields=("position", "displacement"))
+    own = found(rough, 0.034, 13.0, 0.17, methods.DEFAULT, 128)
+    assert shape.displacement is not None
+    assert shape.poles is not None
+    if n == 96:
+        finer = spectra.synthesize(spectra.spectrum(shape.displacement), 128)
+        np.testing.assert_allclose(finer, own, atol=2e-5)
+        # the poles are the surface's own
+        moved = shape.poles - [[0, 1.034, 0], [0, -1.034, 0]]
+        np.testing.assert_allclose(moved, spectra.poles(spectra.spectrum(shape.displacement)), atol=2e-5)
+
+
+def test_gains_are_exact_for_equal_spectra() -> None:
+    samples = grid()
+    power = np.zeros((6, 1, 33))
+    power[:, 0, 3:] = np.random.default_rng(0).uniform(0.5, 1, 30) * 1e-3
+    targets = Targets(power, samples)
+    mean = add_up(power[0, 0], targets.bands)
+    near = samples.weigh("linear", np.array([0.03, 30.0]), 6, 2.0)
+    gains = targets.gains(samples.scale(np.array([0.03, 30.0])), near.samples, near.weights, {0: 1.0}, mean)
+    np.testing.assert_allclose(gains, 1, atol=1e-6)
+    halved = targets.gains(samples.scale(np.array([0.03, 30.0])), near.samples, near.weights, {0: 1.0}, mean / 4)
+    np.testing.assert_allclose(halved, 2, rtol=0.01)
+
+
+def test_the_shape_of_the_fruit_is_not_amplified() -> None:
+    bands = Bands(32)
+    factor = multiplier(np.full(len(bands.first), 3.0), bands, 32)
+    assert (factor[:2, :3] == 1).all()
+    assert factor[2, 2] == 1
+    np.testing.assert_allclose(factor[10:, 10:], 3, rtol=0.1)
+
+
+def test_gains_reach_the_degrees_they_are_meant_for() -> None:
+    bands = Bands(N)
+    gains = 1 + 0.5 * np.tanh(bands.centres - np.log(9))
+    fields = [sum(pattern(seed, middle, 1.0) for middle in (5.0, 8.0, 11.0, 15.0)) for seed in range(12)]
+    waves = spectra.spectrum(np.stack(fields))
+    before = add_up(harmonics.power(harmonics.degrees(waves)).mean(axis=0), bands)
+    after = add_up(harmonics.power(harmonics.degrees(waves * multiplier(gains, bands, N))).mean(axis=0), bands)
+    strong = before > 0.02 * before.sum()
+    assert strong.sum() > 5
+    np.testing.assert_allclose(np.sqrt(after / before)[strong], gains[strong], rtol=0.06)
+
+
+# --- trust ------------------------------------------------------------------------------------------------------
+
+
+def test_expected_errors_vanish_at_samples_and_grow_between(rough: ShapeTable) -> None:
+    at = rough.at({"te": 0.04, "gamma": 20.0}, 0.2, fields=())
+    assert at.expected_error == dict.fromkeys(Measures._fields, 0.0)
+    near, far = (rough.at({"te": 0.04 - d, "gamma": 20.0}, 0.2, fields=()).expected_error for d in (1e-4, 5e-3))
+    assert near is not None
+    assert far is not None
+    for name in ("L2nr", "corr", "ang"):
+        assert 0 < near[name] < 0.1 * far[name]
+    # patterns with nothing in common: half a spacing away, at least a third of what another seed would err
+    assert far["L2nr"] > 0.4
+    assert far["corr"] > 0.25
+    assert far["rgh"] < 0.3
+    assert at.inside
+    assert at.method == methods.DEFAULT
+
+
+def test_a_poor_answer_is_refused(rough: ShapeTable) -> None:
+    query = {"te": 0.035, "gamma": 14.0}
+    with pytest.raises(TooUncertain, match=r"L2nr.*above 0\.1") as refused:
+        rough.at(query, 0.2, max_error={"L2nr": 0.1})
+    assert refused.value.code == "too-uncertain"
+    assert "Run" in refused.value.advice
+    assert rough.at(query, 0.2, max_error={"L2nr": 3, "dB": 30}).position is not None
+    assert rough.at({"te": 0.04, "gamma": 20}, 0.2, max_error=0).exact
+    assert rough.at(query, 0.0, max_error=0).exact
+    with pytest.raises(TooUncertain, match="does not say"):
+        rough.at(query, 0.2, method="idw", max_error=1)
+    with pytest.raises(OutsideTable, match="corr"):
+        rough.at(query, 0.2, max_error={"beauty": 1})
+    with pytest.raises(OutsideTable, match="max_error"):
+        rough.at(query, 0.2, max_error=float("nan"))
+
+
+def test_neighbours_with_nothing_in_common(rough: ShapeTable, filled: Store) -> None:
+    assert max(map(abs, rough.neighbour_correlation.values())) < 0.25
+    tables.build(filled, axes=AXES)
+    assert min(ShapeTable.open(filled).neighbour_correlation.values()) > 0.99
+    with tables.open(filled) as opened:
+        np.testing.assert_allclose(
+            opened["neighbour_correlation"], list(ShapeTable.open(filled).neighbour_correlation.values()), rtol=1e-3
+        )
+        assert opened["left_out_corr"].shape == (9, 3)
+        assert opened["degree_power"].shape == (9, 3, 17)
+
+
+def test_what_is_left_out_is_not_used(rough: ShapeTable) -> None:
+    i = next(i for i in range(9) if rough.sample(i) == {"te": 0.04, "gamma": 20.0})
+    predicted = rough.left_out(i, 0.2, "linear")
+    assert np.abs(predicted - found(rough, 0.04, 20.0, 0.2, "linear")).max() > 0.001
+    nearest = rough.left_out(i, 0.2, "nearest")
+    assert any(np.allclose(nearest, found(rough, te, g, 0.2, "linear")) for te in TE for g in GAMMA)
+    with pytest.raises(OutsideTable):
+        rough.left_out(i, 0.21)
+
+
+def test_a_table_without_errors_still_answers(tmp_path: Path) -> None:
+    # the table in the package may be older than this; its power by degree is then read from the spectra
+    store = Store.open(shutil.copytree(starter.ROOT, tmp_path / "starter"))
+    shape = ShapeTable.open(store).at({"te": 0.034, "gamma": 22.0}, 0.2)
+    assert np.isfinite(shape.position).all()  # type: ignore[arg-type]
+    with tables.open(store) as opened:
+        assert ("degree_power" in opened) == (shape.expected_error is not None)
+
+
+def test_one_axis_and_two_samples(store: Store) -> None:
+    fill(store, te=[0.03, 0.04])
+    tables.build(store, axes=AXES)
+    table = ShapeTable.open(store)
+    assert np.isfinite(table.at({"te": 0.035}, 0.2, max_error=10).position).all()  # type: ignore[arg-type]
+    assert set(table.neighbour_correlation) == set(STAGES)

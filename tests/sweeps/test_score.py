@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from service.cli import app
+from solver.contract import Need, finish
+from solver.dehydration import SOLVER
+from solver.fruit import azimuths, colatitudes
+from store import methods, starter
+from store.lookup import ShapeTable
+from store.store import Store
+from sweeps import plan, score
+from sweeps.errors import InvalidOption
+
+
+def test_samples_predicted_from_each_other(tmp_path: Path) -> None:
+    picture = tmp_path / "score.png"
+    words = ["table", "score", "--methods", "idw,linear+LL+env", "--picture", str(picture), "--json"]
+    done = CliRunner().invoke(app, words, env={"WIZEN_STORE": str(starter.ROOT)})
+    assert done.exit_code == 0, done.output
+    document = json.loads(done.stdout)
+    assert not document["held_out"]
+    assert len(document["cases"]) == 6
+    assert document["default"] == methods.DEFAULT
+    late = {row["method"]: row for row in document["rows"] if row["stage"] == 0.2}
+    # the paper's weights flatten a cold table, the corrected ones do not
+    assert late["idw"]["rgh"] < 0.8
+    assert 0.9 < late["linear+LL+env"]["rgh"] < 1.1
+    assert late["linear+LL+env"]["W1"] < late["idw"]["W1"] / 2
+    assert all(0 < row["correlation"] < 0.8 for row in document["neighbour_correlation"])
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def held_out(root: Path, table: ShapeTable) -> Store:
+    """Return runs between the samples whose shape is by construction what `linear` says, one more with another seed."""
+    store = Store.open(root, create=True)
+    values, n = {"te": 0.034, "gamma": 22.0}, 64
+    u = np.stack([table.at(values, s, fields=("displacement",), method="linear").displacement for s in table.stages])
+    for seed in (0, 1):
+        params = SOLVER.parse({**table.at_parameters(values), "seed": seed})
+        need = SOLVER.settle(Need(fields=("displacement",), stages=table.stages, resolution=n))
+        job = plan.job(SOLVER, params, need)
+        turned = np.roll(u, 64 * seed, axis=2) * ([-1, 1, -1] if seed else [1, 1, 1])  # by half a turn about y
+        data = {"displacement": (("stage", "colatitude", "azimuth", "component"), turned.astype(np.float32))}
+        coords = {"stage": list(table.stages), "colatitude": colatitudes(n), "azimuth": azimuths(n)}
+        result = finish(xr.Dataset(data, {**coords, "component": ["x", "y", "z"]}), SOLVER, params, need)
+        store.ledger.want([job])
+        store.ledger.done(job.key, store.put(job.key, result), 1.0)
+    return store
+
+
+def test_held_out_runs_and_the_floor_of_another_seed(tmp_path: Path) -> None:
+    table = ShapeTable.open(starter.ROOT)
+    runs = held_out(tmp_path / "held", table)
+    found, pairs = score.cases(Store.open(starter.ROOT), table, runs.root)
+    assert [case.label for case in found] == ["te = 0.034, gamma = 22"]
+    report = score.score(table, found, pairs, ("linear", "nearest"))
+    assert report.seeds == 1
+    rows = {(row.method, row.stage): row.measures for row in report.rows}
+    np.testing.assert_allclose(rows["linear", 0.2], (1, 0, 0, 0, 0, 0, 1), atol=2e-2)
+    assert rows["nearest", 0.2].ang > 10
+    # the other seed is the same fruit turned: as rough, as fine, as steep, and elsewhere
+    floor = rows["seed", 0.2]
+    np.testing.assert_allclose(floor[:4], (1, 0, 0, 0), atol=1e-2)
+    assert floor.corr < 0.5
+
+
+def test_the_table_for_people() -> None:
+    done = CliRunner().invoke(app, ["table", "score", "--store", str(starter.ROOT), "--methods", "nearest"])
+    assert done.exit_code == 0, done.output
+    assert "rgh" in done.stdout
+    assert "correlation of neighbours" in done.stdout
+
+
+def test_what_cannot_be_scored(tmp_path: Path) -> None:
+    store = Store.open(shutil.copytree(starter.ROOT, tmp_path / "store"))
+    table = ShapeTable.open(store)
+    empty = Store.open(tmp_path / "empty", create=True)
+    with pytest.raises(InvalidOption, match="no finished run"):
+        score.cases(store, table, empty.root)
+    wrong = CliRunner().invoke(app, ["table", "score", "--store", str(store.root), "--methods", "best"])
+    assert wrong.exit_code == 2
+    assert "best" in wrong.stderr
+    wrong = CliRunner().invoke(app, ["table", "score", "--store", str(store.root), "--picture", "score.jpg"])
+    assert wrong.exit_code == 2
