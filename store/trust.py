@@ -117,7 +117,7 @@ def refuse(
                     "Rebuild the table (`wizen table build`) from two results or more, or ask without max_error.",
                 )
             raise TooUncertain(
-                f"this table says how far {known} errs, not other methods.",
+                f"this table does not say how far methods other than {known} err.",
                 f"Take the method {known}, or ask without max_error.",
             )
         if expected[name] > most:
