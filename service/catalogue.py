@@ -9,6 +9,7 @@ from starlette.responses import JSONResponse, Response
 
 from solver import __version__, quantities, registry
 from solver.contract import Solver
+from store import methods
 from store.errors import CorruptTable
 from store.tables import TableInfo
 
@@ -70,7 +71,7 @@ def tables(request: Request) -> Json:
     found = []
     for name in live.names():
         try:
-            found.append(_table(live.info(name)))
+            found.append(_table(request, live.info(name)))
         except CorruptTable as error:
             found.append({"name": name, "complaint": str(error)})
     return {"tables": found}
@@ -80,7 +81,7 @@ def tables(request: Request) -> Json:
 def table(request: Request, name: str = Path(description="Name of a table; GET /v1/tables lists them")) -> Json:
     """Describe a table: its axes with ranges and units, its stages and its generation."""
     live: LiveTables = request.app.state.tables
-    return _table(live.info(name))
+    return _table(request, live.info(name))
 
 
 @router.get("/v1/solvers", summary="All solvers")
@@ -121,8 +122,12 @@ def _bounds(axis: vocabulary.Axis) -> Json:
     return {key: value for key, value in axis._asdict().items() if key != "name" and value is not None}
 
 
-def _table(info: TableInfo) -> Json:
-    """Return what an asker needs of a table's manifest; the keys of its results stay inside."""
+def _table(request: Request, info: TableInfo) -> Json:
+    """Return what an asker needs to know of a table; the keys of its results stay inside.
+
+    `neighbour_correlation` belongs to the stored stages, and `methods.judged` is the method whose errors the table
+    knows: both are null where the table does not know.
+    """
     solver = vocabulary.solver_named(info.solver)
     described = vocabulary.axes(info.solver)
     axes = {}
@@ -136,6 +141,8 @@ def _table(info: TableInfo) -> Json:
         }
     stage = solver.stages
     lowest, highest = info.reach
+    live: LiveTables = request.app.state.tables
+    judged = live.judged(info)
     return {
         "name": info.name,
         "solver": info.solver,
@@ -144,6 +151,7 @@ def _table(info: TableInfo) -> Json:
         "created": info.created,
         "samples": info.samples,
         "resolution": info.resolution,
+        "max_resolution": request.app.state.settings.max_resolution,
         "dtype": info.dtype,
         "axes": axes,
         "fixed": info.fixed,
@@ -154,7 +162,9 @@ def _table(info: TableInfo) -> Json:
             "lowest": lowest,
             "highest": highest,
             "stored": info.stages,
+            "neighbour_correlation": judged.neighbour_correlation,
         },
+        "methods": {"default": methods.DEFAULT, "known": methods.NAMED, "judged": judged.method},
         "descriptors": {name: quantities.attrs(name) for name in info.descriptors if name in quantities.QUANTITIES},
         "links": {"self": f"/v1/tables/{info.name}", "shapes": f"/v1/shapes/{info.solver}?table={info.name}"},
     }

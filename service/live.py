@@ -9,12 +9,14 @@ import difflib
 import threading
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from store.errors import CorruptTable, StoreError, UnknownTable
+from store.generation import Judged, judged
 from store.lookup import ShapeTable
 from store.store import Store
-from store.tables import TableInfo, info
+from store.tables import TableInfo, info, path_of
 
 from .errors import AmbiguousTable, Wrong
 from .telemetry import LOGGER
@@ -75,6 +77,13 @@ class LiveTables:
         """
         self._known(name)
         return info(self.store, name)
+
+    def judged(self, table: TableInfo) -> Judged:
+        """Return what a table says of its own trust, without opening all of it; nothing if it cannot be read."""
+        try:
+            return _judged(path_of(self.store, table))
+        except (CorruptTable, FileNotFoundError):
+            return Judged(None, None)  # /healthz and /v1/shapes complain
 
     def complaint(self, name: str) -> str:
         """Return why the newest generation of an open table is not the one that is served, or nothing."""
@@ -188,3 +197,8 @@ class LiveTables:
         if entry.stamp == stamp:  # else a still newer one is on its way
             entry.table, entry.complaint = table, ""
             LOGGER.info("table %s: new generation %s", name, table.digest)
+
+
+@lru_cache(maxsize=256)
+def _judged(path: Path) -> Judged:
+    return judged(path)  # a generation's file never changes

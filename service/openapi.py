@@ -12,17 +12,22 @@ from fastapi import FastAPI
 
 from solver import registry
 from solver.contract import Solver
+from store import methods
 from store.errors import StoreError
+from store.measures import UNITS
 
 from . import problems, vocabulary
 from .formats import FORMATS
 from .live import LiveTables
-from .query import LOWEST_RESOLUTION
+from .query import LIMITS, LOWEST_RESOLUTION
 from .settings import Settings
 
 __all__ = ["Documented"]
 
 Json = dict[str, Any]
+
+_CORRECTION = "|".join(methods.CORRECTIONS)
+_METHOD = rf"^({'|'.join(methods.WEIGHTINGS)})([+ ]({_CORRECTION}))*$"
 
 
 class Documented(FastAPI):
@@ -133,6 +138,24 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
             "format",
             "Representation; goes before the Accept header",
             {"type": "string", "enum": list(FORMATS)},
+        ),
+        _query(
+            "method",
+            f"How to look up: a weighting ({', '.join(methods.WEIGHTINGS)}) and corrections "
+            f"({', '.join(methods.CORRECTIONS)}), joined by plus signs. Without it, {methods.DEFAULT}; "
+            "idw is the paper's.",
+            {"type": "string", "pattern": _METHOD, "examples": list(methods.NAMED)},
+        ),
+        _query(
+            "max_error",
+            "Largest expected error: a number limits the roughness's, measure:number another, joined by commas. "
+            f"Measures: {', '.join(f'{name} [{unit}]' for name, unit in UNITS.items())}; rgh and corr as shares off 1.",
+            {"type": "string", "pattern": f"^{LIMITS}$", "examples": ["0.05", "rgh:0.05,dB:1.5"]},
+        ),
+        _query(
+            "exact",
+            "run: what max_error refuses, or the table does not reach, is run as a job; needs a token",
+            {"type": "string", "enum": ["run"]},
         ),
     ]
 

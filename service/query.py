@@ -6,18 +6,26 @@ import difflib
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
-from .errors import InvalidQuery, OutsideRanges, Wrong
+from store import methods
+from store.errors import OutsideTable
+from store.measures import Measures
 
-__all__ = ["LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
+from .errors import InvalidQuery, Wrong
+
+__all__ = ["LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
 
 #: Names that are not axes.
-RESERVED = ("resolution", "table", "format")
+RESERVED = ("resolution", "table", "format", "method", "max_error", "exact")
 
 #: Fewer colatitude samples hold no shape.
 LOWEST_RESOLUTION = 4
+#: How errors are limited: a number, or measure:number, several of them with commas between.
+_LIMIT = rf"(?:(?:{'|'.join(Measures._fields)}):)?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?"
+LIMITS = rf"{_LIMIT}(?:,{_LIMIT})*"
+
 _RESOLUTION = re.compile(r"(\d{1,6})(?:[x×](\d{1,6}))?")
 
 #: Share of a range by which a number may lie outside: round-off of bounds that went through text.
@@ -49,33 +57,42 @@ class Words(NamedTuple):
 
 
 class ShapeQuery(NamedTuple):
-    """One question: the point on the axes, the stage, and the resolution where one was named."""
+    """One question: the point on the axes, the stage, and the resolution where one was named.
+
+    `named` are fixed parameters that were given all the same, and `outside` what is off the table: then `point`,
+    `stage` and `named` are a question to the solver, not to the table. `method` is spelt in one way. `max_error` limits
+    errors by measure. `exact`: what the table cannot answer is to be run.
+    """
 
     point: dict[str, float]
     stage: float
     resolution: int | None
+    named: dict[str, float]
+    outside: tuple[Wrong, ...] = ()
+    method: str = methods.DEFAULT
+    max_error: dict[str, float] | None = None
+    exact: bool = False
 
 
 def parse(items: Sequence[tuple[str, str]], words: Words) -> ShapeQuery:
-    """Return the question that the decoded `items` of a query string ask.
+    """Return the question that the decoded `items` of a query string ask; it may lie outside the table.
 
     Raises:
-        OutsideRanges: listing every number off its axis, where nothing else is wrong.
         InvalidQuery: listing every name that is unknown, missing or repeated, and every value that cannot be used.
 
     """
     wrong = _repeated(items)
     outside: list[Wrong] = []
     numbers: dict[str, float] = {}
-    resolution: int | None = None
+    chosen: dict[str, Any] = {"resolution": None}
     given = dict(items)
     for name, text in given.items():
-        if name == "resolution":
-            found = _resolution(text, words.max_resolution)
+        if name in _READERS:
+            found = _READERS[name](text, words)
             if isinstance(found, Wrong):
                 wrong.append(found)
             else:
-                resolution = found
+                chosen[name] = found
         elif name in words.ranges or name in words.fixed:
             number = _number(text)
             if number is None:
@@ -90,9 +107,9 @@ def parse(items: Sequence[tuple[str, str]], words: Words) -> ShapeQuery:
             wrong.append(Wrong(name, "is missing", f"Add {name}= and a number from {words.say(name)}."))
     if wrong:
         raise InvalidQuery.of([*wrong, *outside])
-    if outside:
-        raise OutsideRanges.of(outside)
-    return ShapeQuery({name: numbers[name] for name in words.axes}, numbers[words.stage], resolution)
+    point = {name: numbers[name] for name in words.axes}
+    named = {name: value for name, value in numbers.items() if name in words.fixed}
+    return ShapeQuery(point, numbers[words.stage], named=named, outside=tuple(outside), **chosen)
 
 
 def _unknown(name: str, known: Sequence[str]) -> Wrong:
@@ -128,8 +145,9 @@ def _number(text: str) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _resolution(text: str, highest: int) -> int | Wrong:
+def _resolution(text: str, words: Words) -> int | Wrong:
     """Return the colatitude samples that `64` or `64x128` name."""
+    highest = words.max_resolution
     match = _RESOLUTION.fullmatch(text.strip().lower())
     if match is None:
         return Wrong("resolution", f"{text[:40]!r} is not a resolution", "Write it like 64 or 64x128.")
@@ -144,3 +162,35 @@ def _resolution(text: str, highest: int) -> int | Wrong:
             f"Ask for {LOWEST_RESOLUTION} to {highest}; an operator raises the limit with WIZEN_MAX_RESOLUTION.",
         )
     return rows
+
+
+def _method(text: str, words: Words) -> str | Wrong:
+    """Return the one spelling of a method; a plus that came as a blank, as an unquoted one does, is one."""
+    try:
+        return str(methods.parse(text.replace(" ", "+")))
+    except OutsideTable as error:
+        return Wrong("method", f"{text[:40]!r} is not a method of look-up", error.advice)
+
+
+def _max_error(text: str, words: Words) -> dict[str, float] | Wrong:
+    """Return the limits that `0.05` (of the roughness) or `rgh:0.05,dB:1.5` set."""
+    advice = f"Write it like 0.05, for the roughness, or dB:1.5; measures: {', '.join(Measures._fields)}."
+    pairs = [part.rpartition(":") for part in text.split(",")]
+    limits = {name or "rgh": float(value) for name, _, value in pairs} if re.fullmatch(LIMITS, text) else {}
+    if not limits or not all(map(math.isfinite, limits.values())):
+        return Wrong("max_error", f"{text[:40]!r} limits no error", advice)
+    return limits
+
+
+def _exact(text: str, words: Words) -> bool | Wrong:
+    if text != "run":
+        return Wrong("exact", f"{text[:40]!r} is not run", "Write exact=run, or leave it out.")
+    return True
+
+
+_READERS: Mapping[str, Callable[[str, Words], Any]] = {
+    "resolution": _resolution,
+    "method": _method,
+    "max_error": _max_error,
+    "exact": _exact,
+}

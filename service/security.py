@@ -12,12 +12,13 @@ from typing import Annotated, Any
 from fastapi import Request, Security
 from fastapi.datastructures import State
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from fastapi.security.utils import get_authorization_scheme_param
 
 from store.tokens import Scope, Token
 
 from .errors import Forbidden, Unauthorized
 
-__all__ = ["authorize", "requires"]
+__all__ = ["authorize", "bearer", "requires"]
 
 _REALM = 'Bearer realm="wizen"'
 
@@ -37,6 +38,12 @@ def requires(scope: Scope) -> Callable[..., Coroutine[Any, Any, Token]]:
         return authorize(request.app.state, given.credentials if given else None, scope)
 
     return check
+
+
+def bearer(request: Request) -> str | None:
+    """Return the secret that a request carries, for routes where only some questions need one."""
+    scheme, secret = get_authorization_scheme_param(request.headers.get("authorization"))
+    return secret if scheme.lower() == "bearer" else None
 
 
 def authorize(state: State, secret: str | None, scope: Scope) -> Token:

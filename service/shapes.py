@@ -14,9 +14,11 @@ from starlette.responses import Response
 from solver import __version__
 from solver.contract import Solver
 from store.canonical import canonical
+from store.errors import TooUncertain
 from store.lookup import ShapeTable
 
-from . import problems, vocabulary
+from . import exact, problems, vocabulary
+from .errors import OutsideRanges
 from .formats import FORMATS, About, Format, negotiate
 from .live import LiveTables
 from .query import ShapeQuery, Words, parse
@@ -36,14 +38,17 @@ _CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" els
     response_class=Response,
     responses={
         200: {"description": "The shape", "content": _CONTENT},
+        303: exact.RESPONSE,
         304: {"description": "The shape that the asker has is the current one"},
-        **problems.responses(404, 406, 413, 414, 422, 500, 503),
+        **problems.responses(401, 403, 404, 406, 409, 413, 414, 422, 429, 500, 503, 507),
     },
 )
 def shape(request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Response:
     """Interpolate the table at a point of its axes and a stage.
 
-    Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`.
+    Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Every answer
+    says what error to expect (`expected_error`, by measure) and whether it lies between the runs (`inside`);
+    `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table.
     """
     settings: Settings = request.app.state.settings
     tables: LiveTables = request.app.state.tables
@@ -54,6 +59,26 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
     table = tables.get(name)
     words = _words(known, table, settings.max_resolution)
     query = parse(given.multi_items(), words)
+    try:
+        if query.outside:
+            raise OutsideRanges.of(query.outside)
+        return _answer(request, known, name, table, words, query, chosen)
+    except (OutsideRanges, TooUncertain) as error:
+        if not query.exact:
+            raise exact.offered(error) from None
+        return exact.redirect(request, known, table, query, chosen)
+
+
+def _answer(
+    request: Request, solver: Solver, name: str, table: ShapeTable, words: Words, query: ShapeQuery, chosen: Format
+) -> Response:
+    """Return the shape, or that the asker has it already.
+
+    Raises:
+        TooUncertain: it would be worse than the query allows.
+
+    """
+    settings: Settings = request.app.state.settings
     resolution = query.resolution or min(table.resolution, settings.max_resolution)
     tag = _tag(chosen, name, table.digest, query, resolution)
     headers = {
@@ -65,10 +90,17 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
         return Response(status_code=304, headers=headers)
 
     begin = time.perf_counter()
-    found = table.at(query.point, query.stage, resolution=resolution, fields=chosen.fields)
+    found = table.at(
+        query.point,
+        query.stage,
+        resolution=resolution,
+        fields=chosen.fields,
+        method=query.method,
+        max_error=query.max_error,
+    )
     looked = time.perf_counter()
     about = About(
-        solver=solver,
+        solver=solver.name,
         table=name,
         fixed=words.fixed,
         stage_symbol=words.stage,
@@ -80,7 +112,7 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
     encoded = time.perf_counter()
     headers["Server-Timing"] = f"lookup;dur={1e3 * (looked - begin):.3f}, encode;dur={1e3 * (encoded - looked):.3f}"
     if chosen.name != "json":
-        headers["Content-Disposition"] = f'attachment; filename="{_filename(solver, query, words.stage, chosen)}"'
+        headers["Content-Disposition"] = f'attachment; filename="{_filename(solver.name, query, words.stage, chosen)}"'
     return Response(body, headers=headers, media_type=chosen.media_type)
 
 
@@ -102,6 +134,7 @@ def _words(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
 def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int) -> str:
     """Return the entity tag; JSON carries timings, so its bytes differ and its tag is a weak one."""
     words = [__version__, chosen.name, name, digest, query.point, query.stage, resolution]
+    words += [query.method, query.max_error]
     text = hashlib.sha256(canonical(words)).hexdigest()[:32]
     return f'W/"{text}"' if chosen.name == "json" else f'"{text}"'
 

@@ -29,7 +29,7 @@ from .methods.weights import Samples as Points
 from .samples import Samples
 from .store import Store
 
-__all__ = ["CONVERGENCE", "DIMS", "Written", "digest", "left_out", "map_spectra", "open", "write"]
+__all__ = ["CONVERGENCE", "DIMS", "Judged", "Written", "digest", "judged", "left_out", "map_spectra", "open", "write"]
 
 DIMS = ("sample", "stage", "component", "m", "k", "part")
 
@@ -225,6 +225,33 @@ def open(path: Path) -> xr.Dataset:
         raise
     except Exception as error:  # HDF5 reports damage as whatever it stumbles over
         raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
+
+
+class Judged(NamedTuple):
+    """What a generation says of its own trust: the method whose errors it holds, and how alike neighbours are.
+
+    `neighbour_correlation` has one entry per stored stage. Both are None where they were not stored.
+    """
+
+    method: str | None
+    neighbour_correlation: tuple[float, ...] | None
+
+
+def judged(path: Path) -> Judged:
+    """Return what a generation file says of its trust, without reading its spectra.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    with open(path) as opened:
+        try:
+            found, likeness = left_out(opened), None
+            if "neighbour_correlation" in opened:
+                likeness = tuple(opened["neighbour_correlation"].values.tolist())
+        except Exception as error:  # as above
+            raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
+    return Judged(found[1] if found else None, likeness)
 
 
 def map_spectra(path: Path) -> NDArray[Any]:

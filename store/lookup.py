@@ -223,7 +223,7 @@ class ShapeTable:
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
         if max_error is not None:
-            trust.refuse(expected, max_error, inside)
+            trust.refuse(expected, max_error, inside, self._trust.method if self._trust else None)
         fruit = self.fruit(values) if "position" in fields else None
         position = displacement = poles = None
         if fields:

@@ -94,8 +94,12 @@ class Trust:
         return dict(zip(Measures._fields, (share * whole).tolist(), strict=True))
 
 
-def refuse(expected: Mapping[str, float] | None, limit: float | Mapping[str, float], inside: bool) -> None:
+def refuse(
+    expected: Mapping[str, float] | None, limit: float | Mapping[str, float], inside: bool, known: str | None
+) -> None:
     """Refuse an answer that is worse than asked for; a number limits the error of the roughness.
+
+    `known` is the method whose errors the table holds, if it holds any.
 
     Raises:
         TooUncertain: an expected error is above its limit, or nobody knows it.
@@ -107,9 +111,14 @@ def refuse(expected: Mapping[str, float] | None, limit: float | Mapping[str, flo
         if name not in Measures._fields or not most >= 0:
             raise OutsideTable(f"max_error {name} = {most}.", f"Limit any of {', '.join(Measures._fields)}, from 0 on.")
         if expected is None:
+            if known is None:
+                raise TooUncertain(
+                    "this table does not say how far it errs: it holds one result, or no errors were stored with it.",
+                    "Rebuild the table (`wizen table build`) from two results or more, or ask without max_error.",
+                )
             raise TooUncertain(
-                "this table does not say how far this method errs.",
-                "Build it again, take its default method, or ask without max_error.",
+                f"this table does not say how far methods other than {known} err.",
+                f"Take the method {known}, or ask without max_error.",
             )
         if expected[name] > most:
             where = "" if inside else " The query lies outside the hull of the samples."

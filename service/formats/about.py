@@ -46,5 +46,8 @@ def extras(shape: Shape, about: About) -> dict[str, Any]:
         "exact": shape.exact,
         "converged": shape.converged,
         "nearest": shape.nearest,
+        "inside": shape.inside,
+        "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
+        "method": shape.method,
         "units": {"length": LENGTH_UNIT, **about.units},
     }

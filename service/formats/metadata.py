@@ -19,7 +19,8 @@ __all__ = ["encode"]
 def encode(shape: Shape, about: About) -> bytes:
     """Return descriptors with units, the results that took part with their weights, and where the files are.
 
-    `nearest` is the scaled distance to the nearest stored result, `exact` that this is a stored result itself.
+    `nearest` is the scaled distance to the nearest stored result, `exact` that this is a stored result itself, `inside`
+    that stored results surround it, `expected_error` how far it may be off by measure, null where nobody knows.
     """
     described = {
         name: {

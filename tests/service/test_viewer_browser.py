@@ -26,6 +26,10 @@ from numpy.typing import NDArray
 
 from service.page import BUILT
 from solver import __version__
+from store.store import Store
+
+from ..store.conftest import fill
+from .conftest import AXES, SHAPE, build
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -159,6 +163,38 @@ def test_looks_and_skins(visit: Visit, address: str) -> None:
     assert visit.complaints == []
 
 
+def test_the_method_can_be_chosen(visit: Visit, address: str) -> None:
+    visit.page.goto(f"{address}/#s=0.25&te=0.035&gamma=20")
+    visit.shown("shown.n >= 192")
+    assert visit.page.get_by_role("button", name="Default").get_attribute("aria-pressed") == "true"
+    before = visit.picture()
+    visit.page.get_by_role("button", name="Paper's IDW").click()
+    visit.page.wait_for_function("() => document.getElementById('view').dataset.method === 'idw'")
+    visit.shown("shown.n >= 192")
+    assert visit.picture() != before
+    assert "idw" in visit.page.locator("#trust").inner_text()
+    assert "method=idw" in visit.page.url
+    assert "method=idw" in str(visit.page.get_by_role("link", name="Download GLB").get_attribute("href"))
+    assert visit.complaints == []
+
+
+def test_the_badge_tells_the_error_to_expect(browser: Browser, tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store", create=True)
+    fill(store, **AXES)
+    build(store)
+    with serving(tmp_path, "--store", str(store.root)) as address:
+        visit = Visit(browser)
+        visit.page.goto(f"{address}/#s=0.25&te=0.03&gamma=7")
+        visit.shown("shown.n >= 192")
+        query = {"te": 0.03, "gamma": 7, "s": 0.25}
+        said = httpx.get(f"{address}{SHAPE}", params=query).json()["expected_error"]
+        assert re.search(r"expected error ([\d.]+) %", visit.page.locator(".badge").inner_text())
+        shown = visit.page.locator("#trust").inner_text()
+        assert f"{float(format(said['dB'], '.2g')):g} dB" in shown
+        assert re.search(r"Between runs\s+yes", shown)
+        visit.page.close()
+
+
 def test_the_view_turns_with_the_keys(visit: Visit, address: str) -> None:
     visit.page.goto(address)
     visit.shown("shown.n >= 192")
@@ -213,12 +249,13 @@ def test_errors_of_the_service_are_shown_with_advice_until_they_pass(browser: Br
         visit.page.close()
 
 
-def test_a_service_that_allows_little_detail_is_asked_for_less(browser: Browser, tmp_path: Path) -> None:
+def test_a_service_that_allows_little_detail_is_asked_for_no_more(browser: Browser, tmp_path: Path) -> None:
     with serving(tmp_path, WIZEN_MAX_RESOLUTION="100") as address:
         visit = Visit(browser)
         visit.page.goto(address)
-        assert visit.shown("shown.n == 96")["n"] == 96
-        assert visit.page.get_by_role("alert").is_hidden()
+        assert visit.shown("shown.n >= 100")["n"] == 100
+        assert all("resolution=192" not in url for url in visit.asked)
+        assert visit.complaints == []
         visit.page.close()
 
 

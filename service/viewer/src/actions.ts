@@ -1,13 +1,7 @@
 // What people take away: a file, a command line, a link.
 
-import { address, type Point, type Table } from "./api";
+import { address, type Asked } from "./api";
 import { button, el } from "./dom";
-
-export interface Now {
-  table: Table;
-  point: Point;
-  resolution: number;
-}
 
 export class Actions {
   private readonly glb = el("a", { class: "button primary", download: "" }, "Download GLB");
@@ -15,7 +9,7 @@ export class Actions {
 
   constructor(
     root: HTMLElement,
-    private readonly now: () => Now,
+    private readonly now: () => Asked,
   ) {
     root.replaceChildren(
       this.glb,
@@ -30,8 +24,7 @@ export class Actions {
   }
 
   private url(format: string): string {
-    const { table, point, resolution } = this.now();
-    return new URL(address(table, point, resolution, format), document.baseURI).href;
+    return new URL(address(this.now(), format), document.baseURI).href;
   }
 
   private curl(): string {

@@ -13,6 +13,9 @@ export interface Table {
   digest: string;
   samples: number;
   resolution: number;
+  /** The finest that the service computes of it. */
+  max_resolution: number;
+  methods: { default: string; known: string[]; judged: string | null };
   axes: Record<string, Axis>;
   fixed: Record<string, unknown>;
   stage: { symbol: string; long_name: string; units: string; lowest: number; highest: number; stored: number[] };
@@ -32,7 +35,7 @@ export interface Described {
   long_name: string;
 }
 
-/** What an answer says about itself. The last ones are there once the service offers them. */
+/** What an answer says about itself; an error that nobody knows is null. */
 export interface About {
   exact: boolean;
   converged: boolean;
@@ -42,8 +45,9 @@ export interface About {
   weights: Record<string, number>;
   descriptors: Record<string, Described>;
   lattice: { colatitude: number; azimuth: number };
-  inside?: boolean;
-  expected_error?: number | Record<string, unknown> | null;
+  inside: boolean;
+  expected_error: Record<string, number> | null;
+  method: string;
 }
 
 export interface Answer {
@@ -88,22 +92,31 @@ export async function solver(name: string): Promise<Solver> {
   return (await get(`v1/solvers/${encodeURIComponent(name)}`)).json();
 }
 
+/** What is asked: a point on a table's axes with the stage, how finely, and by which method of look-up. */
+export interface Asked {
+  table: Table;
+  point: Point;
+  resolution: number;
+  method: string;
+}
+
 /** The address of a shape relative to the page; numbers are rounded as far as nobody can see it. */
-export function address(table: Table, point: Point, resolution: number, format: string): string {
+export function address({ table, point, resolution, method }: Asked, format: string): string {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries(point)) query.set(name, String(Number(value.toPrecision(5))));
   query.set("resolution", String(resolution));
   query.set("format", format);
   query.set("table", table.name);
+  if (method !== table.methods.default) query.set("method", method);
   return `v1/shapes/${encodeURIComponent(table.solver)}?${query}`;
 }
 
 const MAGIC = 0x50_5a_49_57; // "WIZP", read as a little-endian number
 const HEAD = 16;
 
-export async function shape(table: Table, point: Point, resolution: number, signal?: AbortSignal): Promise<Answer> {
+export async function shape(asked: Asked, signal?: AbortSignal): Promise<Answer> {
   const begin = performance.now();
-  const response = await get(address(table, point, resolution, "points"), signal);
+  const response = await get(address(asked, "points"), signal);
   const buffer = await response.arrayBuffer();
   const head = new DataView(buffer);
   if (buffer.byteLength < HEAD || head.getUint32(0, true) !== MAGIC || head.getUint32(4, true) !== 1) {

@@ -1,7 +1,7 @@
 // The page: catalogue -> sliders -> questions -> mesh. Each part is its own module and knows nothing of the others.
 
 import { Actions } from "./actions";
-import { Problem, shape, solver as askSolver, tables as askTables, type Answer, type Point, type Table } from "./api";
+import { Problem, shape, solver as askSolver, tables as askTables, type Answer, type Asked, type Point, type Table } from "./api";
 import { Choice, Slider } from "./controls";
 import { Detail } from "./detail";
 import { button, byId, el } from "./dom";
@@ -16,12 +16,12 @@ import { showFacts, showTrust } from "./trust";
 const REST = 160; // [ms] without a change after which the finest shape is asked for
 const AGAIN = 3000; // [ms] until a silent service is asked again
 
-interface Question {
-  table: Table;
-  point: Point;
-  resolution: number;
+interface Question extends Asked {
   moving: boolean;
 }
+
+/** Methods of look-up worth a button, in words; a table's default goes before them. */
+const METHODS: Record<string, string> = { idw: "Paper's IDW", linear: "Linear", nearest: "Nearest run" };
 
 const canvas = byId<HTMLCanvasElement>("view");
 const problem = byId("problem");
@@ -61,12 +61,15 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
 
   const fruit = new Fruit();
   const studio = new Studio(canvas, fruit);
-  const detail = new Detail();
-  const actions = new Actions(byId("actions"), () => ({ table, point, resolution: detail.finest }));
+  const detail = new Detail(table.max_resolution);
+  const named: Record<string, string> = { Default: table.methods.default };
+  for (const name of table.methods.known) if (name in METHODS) named[METHODS[name]] ??= name;
+  let method = table.methods.known.includes(wanted.method) ? wanted.method : table.methods.default;
+  const actions = new Actions(byId("actions"), () => ({ table, point, resolution: detail.finest, method }));
   let resting = 0;
 
   const questions = new Latest<Question, Answer>(
-    (q) => shape(q.table, q.point, q.resolution),
+    (q) => shape(q),
     (answer, q, last) => {
       problem.hidden = true;
       if (q.moving) detail.learn(q.resolution, answer.milliseconds);
@@ -77,19 +80,16 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
       showTrust(byId("trust"), answer.about, speed);
       showFacts(byId("facts").querySelector("div") as HTMLElement, answer.about);
       canvas.dataset.shown = JSON.stringify({ n: answer.n, ...q.point });
+      canvas.dataset.method = answer.about.method;
       if (last && q.moving) rest();
     },
-    (error, q) => {
-      if (error instanceof Problem && error.detail.startsWith("resolution:") && detail.refuse(q.resolution)) {
-        rest();
-        return;
-      }
+    (error) => {
       complain(error);
       setTimeout(rest, AGAIN);
     },
   );
   const ask = (moving: boolean): void => {
-    questions.put({ table, point: { ...point }, resolution: detail.of(moving), moving });
+    questions.put({ table, point: { ...point }, resolution: detail.of(moving), method, moving });
   };
   const rest = (): void => {
     clearTimeout(resting);
@@ -99,7 +99,12 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
     ask(true);
     rest();
     actions.refresh();
-    toHash(table.name, skin, point);
+    keep();
+  };
+  const keep = (): void => {
+    const words = new URLSearchParams({ table: table.name, skin });
+    if (method !== table.methods.default) words.set("method", method);
+    toHash(words, point);
   };
 
   const sliders = axes.map(
@@ -149,7 +154,7 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
       skins.mark(name);
       fruit.wear(look.skins[skin], shareOf(stage, point[stage.name]));
       studio.invalidate();
-      toHash(table.name, skin, point);
+      keep();
     },
     (name, made) => {
       const swatch = el("i", { class: "swatch", "aria-hidden": "true" });
@@ -159,6 +164,18 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
     },
   );
   skins.mark(skin);
+  const wayOf = (name: string): string | undefined => Object.keys(named).find((word) => named[word] === name);
+  const ways = new Choice(
+    "Look-up",
+    Object.keys(named),
+    (word) => {
+      method = named[word];
+      ways.mark(word);
+      changed();
+    },
+    (word, made) => (made.title = named[word]),
+  );
+  ways.mark(wayOf(method));
 
   byId("subject").textContent = `${solver.title} · ${table.samples} runs`;
   byId("controls").replaceChildren(
@@ -168,6 +185,7 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
     ...sliders.slice(1).map((slider) => slider.root),
     places.root,
     skins.root,
+    ways.root,
   );
   set({});
 }

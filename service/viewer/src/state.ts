@@ -76,8 +76,7 @@ export function fromHash(): Record<string, string> {
   return Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
 }
 
-export function toHash(table: string, skin: string, point: Point): void {
-  const words = new URLSearchParams({ table, skin });
+export function toHash(words: URLSearchParams, point: Point): void {
   for (const [name, value] of Object.entries(point)) words.set(name, String(Number(value.toPrecision(4))));
   history.replaceState(null, "", `#${words}`);
 }

@@ -1,4 +1,4 @@
-// How far to trust a shape: what its answer says of itself, in words. What an answer does not say is not shown.
+// How far to trust a shape: what its answer says of itself, in words. What nobody knows is not shown.
 
 import type { About } from "./api";
 import { digits, el } from "./dom";
@@ -10,7 +10,7 @@ interface Verdict {
 }
 
 function verdict(about: About): Verdict {
-  if (about.inside === false) {
+  if (!about.inside) {
     return { level: "poor", text: "outside the runs", why: "No runs surround this point: the shape is a guess." };
   }
   if (about.exact && about.stage.value === 0) {
@@ -21,34 +21,37 @@ function verdict(about: About): Verdict {
       ? { level: "good", text: "a stored run", why: "Computed, not interpolated." }
       : { level: "fair", text: "a stored run, still settling", why: "Computed, but a stage had not come to rest." };
   }
-  const error = leading(about.expected_error);
-  if (error !== undefined) {
+  if (about.expected_error) {
+    const error = about.expected_error.rgh;
     const level = error < 0.05 ? "good" : error < 0.2 ? "fair" : "poor";
-    return { level, text: `expected error ${percent(error)}`, why: "Measured by leaving runs out of the table." };
+    const why = "Of the roughness, measured by leaving runs out of the table: how deep the wrinkles are, not where.";
+    return { level, text: `expected error ${percent(error)}`, why };
   }
   const level = about.nearest > 0.5 ? "poor" : "fair";
   const text = level === "poor" ? "interpolated, far from any run" : "interpolated, near a run";
   return { level, text, why: "Between stored runs; 0 is on a run, 1 a whole range away from it." };
 }
 
-/** The figure that stands for an expected error: itself, or the largest of several. */
-function leading(error: About["expected_error"]): number | undefined {
-  if (typeof error === "number") return error;
-  const numbers = Object.values(error ?? {}).filter((value): value is number => typeof value === "number");
-  return numbers.length ? Math.max(...numbers) : undefined;
-}
+const short = (value: number): string => digits(Number(value.toPrecision(2)));
+const percent = (share: number): string => `${short(100 * share)} %`;
 
-const percent = (share: number): string => `${digits(Number((100 * share).toPrecision(2)))} %`;
+/** Errors by measure, in words and their own units; docs/service.md says what they are. */
+const MEASURES: Record<string, [string, (value: number) => string]> = {
+  rgh: ["Roughness, off by", percent],
+  dB: ["Wave powers, off by", (value) => `${short(value)} dB`],
+  W1: ["Slopes, off by", (value) => `${short(value)}°`],
+  corr: ["Pattern, off by", percent],
+};
 
 export function showTrust(root: HTMLElement, about: About, speed: string): void {
   const { level, text, why } = verdict(about);
   const rows: [string, string | Node][] = [["Nearest run", digits(about.nearest)]];
-  if (about.inside !== undefined) rows.push(["Between runs", about.inside ? "yes" : "no"]);
-  if (typeof about.expected_error === "object" && about.expected_error !== null) {
-    for (const [name, value] of Object.entries(about.expected_error)) {
-      if (typeof value === "number") rows.push([`Error, ${name.replaceAll("_", " ")}`, percent(value)]);
-    }
+  rows.push(["Between runs", about.inside ? "yes" : "no"]);
+  for (const [name, [word, say]] of Object.entries(MEASURES)) {
+    const value = about.expected_error?.[name];
+    if (value !== undefined) rows.push([word, say(value)]);
   }
+  rows.push(["Looked up by", about.method]);
   rows.push(["Settled", about.converged ? "yes" : "not every stage it is made of"]);
   rows.push(["Made of", bars(about.weights)]);
   rows.push(["Answered in", speed]);
