@@ -61,6 +61,7 @@ def at_random(store: Store, plan: Plan, count: int, seed: int) -> None:
     tables.rebuild(store, more=[job.key for job in more.jobs()])
 
 
+@pytest.mark.slow
 def test_the_error_falls_and_faster_than_at_random(site: None, tmp_path: Path) -> None:
     held = held_out(tmp_path / "held")
     store, plan = made(tmp_path / "refined", SCATTERED)
