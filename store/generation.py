@@ -29,7 +29,19 @@ from .methods.weights import Samples as Points
 from .samples import Samples
 from .store import Store
 
-__all__ = ["CONVERGENCE", "DIMS", "Judged", "Written", "digest", "judged", "left_out", "map_spectra", "open", "write"]
+__all__ = [
+    "CONVERGENCE",
+    "DIMS",
+    "Judged",
+    "Written",
+    "digest",
+    "judged",
+    "left_out",
+    "map_spectra",
+    "open",
+    "spectra_of",
+    "write",
+]
 
 DIMS = ("sample", "stage", "component", "m", "k", "part")
 
@@ -80,7 +92,7 @@ def write(
         target.attrs["long_name"] = "double-Fourier-sphere amplitudes of the displacement, see store/spectra.py"
         for i, key in enumerate(samples.keys):
             result = store.get(key)
-            block = _spectra(result, key, samples, band).astype(dtype)
+            block = spectra_of(result, key, samples.need, band).astype(dtype)
             total.update(block.data)
             target[i] = block
             rows.append(_rows(result))
@@ -95,9 +107,14 @@ def write(
     return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
 
 
-def _spectra(result: xr.Dataset, key: str, samples: Samples, band: int) -> NDArray[Any]:
-    """Return (stage, component, m, k, part) in float64 of a result."""
-    need, n = samples.need, samples.need["resolution"]
+def spectra_of(result: xr.Dataset, key: str, need: Mapping[str, Any], band: int) -> NDArray[Any]:
+    """Return (stage, component, m, k, part) in float64 of a result.
+
+    Raises:
+        MixedSamples: it is not what its need says.
+
+    """
+    n = need["resolution"]
     stages = result["stage"].values
     if stages.shape != (len(need["stages"]),) or not np.allclose(stages, need["stages"], rtol=0, atol=1e-9):
         raise MixedSamples(

@@ -115,7 +115,7 @@ def read_manifest(tables: Path, name: str) -> TableInfo:
         hint = f"Known: {', '.join(known)}." if known else "Build one first."
         raise UnknownTable(f"there is no table {name!r}.", hint) from None
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise CorruptTable(f"{path} is damaged ({error}).", "Rebuild the table from the shards.") from error
+        raise CorruptTable(f"{path} is damaged ({error}).", "Build the table again from the shards.") from error
 
 
 def _checksum(values: Mapping[str, Any]) -> str:

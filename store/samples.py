@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solver.fruit import Fruit
 
 from .canonical import canonical
-from .errors import EmptyTable, MixedSamples
+from .errors import EmptyTable, MixedSamples, UnknownJob
 from .jobs import Job
 from .store import Store
 
@@ -59,16 +59,25 @@ class Samples(NamedTuple):
 
 
 def collect(
-    store: Store, solver: str, axes: Axes | None, plan: str | None, quality: str | None, version: str | None
+    store: Store,
+    solver: str,
+    axes: Axes | None,
+    plan: str | None = None,
+    quality: str | None = None,
+    version: str | None = None,
+    keys: Collection[str] | None = None,
 ) -> Samples:
-    """Find the results to tabulate: done, whole surfaces with a displacement; None takes any plan, quality, version.
+    """Find the results to tabulate: done, whole surfaces with a displacement.
+
+    None takes any plan, quality, version; `keys` names the results instead, and then all of them must be there.
 
     Raises:
         EmptyTable: there is none.
         MixedSamples: they differ in more than the axes.
+        UnknownJob: one of `keys` is not there.
 
     """
-    jobs = _done(store, solver, plan)
+    jobs = _named(store, solver, keys) if keys is not None else _done(store, solver, plan)
     if not jobs and plan is None:
         store.ledger.rebuild(store)
         jobs = _done(store, solver, plan)
@@ -113,6 +122,19 @@ def collect(
 
 def _done(store: Store, solver: str, plan: str | None) -> list[Job]:
     return [job for job in store.ledger.jobs("done", plan) if job.solver == solver]
+
+
+def _named(store: Store, solver: str, keys: Collection[str]) -> list[Job]:
+    missing = set(keys) - {job.key for job in _done(store, solver, None)}
+    if missing:
+        store.ledger.rebuild(store)
+        missing = set(keys) - {job.key for job in _done(store, solver, None)}
+    if missing:
+        raise UnknownJob(
+            f"{len(missing)} of the table's {len(keys)} results are gone, {min(missing)} first.",
+            "Run the sweep again, or build the table from what is left.",
+        )
+    return [job for job in _done(store, solver, None) if job.key in keys]
 
 
 def _fits(job: Job, quality: str | None, version: str | None) -> bool:

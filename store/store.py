@@ -88,6 +88,15 @@ class Store:
         """Return whether a result is stored under `key`. Whether it reads well is for `get` to find out."""
         return is_key(key) and self.shard_path(key).is_file()
 
+    def find(self, key: str) -> xr.Dataset | None:
+        """Return the result of `key` if there is one: the `library` of runs that start from others.
+
+        Raises:
+            CorruptShard: it is damaged, or belongs to another key.
+
+        """
+        return self.get(key) if self.has(key) else None
+
     def put(self, key: str, dataset: xr.Dataset) -> str:
         """Store a result and return its content digest. One that is there already, undamaged, is kept.
 

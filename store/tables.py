@@ -9,7 +9,7 @@ even when it is pruned.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
@@ -17,12 +17,15 @@ from typing import Literal
 import xarray as xr
 
 from . import generation, seal
-from .errors import CorruptShard, CorruptTable, EmptyTable, UnknownJob
+from .errors import EmptyTable
 from .manifest import TableInfo, directory, read_manifest, write_manifest
 from .samples import Axes, collect
 from .store import Store
 
-__all__ = ["TableInfo", "build", "info", "open", "path_of", "prune", "verify"]
+__all__ = ["Precision", "TableInfo", "build", "info", "open", "path_of", "prune", "rebuild"]
+
+#: How a spectrum's numbers are stored.
+Precision = Literal["float32", "float64"]
 
 
 def build(
@@ -35,23 +38,26 @@ def build(
     plan: str | None = None,
     quality: str | None = None,
     version: str | None = None,
+    keys: Collection[str] | None = None,
     resolution: int | None = None,
-    dtype: Literal["float32", "float64"] = "float32",
+    dtype: Precision = "float32",
 ) -> TableInfo:
     """Build a table from the finished runs of `solver` and make it current.
 
-    `axes` is the solver's `Params.axes`, `units` the units of those axes (the fruit's have none); `resolution` cuts
-    the spectra to that band. The same results make the same digest, in whatever order they were stored.
+    `axes` is the solver's `Params.axes`, `units` the units of those axes (the fruit's have none); `keys` names the
+    results, if not all that fit are wanted; `resolution` cuts the spectra to that band, and so the lattice that holds
+    them. The same results make the same digest, in whatever order they were stored.
 
     Raises:
         EmptyTable: no finished run fits.
         MixedSamples: the runs differ in more than their axes.
+        UnknownJob: one of `keys` is not stored.
         CorruptShard: a run's result is damaged.
         StorageFull: the disk is full; the old generation stays current.
 
     """
     home = directory(store.tables_dir, name)
-    samples = collect(store, solver, axes, plan, quality, version)
+    samples = collect(store, solver, axes, plan, quality, version, keys)
     band = min(resolution or samples.need["resolution"], samples.need["resolution"])
     if band < 4:
         raise EmptyTable(f"a band of {band} waves holds no shape.", "Ask for a resolution of at least 4.")
@@ -81,6 +87,42 @@ def build(
     )
     write_manifest(store.tables_dir, table)
     return table
+
+
+def rebuild(
+    store: Store,
+    name: str = "default",
+    *,
+    units: Mapping[str, str] | None = None,
+    more: Collection[str] = (),
+    resolution: int | None = None,
+    dtype: Precision | None = None,
+) -> TableInfo:
+    """Write a table anew from the results that it was built of, and make it current; no run is repeated.
+
+    What is not said stays: `resolution` and `dtype` of the current generation, even where its file is damaged. `more`
+    names results to add. A `resolution` above that of the runs means theirs.
+
+    Raises:
+        UnknownTable: there is none of that name.
+        CorruptTable: its manifest is damaged, so that nobody knows what it was built of.
+        MixedSamples: the results to add differ from the others in more than their axes.
+        UnknownJob: a result is gone.
+        CorruptShard: a result is damaged.
+        StorageFull: the disk is full; the old generation stays current.
+
+    """
+    now = info(store, name)
+    return build(
+        store,
+        name,
+        now.solver,
+        axes=now.places,
+        units=units,
+        keys={*now.keys, *more},
+        resolution=resolution or now.resolution,
+        dtype=dtype or ("float64" if now.dtype == "float64" else "float32"),
+    )
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:
@@ -113,36 +155,6 @@ def open(store: Store, name: str = "default") -> xr.Dataset:
 
     """
     return generation.open(path_of(store, info(store, name)))
-
-
-def verify(store: Store, name: str = "default") -> list[str]:
-    """Check a table to the last byte, and that it could be rebuilt; return what is wrong, one sentence each.
-
-    Raises:
-        UnknownTable: there is none of that name.
-
-    """
-    try:
-        table = info(store, name)
-        path = path_of(store, table)
-        if not path.is_file():
-            return [f"{path} is missing. Rebuild the table."]
-        if not seal.is_whole(path):
-            return [f"{path} is damaged. Rebuild the table."]
-        found = generation.digest(path)
-    except CorruptTable as error:
-        return [str(error)]
-    findings = []
-    if found != table.digest:
-        findings.append(f"{path} holds other values than the manifest says. Rebuild the table.")
-    for key in table.keys:
-        try:
-            store.get(key)
-        except UnknownJob:
-            findings.append(f"the result {key} is gone: the table could not be rebuilt without it.")
-        except CorruptShard as error:
-            findings.append(str(error))
-    return findings
 
 
 def prune(store: Store, name: str = "default") -> list[Path]:

@@ -13,7 +13,7 @@ import typer
 
 from solver import __version__
 
-from . import cli_onset, cli_queue, cli_tables
+from . import cli_onset, cli_queue, cli_refine, cli_tables
 from .console import Root, emit, grid, note
 from .options import As_json, Out, Preset, Quality, Seed, Set, Stages, StorePath, assignments, numbers
 
@@ -237,6 +237,7 @@ def status(store: StorePath, as_json: As_json = False) -> None:
     emit(document, as_json, show)
 
 
+cli_refine.add_to(app)
 cli_onset.add_to(app)
 cli_queue.add_to(app)
 cli_tables.add_to(app)

@@ -1,4 +1,4 @@
-"""The commands about tables: build, verify, info, score, map and query."""
+"""The commands about tables: build, info, score, map and query; `cli_tools` holds those that keep them."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from typing import Annotated, Any
 
 import typer
 
+from . import cli_tools
 from .console import emit, grid
 from .errors import InvalidOption
 from .options import As_json, Out, Quality, Set, Stages, StorePath, StoreToRead, TableName, assignments, numbers
 
 __all__ = ["add_to"]
 
-table_app = typer.Typer(no_args_is_help=True, help="Build, check and describe look-up tables.")
+table_app = typer.Typer(no_args_is_help=True, help="Build, keep, check, compare and describe look-up tables.")
 
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands of this module to the root command."""
+    cli_tools.add_to(table_app)
     app.add_typer(table_app, name="table")
     app.command("map")(draw_map)
     app.command()(query)
@@ -77,28 +79,6 @@ def info(store: StoreToRead = None, name: TableName = "default", as_json: As_jso
     opened = Store.open(store or starter.ROOT)
     found = tables.info(opened, name)
     _show_table(found, tables.path_of(opened, found), as_json)
-
-
-@table_app.command()
-def verify(store: StorePath, name: TableName = "default", as_json: As_json = False) -> None:
-    """Check a table to the last byte, and that it could be rebuilt. Exit code 1 if anything is wrong.
-
-    [bold]Example[/bold]
-
-    wizen table verify --store demo
-    """
-    from store import tables
-    from store.store import Store
-
-    findings = tables.verify(Store.open(store), name)
-
-    def show(console: Any) -> None:
-        for finding in findings or [f"table {name} is sound"]:
-            console.print(finding, markup=False)
-
-    emit({"table": name, "sound": not findings, "findings": findings}, as_json, show)
-    if findings:
-        raise typer.Exit(1)
 
 
 @table_app.command()

@@ -34,6 +34,9 @@ __all__ = ["MAX_SAMPLES", "Plan", "job", "units_of"]
 #: More samples than this are a typing error in a range, not a plan.
 MAX_SAMPLES = 100_000
 
+#: Points of a Sobol sequence that are tried for one possible sample, before the ranges are called wrong.
+_PATIENCE = 200
+
 #: Significant digits of a generated value: 0.02 in a list and 0.02 in a range must be one number and one key.
 _DIGITS = 12
 
@@ -84,8 +87,10 @@ class Plan:
             raise PlanError(error.message, error.advice) from None
         _check_names(written, solver)
         samples: dict[str, Params] = {}
-        skipped = repeated = 0
+        skipped = repeated = tried = 0
+        wanted = written.sampling.count if written.sampling.skip_invalid else None
         for values in _combinations(written):
+            tried += 1
             try:
                 params = solver.parse({**written.set, **values}, written.preset)
             except InvalidGeometry as error:
@@ -98,6 +103,13 @@ class Plan:
                 raise PlanError(f"{where}{error.message}", error.advice) from None
             else:
                 repeated += samples.setdefault(params.model_dump_json(), params) is not params
+            if len(samples) == wanted:
+                break
+        if wanted is not None and 0 < len(samples) < wanted:
+            raise PlanError(
+                f"of {tried} points only {len(samples)} are possible, fewer than the {wanted} asked for.",
+                "Change the ranges under [axes], or ask for fewer.",
+            )
         if not samples:
             raise PlanError(f"none of the {skipped} combinations is possible.", "Change the ranges under [axes].")
         name = written.name or name
@@ -223,12 +235,16 @@ def _sobol(written: PlanFile) -> Iterator[Mapping[str, Any]]:
     assert count is not None  # checked with the grammar
     _limit(count)
     unit = qmc.Sobol(len(written.axes), scramble=True, rng=written.sampling.seed)
-    with warnings.catch_warnings():
-        # any count is allowed: the first points of the sequence stay the same, so that a plan can grow
-        warnings.filterwarnings("ignore", "The balance properties of Sobol", UserWarning)
-        points = unit.random(count)
-    for point in points:
-        yield {name: _scaled(axis, u) for (name, axis), u in zip(written.axes.items(), point, strict=True)}
+    # impossible points are passed over and the sequence goes on, so that the plan has as many samples as it asks for
+    left = _PATIENCE * count if written.sampling.skip_invalid else count
+    while left > 0:
+        with warnings.catch_warnings():
+            # any count is allowed: the first points of the sequence stay the same, so that a plan can grow
+            warnings.filterwarnings("ignore", "The balance properties of Sobol", UserWarning)
+            points = unit.random(min(count, left))
+        left -= len(points)
+        for point in points:
+            yield {name: _scaled(axis, u) for (name, axis), u in zip(written.axes.items(), point, strict=True)}
 
 
 def _scaled(axis: Axis, u: float) -> float:

@@ -53,7 +53,10 @@ class Sampling(_Strict):
     kind: Literal["grid", "sobol", "list"] = Field("grid", description="grid, sobol or list")
     count: int | None = Field(None, ge=1, description="Number of Sobol samples (a power of 2 fills the space best)")
     seed: int = Field(0, ge=0, description="Seed of the Sobol scrambling; more samples keep the earlier ones")
-    skip_invalid: bool = Field(False, description="Leave out impossible combinations instead of refusing the plan")
+    skip_invalid: bool = Field(
+        False,
+        description="Pass over impossible combinations instead of refusing the plan; Sobol goes on to its count",
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -136,9 +136,7 @@ def _solver(job: JobSpec) -> Solver:
 
 def _solve(task: Task, heart: _Heart, store: Store) -> xr.Dataset:
     solver = _solver(task.job)
-    context = Context(
-        observe=heart.note, cancelled=heart.lost.is_set, library=lambda key: store.get(key) if store.has(key) else None
-    )
+    context = Context(observe=heart.note, cancelled=heart.lost.is_set, library=store.find)
     return solver.solve(solver.parse(task.job.params), Need.parse(task.job.need), context)
 
 

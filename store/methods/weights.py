@@ -46,6 +46,11 @@ class Samples:
         """Return a point's place (axes,) among `points`: logarithms scaled to 0..1."""
         return (self._log(query) - self._low) / self._span
 
+    def unscale(self, point: Array) -> Array:
+        """Return the place (axes,) of which `scale` makes `point`."""
+        logs = self._low + point * self._span
+        return np.where(self._logarithmic, np.exp(np.where(self._logarithmic, logs, 0.0)), logs)
+
     def weigh(self, weighting: str, query: Array, m: int, eta: float) -> Weighted:
         """Weigh the samples for a point (axes,); `m` and `eta` only matter to `idw` and `scattered`."""
         if weighting == "idw":

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from solver.dehydration import DehydrationParams
-from store import tables
+from store import audit, tables
 from store.errors import CorruptShard, CorruptTable, EmptyTable, MixedSamples, StorageFull, UnknownTable
 from store.lookup import ShapeTable
 from store.samples import default_axes
@@ -52,7 +52,7 @@ def test_a_table_explains_itself(filled: Store) -> None:
         assert {"converged", "residual", "buckle_count"} <= set(opened.data_vars)
         assert "seconds" not in opened
         assert sorted(zip(opened.te.values, opened.gamma.values, strict=True))[0] == (0.03, 10.0)
-    assert tables.verify(store) == []
+    assert audit.verify(store) == []
 
 
 def test_the_digest_is_of_the_content(tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_every_flipped_byte_is_found(store: Store) -> None:
         path.write_bytes(data)
         with pytest.raises(CorruptTable, match="Rebuild"):
             ShapeTable.open(store)
-        assert len(tables.verify(store)) == 1
+        assert len(audit.verify(store)) == 1
     manifest = path.with_name("current.json")
     text = manifest.read_bytes()
     for place in range(0, len(text), 61):
@@ -208,11 +208,11 @@ def test_verify_names_what_is_missing(store: Store) -> None:
     keys = fill(store, te=[0.03, 0.04])
     info = tables.build(store, axes=AXES)
     store.shard_path(keys[0]).unlink()
-    (finding,) = tables.verify(store)
-    assert keys[0] in finding
+    (finding,) = audit.verify(store)
+    assert (finding.part, finding.name) == ("result", keys[0])
     tables.path_of(store, info).unlink()
-    (finding,) = tables.verify(store)
-    assert "missing" in finding
+    finding, _ = audit.verify(store)
+    assert "missing" in finding.message
     with pytest.raises(CorruptTable, match="missing"):
         ShapeTable.open(store)
 
@@ -242,7 +242,7 @@ def test_no_space_is_refused_before_work(store: Store, monkeypatch: pytest.Monke
 
 FULL = """
 import shutil, sys
-from store import tables
+from store import audit, tables
 from store.errors import StorageFull
 from store.store import Store
 shutil.disk_usage = lambda path: shutil._ntuple_diskusage(10**9, 0, 10**9)  # others fill the disk while we write

@@ -1,4 +1,4 @@
-"""The extra solver `shrinking`, installed the way any third solver is: a module and an entry point on the path."""
+"""The solvers `shrinking` and `ridged`, installed as any third solver is: modules and entry points on the path."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     info = tmp_path_factory.mktemp("site") / "shrinking-1.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: shrinking\nVersion: 1\n")
-    (info / "entry_points.txt").write_text("[wizen.solvers]\nshrinking = shrinking:SOLVER\n")
+    (info / "entry_points.txt").write_text("[wizen.solvers]\nshrinking = shrinking:SOLVER\nridged = ridged:SOLVER\n")
     with pytest.MonkeyPatch.context() as patch:
         for path in (HERE, info.parent):
             patch.syspath_prepend(path)

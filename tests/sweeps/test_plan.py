@@ -113,6 +113,25 @@ def test_impossible_samples_are_skipped_only_when_told() -> None:
         plan(axes={"rs1": [0.99]}, sampling={"skip_invalid": True})
 
 
+@pytest.mark.parametrize(("low", "high", "waste"), [(0.6, 1.2, 0.7), (0.7, 1.1, 0.2)])
+def test_no_sample_of_free_radii_is_wasted(low: float, high: float, waste: float) -> None:
+    axes = {f"r{i}": {"from": low, "to": high} for i in range(2, 8)}
+    sampling = {"kind": "sobol", "count": 12, "skip_invalid": True}
+    read = plan(axes=axes, sampling=sampling)
+    assert len(read.samples) == 12
+    # this share of the points was lost before, or refused the plan
+    assert read.skipped / (read.skipped + 12) > waste
+    assert plan(axes=axes, sampling={**sampling, "count": 5}).samples == read.samples[:5]
+    with pytest.raises(PlanError, match="skip_invalid"):
+        plan(axes=axes, sampling={**sampling, "skip_invalid": False})
+
+
+def test_radii_of_which_none_is_possible() -> None:
+    axes = {"r2": [0.2, 0.25], "r4": [1.9, 2.0]}
+    with pytest.raises(PlanError, match="none of the 200"):
+        plan(axes=axes, sampling={"kind": "sobol", "count": 1, "skip_invalid": True})
+
+
 def test_a_value_out_of_range_is_never_skipped() -> None:
     with pytest.raises(PlanError, match=r"te = 0\.9"):
         plan(axes={"te": [0.02, 0.9]}, sampling={"skip_invalid": True})

@@ -1,0 +1,177 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from solver.dehydration import DehydrationParams
+from store import audit, compare, seal, tables, truncation
+from store.errors import CorruptTable, UnknownJob
+from store.manifest import write_manifest
+from store.store import Store
+
+from .conftest import fill
+
+AXES = DehydrationParams.axes
+
+
+def flip(path: Path, place: float) -> None:
+    data = bytearray(path.read_bytes())
+    data[int(place * (len(data) - 1))] ^= 1
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("place", [0.0, 0.3, 0.6, 1.0])
+def test_one_flipped_byte_is_found_in_each_part(store: Store, place: float) -> None:
+    keys = fill(store, te=[0.03, 0.04], gamma=[10, 20])
+    table = tables.build(store, axes=AXES)
+    assert audit.verify(store) == []
+    file = tables.path_of(store, table)
+    parts = {"generation": file, "result": store.shard_path(keys[2])}
+    for part, path in parts.items():
+        good = path.read_bytes()
+        flip(path, place)
+        (finding,) = audit.verify(store)
+        assert finding.part == part
+        assert finding.name in (path.name, path.stem)
+        path.write_bytes(good)
+    assert audit.verify(store) == []
+    manifest = file.with_name("current.json")
+    text = manifest.read_text()
+    manifest.write_text(text.replace('"resolution": 16', '"resolution": 17', 1))
+    (finding,) = audit.verify(store)
+    assert finding.part == "manifest"
+
+
+def edited(path: Path, edit: Callable[[h5py.File], None]) -> None:
+    """Change a sealed file and seal it again, as a program would that means well."""
+    path.write_bytes(path.read_bytes()[: -seal.TRAILER])
+    with h5py.File(path, "r+") as file:
+        edit(file)
+    seal.seal(path)
+
+
+def _move(file: h5py.File) -> None:
+    file["spectrum"][1, 0, 0, 2, 2, 0] += 0.01
+
+
+def _blind(file: h5py.File) -> None:
+    file["left_out_dB"][0, 0] = np.nan
+
+
+def _units(file: h5py.File) -> None:
+    file["mean_radius"].attrs["units"] = "m"
+
+
+def _axis(file: h5py.File) -> None:
+    file["te"][...] = file["te"][...] * 1.01
+
+
+@pytest.mark.parametrize(
+    ("edit", "part", "said"),
+    [
+        (_move, "result", "other values than the result"),
+        (_blind, "trust", "left_out_dB is not finite"),
+        (_units, "generation", "mean_radius is in 'm'"),
+        (_axis, "generation", "te runs from"),
+    ],
+)
+def test_what_a_seal_does_not_tell(store: Store, edit: Callable[[h5py.File], None], part: str, said: str) -> None:
+    from dataclasses import replace
+
+    from store import generation
+
+    fill(store, te=[0.03, 0.04, 0.05], gamma=[10, 20])
+    table = tables.build(store, axes=AXES)
+    file = tables.path_of(store, table)
+    edited(file, edit)
+    assert any("other values than the manifest" in finding.message for finding in audit.verify(store))
+    # even one whose digest was made to fit, in the file as in the manifest
+    digest = generation.digest(file)
+    edited(file, lambda opened: opened.attrs.__setitem__("digest", digest))
+    write_manifest(store.tables_dir, replace(table, digest=digest))
+    findings = audit.verify(store)
+    assert [finding.part for finding in findings] == [part]
+    assert said in findings[0].message
+
+
+def test_a_result_that_was_replaced(store: Store) -> None:
+    keys = fill(store, te=[0.03, 0.04])
+    tables.build(store, axes=AXES)
+    result = store.get(keys[0])
+    store.shard_path(keys[0]).unlink()
+    store.put(keys[0], result.assign(displacement=result["displacement"] * 1.01))
+    said = [finding.message for finding in audit.verify(store) if finding.name == keys[0]]
+    assert len(said) == 2
+    assert "ledger noted" in said[0]
+
+
+def test_rebuilding_keeps_the_runs_and_the_old_generation(filled: Store) -> None:
+    first = tables.build(filled, axes=AXES, units={"gamma": "1"})
+    fill(filled, te=[0.06], gamma=[10, 20, 30])
+    old = tables.path_of(filled, first)
+    exact = tables.rebuild(filled, units={"gamma": "1"}, dtype="float64")
+    assert (exact.keys, exact.resolution, exact.dtype) == (first.keys, 16, "float64")
+    coarse = tables.rebuild(filled, units={"gamma": "1"}, resolution=5)
+    assert (coarse.resolution, coarse.dtype) == (5, "float64")
+    assert old.is_file()
+    again = tables.rebuild(filled, units={"gamma": "1"}, resolution=99, dtype="float32")
+    assert again.digest == first.digest
+    assert audit.verify(filled) == []
+    with pytest.raises(UnknownJob, match="1 of the table's 10"):
+        tables.rebuild(filled, more=["0" * 64])
+    assert tables.info(filled) == again
+
+
+def test_what_truncation_costs(filled: Store) -> None:
+    whole = truncation.losses(filled, tables.build(filled, axes=AXES, dtype="float64"))
+    assert max(loss.max for loss in whole) < 1e-12
+    single = truncation.losses(filled, tables.rebuild(filled, dtype="float32"))
+    assert 1e-10 < single[-1].rms < 1e-7
+    cut = truncation.losses(filled, tables.rebuild(filled, resolution=5))
+    # the harmonic of degree 6 is what is lost, and its amplitude is linear in the stage
+    assert [loss.stage for loss in cut] == [0.1, 0.2, 0.3]
+    assert cut[2].rms == pytest.approx(3 * cut[0].rms, rel=1e-3)
+    assert 0.001 < cut[2].rms < cut[2].max < 0.2
+
+
+def test_a_damaged_generation_is_rebuilt(filled: Store) -> None:
+    table = tables.build(filled, axes=AXES)
+    flip(tables.path_of(filled, table), 0.5)
+    assert tables.rebuild(filled).digest == table.digest
+    assert audit.verify(filled) == []
+
+
+def test_comparing(filled: Store) -> None:
+    whole = tables.build(filled, axes=AXES)
+    left = tables.path_of(filled, whole)
+    assert compare.compare(left, left).equal
+    cut = tables.path_of(filled, tables.rebuild(filled, resolution=5))
+    found = compare.compare(left, cut)
+    assert not found.equal
+    assert (found.common, found.only_a, found.only_b, found.fixed) == (9, (), (), {})
+    rows = {row.stage: row for row in found.differences if row.of == "displacement"}
+    lost = {loss.stage: loss for loss in truncation.losses(filled, tables.info(filled))}
+    for stage, row in rows.items():
+        assert row.rms == pytest.approx(lost[stage].rms, rel=1e-3)
+    assert all(row.max == 0 for row in found.differences if row.of == "mean_radius")
+    json.dumps(found.to_json(), allow_nan=False)
+
+
+def test_comparing_other_samples_and_settings(filled: Store, tmp_path: Path) -> None:
+    a = tables.path_of(filled, tables.build(filled, axes=AXES))
+    other = Store.open(tmp_path / "other", create=True)
+    fill(other, te=[0.03, 0.06], gamma=[10.0, 20.0], seed=3)
+    b = tables.path_of(other, tables.build(other, axes=AXES))
+    found = compare.compare(a, b)
+    assert (found.common, len(found.only_a), len(found.only_b)) == (2, 7, 2)
+    assert found.fixed["seed"] == (0, 3)
+    assert found.only_b[0]["te"] == 0.06
+    assert max(row.max for row in found.differences if row.of == "displacement") < 1e-6
+    flip(b, 0.5)
+    with pytest.raises(CorruptTable, match="Rebuild"):
+        compare.compare(a, b)

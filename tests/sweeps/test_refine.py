@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import itertools
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from service.cli import app
+from store import tables
+from store.errors import MixedSamples
+from store.store import Store
+from sweeps import executors, refine
+from sweeps.errors import PlanError
+from sweeps.plan import Plan, units_of
+from sweeps.rounds import Round, held_out_error, rounds
+from sweeps.runner import run_plan
+
+NEED = {"stages": [0.2], "quality": "fine", "fields": ["displacement", "mean_radius"]}
+BOX = {"te": {"from": 0.02, "to": 0.06}, "gamma": {"from": 10, "to": 200, "scale": "log"}}
+SCATTERED = {"solver": "ridged", "axes": BOX, "sampling": {"kind": "sobol", "count": 10}, "need": NEED}
+GRID = {"solver": "ridged", "axes": {"te": [0.02, 0.06], "gamma": [10, 25, 70, 200]}, "need": NEED}
+
+
+def made(root: Path, tables_: Mapping[str, object]) -> tuple[Store, Plan]:
+    """Return a store with the runs of a plan and their table."""
+    store, plan = Store.open(root, create=True), Plan.parse(tables_)
+    sweep(store, plan)
+    solver = plan.solver
+    tables.build(store, solver=solver.name, axes=solver.params.axes, units=units_of(solver.name))
+    return store, plan
+
+
+def sweep(store: Store, plan: Plan) -> None:
+    with executors.serial() as pool:
+        assert run_plan(plan, store, pool).complete
+
+
+def held_out(root: Path) -> Path:
+    box = {"te": {"from": 0.026, "to": 0.055}, "gamma": {"from": 15, "to": 150, "scale": "log"}}
+    many = {**SCATTERED, "axes": box, "sampling": {"kind": "sobol", "count": 16, "seed": 5}, "name": "held"}
+    sweep(Store.open(root, create=True), Plan.parse(many))
+    return root
+
+
+def refined(store: Store, plan: Plan, count: int, held: Path | None = None) -> list[Round]:
+    with executors.serial() as pool:
+        return list(rounds(plan, store, "default", pool, count, "L2nr", held))
+
+
+def at_random(store: Store, plan: Plan, count: int, seed: int) -> None:
+    """Add points of the table's box without looking at errors."""
+    state, draw = refine.read(store, "default", "L2nr"), np.random.default_rng(seed)
+    points = [state.samples.unscale(draw.random(2)).tolist() for _ in range(count)]
+    more = refine.with_samples(plan, [plan.solver.parse(dict(zip(state.table.axes, p, strict=True))) for p in points])
+    sweep(store, more)
+    tables.rebuild(store, more=[job.key for job in more.jobs()])
+
+
+@pytest.mark.slow
+def test_the_error_falls_and_faster_than_at_random(site: None, tmp_path: Path) -> None:
+    held = held_out(tmp_path / "held")
+    store, plan = made(tmp_path / "refined", SCATTERED)
+    base = shutil.copytree(store.root, tmp_path / "base")
+    found = refined(store, plan, 8, held)
+    errors = [one.held_out or 0.0 for one in found]
+    assert [one.added for one in found] == list(range(9))
+    blind = []
+    for seed in range(4):
+        other = Store.open(shutil.copytree(base, tmp_path / f"random{seed}"))
+        at_random(other, plan, 8, seed)
+        blind.append(held_out_error(other, "default", held, "L2nr"))
+    print("refined", [f"{error:.3f}" for error in errors], "at random", [f"{error:.3f}" for error in blind])
+    assert errors[-1] < 0.75 * errors[0]
+    assert errors[-1] < np.mean(blind)
+
+
+def test_the_same_command_goes_on_and_then_has_nothing_to_do(site: None, tmp_path: Path) -> None:
+    store, plan = made(tmp_path / "store", {**SCATTERED, "sampling": {"kind": "sobol", "count": 4}})
+    first = refined(store, plan, 2)
+    # killed after the runs were asked for, before the table was rebuilt
+    state = refine.read(store, "default", "L2nr")
+    third = next(refine.propose(plan, state))
+    store.ledger.want(refine.with_samples(plan, third.samples).jobs(), refine.name_of(plan))
+    again = refined(store, plan, 3)
+    assert [one.added for one in [*first, *again]] == [0, 1, 2, 3]
+    assert [one.added for one in refined(store, plan, 3)] == [3]
+    assert tables.info(store).samples == 7
+
+
+def test_a_grid_stays_one(site: None, tmp_path: Path) -> None:
+    store, plan = made(tmp_path / "store", GRID)
+    (line,) = itertools.islice(refine.propose(plan, refine.read(store, "default", "L2nr")), 1)
+    assert len(line.points) in (2, 4)
+    found = refined(store, plan, 3)
+    assert found[-1].added == 2
+    state = refine.read(store, "default", "L2nr")
+    assert state.samples.is_grid
+    assert len(state.errors) == 10
+
+
+def test_no_run_is_wasted_on_fruits_that_cannot_exist(site: None, tmp_path: Path) -> None:
+    axes = {f"r{i}": {"from": 0.6, "to": 1.2} for i in (3, 4, 5)}
+    sampling = {"kind": "sobol", "count": 6, "skip_invalid": True}
+    store, plan = made(tmp_path / "store", {**SCATTERED, "axes": axes, "sampling": sampling})
+    state = refine.read(store, "default", "rgh")
+    found = list(itertools.islice(refine.propose(plan, state), 6))
+    assert len({tuple(p.points[0].values()) for p in found}) == 6
+    for proposal in found:
+        assert plan.solver.parse(proposal.samples[0].model_dump()) == proposal.samples[0]
+        for axis, value in proposal.points[0].items():
+            low, high = state.table.axes[axis]
+            assert low - 1e-9 <= value <= high + 1e-9
+
+
+def test_plan_and_table_must_fit(site: None, tmp_path: Path) -> None:
+    store, plan = made(tmp_path / "store", GRID)
+    other = Plan.parse({**GRID, "set": {"rs1": 0.3, "rs2": 0.3}})
+    with pytest.raises(MixedSamples, match="no run of the plan"):
+        refined(store, other, 2)
+    with pytest.raises(PlanError, match="no measure"):
+        refine.read(store, "default", "beauty")
+    text = 'solver = "ridged"\n[axes]\nte = [0.02, 0.06]\ngamma = [10, 25, 70, 200]\n[need]\nstages = [0.2]\n'
+    text += 'quality = "fine"\nfields = ["displacement", "mean_radius"]\n'
+    (tmp_path / "grid.toml").write_text(text)
+    words = ["refine", str(tmp_path / "grid.toml"), "--store", str(store.root), "--measure", "L2nr", "--json"]
+    done = CliRunner().invoke(app, [*words, "--dry-run"])
+    assert done.exit_code == 0, done.output
+    assert sum(len(proposal["points"]) for proposal in json.loads(done.stdout)["proposals"]) <= 8
+    assert tables.info(store).samples == 8
+    done = CliRunner().invoke(app, [*words, "--count", "2"])
+    assert json.loads(done.stdout)["added"] == 2
+    assert len(store.ledger.jobs("done", refine.name_of(plan).replace("plan", "grid"))) == 2
