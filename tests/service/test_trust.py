@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,13 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+import xarray as xr
 
 from service.live import LiveTables
 from solver.contract import Need
 from solver.dehydration import SOLVER
 from solver.fruit import lattice
-from store import generation, methods, tables
+from store import generation, methods, seal, tables
 from store.lookup import ShapeTable
 from store.measures import Measures
 from store.queue import Queue
@@ -143,9 +145,16 @@ def test_of_which_method_the_errors_are_known(client: httpx.Client) -> None:
     assert f"Take the method {methods.DEFAULT}" in problem["advice"]
 
 
-def test_an_old_table_is_to_be_rebuilt() -> None:
-    with client_of(STARTER) as client:
-        # built before errors were stored with a table
+def test_an_old_table_is_to_be_rebuilt(tmp_path: Path) -> None:
+    old = Store.open(shutil.copytree(STARTER, tmp_path / "old"))
+    path = tables.path_of(old, tables.info(old))
+    whole = xr.load_dataset(path, engine="h5netcdf")
+    # as they were before errors were stored with a table
+    judged = [name for name in whole if str(name).startswith("left_out_")]
+    assert judged
+    whole.drop_vars(judged).to_netcdf(path, engine="h5netcdf", encoding={n: {"_FillValue": None} for n in whole.coords})
+    seal.seal(path)
+    with client_of(old.root) as client:
         assert client.get("/v1/tables/default").json()["methods"]["judged"] is None
         query = {"te": 0.035, "gamma": 20, "s": 0.22, "max_error": "0.5"}
         problem = checked(client.get(SHAPE, params=query), 422, "too-uncertain")

@@ -23,8 +23,8 @@ def test_it_serves_shapes_at_once() -> None:
 
 def test_every_stage_of_it_is_free_of_penetration_and_inversion() -> None:
     table = ShapeTable.open(starter.ROOT)
-    for te in (0.03, 0.04):
-        for gamma in (10.0, 30.0, 50.0):
+    for te in (0.03, 0.035, 0.04):
+        for gamma in (10.0, 17.0, 30.0, 50.0):
             for stage in table.stages:
                 found = table.at({"te": te, "gamma": gamma}, stage, resolution=8, fields=()).descriptors
                 assert found["penetration"] <= 0.1 * te

@@ -27,14 +27,17 @@ def test_samples_predicted_from_each_other(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     document = json.loads(done.stdout)
     assert not document["held_out"]
-    assert len(document["cases"]) == 6
+    assert len(document["cases"]) == 12
     assert document["default"] == methods.DEFAULT
     late = {row["method"]: row for row in document["rows"] if row["stage"] == 0.2}
-    # the paper's weights flatten a cold table, the corrected ones do not
-    assert late["idw"]["rgh"] < 0.8
+    # the paper's weights flatten what lies between samples, the corrected ones do not
+    assert late["idw"]["rgh"] < 0.85
     assert 0.9 < late["linear+LL+env"]["rgh"] < 1.1
     assert late["linear+LL+env"]["W1"] < late["idw"]["W1"] / 2
-    assert all(0 < row["correlation"] < 0.8 for row in document["neighbour_correlation"])
+    likeness = [row["correlation"] for row in document["neighbour_correlation"]]
+    assert 0.95 < likeness[0] <= 1 and likeness == sorted(
+        likeness, reverse=True
+    )  # from one pattern, and ever further from it
     assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
