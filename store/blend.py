@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import harmonics, spectra, transforms
-from .methods import Method, bands, envelope
+from .methods import Method, bands, envelope, poles
 from .methods.cells import Cells
 from .methods.weights import Samples
 
@@ -85,7 +85,8 @@ class Blender:
         if "LL" in method.corrections:
             mean = _form(parts, cell.power)
             gains = targets.gains(known.scale(query), samples, weights, dict(stages), mean)
-            waves *= bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
+            added = waves * (bands.multiplier(gains, targets.bands, waves.shape[-1] - 1) - 1)
+            waves += poles.keep_off(added, targets.highest)
             total = float((gains**2 * mean).sum())
         if "env" not in method.corrections:
             return Blend(waves)

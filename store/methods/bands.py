@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import harmonics
+from . import poles
 from .weights import Samples
 
 __all__ = ["Bands", "Targets", "add_up", "multiplier"]
@@ -55,6 +56,7 @@ class Targets:
 
     def __init__(self, power: Array, samples: Samples) -> None:
         self.bands = Bands(power.shape[-1] - 1)
+        self.highest = poles.highest_degree(power)
         own = add_up(np.asarray(power, float), self.bands)
         even = _NOTHING / own.shape[-1]
         self._total = np.log(own.sum(axis=-1) + _NOTHING)
