@@ -82,6 +82,10 @@ def collect(
         store.ledger.rebuild(store)
         jobs = _done(store, solver, plan)
     jobs = [job for job in jobs if _fits(job, quality, version)]
+    if plan is None:
+        # a run that others start from is no sample of theirs
+        origins = {pattern["key"] for job in jobs if (pattern := job.params.get("pattern"))}
+        jobs = [job for job in jobs if job.key not in origins]
     if not jobs:
         raise EmptyTable(
             f"there are no results of {solver} to build a table from.",

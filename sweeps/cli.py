@@ -192,7 +192,7 @@ def sweep(
     document = report_document(report) | {"store": str(store), "skipped": read.skipped, "repeated": read.repeated}
     document["parts"] = [report_document(r) for r in reports]
 
-    emit(document, as_json, lambda console: show_report(console, report, store, read.name if read.first else ""))
+    emit(document, as_json, lambda console: show_report(console, report, store, read.name if read.controls else ""))
     if any(r.stopped for r in reports):
         raise typer.Exit(130)
     if not all(r.complete for r in reports):

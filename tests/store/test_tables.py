@@ -118,6 +118,19 @@ def test_plans_and_qualities_select(store: Store) -> None:
     assert tables.build(store, axes=AXES, plan="few").samples == 1
 
 
+def test_a_run_that_others_start_from_is_no_sample(store: Store) -> None:
+    (origin,) = fill(store, te=[0.035], stages=(0.1,))
+    keys = fill(store, te=[0.03, 0.04], pattern={"key": origin, "stage": 0.1})
+    table = tables.build(store, axes=AXES)
+    assert set(table.keys) == set(keys)
+    assert table.fixed["pattern"] == {"key": origin, "stage": 0.1, "amplitude": 0.2}
+    assert ShapeTable.open(store).at({"te": 0.035}, 0.2).inside
+    # the same fruit without the pattern is another question
+    fill(store, te=[0.03])
+    with pytest.raises(MixedSamples, match="pattern"):
+        tables.build(store, axes=AXES)
+
+
 def test_the_same_run_for_other_fields_counts_once(store: Store) -> None:
     fill(store, te=[0.03, 0.04])
     fill(store, te=[0.03], fields=["displacement"])
