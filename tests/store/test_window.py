@@ -37,10 +37,9 @@ def test_a_window_is_cut_out_of_the_whole(table: ShapeTable, part: Window, n: in
     shape = table.at(QUERY, STAGE, resolution=n, fields=("position", "displacement"), window=part)
     rows = [i for i, theta in enumerate(whole.colatitude) if part.colatitude[0] <= theta <= part.colatitude[1]]
     first, last = part.azimuth
-    columns = np.array(
-        [j for j, phi in enumerate(whole.azimuth) if (phi - first) % (2 * np.pi) <= (last - first) % 6.3]
-    )
-    columns = columns[np.argsort((whole.azimuth[columns] - first) % (2 * np.pi), kind="stable")]
+    after = (whole.azimuth - first) % (2 * np.pi)
+    reach = 2 * np.pi if last - first == 2 * np.pi else (last - first) % (2 * np.pi)
+    columns = [j for j in np.argsort(after, kind="stable") if after[j] <= reach]
     for name in ("position", "displacement"):
         expected = getattr(whole, name)[rows][:, columns][..., list(part.components)]
         assert np.abs(getattr(shape, name) - expected).max() < 2e-6
