@@ -14,7 +14,7 @@ from solver import registry
 from solver.contract import Solver
 from store.errors import StoreError
 
-from . import problems, vocabulary
+from . import detail, problems, vocabulary
 from .formats import FORMATS
 from .live import LiveTables
 from .query import LOWEST_RESOLUTION
@@ -124,6 +124,7 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
             "64 and 64x128 are the same. Without it, the table's own.",
             {"type": "string", "pattern": "^[0-9]+(x[0-9]+)?$", "examples": ["64", "64x128"]},
         ),
+        *(_query(name, text, dict(schema)) for name, (text, schema) in detail.parameters().items()),
         _query(
             "table",
             "Name of the table; needed only where a solver has several",

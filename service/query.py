@@ -9,12 +9,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from . import detail
 from .errors import InvalidQuery, OutsideRanges, Wrong
 
 __all__ = ["LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
 
 #: Names that are not axes.
-RESERVED = ("resolution", "table", "format")
+RESERVED = ("resolution", "table", "format", *detail.NAMES)
 
 #: Fewer colatitude samples hold no shape.
 LOWEST_RESOLUTION = 4
@@ -56,15 +57,15 @@ class ShapeQuery(NamedTuple):
     resolution: int | None
 
 
-def parse(items: Sequence[tuple[str, str]], words: Words) -> ShapeQuery:
-    """Return the question that the decoded `items` of a query string ask.
+def parse(items: Sequence[tuple[str, str]], words: Words, also: Sequence[Wrong] = ()) -> ShapeQuery:
+    """Return the question that the decoded `items` of a query string ask. `also` is what is wrong besides.
 
     Raises:
         OutsideRanges: listing every number off its axis, where nothing else is wrong.
         InvalidQuery: listing every name that is unknown, missing or repeated, and every value that cannot be used.
 
     """
-    wrong = _repeated(items)
+    wrong = [*_repeated(items), *also]
     outside: list[Wrong] = []
     numbers: dict[str, float] = {}
     resolution: int | None = None

@@ -16,13 +16,14 @@ from solver.contract import Solver
 from store.canonical import canonical
 from store.lookup import ShapeTable
 
+from . import detail as level
 from . import problems, vocabulary
 from .formats import FORMATS, About, Format, negotiate
 from .live import LiveTables
 from .query import ShapeQuery, Words, parse
 from .settings import Settings
 
-__all__ = ["router"]
+__all__ = ["router", "words_of"]
 
 router = APIRouter(tags=["shapes"])
 
@@ -52,10 +53,11 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
     chosen = negotiate(request.headers.get("accept"), given.get("format"))
     name = tables.choose(solver, given.get("table"))
     table = tables.get(name)
-    words = _words(known, table, settings.max_resolution)
-    query = parse(given.multi_items(), words)
-    resolution = query.resolution or min(table.resolution, settings.max_resolution)
-    tag = _tag(chosen, name, table.digest, query, resolution)
+    words = words_of(known, table, settings.max_resolution)
+    detail = level.read(given)
+    query = parse(given.multi_items(), words, detail.refused(chosen))
+    resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
+    tag = _tag(chosen, name, table.digest, query, resolution, *detail.key)
     headers = {
         "ETag": tag,
         "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
@@ -65,7 +67,8 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
         return Response(status_code=304, headers=headers)
 
     begin = time.perf_counter()
-    found = table.at(query.point, query.stage, resolution=resolution, fields=chosen.fields)
+    fields = detail.of(chosen)
+    found = table.at(query.point, query.stage, resolution=resolution, fields=fields, window=detail.window)
     looked = time.perf_counter()
     about = About(
         solver=solver,
@@ -73,7 +76,8 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
         fixed=words.fixed,
         stage_symbol=words.stage,
         units=words.units,
-        links=_links(request, resolution) if chosen.name == "json" else {},
+        detail=detail.said(resolution, table.resolution),
+        links=_links(request, resolution, detail) if chosen.name == "json" else {},
         timings={"lookup": 1e3 * (looked - begin)},
     )
     body = chosen.encode(found, about)
@@ -84,7 +88,7 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
     return Response(body, headers=headers, media_type=chosen.media_type)
 
 
-def _words(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
+def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
     """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers."""
     described = vocabulary.axes(solver.name)
     fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
@@ -99,9 +103,9 @@ def _words(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
     )
 
 
-def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int) -> str:
+def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int, *detail: str) -> str:
     """Return the entity tag; JSON carries timings, so its bytes differ and its tag is a weak one."""
-    words = [__version__, chosen.name, name, digest, query.point, query.stage, resolution]
+    words = [__version__, chosen.name, name, digest, query.point, query.stage, resolution, *detail]
     text = hashlib.sha256(canonical(words)).hexdigest()[:32]
     return f'W/"{text}"' if chosen.name == "json" else f'"{text}"'
 
@@ -111,11 +115,13 @@ def _matches(header: str, tag: str) -> bool:
     return tag.removeprefix("W/") in {part.strip().removeprefix("W/") for part in header.split(",")}
 
 
-def _links(request: Request, resolution: int) -> dict[str, str]:
-    """Return the addresses of this shape's other representations, relative to this host."""
-    kept = [(k, v) for k, v in request.query_params.multi_items() if k not in ("format", "resolution")]
+def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str, str]:
+    """Return the addresses of this shape's other representations that can hold it, relative to this host."""
+    settled = ("format", "resolution", "screen_px", "distance", "fov")
+    kept = [(k, v) for k, v in request.query_params.multi_items() if k not in settled]
+    others = [name for name, chosen in FORMATS.items() if name != "json" and not detail.refused(chosen)]
     pairs = [*kept, ("resolution", str(resolution))]
-    return {name: f"{request.url.path}?{urlencode([*pairs, ('format', name)])}" for name in FORMATS if name != "json"}
+    return {name: f"{request.url.path}?{urlencode([*pairs, ('format', name)])}" for name in others}
 
 
 def _filename(solver: str, query: ShapeQuery, symbol: str, chosen: Format) -> str:

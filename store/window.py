@@ -69,7 +69,8 @@ class Window:
 
     def on(self, n: int) -> Patch:
         """Return the lattice points within; the nearest row or column where none is."""
-        top, height = _within(*(angle * n / math.pi - 0.5 for angle in self.colatitude), n)
+        north, south = (angle * n / math.pi - 0.5 for angle in self.colatitude)
+        top, height = _within(north, south, n)
         first, last = (angle * n / math.pi for angle in self.azimuth)
         if last - first >= 2 * n - 1e-9:
             return Patch(n, top, height, 0, 2 * n, self.components)
