@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.fruit import Fruit, azimuths, colatitudes
+from solver.quantities import QUANTITIES
 
 from . import asking, generation, methods, seal, surface, trust
 from .blend import Blend, Blender
@@ -110,14 +111,14 @@ class ShapeTable:
     def __init__(self, table: TableInfo, path: Path) -> None:
         self.info = table
         self._spectra = generation.map_spectra(path)
-        with generation.open(path) as opened:
-            columns = {name: opened[name].values for name in (*table.axes, *table.descriptors)}
-            self._converged = opened["converged"].values.astype(bool) if "converged" in opened else None
-            self._keys = [str(key) for key in opened["key"].values]
-            self._units = {name: str(opened[name].attrs.get("units", "")) for name in table.descriptors}
-            self._units |= dict.fromkeys(FIELDS, str(opened["spectrum"].attrs["units"]))
-            power = opened["degree_power"].values if "degree_power" in opened else None
-            found = generation.left_out(opened)
+        opened = generation.read(path)
+        columns = {name: opened[name].values for name in (*table.axes, *table.descriptors)}
+        self._converged = opened["converged"].values.astype(bool) if "converged" in opened else None
+        self._keys = [str(key) for key in opened["key"].values]
+        self._units = {name: str(opened[name].attrs.get("units", "")) for name in table.descriptors}
+        self._units |= dict.fromkeys(FIELDS, QUANTITIES["displacement"].units)
+        power = opened["degree_power"].values if "degree_power" in opened else None
+        found = generation.left_out(opened)
         self._descriptors = {name: columns[name] for name in table.descriptors}
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
         self._samples = None if values is None else Samples(values)
