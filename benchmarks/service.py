@@ -70,7 +70,7 @@ def running(command: list[str], path: str, **environment: str) -> Iterator[tuple
     port = free_port()
     start = time.perf_counter()
     process = subprocess.Popen(
-        [word.format(port=port) for word in command],
+        [word.replace("{port}", str(port)) for word in command],
         cwd=ROOT,
         env={**os.environ, **environment},
         stdout=subprocess.DEVNULL,
