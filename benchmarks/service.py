@@ -2,8 +2,8 @@
 
 Parts: `start` (until the first answer), `load` (requests per second and latencies of 200 kB bodies at 16 clients, one
 worker each, in turns), `batch` (one request against many), `memory` (four workers over one table), `swaps` (a new
-generation 200 times under load). The peer needs a Python with xpublish, uvicorn and h5netcdf:
-python -m venv peers/xpublish && peers/xpublish/bin/pip install xpublish uvicorn h5netcdf.
+generation 200 times under load). The peer needs a Python with xpublish below 0.5, whose zarr routes later ones lack:
+python -m venv peers/xpublish && peers/xpublish/bin/pip install 'xpublish<0.5' 'fastapi<0.120' zarr uvicorn.
 
 The table is the synthetic one of `benchmarks.lookup`: 30 samples, 5 stages, 96 waves, 34 MB.
 """
@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -82,6 +83,8 @@ def running(command: list[str], path: str, **environment: str) -> Iterator[tuple
                 with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=20) as answer:
                     answer.read()
                 break
+            except urllib.error.HTTPError:
+                raise  # it is up, and has no such address
             except OSError:
                 if process.poll() is not None or time.perf_counter() - start > 60:
                     raise
