@@ -43,10 +43,10 @@ QUERY = "/v1/shapes/dehydration?te={te:.6f}&gamma={gamma:.4f}&s=0.17&resolution=
 PEER = """
 import sys, numpy as np, xarray as xr, xpublish, uvicorn
 values = np.random.default_rng(0).standard_normal((200, 50000), dtype=np.float32)
-data = xr.Dataset({"values": (("sample", "point"), values)}, coords={"sample": np.arange(200)})
-data["values"].encoding["chunks"] = (1, 50000)
+data = xr.Dataset({f"v{i}": ("point", row) for i, row in enumerate(values)})  # numpy arrays are one chunk each
 if "raw" in sys.argv:
-    data["values"].encoding.update(compressors=None, compressor=None)
+    for name in data:
+        data[name].encoding.update(compressors=None, compressor=None)
 uvicorn.run(xpublish.Rest({"d": data}).app, host="127.0.0.1", port=int(sys.argv[1]), log_level="error")
 """
 
@@ -57,7 +57,7 @@ def ours(i: int, n: int = RESOLUTION) -> str:
 
 
 def theirs(i: int) -> str:
-    return f"/datasets/d/zarr/values/{i * 89 % 200}.0"
+    return f"/datasets/d/zarr/v{i * 89 % 200}/0"
 
 
 def free_port() -> int:
