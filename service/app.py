@@ -13,7 +13,7 @@ from fastapi import Depends, FastAPI
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, jobs, jobs_events, jobs_results, page, problems, shapes
+from . import batch, catalogue, jobs, jobs_events, jobs_results, page, problems, shapes
 from .jobs_runner import JobRunner
 from .limits import Limits
 from .live import LiveTables
@@ -68,7 +68,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     guards = [] if settings.public_read else [Depends(requires("read"))]
     declared = {} if settings.public_read else problems.responses(401, 403)
     app.include_router(catalogue.open_router)
-    for router in (catalogue.router, shapes.router, jobs.reading, jobs_events.router, jobs_results.router):
+    for router in (
+        catalogue.router,
+        shapes.router,
+        batch.router,
+        jobs.reading,
+        jobs_events.router,
+        jobs_results.router,
+    ):
         app.include_router(router, dependencies=guards, responses=declared)
     app.include_router(jobs.writing)
     page.install(app, settings.page)

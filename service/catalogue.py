@@ -39,6 +39,7 @@ def index(request: Request) -> Response:
         "tables": "/v1/tables",
         "solvers": "/v1/solvers",
         "shapes": "/v1/shapes/{solver}",
+        "batches": "/v1/shapes:batch",
         "jobs": "/v1/jobs",
         "health": "/healthz",
         "documentation": "/docs",

@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple, Self
 
 __all__ = [
     "AmbiguousTable",
+    "BatchTooLarge",
     "BodyTooLarge",
     "Forbidden",
     "InvalidQuery",
@@ -21,6 +22,7 @@ __all__ = [
     "TooCostly",
     "TooManyListeners",
     "Unauthorized",
+    "UncertainBatch",
     "UnknownSolver",
     "Wrong",
 ]
@@ -78,6 +80,18 @@ class AmbiguousTable(InvalidQuery):
     """A solver with several tables, none of which was chosen."""
 
     code = "ambiguous-table"
+
+
+class UncertainBatch(InvalidQuery):
+    """Entries of a batch whose expected error is above what was asked for."""
+
+    code = "too-uncertain"
+
+
+class BatchTooLarge(InvalidQuery):
+    """More shapes, or more lattice points, than one batch may have."""
+
+    code = "batch-too-large"
 
 
 class NotAcceptable(ServiceError):

@@ -16,7 +16,7 @@ from store import methods
 from store.errors import StoreError
 from store.measures import UNITS
 
-from . import problems, vocabulary
+from . import detail, problems, vocabulary
 from .formats import FORMATS
 from .live import LiveTables
 from .query import LIMITS, LOWEST_RESOLUTION
@@ -129,6 +129,7 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
             "64 and 64x128 are the same. Without it, the table's own.",
             {"type": "string", "pattern": "^[0-9]+(x[0-9]+)?$", "examples": ["64", "64x128"]},
         ),
+        *(_query(name, text, dict(schema)) for name, (text, schema) in detail.parameters().items()),
         _query(
             "table",
             "Name of the table; needed only where a solver has several",

@@ -55,6 +55,7 @@ STATUS: Mapping[type[Exception], int] = {
     stored.UnknownToken: 404,
     errors.ServiceError: 500,
     errors.InvalidQuery: 422,
+    errors.BatchTooLarge: 413,
     errors.NotAcceptable: 406,
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,

@@ -13,12 +13,13 @@ from store import methods
 from store.errors import OutsideTable
 from store.measures import Measures
 
+from . import detail
 from .errors import InvalidQuery, Wrong
 
 __all__ = ["LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
 
 #: Names that are not axes.
-RESERVED = ("resolution", "table", "format", "method", "max_error", "exact")
+RESERVED = ("resolution", "table", "format", "method", "max_error", "exact", *detail.NAMES)
 
 #: Fewer colatitude samples hold no shape.
 LOWEST_RESOLUTION = 4
@@ -74,14 +75,16 @@ class ShapeQuery(NamedTuple):
     exact: bool = False
 
 
-def parse(items: Sequence[tuple[str, str]], words: Words) -> ShapeQuery:
+def parse(items: Sequence[tuple[str, str]], words: Words, also: Sequence[Wrong] = ()) -> ShapeQuery:
     """Return the question that the decoded `items` of a query string ask; it may lie outside the table.
+
+    `also` is what is wrong besides.
 
     Raises:
         InvalidQuery: listing every name that is unknown, missing or repeated, and every value that cannot be used.
 
     """
-    wrong = _repeated(items)
+    wrong = [*_repeated(items), *also]
     outside: list[Wrong] = []
     numbers: dict[str, float] = {}
     chosen: dict[str, Any] = {"resolution": None}

@@ -17,6 +17,7 @@ from store.canonical import canonical
 from store.errors import TooUncertain
 from store.lookup import ShapeTable
 
+from . import detail as level
 from . import exact, problems, vocabulary
 from .errors import OutsideRanges
 from .formats import FORMATS, About, Format, negotiate
@@ -24,7 +25,7 @@ from .live import LiveTables
 from .query import ShapeQuery, Words, parse
 from .settings import Settings
 
-__all__ = ["router"]
+__all__ = ["router", "words_of"]
 
 router = APIRouter(tags=["shapes"])
 
@@ -57,12 +58,13 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
     chosen = negotiate(request.headers.get("accept"), given.get("format"))
     name = tables.choose(solver, given.get("table"))
     table = tables.get(name)
-    words = _words(known, table, settings.max_resolution)
-    query = parse(given.multi_items(), words)
+    words = words_of(known, table, settings.max_resolution)
+    detail = level.read(given)
+    query = parse(given.multi_items(), words, detail.refused(chosen))
     try:
         if query.outside:
             raise OutsideRanges.of(query.outside)
-        return _answer(request, known, name, table, words, query, chosen)
+        return _answer(request, known, name, table, words, query, detail, chosen)
     except (OutsideRanges, TooUncertain) as error:
         if not query.exact:
             raise exact.offered(error) from None
@@ -70,7 +72,14 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
 
 
 def _answer(
-    request: Request, solver: Solver, name: str, table: ShapeTable, words: Words, query: ShapeQuery, chosen: Format
+    request: Request,
+    solver: Solver,
+    name: str,
+    table: ShapeTable,
+    words: Words,
+    query: ShapeQuery,
+    detail: level.Detail,
+    chosen: Format,
 ) -> Response:
     """Return the shape, or that the asker has it already.
 
@@ -79,8 +88,8 @@ def _answer(
 
     """
     settings: Settings = request.app.state.settings
-    resolution = query.resolution or min(table.resolution, settings.max_resolution)
-    tag = _tag(chosen, name, table.digest, query, resolution)
+    resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
+    tag = _tag(chosen, name, table.digest, query, resolution, *detail.key)
     headers = {
         "ETag": tag,
         "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
@@ -94,9 +103,10 @@ def _answer(
         query.point,
         query.stage,
         resolution=resolution,
-        fields=chosen.fields,
+        fields=detail.of(chosen),
         method=query.method,
         max_error=query.max_error,
+        window=detail.window,
     )
     looked = time.perf_counter()
     about = About(
@@ -105,7 +115,8 @@ def _answer(
         fixed=words.fixed,
         stage_symbol=words.stage,
         units=words.units,
-        links=_links(request, resolution) if chosen.name == "json" else {},
+        detail=detail.said(resolution, table.resolution),
+        links=_links(request, resolution, detail) if chosen.name == "json" else {},
         timings={"lookup": 1e3 * (looked - begin)},
     )
     body = chosen.encode(found, about)
@@ -116,7 +127,7 @@ def _answer(
     return Response(body, headers=headers, media_type=chosen.media_type)
 
 
-def _words(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
+def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
     """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers."""
     described = vocabulary.axes(solver.name)
     fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
@@ -131,9 +142,9 @@ def _words(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
     )
 
 
-def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int) -> str:
+def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int, *detail: str) -> str:
     """Return the entity tag; JSON carries timings, so its bytes differ and its tag is a weak one."""
-    words = [__version__, chosen.name, name, digest, query.point, query.stage, resolution]
+    words = [__version__, chosen.name, name, digest, query.point, query.stage, resolution, *detail]
     words += [query.method, query.max_error]
     text = hashlib.sha256(canonical(words)).hexdigest()[:32]
     return f'W/"{text}"' if chosen.name == "json" else f'"{text}"'
@@ -144,11 +155,13 @@ def _matches(header: str, tag: str) -> bool:
     return tag.removeprefix("W/") in {part.strip().removeprefix("W/") for part in header.split(",")}
 
 
-def _links(request: Request, resolution: int) -> dict[str, str]:
-    """Return the addresses of this shape's other representations, relative to this host."""
-    kept = [(k, v) for k, v in request.query_params.multi_items() if k not in ("format", "resolution")]
+def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str, str]:
+    """Return the addresses of this shape's other representations that can hold it, relative to this host."""
+    settled = ("format", "resolution", "screen_px", "distance", "fov")
+    kept = [(k, v) for k, v in request.query_params.multi_items() if k not in settled]
+    others = [name for name, chosen in FORMATS.items() if name != "json" and not detail.refused(chosen)]
     pairs = [*kept, ("resolution", str(resolution))]
-    return {name: f"{request.url.path}?{urlencode([*pairs, ('format', name)])}" for name in FORMATS if name != "json"}
+    return {name: f"{request.url.path}?{urlencode([*pairs, ('format', name)])}" for name in others}
 
 
 def _filename(solver: str, query: ShapeQuery, symbol: str, chosen: Format) -> str:

@@ -10,13 +10,15 @@ import difflib
 import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from . import quantities
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "Cancelled",

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import harmonics, spectra, transforms
+from . import harmonics, spectra, window
 from .methods import Method, bands, envelope, poles
 from .methods.cells import Cells
 from .methods.weights import Samples
+from .window import Patch
 
 __all__ = ["Blend", "Blender", "complex_view", "powers"]
 
@@ -28,13 +30,13 @@ class Blend(NamedTuple):
     ratio: Array | None = None
     low: Array | None = None
 
-    def fields(self, plan: transforms.Synthesis) -> Array:
-        """Return the displacement (3, n, 2n) in the memory of a borrowed plan."""
-        spectra.fill(plan.coefficients, self.waves)
-        planes = plan.run()
-        if self.ratio is not None and self.low is not None:
-            envelope.apply(planes, self.ratio, self.low)
-        return planes
+    @contextmanager
+    def fields(self, patch: Patch) -> Iterator[Array]:
+        """Lend the displacement (components, height, width) on a patch of the lattice; good until left."""
+        with window.planes(self.waves, patch) as planes:
+            if self.ratio is not None and self.low is not None:
+                envelope.apply(planes, self.ratio, self.low, patch)
+            yield planes
 
     def poles(self) -> Array:
         """Return the displacement (2, 3) of the two poles."""

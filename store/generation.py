@@ -9,12 +9,11 @@ import hashlib
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import h5netcdf  # type: ignore[import-untyped]
 import h5py
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from solver import quantities
@@ -29,6 +28,9 @@ from .methods.weights import Samples as Points
 from .samples import Samples
 from .store import Store
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 __all__ = [
     "CONVERGENCE",
     "DIMS",
@@ -39,6 +41,7 @@ __all__ = [
     "left_out",
     "map_spectra",
     "open",
+    "read",
     "spectra_of",
     "write",
 ]
@@ -50,7 +53,7 @@ CONVERGENCE = ("converged", "residual", "iterations")
 
 _PAGE = 4096
 #: What a result says per stage: name -> values and attributes.
-Rows = dict[str, xr.Variable]
+Rows = dict[str, "xr.Variable"]
 
 _ADVICE = "Rebuild the table from the shards."
 
@@ -136,6 +139,8 @@ def _rows(result: xr.Dataset) -> Rows:
 
 def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Mapping[str, str]) -> xr.Dataset:
     """Return all but the spectra as a dataset."""
+    import xarray as xr
+
     waves = np.arange(band + 1)
     axes = {name: _axis(samples, name, units) for name in samples.axes}
     common = [name for name in rows[0] if all(name in row for row in rows)]
@@ -166,6 +171,8 @@ def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Ma
 
 def _judge(stored: NDArray[Any], samples: Samples) -> dict[str, xr.Variable]:
     """Return what look-ups want to know of the spectra: power by degree, errors, likeness of neighbours."""
+    import xarray as xr
+
     power = _rounded(powers(stored))
     found = {
         "degree_power": xr.Variable(
@@ -203,7 +210,7 @@ def _rounded(values: NDArray[Any]) -> NDArray[Any]:
     return (np.round(values * scale) / scale).astype(np.float32)
 
 
-def left_out(opened: xr.Dataset) -> tuple[NDArray[Any], str] | None:
+def left_out(opened: Mapping[str, Column]) -> tuple[NDArray[Any], str] | None:
     """Return the measures (sample, stage, measure) of samples predicted from the others, and by which method.
 
     None for a table of one sample, of no fruits, or built before they were stored.
@@ -229,6 +236,36 @@ def _combine(small: xr.Dataset, of_spectra: str) -> str:
     return hashlib.sha256(canonical([shards.digest(small), small.attrs["fixed"], of_spectra])).hexdigest()
 
 
+class Column(NamedTuple):
+    """A small variable of a generation."""
+
+    values: NDArray[Any]
+    attrs: Mapping[str, Any]
+
+
+def read(path: Path) -> dict[str, Column]:
+    """Read all of a generation but its spectra, without xarray, whose import takes longer than a service's start may.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    try:
+        with h5py.File(path) as file:
+            return {name: _column(file[name]) for name in file if name != "spectrum" and file[name].ndim}
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # HDF5 reports damage as whatever it stumbles over
+        raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
+
+
+def _column(variable: h5py.Dataset) -> Column:
+    values = variable[()]
+    if values.dtype.kind == "S":  # letters, one by one
+        values = np.array([b"".join(row).decode() for row in values])
+    return Column(values, {name: value for name, value in variable.attrs.items() if isinstance(value, str)})
+
+
 def open(path: Path) -> xr.Dataset:
     """Open a generation lazily; close it after use.
 
@@ -236,6 +273,8 @@ def open(path: Path) -> xr.Dataset:
         CorruptTable: it cannot be read.
 
     """
+    import xarray as xr
+
     try:
         return xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
     except FileNotFoundError:
@@ -261,14 +300,9 @@ def judged(path: Path) -> Judged:
         CorruptTable: it cannot be read.
 
     """
-    with open(path) as opened:
-        try:
-            found, likeness = left_out(opened), None
-            if "neighbour_correlation" in opened:
-                likeness = tuple(opened["neighbour_correlation"].values.tolist())
-        except Exception as error:  # as above
-            raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
-    return Judged(found[1] if found else None, likeness)
+    opened = read(path)
+    found, likeness = left_out(opened), opened.get("neighbour_correlation")
+    return Judged(found[1] if found else None, tuple(likeness.values.tolist()) if likeness else None)
 
 
 def map_spectra(path: Path) -> NDArray[Any]:

@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.fruit import Fruit, azimuths, colatitudes
+from solver.quantities import QUANTITIES
 
-from . import asking, generation, methods, seal, surface, transforms, trust
+from . import asking, generation, methods, seal, surface, trust
 from .blend import Blend, Blender
 from .errors import CorruptTable, OutsideTable
 from .manifest import TableInfo
@@ -30,6 +31,7 @@ from .neighbours import SAME, Weighted
 from .samples import insert
 from .store import Store
 from .tables import info, path_of
+from .window import WHOLE, Patch, Window
 
 __all__ = ["Shape", "ShapeTable"]
 
@@ -48,9 +50,10 @@ class Shape:
     """An interpolated surface on the lattice. What was not asked for is None.
 
     `position` and `displacement` are (n, 2n, 3), `poles` (2, 3) the positions at colatitude 0 and pi, all in units of
-    r1 and in the table's precision. `weights` says which results it was made of, `nearest` how far (scaled) the
-    nearest one is, `inside` whether the query lies in the samples' convex hull, and `exact` that it is a stored result
-    at a stored stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
+    r1 and in the table's precision. Of a window there are only its rows, columns and components, and no poles but with
+    the whole lattice. `weights` says which results it was made of, `nearest` how far (scaled) the nearest one is,
+    `inside` whether the query lies in the samples' convex hull, and `exact` that it is a stored result at a stored
+    stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
     `expected_error` says by measure (`store.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape may be off
     the true one; None where the table does not know, as for any method but the one it was built for.
     """
@@ -97,6 +100,8 @@ class Shape:
     def _normals(self) -> tuple[Array, Array]:
         if self.position is None:
             raise OutsideTable("normals follow from positions.", "Ask for the field 'position'.")
+        if self.poles is None or self.poles.shape[1] != 3:
+            raise OutsideTable("normals follow from the whole surface.", "Ask for it without a window.")
         return surface.normals(self.position)
 
 
@@ -106,14 +111,14 @@ class ShapeTable:
     def __init__(self, table: TableInfo, path: Path) -> None:
         self.info = table
         self._spectra = generation.map_spectra(path)
-        with generation.open(path) as opened:
-            columns = {name: opened[name].values for name in (*table.axes, *table.descriptors)}
-            self._converged = opened["converged"].values.astype(bool) if "converged" in opened else None
-            self._keys = [str(key) for key in opened["key"].values]
-            self._units = {name: str(opened[name].attrs.get("units", "")) for name in table.descriptors}
-            self._units |= dict.fromkeys(FIELDS, str(opened["spectrum"].attrs["units"]))
-            power = opened["degree_power"].values if "degree_power" in opened else None
-            found = generation.left_out(opened)
+        opened = generation.read(path)
+        columns = {name: opened[name].values for name in (*table.axes, *table.descriptors)}
+        self._converged = opened["converged"].values.astype(bool) if "converged" in opened else None
+        self._keys = [str(key) for key in opened["key"].values]
+        self._units = {name: str(opened[name].attrs.get("units", "")) for name in table.descriptors}
+        self._units |= dict.fromkeys(FIELDS, QUANTITIES["displacement"].units)
+        power = opened["degree_power"].values if "degree_power" in opened else None
+        found = generation.left_out(opened)
         self._descriptors = {name: columns[name] for name in table.descriptors}
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
         self._samples = None if values is None else Samples(values)
@@ -195,8 +200,11 @@ class ShapeTable:
         m: int = 6,
         eta: float = 2.0,
         max_error: float | Mapping[str, float] | None = None,
+        window: Window = WHOLE,
     ) -> Shape:
         """Return the shape at parameters and a stage, on the lattice of `resolution` (None: the table's own).
+
+        `window` limits it to a part of the lattice and to some components; the rest is not computed where that pays.
 
         `fields` are position and/or displacement; nothing else is computed. `method` is named as in `store.methods`;
         in `idw`, and where the samples form no grid, the `m` nearest take part, with weights distance^-eta.
@@ -216,7 +224,7 @@ class ShapeTable:
             raise OutsideTable(f"a resolution of {n} is out of reach.", "Ask for 4 to 1024 colatitudes.")
         if m < 1 or not eta > 0:
             raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
-        how = methods.parse(method)
+        how, patch = methods.parse(method), window.on(n)
         point = np.array(list(values.values())) if self._samples is not None else None
         near = self._near(point, how, m, eta)
         stages = self._bracket(s)
@@ -228,12 +236,13 @@ class ShapeTable:
         position = displacement = poles = None
         if fields:
             blend = self._blend(point, near, stages, how, n)
-            position, displacement = _synthesize(blend, n, fruit, "displacement" in fields)
-            if fruit is not None:
+            position, displacement = _synthesize(blend, patch, fruit, "displacement" in fields)
+            if fruit is not None and patch.is_whole:
                 poles = (surface.fresh_poles(fruit) + blend.poles()).astype(blend.waves.real.dtype)
+                poles = poles[:, list(patch.components)]
         return Shape(
-            colatitude=colatitudes(n),
-            azimuth=azimuths(n),
+            colatitude=colatitudes(n)[patch.rows],
+            azimuth=azimuths(n)[patch.columns],
             position=position,
             displacement=displacement,
             poles=poles,
@@ -268,7 +277,7 @@ class ShapeTable:
             raise OutsideTable("nothing can be left out there.", "Name a stored stage of a table with several samples.")
         others, j = self._samples.without(i, how.weighting), self.stages.index(stage)
         blend = self._blender(self._samples.values[i], others.samples, others.weights, {j: 1.0}, how)
-        found = _synthesize(blend, resolution or self.resolution, None, True)[1]
+        found = _synthesize(blend, WHOLE.on(resolution or self.resolution), None, True)[1]
         assert found is not None
         return found
 
@@ -366,10 +375,8 @@ def _stored(stages: Mapping[int, float]) -> dict[int, float]:
     return {j: t for j, t in stages.items() if j != _FRESH}
 
 
-def _synthesize(blend: Blend, n: int, fruit: Fruit | None, displaced: bool) -> tuple[Array | None, Array | None]:
-    """Return positions and displacements (n, 2n, 3), each only if wanted."""
-    waves = blend.waves
-    with transforms.borrow(n, min(waves.shape[1] - 1, n), len(waves), waves.real.dtype) as plan:
-        planes = blend.fields(plan)
-        position = None if fruit is None else surface.add_fresh(fruit, planes)
+def _synthesize(blend: Blend, patch: Patch, fruit: Fruit | None, displaced: bool) -> tuple[Array | None, Array | None]:
+    """Return positions and displacements (height, width, c) on a patch, each only if wanted."""
+    with blend.fields(patch) as planes:
+        position = None if fruit is None else surface.add_fresh(fruit, planes, patch)
         return position, np.stack(list(planes), axis=-1) if displaced else None

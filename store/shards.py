@@ -5,16 +5,18 @@ from __future__ import annotations
 import hashlib
 import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from solver.quantities import QUANTITIES
 
 from . import seal
 from .canonical import canonical
 from .errors import CorruptShard
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["digest", "read", "write"]
 
@@ -106,6 +108,8 @@ def read(path: Path, verify: bool = True) -> xr.Dataset:
             raise CorruptShard(f"{path} is damaged or was cut short.", _ADVICE)
         data = whole
     try:
+        import xarray as xr
+
         with xr.open_dataset(io.BytesIO(data), engine="h5netcdf", decode_times=False, decode_timedelta=False) as opened:
             dataset = opened.load()
     except Exception as error:  # HDF5 reports damage as whatever it stumbles over: OSError, KeyError, RuntimeError

@@ -10,14 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any, Self
 
 from . import seal, shards
 from .errors import CorruptShard, MissingStore, UnknownJob
 from .keys import is_key
 from .ledger import Ledger
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["Store"]
 

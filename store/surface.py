@@ -11,24 +11,25 @@ from numpy.typing import NDArray
 from solver.fruit import Fruit, azimuths, colatitudes
 
 from . import spectra
+from .window import WHOLE, Patch
 
 __all__ = ["add_fresh", "fresh_poles", "normals"]
 
 Array = NDArray[Any]
 
 
-def add_fresh(fruit: Fruit, displacement: Array) -> Array:
-    """Return X + u as (n, 2n, 3) for displacements u (3, n, 2n); X is `fruit.surface` on the lattice, in u's precision.
+def add_fresh(fruit: Fruit, displacement: Array, patch: Patch | None = None) -> Array:
+    """Return X + u as (height, width, c) for displacements u (c, height, width) on a patch (None: the whole lattice);
+    X is `fruit.surface` there, in u's precision.
 
     Only the generatrix and the azimuth's sine and cosine are evaluated, each once; the surface is their product.
     """
-    _, n, _ = displacement.shape
+    patch = patch or WHOLE.on(displacement.shape[1])
     kind = displacement.dtype
-    x, y = _generatrix(fruit.radii, n)
-    cosine, sine = _circle(n)
+    x, y = (values[patch.rows] for values in _generatrix(fruit.radii, patch.n))
+    cosine, sine = (values[patch.columns] for values in _circle(patch.n))
     squash = fruit.radii[7] / fruit.radii[3]
     te = fruit.exocarp_thickness
-    position = np.empty((n, 2 * n, 3), kind)
     if fruit.is_axisymmetric:
         stretch: Array = 1 + te / np.hypot(x, y)
         across: Array = (x * stretch)[:, None].astype(kind)
@@ -37,9 +38,10 @@ def add_fresh(fruit: Fruit, displacement: Array) -> Array:
         flat = (x**2).astype(kind)[:, None] * (cosine**2 + (squash * sine) ** 2).astype(kind)
         stretch = 1 + kind.type(te) / np.sqrt(flat + (y**2).astype(kind)[:, None])
         across, along = stretch * x.astype(kind)[:, None], stretch * y.astype(kind)[:, None]
-    np.add(displacement[0], across * cosine.astype(kind), out=position[..., 0])
-    np.add(displacement[1], along, out=position[..., 1])
-    np.add(displacement[2], across * (squash * sine).astype(kind), out=position[..., 2])
+    position = np.empty((patch.height, patch.width, len(patch.components)), kind)
+    for i, component in enumerate(patch.components):
+        fresh = along if component == 1 else across * (squash * sine if component else cosine).astype(kind)
+        np.add(displacement[i], fresh, out=position[..., i])
     return position
 
 

@@ -12,15 +12,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
-
-import xarray as xr
+from typing import TYPE_CHECKING, Literal
 
 from . import generation, seal
 from .errors import EmptyTable
 from .manifest import TableInfo, directory, read_manifest, write_manifest
 from .samples import Axes, collect
 from .store import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["Precision", "TableInfo", "build", "info", "open", "path_of", "prune", "rebuild"]
 

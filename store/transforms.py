@@ -9,6 +9,7 @@ a millisecond.
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -19,10 +20,15 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+# where dask is installed, pyfftw would import all of it for an interface that is not used here: half a second
+_hidden = sys.modules.setdefault("dask", None) is None  # type: ignore[arg-type]
 try:
     import pyfftw
 except ImportError:
     pyfftw = None
+finally:
+    if _hidden:
+        del sys.modules["dask"]
 
 __all__ = ["Synthesis", "analyse", "backend", "borrow"]
 

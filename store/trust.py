@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from solver.fruit import Fruit, lattice
 
-from . import harmonics, transforms
+from . import harmonics
 from .blend import Blend, Blender, complex_view
 from .errors import OutsideTable, TooUncertain
 from .measures import LATTICE, Measures, Surface, compare
 from .methods import Method
 from .methods.weights import Samples
 from .neighbours import Weighted
+from .window import WHOLE
 
 __all__ = ["Trust", "correlations", "errors", "fresh", "leave_one_out", "refuse", "surface_of"]
 
@@ -34,9 +35,8 @@ def errors(found: Measures) -> dict[str, float]:
 
 def surface_of(blend: Blend, start: Array) -> Surface:
     """Return a blend as a surface over fresh positions `start` (n, 2n, 3)."""
-    n, band = len(start), blend.waves.shape[-1] - 1
-    with transforms.borrow(n, min(band, n), 3, blend.waves.real.dtype) as plan:
-        return Surface(start, np.moveaxis(blend.fields(plan), 0, -1))
+    with blend.fields(WHOLE.on(len(start))) as planes:
+        return Surface(start, np.moveaxis(planes, 0, -1))
 
 
 def leave_one_out(blender: Blender, stored: Array, samples: Samples, fruits: list[Fruit], method: Method) -> Array:

@@ -76,9 +76,9 @@ def read(store: Store, name: str, measure: str) -> State:
     if measure not in Measures._fields:
         raise PlanError(f"there is no measure {measure!r}.", f"Known: {', '.join(Measures._fields)}.")
     table = tables.info(store, name)
-    with tables.open(store, name) as opened:
-        found = generation.left_out(opened)
-        values = np.stack([opened[axis].values for axis in table.axes], axis=-1) if table.axes else None
+    opened = generation.read(tables.path_of(store, table))
+    found = generation.left_out(opened)
+    values = np.stack([opened[axis].values for axis in table.axes], axis=-1) if table.axes else None
     if found is None or values is None:
         raise PlanError(
             f"table {name} does not say how well its samples predict each other.",

@@ -19,7 +19,7 @@ from .about import About
 if TYPE_CHECKING:
     from store.lookup import Shape
 
-__all__ = ["FORMATS", "About", "Format", "negotiate", "write"]
+__all__ = ["FORMATS", "About", "Format", "best", "negotiate", "write"]
 
 
 class Format(NamedTuple):
@@ -64,14 +64,24 @@ def negotiate(accept: str | None, explicit: str | None = None) -> Format:
             raise InvalidQuery.of([Wrong("format", f"there is no format {explicit!r}", advice)])
         return FORMATS[explicit]
     by_type = {f.media_type: f for f in FORMATS.values()}
+    return by_type[best(accept, by_type)]
+
+
+def best(accept: str | None, by_type: Mapping[str, Format]) -> str:
+    """Return the media type that fits an Accept header best, the last one of equals.
+
+    Raises:
+        NotAcceptable: none does.
+
+    """
     try:
-        best = mimeparse.best_match(list(by_type), (accept or "").strip().lower() or "*/*")
+        found = mimeparse.best_match(list(by_type), (accept or "").strip().lower() or "*/*")
     except mimeparse.MimeTypeParseException:
-        best = ""
-    if not best:
-        listed = ", ".join(f"{f.media_type} (format={f.name})" for f in FORMATS.values())
+        found = ""
+    if not found:
+        listed = ", ".join(f"{media_type} (format={f.name})" for media_type, f in by_type.items())
         raise NotAcceptable(f"no representation fits Accept: {accept}.", advice=f"Ask for one of {listed}.")
-    return by_type[best]
+    return str(found)
 
 
 def write(shape: Shape, fmt: str | Format, about: About | None = None) -> bytes:

@@ -22,7 +22,8 @@ LENGTH_UNIT = "r1"
 class About:
     """What a shape does not know of itself: its solver, its table's name, what the table holds fixed.
 
-    `units` are those of the parameters and the stage; `links` and `timings` [ms] appear in JSON alone.
+    `units` are those of the parameters and the stage; `detail` says what was chosen of resolution, part and fields;
+    `links` and `timings` [ms] appear in JSON alone.
     """
 
     solver: str = ""
@@ -30,6 +31,7 @@ class About:
     fixed: Mapping[str, Any] = field(default_factory=dict)
     stage_symbol: str = "stage"
     units: Mapping[str, str] = field(default_factory=dict)
+    detail: Mapping[str, Any] = field(default_factory=dict)
     links: Mapping[str, str] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
 
@@ -50,4 +52,5 @@ def extras(shape: Shape, about: About) -> dict[str, Any]:
         "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
         "method": shape.method,
         "units": {"length": LENGTH_UNIT, **about.units},
+        **({"detail": dict(about.detail)} if about.detail else {}),
     }

@@ -54,7 +54,7 @@ class Cells:
         found = harmonics.degrees(waves)
         local = _local(waves)
         own = np.sqrt(np.maximum(local[np.diag_indices(len(local))], 0))
-        low = found[..., : harmonics.LOWEST, : harmonics.LOWEST]
+        low = found[..., : harmonics.LOWEST, : harmonics.LOWEST].copy()  # a view would keep all harmonics of the cell
         return Cell(_power(found, self._bands), local, own, low)
 
 

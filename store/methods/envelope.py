@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import harmonics, spectra, transforms
+from .. import harmonics, spectra, window
 from ..harmonics import legendre
+from ..window import Patch
 from .cells import COARSE
 
 __all__ = ["apply", "factor", "take_low"]
@@ -47,15 +48,16 @@ def take_low(waves: Array, low: Array) -> None:
     waves[:, : harmonics.LOWEST] -= np.einsum("cml,mlk->cmk", low, series).astype(waves.dtype)
 
 
-def apply(planes: Array, ratio: Array, low: Array) -> None:
-    """Multiply wrinkles (3, n, 2n) by the factor with spectrum `ratio`, and add `low` (3, m, l): all in place."""
-    n = planes.shape[1]
-    with transforms.borrow(n, min(COARSE, n), 1, planes.dtype) as plan:
-        spectra.fill(plan.coefficients, ratio[None].astype(plan.coefficients.dtype))
-        planes *= plan.run()
-    lines = np.einsum("cml,mlt->ctm", low, legendre(harmonics.LOWEST - 1, n))
-    sides = np.concatenate([lines.real, lines.imag], axis=-1).astype(planes.dtype)
-    planes += sides @ _around(n).astype(planes.dtype, copy=False)
+def apply(planes: Array, ratio: Array, low: Array, patch: Patch) -> None:
+    """Multiply wrinkles (c, height, width) on a patch by the factor with spectrum `ratio`, and add `low` (3, m, l) of
+    the patch's components: all in place.
+    """
+    with window.planes(ratio[None].astype(np.result_type(planes, np.complex64)), patch._replace(components=(0,))) as by:
+        planes *= by
+    shapes = legendre(harmonics.LOWEST - 1, patch.n)[..., patch.rows]
+    lines = np.ascontiguousarray(np.einsum("cml,mlt->ctm", low[list(patch.components)], shapes))
+    sides = lines.view(float).astype(planes.dtype)
+    planes += sides @ window.around(patch.n, harmonics.LOWEST, patch.left, patch.width, planes.dtype.str)
 
 
 @lru_cache(maxsize=1)
@@ -64,12 +66,3 @@ def _analysis() -> Array:
     places = 2 * COARSE * COARSE
     waves = spectra.spectrum(np.eye(places).reshape(places, COARSE, 2 * COARSE))
     return np.ascontiguousarray(waves.reshape(places, -1)).view(float)
-
-
-@lru_cache(maxsize=16)
-def _around(n: int) -> Array:
-    """Return the waves (real and imaginary part of m, azimuth) of a real field's harmonics."""
-    m = np.arange(harmonics.LOWEST)
-    angle = np.outer(m, np.arange(2 * n) * np.pi / n)
-    twice = np.where(m == 0, 1.0, 2.0)[:, None]
-    return np.concatenate([twice * np.cos(angle), -twice * np.sin(angle)])

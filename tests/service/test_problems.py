@@ -59,6 +59,8 @@ EXPECTED: dict[type[Exception], int] = {
     errors.JobFailed: 409,
     errors.JobEnded: 409,
     errors.TooManyListeners: 429,
+    errors.UncertainBatch: 422,
+    errors.BatchTooLarge: 413,
 }
 
 

@@ -162,7 +162,7 @@ def test_only_what_is_asked_for_is_computed(table: ShapeTable, monkeypatch: pyte
     monkeypatch.setattr("store.lookup._check_fruit", unwanted)
     query = {"te": 0.033, "gamma": 20.0}
     assert table.at(query, 0.2, fields=("displacement",)).displacement is not None
-    monkeypatch.setattr("store.lookup.transforms.borrow", unwanted)
+    monkeypatch.setattr("store.window.transforms.borrow", unwanted)
     assert table.at(query, 0.2, fields=()).descriptors["roughness"] > 0
 
 
