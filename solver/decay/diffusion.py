@@ -124,9 +124,7 @@ def rkl2(
         lean = -(1 - b1) * step
         _flow(last, c, scale, cap, listed, on, start, near, weight, area, phi, flow)
         for i in listed:
-            following[i] = (
-                mu * last[i] + nu * before[i] + (1 - mu - nu) * y[i] + step * flow[i] + lean * first[i]
-            )
+            following[i] = mu * last[i] + nu * before[i] + (1 - mu - nu) * y[i] + step * flow[i] + lean * first[i]
         before, last, following = last, following, before
         b0, b1 = b1, b
     missing = 0.0

@@ -83,7 +83,7 @@ class Layer:
         nearest = int(np.argmin(far))
         bump = np.clip(1 - far / radius**2, 0, None) ** 2
         bump[nearest] = max(bump[nearest], 1e-3)
-        whole = float(self.surface.area @ bump)
+        whole = self.surface.total(bump)
         if gate is not None:
             bump[gate <= 0] = 0.0
         bump *= self.rates.cap * np.pi * radius**2 / 3 / whole

@@ -23,5 +23,6 @@ def patches(points: Array, size: float, generator: np.random.Generator) -> Array
     phases = generator.uniform(0, 2 * np.pi, _WAVES)
     total = np.zeros(len(points))
     for wave, phase in zip(waves, phases, strict=True):
-        total += np.cos(points @ wave + phase)
+        # no matrix product: BLAS sums by threads, and the field must not depend on their number
+        total += np.cos(points[:, 0] * wave[0] + points[:, 1] * wave[1] + points[:, 2] * wave[2] + phase)
     return 2 * ndtr(total * np.sqrt(2 / _WAVES)) - 1

@@ -17,7 +17,7 @@ _GIRTH = 2 * np.pi
 
 
 class Rates(NamedTuple):
-    """mobility [r1^2/day]: D = mobility u (1 - u/cap) n. consume, wither: [1/day]. feed: D_n [r1^2/day]. The rest: 1."""
+    """mobility [r1^2/day]: D = mobility u (1 - u/cap) n. consume, wither: [1/day]. feed: D_n [r1^2/day]."""
 
     mobility: float
     cap: float

@@ -34,6 +34,8 @@ _LEVELS: dict[Quality, tuple[int, float]] = {"preview": (5, 1e-4), "default": (6
 _LONGEST = 4.0
 #: Measured on one busy core: seconds per step and vertex with both organisms, and a typical step in model time.
 _SECONDS, _STEP = 3e-7, 1.0
+#: Working memory per vertex, mesh and states of both organisms.
+_BYTES = 1000
 
 
 def choose(params: DecayParams, quality: Quality) -> Settings:
@@ -51,7 +53,7 @@ def expected_cost(params: DecayParams, need: Need) -> Cost:
     width = 8 if need.dtype == "float64" else 4
     values = sum((3 if f == "position" else 1) for f in FIELDS if f in need.fields) * 2 * need.resolution**2
     seconds = 1e-5 * settings.vertices + steps * settings.vertices * _SECONDS * organisms / 2
-    return Cost(seconds, len(need.stages) * (values * width + 200) + 4096)
+    return Cost(seconds, len(need.stages) * (values * width + 200) + settings.vertices * _BYTES)
 
 
 def _clock(params: DecayParams) -> float:

@@ -7,6 +7,7 @@ are, and when, depends on the seed and on what grew, never on the stages that we
 from __future__ import annotations
 
 import heapq
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,13 @@ Array = NDArray[np.float64]
 _MOST = 200
 
 
-class Landing:
-    """Where a spore comes down: a unit direction (3), and a mark in [0, 1) to weigh against a probability."""
+class Landing(NamedTuple):
+    """When [day] and at which unit direction (3) a spore comes down; a mark in [0, 1) to weigh against a chance."""
 
-    def __init__(self, direction: Array, mark: float, stray: bool) -> None:
-        self.direction, self.mark, self.stray = direction, mark, stray
+    day: float
+    direction: Array
+    mark: float
+    stray: bool
 
 
 class Spawner:
@@ -49,20 +52,20 @@ class Spawner:
             self._wind(day, len(self._parents) - 1)
 
     def land(self) -> Landing:
-        """Return the landing that is due, and wind its clock again."""
+        """Return the next landing, and wind its clock again."""
         day, parent = heapq.heappop(self._clocks)
         self._wind(day, parent)
         draw = self._generator
         free = draw.normal(size=3)
         mark, distance = draw.uniform(size=2)
         if parent < 0:
-            return Landing(free / np.linalg.norm(free), float(mark), True)
+            return Landing(day, free / np.linalg.norm(free), float(mark), True)
         home = self._parents[parent]
         aside = free - (free @ home) * home
         aside /= np.linalg.norm(aside)
         # even over the cap: the area within an angle grows as 1 - cos
         cosine = 1 - distance * (1 - np.cos(self._reach))
-        return Landing(cosine * home + np.sqrt(1 - cosine**2) * aside, float(mark), False)
+        return Landing(day, cosine * home + np.sqrt(1 - cosine**2) * aside, float(mark), False)
 
     def _wind(self, day: float, parent: int) -> None:
         rate = self._strays if parent < 0 else self._per_colony

@@ -1,7 +1,7 @@
 """Steps in time: as long as the error allows, and never shortened by the stages that are asked for.
 
-The main path goes from landing to landing with steps chosen by step doubling. A stage that lies within a step is
-reached from the step's start on a copy, so 24 or 96 stages of one run show the same rot.
+The main path goes from one new colony to the next, with steps chosen by step doubling. A stage that lies within a step
+is reached from the step's start on a copy, so 24 or 96 stages of one run show the same rot.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def march(
     for wanted in days:
         while day < wanted:
             context.check_cancelled()
-            landing = system.next_landing
-            dt = min(length, landing - day)
-            if since >= _EVERY and dt > 0:
+            rooting = system.next_root(state, day + length)
+            dt = min(length, rooting - day)
+            if since >= _EVERY:
                 # two halves, compared with the whole; the halves are kept
                 halves, error = _doubled(system.advance, system.distance, state, dt)
                 ratio = error / tolerance
@@ -73,9 +73,10 @@ def march(
                 state = system.advance(state, dt)
                 since += 1
             steps += 1
-            day = landing if dt == landing - day else day + dt
-            while system.next_landing <= day:
-                state = system.land(state, day)
+            rooted = dt == rooting - day
+            day = rooting if rooted else day + dt
+            if rooted:
+                state = system.root(state)
             context.report(day / last, f"day {day:.2f}")
         shown = system.advance(state, wanted - day) if wanted > day else state
         yield Reached(wanted, shown, steps, worst)

@@ -39,6 +39,14 @@ class Both(NamedTuple):
     mould: State | None
 
 
+class _Due(NamedTuple):
+    """A spore that will take root: where (vertex), and whether it is rot."""
+
+    landing: Landing
+    site: int
+    rots: bool
+
+
 class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it."""
 
@@ -53,6 +61,7 @@ class System:
         self.mould = self._layer(params, "mould", for_mould) if with_mould else None
         strays = params.rot_spawning if with_mould else 0.0
         self._mould_spawner = Spawner(chance, strays, params.spawn_reach, mould_clocks)
+        self._due: _Due | None = None
         self.start = self._wounded(params)
 
     def _layer(self, params: DecayParams, name: str, generator: np.random.Generator) -> Layer:
@@ -94,37 +103,47 @@ class System:
             if x is None or y is None:
                 continue
             there = y.u + y.v
-            size = float(self.surface.area @ there**2)
+            size = self.surface.total(there**2)
             if size > 0:
                 gap = x.u + x.v - there
-                worst = max(worst, float(np.sqrt(self.surface.area @ gap**2 / size)))
+                worst = max(worst, float(np.sqrt(self.surface.total(gap**2) / size)))
         return worst
 
-    @property
-    def next_landing(self) -> float:
-        """When the next spore lands [day]."""
-        return min(self._rot_spawner.next, self._mould_spawner.next)
+    def next_root(self, state: Both, until: float) -> float:
+        """Return when the next spore takes root [day], infinite if none does before `until`.
 
-    def land(self, state: Both, day: float) -> Both:
-        """Return the state with the colony that is due, if it takes root."""
-        if self._rot_spawner.next <= self._mould_spawner.next:
-            landing = self._rot_spawner.land()
-            site = self._site(landing)
-            if self.rot.share(state.rot)[site] >= _TAKEN:
-                return state
-            self._rot_spawner.settle(landing.direction, day)
-            return state._replace(rot=self.rot.seeded(state.rot, self.surface.points[site], _SPORE))
-        landing = self._mould_spawner.land()
-        site = self._site(landing)
+        Whether it will is judged on the state at the start of the step it falls in, so that the many that land on
+        barren or taken ground cost no step.
+        """
+        while self._due is None:
+            first = self._rot_spawner if self._rot_spawner.next <= self._mould_spawner.next else self._mould_spawner
+            if first.next > until:
+                return np.inf
+            landing = first.land()
+            site = int(self._tree.query(landing.direction)[1])
+            if self._roots(state, landing, site, first is self._rot_spawner):
+                self._due = _Due(landing, site, first is self._rot_spawner)
+        return self._due.landing.day
+
+    def root(self, state: Both) -> Both:
+        """Return the state with the colony that is due."""
+        assert self._due is not None
+        landing, site, rots = self._due
+        self._due = None
+        place = self.surface.points[site]
+        if rots:
+            self._rot_spawner.settle(landing.direction, landing.day)
+            return state._replace(rot=self.rot.seeded(state.rot, place, _SPORE))
         assert self.mould is not None
         assert state.mould is not None
-        gate = self.gate(state.rot)
-        rotten = float(self.rot.share(state.rot)[site])
-        barren = gate[site] <= 0 or (landing.stray and landing.mark >= rotten)
-        if barren or self.mould.share(state.mould)[site] >= _TAKEN:
-            return state
-        self._mould_spawner.settle(landing.direction, day)
-        return state._replace(mould=self.mould.seeded(state.mould, self.surface.points[site], _SPORE, gate))
+        self._mould_spawner.settle(landing.direction, landing.day)
+        return state._replace(mould=self.mould.seeded(state.mould, place, _SPORE, self.gate(state.rot)))
 
-    def _site(self, landing: Landing) -> int:
-        return int(self._tree.query(landing.direction)[1])
+    def _roots(self, state: Both, landing: Landing, site: int, rots: bool) -> bool:
+        rotten = float(self.rot.share(state.rot)[site])
+        if rots:
+            return rotten < _TAKEN
+        assert self.mould is not None
+        assert state.mould is not None
+        chance = rotten if landing.stray else 1.0
+        return rotten > _SHUT and landing.mark < chance and float(self.mould.share(state.mould)[site]) < _TAKEN
