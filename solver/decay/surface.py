@@ -49,11 +49,11 @@ class Surface:
     weight: Array
     stiffest: float
 
-    def mean(self, field: Array) -> float:
+    def mean(self, field: Array | NDArray[np.bool_]) -> float:
         """Return the area-weighted mean of a field (v)."""
         return self.total(field) / self.total(1.0)
 
-    def total(self, field: Array | float) -> float:
+    def total(self, field: Array | NDArray[np.bool_] | float) -> float:
         """Return the integral over the surface of a field (v) [r1^2]; the same whatever the number of threads."""
         return float(np.sum(self.area * field))  # a BLAS product would sum by threads
 
@@ -136,7 +136,7 @@ def sampler(level: int, resolution: int) -> sparse.csr_array:
     _, candidates = KDTree(corners.mean(axis=1)).query(wanted, k=4)
     best, weights = np.full(len(wanted), -np.inf), np.zeros((len(wanted), 3))
     face = np.zeros(len(wanted), np.int64)
-    for column in candidates.T:
+    for column in np.asarray(candidates).T:
         # the ray through the face's plane, as shares of its corners
         shares = np.linalg.solve(np.swapaxes(corners[column], 1, 2), wanted[..., None])[..., 0]
         shares /= shares.sum(axis=1, keepdims=True)
