@@ -31,10 +31,12 @@ def of_run(run: xr.Dataset, index: int) -> Array | None:
     colour = np.broadcast_to(np.array(params["skin_colour"], float), (n, m, 3))
     rot, mould, active = layer("rot"), layer("mould"), layer("mould_active")
     # rot shows long before it is complete, mould hides what is below it
-    colour = _over(colour, _ROT, 0.9 * _smooth(rot / 0.5))
-    growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1)[..., None]
+    colour = _over(colour, _ROT, 0.9 * _smooth(rot / 0.2))
+    # what grows is white while it is thin, and takes its colour with the spores of a dense or a resting mat
+    growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1) * (1 - _smooth((mould - 0.2) / 0.3))
+    growing = growing[..., None]
     centre = np.array(params["mould_colour"], float)
-    return _over(colour, centre + (_RIM - centre) * growing, 0.95 * _smooth(mould / 0.35))
+    return _over(colour, centre + (_RIM - centre) * growing, 0.95 * _smooth(mould / 0.25))
 
 
 def _over(below: Array, above: Array, cover: Array) -> Array:
