@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
-from .params import DecayParams, Wound
+from .params import DecayParams, Weather, Wound
 from .presets import PRESETS
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SOLVER", "DecayParams", "Wound"]
+__all__ = ["SOLVER", "DecayParams", "Weather", "Wound"]
 
 
 def _run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:

@@ -6,6 +6,7 @@ two T_s of the paper are two things: the steam point in Eq. 11, the surface's te
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from .params import DecayParams
 from .surface import Surface
 
-__all__ = ["damping", "deficit", "saturation", "water_lost"]
+__all__ = ["air", "damping", "deficit", "saturation", "water_lost"]
 
 Array = NDArray[np.float64]
 
@@ -38,9 +39,19 @@ def saturation(celsius: float | Array) -> Any:
     return _STEAM_PRESSURE * 10**exponent
 
 
-def deficit(params: DecayParams) -> float:
-    """Return P_s - P_a [Pa], at least 0: fruit and air share one temperature, and no dew falls on the fruit."""
-    return max(float(saturation(params.temperature)) * (_ACTIVITY - params.humidity / 100), 0.0)
+def air(params: DecayParams, day: float | Array) -> tuple[Any, Any]:
+    """Return temperature [degC] and relative humidity [percent] at times [day]."""
+    if not params.weather:
+        return params.temperature + 0 * day, params.humidity + 0 * day
+    days = [w.day for w in params.weather]
+    temperature = np.interp(day, days, [w.temperature for w in params.weather])
+    return temperature, np.interp(day, days, [w.humidity for w in params.weather])
+
+
+def deficit(params: DecayParams, day: float | Array = 0.0) -> Any:
+    """Return P_s - P_a [Pa] at times [day], at least 0: fruit and air share one temperature, and no dew falls."""
+    celsius, humidity = air(params, day)
+    return np.maximum(saturation(celsius) * (_ACTIVITY - humidity / 100), 0.0)
 
 
 def water_lost(params: DecayParams, surface: Surface, days: float) -> float:
@@ -49,10 +60,22 @@ def water_lost(params: DecayParams, surface: Surface, days: float) -> float:
     The fruit's size follows from its weight, its shape and a density of 1 g/cm^3.
     """
     a, b, c = (surface.points[surface.faces[:, k]] for k in range(3))
-    volume = float(np.einsum("fk,fk->", a, np.cross(b, c))) / 6
+    volume = float(np.sum(a * np.cross(b, c))) / 6
     r1 = (params.weight / (_DENSITY * volume)) ** (1 / 3)
-    grams = params.transpiration * surface.area.sum() * r1**2 * deficit(params) * 1e-6 * _SECONDS * days
+    grams = params.transpiration * surface.total(1.0) * r1**2 * _dryness(params, days) * 1e-6 * _SECONDS
     return float(min(grams / params.weight, params.water_content / 100))
+
+
+def _dryness(params: DecayParams, days: float) -> float:
+    """Return the integral of the deficit over time [Pa day]: Simpson's rule between the given days."""
+    knots = np.unique(np.clip([0.0, *(w.day for w in params.weather), days], 0.0, days))
+    total = 0.0
+    for first, last in pairwise(knots):
+        samples = deficit(params, np.linspace(first, last, 17))
+        total += float(
+            (last - first) / 48 * (samples[0] + samples[-1] + 4 * samples[1::2].sum() + 2 * samples[2:-1:2].sum())
+        )
+    return total
 
 
 def damping(celsius: float, humidity: float) -> float:

@@ -51,21 +51,34 @@ class Layer:
         """Return u + v over what the nutrient n = 1 can feed: the organism's map, 0 to 1."""
         return np.minimum((state.u + state.v) / self.rates.theta, 1.0)
 
-    def advance(self, state: State, dt: float, gate: Array | None = None) -> State:
-        """Return the state dt [day] later; `gate` (v), 0 to 1, says where the organism may spread."""
+    def advance(self, state: State, dt: float, gate: Array | None = None, rates: Rates | None = None) -> State:
+        """Return the state dt [day] later; `gate` (v), 0 to 1, says where the organism may spread.
+
+        rates: those of this step, where the weather changes them.
+        """
+        rates = rates or self.rates
         u, v, n = state.u.copy(), state.v.copy(), state.n.copy()
         s = self.surface
         listed = listed_around(u, _CUT * self.rates.cap, _RINGS, s.start, s.near)
-        self._half(u, v, n, listed, dt / 2, gate)
-        if self.rates.feed > 0:
-            stages = stages_for(dt, self.rates.feed * s.stiffest)
+        self._half(u, v, n, listed, dt / 2, gate, rates)
+        if rates.feed > 0:
+            stages = stages_for(dt, rates.feed * s.stiffest)
             ones = np.ones_like(n)
-            rkl2(n, ones, self.rates.feed, 0.0, dt, stages, self._all, s.start, s.near, s.weight, s.area)
-        self._half(u, v, n, listed, dt / 2, gate)
+            rkl2(n, ones, rates.feed, 0.0, dt, stages, self._all, s.start, s.near, s.weight, s.area)
+        self._half(u, v, n, listed, dt / 2, gate, rates)
         return State(u, v, n, state.added)
 
-    def _half(self, u: Array, v: Array, n: Array, listed: NDArray[np.int64], dt: float, gate: Array | None) -> None:
-        s, rates = self.surface, self.rates
+    def _half(
+        self,
+        u: Array,
+        v: Array,
+        n: Array,
+        listed: NDArray[np.int64],
+        dt: float,
+        gate: Array | None,
+        rates: Rates,
+    ) -> None:
+        s = self.surface
         if not len(listed):
             return
         react(u, v, n, listed, dt / 2, rates)

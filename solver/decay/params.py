@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from ..fruit import Fruit
 from .colony import MOULDS, SOFT_ROT, Colony
 
-__all__ = ["DecayParams", "Wound"]
+__all__ = ["DecayParams", "Weather", "Wound"]
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -23,6 +24,16 @@ class Wound(BaseModel):
     colatitude: float = Field(ge=0, le=180, description="From the pole y > 0 [degree]")
     azimuth: float = Field(0.0, ge=0, le=360, description="About the y axis, from x towards z [degree]")
     radius: float = Field(0.12, ge=0.01, le=0.6, description="Radius [r1]")
+
+
+class Weather(BaseModel):
+    """The air on one day; between two days it changes evenly."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    day: float = Field(ge=0, le=120, description="Time since the wounds [day]")
+    temperature: float = Field(ge=-10, le=60, description="Temperature of air and fruit [degC]")
+    humidity: float = Field(ge=0, le=100, description="Relative humidity [percent]")
 
 
 class DecayParams(Fruit):
@@ -43,6 +54,12 @@ class DecayParams(Fruit):
     )
     humidity: float = Field(
         50.0, ge=0, le=100, description="Relative humidity of the air", json_schema_extra={"units": "percent"}
+    )
+    weather: tuple[Weather, ...] = Field(
+        (),
+        max_length=1000,
+        description="The air in the course of time, in place of temperature and humidity; days in rising order",
+        json_schema_extra={"units": "1"},
     )
     porosity: float = Field(
         25.0, ge=0, le=100, description="Porosity of the skin (Table 2)", json_schema_extra={"units": "percent"}
@@ -129,3 +146,10 @@ class DecayParams(Fruit):
         description="Mould that is no longer active, linear red, green, blue; its active rim is white",
         json_schema_extra={"units": "1"},
     )
+
+    @field_validator("weather")
+    @classmethod
+    def _rising(cls, value: tuple[Weather, ...]) -> tuple[Weather, ...]:
+        if any(a.day >= b.day for a, b in pairwise(value)):
+            raise ValueError("the days of the weather must rise: sort them, and give each day once")
+        return value

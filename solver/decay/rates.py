@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .colony import Colony
-from .environment import damping
+from .environment import air, damping
 from .params import DecayParams
 
 __all__ = ["Rates", "daily"]
@@ -35,12 +35,13 @@ class Rates(NamedTuple):
         return self.mobility * self.cap / 4
 
 
-def daily(colony: Colony, params: DecayParams) -> Rates:
-    """Return a colony's constants per day on this fruit, in this climate."""
+def daily(colony: Colony, params: DecayParams, day: float = 0.0) -> Rates:
+    """Return a colony's constants per day on this fruit, in the air of a day."""
     clock = colony.pace * params.growth_rate / 50
+    celsius, humidity = air(params, day)
     # s adds per cents and degrees Fahrenheit: only the raw sum of the paper gives fronts that move
-    s = params.porosity + max(_fahrenheit(params.temperature), 0.0) + params.humidity + params.water_content
-    motility = s * damping(params.temperature, params.humidity) * colony.sigma1 * colony.d1
+    s = params.porosity + max(_fahrenheit(celsius), 0.0) + humidity + params.water_content
+    motility = s * damping(celsius, humidity) * colony.sigma1 * colony.d1
     return Rates(
         mobility=clock * motility * _GIRTH**2,
         cap=colony.d2,

@@ -35,7 +35,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     settings = choose(params, need.quality)
     begun = time.perf_counter()
     wanted = set(need.fields)
-    attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": deficit(params)}
+    attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": float(deficit(params))}
     if not wanted & {*ROT, *MOULD, "budget_error"}:
         fresh = lay(params, settings.level) if "water_lost" in wanted else None
         rows = []

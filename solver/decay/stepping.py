@@ -6,7 +6,7 @@ is reached from the step's start on a copy, so 24 or 96 stages of one run show t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from .system import Both, System
 
 __all__ = ["Reached", "march"]
 
-#: The error is measured on every so many steps: a front that runs evenly asks for even steps.
+#: The error is measured on every so many steps: a front that runs evenly asks for even steps. In weather, on each.
 _EVERY = 8
 _SHORTEST = 1e-7
 
@@ -42,15 +42,16 @@ def march(
     """
     day, state, steps, worst = 0.0, system.start, 0, 0.0
     length, since = longest / 4, _EVERY
+    every = _EVERY if system.steady else 1
     last = days[-1]
     for wanted in days:
         while day < wanted:
             context.check_cancelled()
             rooting = system.next_root(state, day + length)
             dt = min(length, rooting - day)
-            if since >= _EVERY:
+            if since >= every:
                 # two halves, compared with the whole; the halves are kept
-                halves, error = _doubled(system.advance, system.distance, state, dt)
+                halves, error = _doubled(system, state, day, dt)
                 ratio = error / tolerance
                 if ratio > 1 and dt > _SHORTEST:
                     length = dt * max(0.9 * ratio ** (-1 / 3), 0.25)
@@ -64,13 +65,13 @@ def march(
                     break
                 if dt == length:
                     length = min(dt * float(np.clip(0.9 * max(ratio, 1e-6) ** (-1 / 3), 0.5, 2)), longest)
-                    since = 0
+                    since = 1
                 worst = max(worst, ratio)
                 state = halves
             else:
                 if day + dt > wanted:
                     break
-                state = system.advance(state, dt)
+                state = system.advance(state, day, dt)
                 since += 1
             steps += 1
             rooted = dt == rooting - day
@@ -78,13 +79,11 @@ def march(
             if rooted:
                 state = system.root(state)
             context.report(day / last, f"day {day:.2f}")
-        shown = system.advance(state, wanted - day) if wanted > day else state
+        shown = system.advance(state, day, wanted - day) if wanted > day else state
         yield Reached(wanted, shown, steps, worst)
 
 
-def _doubled(
-    advance: Callable[[Both, float], Both], distance: Callable[[Both, Both], float], state: Both, dt: float
-) -> tuple[Both, float]:
-    halves = advance(advance(state, dt / 2), dt / 2)
+def _doubled(system: System, state: Both, day: float, dt: float) -> tuple[Both, float]:
+    halves = system.advance(system.advance(state, day, dt / 2), day + dt / 2, dt / 2)
     # of second order: the halves' own error is a third of the difference
-    return halves, distance(advance(state, dt), halves) / 3
+    return halves, system.distance(system.advance(state, day, dt), halves) / 3

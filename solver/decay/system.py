@@ -14,10 +14,11 @@ from scipy.spatial import KDTree
 
 from ..contract import Context
 from ..fruit import directions
+from .colony import Colony
 from .layer import Layer, State
 from .noise import patches
 from .params import DecayParams
-from .rates import daily
+from .rates import Rates, daily
 from .spawning import Landing, Spawner
 from .surface import geodesic, lay
 
@@ -51,6 +52,7 @@ class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it."""
 
     def __init__(self, params: DecayParams, level: int, with_mould: bool) -> None:
+        self._params = params
         self.surface = lay(params, level)
         self._rays, _ = geodesic(level)
         self._tree = KDTree(self._rays)
@@ -83,18 +85,27 @@ class System:
                 self._mould_spawner.settle(ray, 0.0)
         return Both(rot, mould)
 
+    @property
+    def steady(self) -> bool:
+        """Whether nothing from outside changes in time."""
+        return not self._params.weather
+
     def gate(self, rot: State) -> Array:
         """Return where the mould may spread, 0 to 1 (v)."""
         x = np.clip((self.rot.share(rot) - _SHUT) / (_OPEN - _SHUT), 0, 1)
         return x * x * (3 - 2 * x)
 
-    def advance(self, state: Both, dt: float) -> Both:
-        """Return the state dt [day] later, without new colonies; the gate is that of the middle of the step."""
-        rot = self.rot.advance(state.rot, dt)
+    def advance(self, state: Both, day: float, dt: float) -> Both:
+        """Return the state dt [day] after a day, without new colonies; gate and air are those of the step's middle."""
+        rot = self.rot.advance(state.rot, dt, rates=self._rates(self._params.rot, day + dt / 2))
         if self.mould is None or state.mould is None:
             return Both(rot, None)
         gate = (self.gate(state.rot) + self.gate(rot)) / 2
-        return Both(rot, self.mould.advance(state.mould, dt, gate))
+        rates = self._rates(self._params.mould, day + dt / 2)
+        return Both(rot, self.mould.advance(state.mould, dt, gate, rates))
+
+    def _rates(self, colony: Colony, day: float) -> Rates | None:
+        return daily(colony, self._params, day) if self._params.weather else None
 
     def distance(self, a: Both, b: Both) -> float:
         """Return the largest relative L2 difference of density u + v between two states, of rot and of mould."""

@@ -46,6 +46,31 @@ def test_daily_losses_of_table_1(fruit, daily):
     assert water_lost(params, fresh, 1e6) == params.water_content / 100
 
 
+def test_water_lost_in_changing_air_is_the_integral():
+    """Humidity falls evenly at a steady temperature: the mean of both ends, exactly."""
+    fresh = lay(DecayParams(), 2)
+    falling = [{"day": 0, "temperature": 22.2, "humidity": 80}, {"day": 10, "temperature": 22.2, "humidity": 40}]
+    lost = water_lost(DecayParams(weather=falling), fresh, 10.0)
+    ends = [water_lost(DecayParams(humidity=h), fresh, 10.0) for h in (80, 40)]
+    assert lost == pytest.approx(sum(ends) / 2, rel=1e-12)
+    assert water_lost(DecayParams(weather=falling), fresh, 14.0) == pytest.approx(lost + 0.4 * ends[1], rel=1e-12)
+    with pytest.raises(InvalidInput, match="must rise"):
+        SOLVER.parse({"weather": falling[::-1]})
+
+
+def test_steady_weather_is_the_climate_and_frost_stops_the_front():
+    air = {"temperature": 22.2, "humidity": 50.0}
+    (plain,) = stages(system(), (3.0,))
+    (same,) = stages(system(weather=[{"day": 1, **air}, {"day": 2, **air}]), (3.0,))
+    # the error is measured on every step in weather, so the steps differ
+    assert system().distance(plain.state, same.state) < 5e-3
+    frost = [{"day": 0, **air}, {"day": 1.5, **air}, {"day": 1.6, "temperature": -10.0, "humidity": 0.0}]
+    cold = system(spawning=0.0, rot_spawning=0.0, weather=frost)
+    reached = stages(cold, (1.6, 5.0))
+    gone = [cold.rot.share(r.state.rot) > 0 for r in reached]
+    assert gone[0].sum() == gone[1].sum() > 0
+
+
 def system(level: int = 3, mould: bool = True, **more: object) -> System:
     return System(SOLVER.parse({**FAST, **more}), level, mould)
 
