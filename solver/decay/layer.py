@@ -88,7 +88,7 @@ class Layer:
         react(u, v, n, listed, dt / 2, rates)
 
     def seeded(self, state: State, centre: Array, radius: float, gate: Array | None = None) -> State:
-        """Return the state with a new colony: a smooth bump of height d2 about a point (3), where the gate is open.
+        """Return the state with a new colony: a smooth bump of height d2 about a point (3), times the gate.
 
         Its total does not depend on the mesh; a mesh coarser than the bump takes it all at the nearest vertex.
         """
@@ -98,7 +98,7 @@ class Layer:
         bump[nearest] = max(bump[nearest], 1e-3)
         whole = self.surface.total(bump)
         if gate is not None:
-            bump[gate <= 0] = 0.0
+            bump *= gate
         bump *= self.rates.cap * np.pi * radius**2 / 3 / whole
         return state._replace(u=state.u + bump, added=state.added + self.surface.mean(bump))
 

@@ -1,7 +1,7 @@
 """Rot and mould together on one fruit: initial fields, the gate between them, wounds and spawning.
 
 The soft rot lives on the flesh and eats what is in it, the mould lives on the skin and eats what is there; both start
-as random fields of one kind (D15). The mould spreads only where rot is (D14): the gate is 0 below a hundredth of rot.
+as random fields of one kind (D15). The mould spreads only where rot is (D14): the gate is 0 below 0.002 of rot.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ __all__ = ["Both", "System"]
 
 Array = NDArray[np.float64]
 
-#: Rot map where the gate starts to open and where it is open; below the first the mould does not enter.
-_SHUT, _OPEN = 0.01, 0.1
+#: Rot map where the gate starts to open and where it is open; below the first the mould does not enter. Ten times more
+#: makes young colonies hang on how thin their rot is, and errors of the mesh four times larger.
+_SHUT, _OPEN = 0.002, 0.02
 #: Radius of a spawned colony [r1], and the share of the map above which a place is taken already.
 _SPORE = 0.06
 _TAKEN = 0.05
@@ -41,10 +42,9 @@ class Both(NamedTuple):
 
 
 class _Due(NamedTuple):
-    """A spore that will take root: where (vertex), and whether it is rot."""
+    """A spore that will take root, and whether it is rot."""
 
     landing: Landing
-    site: int
     rots: bool
 
 
@@ -133,15 +133,16 @@ class System:
             landing = first.land()
             site = int(self._tree.query(landing.direction)[1])
             if self._roots(state, landing, site, first is self._rot_spawner):
-                self._due = _Due(landing, site, first is self._rot_spawner)
+                self._due = _Due(landing, first is self._rot_spawner)
         return self._due.landing.day
 
     def root(self, state: Both) -> Both:
         """Return the state with the colony that is due."""
         assert self._due is not None
-        landing, site, rots = self._due
+        landing, rots = self._due
         self._due = None
-        place = self.surface.points[site]
+        x, y, z = landing.direction
+        place = self._params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
         if rots:
             self._rot_spawner.settle(landing.direction, landing.day)
             return state._replace(rot=self.rot.seeded(state.rot, place, _SPORE))
