@@ -20,6 +20,8 @@ __all__ = ["air", "damping", "deficit", "saturation", "water_lost"]
 Array = NDArray[np.float64]
 
 _STEAM_POINT = 373.16
+#: The ice point of the formula's own temperature scale, on which 100 degC is 373.16 K; 273.15 is off by 0.07 %.
+_ICE_POINT = 273.16
 _STEAM_PRESSURE = 101324.6
 #: Water activity at the evaporating surface: dissolved matter lowers the vapour pressure (the paper: 0.98 or 0.99).
 _ACTIVITY = 0.98
@@ -29,7 +31,7 @@ _DENSITY = 1e6
 
 def saturation(celsius: float | Array) -> Any:
     """Return the saturation vapour pressure over water [Pa], Goff and Gratch 1946, at temperatures [degC]."""
-    ratio = _STEAM_POINT / (np.asarray(celsius, dtype=float) + 273.15)
+    ratio = _STEAM_POINT / (np.asarray(celsius, dtype=float) + _ICE_POINT)
     exponent = (
         -7.90298 * (ratio - 1)
         + 5.02808 * np.log10(ratio)
