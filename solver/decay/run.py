@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..contract import Context, Need, SolverError
-from ..fruit import azimuths, colatitudes, lattice
+from ..fruit import azimuths, colatitudes, lattice, window
 from .environment import deficit, water_lost
 from .params import DecayParams
 from .settings import FIELDS, MOULD, ROT, choose
@@ -102,7 +102,7 @@ def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[st
     row: dict[str, Any] = {name: value for name, value in found.items() if name in wanted}
     if wanted & set(maps):
         assert need.resolution is not None  # settled
-        inside = _inside(need)
+        inside = window(need.resolution, need.region)
         sample = sampler(level, need.resolution)
         for name in sorted(wanted & set(maps)):
             field = (sample @ maps[name]).reshape(need.resolution, -1)
@@ -113,7 +113,9 @@ def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[st
 def _positions(row: dict[str, Any], params: DecayParams, need: Need) -> dict[str, Any]:
     if "position" in need.fields:
         assert need.resolution is not None
-        row["position"] = params.surface(*lattice(need.resolution))[_inside(need)].astype(need.dtype)
+        row["position"] = params.surface(*lattice(need.resolution))[window(need.resolution, need.region)].astype(
+            need.dtype
+        )
     return row
 
 
@@ -130,24 +132,9 @@ def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any]) -> x
             data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
     if any(name in FIELDS for name in data):
-        down, along = _inside(need)
+        down, along = window(need.resolution, need.region)
         coords["colatitude"] = colatitudes(need.resolution)[down]
         coords["azimuth"] = azimuths(need.resolution)[along]
     if "position" in data:
         coords["component"] = ["x", "y", "z"]
     return xr.Dataset(data, coords, attrs)
-
-
-def _inside(need: Need) -> tuple[slice, slice]:
-    """Return the lattice rows and columns inside the wanted region."""
-    assert need.resolution is not None
-    if need.region is None:
-        return slice(None), slice(None)
-    slices = []
-    for samples, (low, high) in (
-        (colatitudes(need.resolution), need.region.colatitude),
-        (azimuths(need.resolution), need.region.azimuth),
-    ):
-        first, last = np.searchsorted(np.degrees(samples), [low, high])
-        slices.append(slice(int(first), int(last)))
-    return slices[0], slices[1]
