@@ -33,7 +33,7 @@ _LEVELS: dict[Quality, tuple[int, float]] = {"preview": (5, 1e-4), "default": (6
 #: Longest step, in units of the quicker organism's own time.
 _LONGEST = 4.0
 #: Measured on one busy core: seconds per step and vertex with both organisms, and a typical step in model time.
-_SECONDS, _STEP = 3e-7, 1.0
+_SECONDS, _STEP = 4e-7, 0.2
 #: Working memory per vertex, mesh and states of both organisms.
 _BYTES = 1000
 
