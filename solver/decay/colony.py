@@ -36,7 +36,7 @@ class Colony(BaseModel):
 #: The paper gives no numbers for bacteria: Table 3 with twice the motility, so that rot runs ahead of the mould.
 SOFT_ROT = Colony(sigma1=0.02)
 
-#: Only Table 3 is published. The paces are ours, for the spread that is usual at room temperature; see docs/decay.md.
+#: Only Table 3 is published. The paces are ours, guessed and not fitted to any data; see docs/decay.md.
 MOULDS: Mapping[str, Colony] = {
     "penicillium-expansum": Colony(),
     "penicillium-digitatum": Colony(pace=6.0),
