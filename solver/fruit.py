@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 from scipy.interpolate import CubicSpline
 
-from .contract import Params
+from .contract import Params, Region
 
-__all__ = ["PRESETS", "Fruit", "azimuths", "colatitudes", "directions", "lattice"]
+__all__ = ["PRESETS", "Fruit", "azimuths", "colatitudes", "directions", "lattice", "window"]
 
 Array = NDArray[np.float64]
 
@@ -196,6 +196,20 @@ def lattice(resolution: int) -> tuple[Array, Array]:
     for grid in (theta, phi):
         grid.flags.writeable = False
     return theta, phi
+
+
+def window(resolution: int, region: Region | None) -> tuple[slice, slice]:
+    """Return the rows and columns of the lattice that lie inside a region; all of them if there is none."""
+    if region is None:
+        return slice(None), slice(None)
+    slices = []
+    for samples, (low, high) in (
+        (colatitudes(resolution), region.colatitude),
+        (azimuths(resolution), region.azimuth),
+    ):
+        first, last = np.searchsorted(np.degrees(samples), [low, high])
+        slices.append(slice(int(first), int(last)))
+    return slices[0], slices[1]
 
 
 def directions(colatitude: Array, azimuth: Array) -> Array:

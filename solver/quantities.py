@@ -53,7 +53,9 @@ register(
     azimuth=Quantity("radian", "azimuth about the y axis, from x towards z", "phi"),
     component=Quantity("1", "Cartesian component", "i"),
     converged=Quantity("1", "the stage reached its residual", "-"),
-    residual=Quantity("1", "out-of-balance force over internal force, Euclidean norms", "|r|/|f|"),
+    residual=Quantity(
+        "1", "out-of-balance force over internal force, or the largest error of a step, relative L2", "|r|/|f|"
+    ),
     drift=Quantity("1", "rms motion of the surface in its last 200 steps, in exocarp thicknesses", "d"),
     iterations=Quantity("1", "steps or iterations spent up to and including this stage", "n"),
     seconds=Quantity("s", "wall time spent up to and including this stage", "t", volatile=True),
@@ -76,4 +78,20 @@ register(
     strain_energy=Quantity("1", "strain energy of the settled fruit, in units of mu r1^3, mu of the sarcocarp", "E"),
     released_energy=Quantity("1", "strain energy that settling released, in units of mu r1^3", "dE"),
     volume=Quantity("1", "volume enclosed by the outer surface, in units of r1^3", "V"),
+)
+
+# decay: maps on the surface, and what they come to
+register(
+    rot=Quantity("1", "soft rot, over what a nutrient of 1 can feed", "r"),
+    substrate=Quantity("1", "nutrient left in the flesh, what the rot lives on", "n_r"),
+    mould=Quantity("1", "mould, active and inactive, over what a nutrient of 1 can feed", "m"),
+    mould_active=Quantity("1", "active mould, over what a nutrient of 1 can feed", "u"),
+    nutrient=Quantity("1", "nutrient left in the skin, what the mould lives on", "n"),
+    rotten_share=Quantity("1", "share of the surface with rot of at least 0.1", "A_r"),
+    mouldy_share=Quantity("1", "share of the surface with mould of at least 0.1", "A_m"),
+    mean_rot=Quantity("1", "area-weighted mean of the soft rot", "r_mean"),
+    mean_mould=Quantity("1", "area-weighted mean of the mould", "m_mean"),
+    mean_nutrient=Quantity("1", "area-weighted mean of the nutrient in the skin", "n_mean"),
+    budget_error=Quantity("1", "what is missing of theta n + u + v, over what there was and was added", "e"),
+    water_lost=Quantity("1", "water lost by transpiration, over the fresh weight", "w"),
 )

@@ -42,10 +42,15 @@ def _npz(made: Made) -> bytes:
 
 
 def _png(made: Made) -> bytes:
+    from . import colours
     from .picture import Panel, sheet
 
-    panels = [Panel(shape.position, shape.poles) for shape in made.shapes if shape.position is not None]
-    labels = [f"s = {shape.stage:g}" for shape in made.shapes]
+    panels = [
+        Panel(shape.position, shape.poles, colour=None if made.run is None else colours.of_run(made.run, i))
+        for i, shape in enumerate(made.shapes)
+        if shape.position is not None
+    ]
+    labels = [f"{made.stage_symbol} = {shape.stage:g}" for shape in made.shapes]
     return sheet([panels], title=made.title, column_labels=labels, pixels=360)
 
 

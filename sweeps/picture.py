@@ -21,11 +21,12 @@ _INK = "#3a2a24"
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], and a note to write below it."""
+    """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], a note to write below it, and colours (n, 2n, 3)."""
 
     position: NDArray[Any]
     poles: NDArray[Any] | None = None
     note: str = ""
+    colour: NDArray[Any] | None = None
 
 
 def sheet(
@@ -74,7 +75,8 @@ def sheet(
                 continue
             box = (x / width, 1 - (y + pixels) / height, pixels / width, pixels / height)
             axes = figure.add_axes(box)
-            axes.imshow(render(panel.position, panel.poles, pixels, view), interpolation="nearest")
+            image = render(panel.position, panel.poles, pixels, view, panel.colour)
+            axes.imshow(image, interpolation="nearest")
             axes.set_axis_off()
             if panel.note:
                 write(x + pixels / 2, y + pixels - 9, panel.note, 8.5, alpha=0.8, **middle)

@@ -73,8 +73,17 @@ def mesh(position: Array, poles: Array | None = None, resolution: int | None = N
     return vertices, np.concatenate(faces)
 
 
-def render(position: Array, poles: Array | None = None, pixels: int = 320, view: View | None = None) -> Array:
-    """Return a picture (pixels, pixels, 3), uint8, of a surface (n, 2n, 3) [r1]."""
+def render(
+    position: Array,
+    poles: Array | None = None,
+    pixels: int = 320,
+    view: View | None = None,
+    colour: Array | None = None,
+) -> Array:
+    """Return a picture (pixels, pixels, 3), uint8, of a surface (n, 2n, 3) [r1].
+
+    colour: (n, 2n, 3) of the same lattice, linear light, in place of a dried jujube's.
+    """
     view = view or View()
     side = pixels * _SUPERSAMPLES
     resolution = int(np.clip(side // 3, len(position), max(_FINEST, len(position))))
@@ -91,7 +100,8 @@ def render(position: Array, poles: Array | None = None, pixels: int = 320, view:
     normal = np.einsum("fk,fkc->fc", weights, turned[corners])
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
     image = _floor_shadow(side, view, seen, scale)
-    image.reshape(-1, 3)[index] = _shade(normal, _relief(depth.reshape(side, side)).ravel()[index])
+    paint = None if colour is None else np.einsum("fk,fkc->fc", weights, _paint(colour, resolution)[corners])
+    image.reshape(-1, 3)[index] = _shade(normal, _relief(depth.reshape(side, side)).ravel()[index], paint)
     small = image.reshape(pixels, _SUPERSAMPLES, pixels, _SUPERSAMPLES, 3).mean(axis=(1, 3))
     return (255 * np.clip(small, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
 
@@ -161,10 +171,24 @@ def _relief(depth: Array) -> Array:
     return np.where(inside, relief, 0.0)
 
 
-def _shade(normal: Array, relief: Array) -> Array:
+def _paint(colour: Array, resolution: int) -> Array:
+    """Return the colours of the vertices of `mesh` at a resolution, bilinear: waves would ring at fronts."""
+    n, m = colour.shape[:2]
+    # rows beyond the poles are those of the other side
+    rows = np.concatenate([np.roll(colour[:1], m // 2, axis=1), colour, np.roll(colour[-1:], m // 2, axis=1)])
+    down = (np.arange(resolution) + 0.5) * n / resolution + 0.5
+    along = np.arange(2 * resolution) * m / (2 * resolution)
+    grid = np.meshgrid(down, along, indexing="ij")
+    fine = np.stack(
+        [ndimage.map_coordinates(rows[..., k], grid, order=1, mode="grid-wrap").ravel() for k in range(3)], axis=-1
+    )
+    return np.concatenate([fine, colour[:1].mean(axis=1), colour[-1:].mean(axis=1)])
+
+
+def _shade(normal: Array, relief: Array, paint: Array | None = None) -> Array:
     key, fill = _KEY / np.linalg.norm(_KEY), _FILL / np.linalg.norm(_FILL)
     depth = np.clip(0.5 + 0.5 * relief, 0, 1)[:, None]
-    colour = _RIDGE + (_VALLEY - _RIDGE) * depth
+    colour = _RIDGE + (_VALLEY - _RIDGE) * depth if paint is None else paint
     open_sky = 1 - 0.62 * np.clip(relief, 0, 1)[:, None]
     lit = np.clip(normal @ key, 0, None)[:, None]
     half = key + _TO_EYE

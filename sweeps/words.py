@@ -15,7 +15,9 @@ __all__ = ["per_stage", "readers", "report_document", "short", "show_report", "s
 
 
 def short(value: Any) -> str:
-    """Return a number or a list of numbers in a few characters."""
+    """Return a number, a list of numbers or a group of them in a few characters."""
+    if isinstance(value, Mapping):
+        return f"{{{len(value)} values}}"
     return "[" + ",".join(f"{v:g}" for v in value) + "]" if isinstance(value, list | tuple) else f"{value:g}"
 
 

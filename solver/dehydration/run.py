@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..contract import Context, Need, SolverError
-from ..fruit import azimuths, colatitudes, lattice
+from ..fruit import azimuths, colatitudes, lattice, window
 from .descriptors import Descriptors, Surface
 from .loading import Loading
 from .mesh import Sampler
@@ -32,7 +32,7 @@ class _Record:
         self._descriptors = [f for f in need.fields if f in Descriptors._fields]
         self._surface = Surface(params, path.mesh) if self._descriptors else None
         assert need.resolution is not None  # settled
-        self._inside = _inside(need)
+        self._inside = window(need.resolution, need.region)
         if self._wants_fields:
             self._sampler = Sampler(path.mesh.sphere, need.resolution)
             theta, phi = lattice(need.resolution)
@@ -91,21 +91,6 @@ class _Record:
             coords["azimuth"] = azimuths(need.resolution)[columns]
             coords["component"] = ["x", "y", "z"]
         return xr.Dataset(data, coords, attrs)
-
-
-def _inside(need: Need) -> tuple[slice, slice]:
-    """Return the lattice rows and columns inside the wanted region."""
-    assert need.resolution is not None
-    if need.region is None:
-        return slice(None), slice(None)
-    slices = []
-    for samples, (low, high) in (
-        (colatitudes(need.resolution), need.region.colatitude),
-        (azimuths(need.resolution), need.region.azimuth),
-    ):
-        first, last = np.searchsorted(np.degrees(samples), [low, high])
-        slices.append(slice(int(first), int(last)))
-    return slices[0], slices[1]
 
 
 def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:

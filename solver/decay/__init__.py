@@ -1,0 +1,46 @@
+"""Decay of fruits (Kider, Raja and Badler 2011): nutrient, soft rot and mould on the fruit's own surface, in days."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..contract import Context, Cost, Need, Solver, StageAxis
+from .params import DecayParams, Weather, Wound
+from .presets import PRESETS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["SOLVER", "DecayParams", "Weather", "Wound"]
+
+
+def _run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
+    # the numerics cost a second to import; parameters and schemas must not
+    from .run import run
+
+    return run(params, need, context)
+
+
+def _cost(params: DecayParams, need: Need) -> Cost:
+    from .settings import expected_cost
+
+    return expected_cost(params, need)
+
+
+_SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutrient", "budget_error", "water_lost")
+
+SOLVER = Solver(
+    name="decay",
+    version="1",
+    title="Decay of fruits: rot and mould",
+    params=DecayParams,
+    fields=("position", "rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
+    default_fields=("rot", "mould", "mould_active", "nutrient", *_SHARES),
+    stages=StageAxis("t", "time since the wounds", "day", 0.0, 120.0, (5.0, 10.0, 15.0, 20.0)),
+    default_resolution={"preview": 64, "default": 128, "fine": 256},
+    # error of the mould's density, apple, day 10, against the finest mesh (docs/decay.md); fine has no finer
+    tolerances={"preview": 0.017, "default": 0.004},
+    presets=PRESETS,
+    run=_run,
+    cost=_cost,
+)

@@ -1,0 +1,155 @@
+"""Parameters of a decay run: the fruit, what lives on it, the air about it, and where it was wounded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from ..fruit import Fruit
+from .colony import MOULDS, SOFT_ROT, Colony
+
+__all__ = ["DecayParams", "Weather", "Wound"]
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Wound(BaseModel):
+    """A place where rot and mould enter on day 0."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    colatitude: float = Field(ge=0, le=180, description="From the pole y > 0 [degree]")
+    azimuth: float = Field(0.0, ge=0, le=360, description="About the y axis, from x towards z [degree]")
+    radius: float = Field(0.12, ge=0.01, le=0.6, description="Radius [r1]")
+
+
+class Weather(BaseModel):
+    """The air on one day; between two days it changes evenly."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    day: float = Field(ge=0, le=120, description="Time since the wounds [day]")
+    temperature: float = Field(ge=-10, le=60, description="Temperature of air and fruit [degC]")
+    humidity: float = Field(ge=0, le=100, description="Relative humidity [percent]")
+
+
+class DecayParams(Fruit):
+    """Kider, Raja and Badler 2011: nutrient, soft rot and mould on the fruit's own surface; time in days."""
+
+    axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {
+        **Fruit.axes,
+        "temperature": ("temperature", None),
+        "humidity": ("humidity", None),
+        "porosity": ("porosity", None),
+        "water": ("water_content", None),
+        "growth": ("growth_rate", None),
+        "propagation": ("propagation_rate", None),
+    }
+
+    temperature: float = Field(
+        22.2, ge=-10, le=60, description="Temperature of air and fruit", json_schema_extra={"units": "degC"}
+    )
+    humidity: float = Field(
+        50.0, ge=0, le=100, description="Relative humidity of the air", json_schema_extra={"units": "percent"}
+    )
+    weather: tuple[Weather, ...] = Field(
+        (),
+        max_length=1000,
+        description="The air in the course of time, in place of temperature and humidity; days in rising order",
+        json_schema_extra={"units": "1"},
+    )
+    porosity: float = Field(
+        25.0, ge=0, le=100, description="Porosity of the skin (Table 2)", json_schema_extra={"units": "percent"}
+    )
+    water_content: float = Field(
+        84.0, ge=1, le=99, description="Water in the fresh fruit, by weight", json_schema_extra={"units": "percent"}
+    )
+    weight: float = Field(138.0, ge=0.1, le=20000, description="Fresh weight", json_schema_extra={"units": "g"})
+    transpiration: float = Field(
+        0.17,
+        ge=0,
+        le=50,
+        description="Mass transfer coefficient K of Eq. 10",
+        json_schema_extra={"units": "g m-2 s-1 MPa-1"},
+    )
+    growth_rate: float = Field(
+        20.0,
+        ge=0,
+        le=100,
+        description="Growth rate of Table 2: the clock of all organisms, 50 is their own pace",
+        json_schema_extra={"units": "1"},
+    )
+    propagation_rate: float = Field(
+        5.0,
+        ge=0,
+        le=9,
+        description="Propagation rate of Table 2: a colony seeds 1 / (10 - rate) new ones per spawning",
+        json_schema_extra={"units": "1"},
+    )
+    spawning: float = Field(
+        0.5, ge=0, le=24, description="Spawnings of every colony in a day", json_schema_extra={"units": "1/day"}
+    )
+    spawn_reach: float = Field(
+        0.5, ge=0.01, le=3.2, description="How far a new colony may land", json_schema_extra={"units": "radian"}
+    )
+    rot_spawning: float = Field(
+        2.0,
+        ge=0,
+        le=100,
+        description="Mould spores that land on the fruit in a day; one takes root with the probability of the rot map",
+        json_schema_extra={"units": "1/day"},
+    )
+    nutrient: float = Field(
+        1.0, gt=0, le=1, description="Mean nutrient of the fresh fruit, n0 of Table 3", json_schema_extra={"units": "1"}
+    )
+    unevenness: float = Field(
+        0.3,
+        ge=0,
+        le=1,
+        description="Largest random deviation of the fresh nutrient from its mean, over the mean",
+        json_schema_extra={"units": "1"},
+    )
+    patch_size: float = Field(
+        0.25,
+        ge=0.05,
+        le=3,
+        description="Size of the patches of nutrient and of motility (Eq. 5)",
+        json_schema_extra={"units": "r1"},
+    )
+    noise: float = Field(
+        0.5,
+        ge=0,
+        le=0.9,
+        description="Largest random deviation of motility, delta of Eq. 5; frozen in space",
+        json_schema_extra={"units": "1"},
+    )
+    mould: Colony = Field(
+        MOULDS["penicillium-expansum"],
+        description="Kinetics of the mould",
+        json_schema_extra={"units": "1"},
+    )
+    rot: Colony = Field(SOFT_ROT, description="Kinetics of the soft rot", json_schema_extra={"units": "1"})
+    wounds: tuple[Wound, ...] = Field(
+        (Wound(colatitude=0), Wound(colatitude=180)),
+        max_length=64,
+        description="Where rot and mould enter on day 0; by default the stem and the point the fruit rests on",
+        json_schema_extra={"units": "1"},
+    )
+    skin_colour: tuple[Share, Share, Share] = Field(
+        (0.62, 0.10, 0.06), description="Fresh skin, linear red, green, blue", json_schema_extra={"units": "1"}
+    )
+    mould_colour: tuple[Share, Share, Share] = Field(
+        (0.22, 0.33, 0.30),
+        description="Mould that is no longer active, linear red, green, blue; its active rim is white",
+        json_schema_extra={"units": "1"},
+    )
+
+    @field_validator("weather")
+    @classmethod
+    def _rising(cls, value: tuple[Weather, ...]) -> tuple[Weather, ...]:
+        if any(a.day >= b.day for a, b in pairwise(value)):
+            raise ValueError("the days of the weather must rise: sort them, and give each day once")
+        return value

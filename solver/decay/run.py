@@ -1,0 +1,140 @@
+"""A decay run: step the organisms that were asked for, and keep what is needed of each stage."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..contract import Context, Need, SolverError
+from ..fruit import azimuths, colatitudes, lattice, window
+from .environment import deficit, water_lost
+from .params import DecayParams
+from .settings import FIELDS, MOULD, ROT, choose
+from .stepping import Reached, march
+from .surface import lay, sampler
+from .system import System
+
+__all__ = ["run"]
+
+#: Map value from which a place counts as rotten or mouldy.
+_SEEN = 0.1
+_ROUND_OFF = 1e-10
+
+
+def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
+    """Return maps and shares of the wanted days; see `solver.quantities` for units.
+
+    Raises:
+        Unstable: no step was short enough; carries the stages before.
+        Cancelled: the observer asked to stop.
+
+    """
+    settings = choose(params, need.quality)
+    begun = time.perf_counter()
+    wanted = set(need.fields)
+    attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": float(deficit(params))}
+    if not wanted & {*ROT, *MOULD, "budget_error"}:
+        fresh = lay(params, settings.level) if "water_lost" in wanted else None
+        rows = []
+        for day in need.stages:
+            row = _row(day, 0, 0.0, True, time.perf_counter() - begun)
+            if fresh is not None:
+                row["water_lost"] = water_lost(params, fresh, day)
+            rows.append(_positions(row, params, need))
+            context.report(day / max(need.stages[-1], 1e-9), f"day {day:.2f} settled")
+        return _dataset(rows, need, attrs | {"path": "closed-form"})
+    with_mould = bool(wanted & MOULD)
+    context.report(0.0, f"laying {settings.vertices} points on the fruit")
+    system = System(params, settings.level, with_mould)
+    attrs["path"] = "rot-and-mould" if with_mould else "rot"
+    rows = []
+    try:
+        for reached in march(system, need.stages, settings.tolerance, settings.longest, context):
+            errors = [
+                layer.budget_error(state)
+                for layer, state in zip((system.rot, system.mould), reached.state, strict=True)
+                if layer is not None and state is not None
+            ]
+            sound = reached.error <= 1 and max(errors) <= _ROUND_OFF
+            seconds = time.perf_counter() - begun
+            row = _row(reached.day, reached.steps, reached.error * settings.tolerance, sound, seconds)
+            if "budget_error" in wanted:
+                row["budget_error"] = max(errors)
+            if "water_lost" in wanted:
+                row["water_lost"] = water_lost(params, system.surface, reached.day)
+            row |= _fields(system, reached, need, settings.level)
+            rows.append(_positions(row, params, need))
+            context.report(reached.day / max(need.stages[-1], 1e-9), f"day {reached.day:.2f} settled")
+    except SolverError as error:
+        if rows:
+            error.partial = _dataset(rows, need, attrs)
+            error.last_stage = rows[-1]["stage"]
+        raise
+    return _dataset(rows, need, attrs)
+
+
+def _row(day: float, steps: int, residual: float, converged: bool, seconds: float) -> dict[str, Any]:
+    return {"stage": day, "residual": residual, "converged": converged, "iterations": steps, "seconds": seconds}
+
+
+def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[str, Any]:
+    """Return maps on the lattice and shares of the area, those that were asked for."""
+    surface, wanted = system.surface, set(need.fields)
+    rot = system.rot.share(reached.state.rot)
+    maps = {"rot": rot, "substrate": reached.state.rot.n}
+    found = {"rotten_share": surface.mean(rot >= _SEEN), "mean_rot": surface.mean(rot)}
+    if system.mould is not None and reached.state.mould is not None:
+        state = reached.state.mould
+        mould = system.mould.share(state)
+        maps |= {
+            "mould": mould,
+            "mould_active": np.minimum(state.u / system.mould.rates.theta, 1.0),
+            "nutrient": state.n,
+        }
+        found |= {
+            "mouldy_share": surface.mean(mould >= _SEEN),
+            "mean_mould": surface.mean(mould),
+            "mean_nutrient": surface.mean(state.n),
+        }
+    row: dict[str, Any] = {name: value for name, value in found.items() if name in wanted}
+    if wanted & set(maps):
+        assert need.resolution is not None  # settled
+        inside = window(need.resolution, need.region)
+        sample = sampler(level, need.resolution)
+        for name in sorted(wanted & set(maps)):
+            field = (sample @ maps[name]).reshape(need.resolution, -1)
+            row[name] = field[inside].astype(need.dtype)
+    return row
+
+
+def _positions(row: dict[str, Any], params: DecayParams, need: Need) -> dict[str, Any]:
+    if "position" in need.fields:
+        assert need.resolution is not None
+        row["position"] = params.surface(*lattice(need.resolution))[window(need.resolution, need.region)].astype(
+            need.dtype
+        )
+    return row
+
+
+def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any]) -> xr.Dataset:
+    assert need.resolution is not None
+    data: dict[str, Any] = {}
+    for name in rows[0]:
+        values = np.array([row[name] for row in rows])
+        if name == "position":
+            data[name] = (("stage", "colatitude", "azimuth", "component"), values)
+        elif name in FIELDS:
+            data[name] = (("stage", "colatitude", "azimuth"), values)
+        elif name != "stage":
+            data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
+    coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
+    if any(name in FIELDS for name in data):
+        down, along = window(need.resolution, need.region)
+        coords["colatitude"] = colatitudes(need.resolution)[down]
+        coords["azimuth"] = azimuths(need.resolution)[along]
+    if "position" in data:
+        coords["component"] = ["x", "y", "z"]
+    return xr.Dataset(data, coords, attrs)
