@@ -95,3 +95,11 @@ register(
     budget_error=Quantity("1", "what is missing of theta n + u + v, over what there was and was added", "e"),
     water_lost=Quantity("1", "water lost by transpiration, over the fresh weight", "w"),
 )
+
+# triangle meshes of a solver's own (see `solver.meshes`)
+register(
+    mesh_position=Quantity("1", "position of a vertex, in the solver's unit of length", "x"),
+    triangle=Quantity("1", "the three vertices of a triangle, from 0, counter-clockwise from outside", "-"),
+    vertex_count=Quantity("1", "number of vertices of this stage's mesh", "n_v"),
+    face_count=Quantity("1", "number of triangles of this stage's mesh", "n_f"),
+)
