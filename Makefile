@@ -39,9 +39,9 @@ demo: $(STAMP)
 	  $(BIN)/wizen map --store $(STORE) --out buckling-map.png --stages 0.1,0.15,0.2,0.3
 	$(BIN)/wizen serve --store $(STORE) --port $(PORT)
 
-## test: everything quick; CI runs this
+## test: everything quick, on two cores; CI runs this
 test: $(STAMP)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 ## test-slow: the long checks as well; those of the page need a Chromium (Debian: apt-get install chromium)
 test-slow: $(STAMP) $(PAGE)
