@@ -21,12 +21,12 @@ DESCRIPTORS = ("roughness", "dominant_degree")
 QUALITIES = ("preview", "default", "fine")
 
 
-def run(te: float, quality: Quality, seed: int) -> Row:
-    """Dry one fruit; return descriptors, convergence and CPU seconds per stage."""
+def run(te: float, quality: Quality, seed: int, mirrors: str = "") -> Row:
+    """Dry one fruit, or the part of it between mirror planes; return descriptors, convergence, CPU seconds per stage."""
     from solver.contract import Context, Need
     from solver.dehydration import SOLVER
 
-    params = SOLVER.parse({"te": te, "seed": seed})
+    params = SOLVER.parse({"te": te, "seed": seed, "mirrors": mirrors})
     ready = time.process_time()
     at: list[float] = []
 
@@ -53,32 +53,37 @@ def run(te: float, quality: Quality, seed: int) -> Row:
     }
 
 
-def measure(record: Record, plan: Sequence[tuple[float, str, int]]) -> None:
-    """Run what the record lacks of `plan`: (te, quality, number of seeds)."""
+def measure(record: Record, plan: Sequence[tuple[float, str, int, str]]) -> None:
+    """Run what the record lacks of `plan`: (te, quality, number of seeds, mirrors)."""
     from solver.dehydration import SOLVER
 
-    for te, quality, seeds in plan:
+    for te, quality, seeds, mirrors in plan:
         for seed in range(seeds):
-            asked: Row = {"te": te, "quality": quality, "seed": seed}
+            asked: Row = {"te": te, "quality": quality, "seed": seed, "mirrors": mirrors}
             key = {"version": SOLVER.version, **asked}
-            row = record.row("buckled", key, partial(worker, "buckled:run", **asked))
+            row = record.row("buckled", key, partial(worker, "buckled:run", limit=7200.0, **asked))
             shown = row.get("failed") or " ".join(f"{value:.4f}" for value in row["roughness"])
-            print(f"te {te:g} {quality:8} seed {seed}: {shown}  {row['cpu_process']:.0f} CPU s", flush=True)
+            print(
+                f"te {te:g} {quality:8} {mirrors or 'whole':5} seed {seed}: {shown}  {row['cpu_process']:.0f} CPU s",
+                flush=True,
+            )
     record.parts["buckled_summary"] = summary(record.rows("buckled"), SOLVER.version)
     record.save()
 
 
 def summary(rows: Sequence[Row], version: str) -> list[Row]:
-    """Return mean, spread over seeds and error against the finest quality run, by te, quality and stage."""
+    """Return mean, spread over seeds and error against the finest quality run, by te, mirrors, quality and stage."""
     good = [row for row in rows if row["version"] == version and "failed" not in row]
     found: list[Row] = []
-    for te in sorted({row["te"] for row in good}, reverse=True):
-        groups = {q: [row for row in good if row["te"] == te and row["quality"] == q] for q in QUALITIES}
+    for te, mirrors in sorted({(row["te"], row["mirrors"]) for row in good}, key=lambda c: (-c[0], c[1])):
+        same = [row for row in good if row["te"] == te and row["mirrors"] == mirrors]
+        groups = {q: [row for row in same if row["quality"] == q] for q in QUALITIES}
         groups = {quality: group for quality, group in groups.items() if group}
         reference = list(groups)[-1]
         for quality, group in groups.items():
             for stage, s in enumerate(STAGES):
-                line: Row = {"te": te, "quality": quality, "seeds": len(group), "stage": s, "reference": reference}
+                line: Row = {"te": te, "mirrors": mirrors, "quality": quality, "seeds": len(group), "stage": s}
+                line["reference"] = reference
                 line["cpu"] = statistics.mean(row["cpu"][stage] for row in group)
                 for name in DESCRIPTORS:
                     line[name] = _compare(groups[reference], group, name, stage)

@@ -173,18 +173,20 @@ def measure(record: Record, quality: Quality = "preview") -> None:
 
 
 def _qualities(summary: list[Row]) -> list[Row]:
-    """Compare preview with default, at the last stage, for objects seen from afar."""
-    last: dict[tuple[float, str], Row] = {}
+    """Compare preview with default, and an eighth with the whole, at the last stage."""
+    last: dict[tuple[float, str, str], Row] = {}
     for row in summary:
-        last[row["te"], row["quality"]] = row
+        last[row["te"], row["mirrors"], row["quality"]] = row
     rows = []
-    for te in sorted({te for te, _ in last}, reverse=True):
-        preview, usual = last.get((te, "preview")), last.get((te, "default"))
-        if preview is None or usual is None:
-            continue
-        added = preview["roughness"]["mean"] / usual["roughness"]["mean"] - 1
-        rows.append({
-            "what": f"preview, te {te:g}", "instead_of": "default", "cpu_full": usual["cpu"], "cpu": preview["cpu"],
-            "error": added, "error_is": f"relative, of roughness at s = {preview['stage']:g}",
-        })  # fmt: skip
+    for te in sorted({te for te, _, _ in last}, reverse=True):
+        usual = last.get((te, "", "default"))
+        for what, other in (("preview", (te, "", "preview")), ("an eighth (mirrors=xyz)", (te, "xyz", "default"))):
+            part = last.get(other)
+            if part is None or usual is None:
+                continue
+            added = part["roughness"]["mean"] / usual["roughness"]["mean"] - 1
+            rows.append({
+                "what": f"{what}, te {te:g}", "instead_of": "default", "cpu_full": usual["cpu"], "cpu": part["cpu"],
+                "error": added, "error_is": f"relative, of roughness at s = {part['stage']:g}",
+            })  # fmt: skip
     return rows

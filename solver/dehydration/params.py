@@ -78,6 +78,28 @@ class DehydrationParams(Fruit):
         json_schema_extra={"units": "1", "axes": ["ax", "ay", "az"]},
     )
 
+    mirrors: Literal["", "x", "y", "z", "xy", "xz", "yz", "xyz"] = Field(
+        "",
+        # keys of runs that knew no mirrors stay what they were
+        exclude_if=lambda value: value == "",
+        description="Mirror planes through the centre, by the axis across them: a half, a quarter or an eighth of the "
+        "fruit is solved and stands for the whole. y, across the poles' axis, wants equal halves",
+        json_schema_extra={"units": "1"},
+    )
+
+    @model_validator(mode="after")
+    def _mirrored(self) -> Self:
+        if "y" in self.mirrors and self.radii[:7] != self.radii[6::-1]:
+            raise ValueError("the two ends of the fruit differ (r1..r7): leave y out of mirrors")
+        across = [name for name, slope in zip("xyz", self.wetness, strict=True) if slope and name in self.mirrors]
+        if across:
+            raise ValueError(f"wetness differs across a mirror plane: leave {', '.join(across)} out of mirrors")
+        if self.mirrors and self.imperfection_kind == "mode":
+            raise ValueError(
+                "a buckling mode need not have the mirrors' symmetry: leave out mirrors, or start from waves"
+            )
+        return self
+
     @model_validator(mode="after")
     def _dries(self) -> Self:
         steep = float(np.linalg.norm(self.wetness))

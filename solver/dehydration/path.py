@@ -36,6 +36,7 @@ from .kernel import (
 from .mesh import FruitMesh, build_mesh
 from .params import DehydrationParams
 from .pattern import pattern_heights
+from .sector import cut, evened
 from .settings import Settings
 
 __all__ = ["Path", "State"]
@@ -97,11 +98,14 @@ class Path:
         self._with_release = with_release
         self._params, self._settings, self._context = params, settings, context
         self.mesh: FruitMesh = build_mesh(params, settings.n, settings.core)
-        mesh = self.mesh
+        self._sector = cut(self.mesh, params.mirrors)
+        directions = self.mesh.sphere.directions
         # waves that the mesh cannot carry (fewer than four nodes) would be noise that depends on it
-        bumps = params.imperfection * heights(params, mesh.sphere.directions, context, highest=settings.n)
+        bumps = params.imperfection * heights(params, directions, context, highest=settings.n)
         if params.pattern is not None:
-            bumps = bumps + pattern_heights(params, mesh.sphere.directions, context)
+            bumps = bumps + pattern_heights(params, directions, context)
+        mesh = self._sector.mesh
+        bumps = evened(bumps, self._sector)[self._sector.own]
         fade = (bumps[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
         bumpy = mesh.positions + fade * np.repeat(mesh.rays, mesh.levels, axis=0)
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)
@@ -116,6 +120,7 @@ class Path:
             mesh.fixed,
             safety=_SAFETY,
             full_levels=settings.full_levels,
+            mirrored=self._sector.planes,
         )
         self._drive = Drive(params, mesh, self._layout)
         self._fresh_bound = stiffness_bounds(
@@ -123,7 +128,17 @@ class Path:
         )
         self._least_force = _LEAST_STRAIN * _unit_force(self._layout, mu)
         te = params.exocarp_thickness
-        self._skin = make_skin(self._layout, mesh.surface_nodes, mesh.sphere.quads, settings.clearance * te, te)
+        sector = self._sector
+        self._skin = make_skin(
+            self._layout,
+            mesh.surface_nodes[sector.image],
+            mesh.sphere.quads,
+            settings.clearance * te,
+            te,
+            sign=sector.sign,
+            own=sector.own,
+            share=sector.share,
+        )
         self._state, self._velocity = new_state(self._layout)
         self._steps = 0
         self._place = 0
@@ -134,10 +149,9 @@ class Path:
         """Number of hexahedra."""
         return self._layout.elements
 
-    @property
-    def surface_nodes(self) -> NDArray[np.int64]:
-        """Nodes of the outer surface, in column order."""
-        return self.mesh.surface_nodes
+    def _surface(self, state: Fixed) -> Array:
+        """Return the nodes of the sector's outer surface, in column order."""
+        return positions(state[self._sector.mesh.surface_nodes])
 
     def stage(self, shrinkage: float, last: float) -> State:
         """Return the settled state at `shrinkage`; stages are asked for in ascending order, up to `last`.
@@ -197,7 +211,9 @@ class Path:
         self._rest = self._advance(self._state, self._velocity, self._rest, count, a, b, damping)
 
     def _weighed(self, state: Fixed) -> Layout:
-        return reweigh(self._layout, state, self.mesh.is_exocarp, *self._moduli, self._fresh_bound, safety=_SAFETY)
+        return reweigh(
+            self._layout, state, self._sector.mesh.is_exocarp, *self._moduli, self._fresh_bound, safety=_SAFETY
+        )
 
     def _advance(
         self,
@@ -276,9 +292,11 @@ class Path:
         and swings again if it was not there yet.
         """
         settings = self._settings
-        surface = positions(state[self.surface_nodes])
+        surface = self._surface(state)
         if shrinkage == 0:
-            return State(surface, shrinkage, 0.0, 0.0, self._steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
+            whole = self._sector.whole(surface)
+            return State(whole, shrinkage, 0.0, 0.0, self._steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
+        copies = self._sector.copies
         before = float(self._report(state, rest, shrinkage).energy.sum()) if self._with_release else None
         spent, residual, drift = 0, np.inf, np.inf
         while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
@@ -287,13 +305,13 @@ class Path:
                 spent += settings.swing_steps
             layout, rested = self._weighed(state), 0
             while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
-                surface = positions(state[self.surface_nodes])
+                surface = self._surface(state)
                 # rest volumes stay: under some that go on following, forces have no potential and hardly balance
                 count = min(_REST_STEPS, max(20, _SLICE // self.elements))
                 self._run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping, layout)
                 rested += count
                 residual = self._residual(state, rest, shrinkage, layout, settings.calm_damping)
-                moved = np.square(positions(state[self.surface_nodes]) - surface).sum(axis=1).mean()
+                moved = np.square(self._surface(state) - surface).sum(axis=1).mean()
                 drift = float(np.sqrt(moved) / count * _REST_STEPS / self._params.exocarp_thickness)
             spent += rested
         report = self._report(state, rest, shrinkage)
@@ -305,9 +323,9 @@ class Path:
                 residual=residual,
             )
         energy = float(report.energy.sum())
-        released = before - energy if before is not None else None
-        surface = positions(state[self.surface_nodes])
-        return State(surface, shrinkage, residual, drift, self._steps, least, energy, released)
+        released = copies * (before - energy) if before is not None else None
+        whole = self._sector.whole(self._surface(state))
+        return State(whole, shrinkage, residual, drift, self._steps, least, copies * energy, released)
 
     def _swing(self, state: Fixed, velocity: Single, rest: Array, shrinkage: float) -> None:
         """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy."""

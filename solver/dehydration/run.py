@@ -37,7 +37,7 @@ class _Record:
             self._sampler = Sampler(path.mesh.sphere, need.resolution)
             theta, phi = lattice(need.resolution)
             self._fresh = params.surface(theta, phi)
-        self._fresh_nodes = path.mesh.positions[path.surface_nodes]
+        self._fresh_nodes = path.mesh.positions[path.mesh.surface_nodes]
         self._start = time.perf_counter()
         self.rows: list[dict[str, Any]] = []
 

@@ -26,10 +26,10 @@ class Settings:
     core layers that are integrated fully, the others take one point.
     kappa_ratio: bulk over shear modulus; march_kappa_ratio: the one that is marched with (see `kernel.bulk`).
     start: shrinkage below which the fruit is still smooth, where the march begins. pace: shrinkage per step of the
-    march. damping: per step, while marching; swing_damping and calm_damping: while a stage settles (see `path.Path`).
-    residual, drift: at which a stage counts as settled (see `path.State`). swing_steps, calm_steps: longest turn of
-    each way of settling. settle_steps: after which a stage does not settle. clearance: gap that self-contact keeps, in
-    exocarp thicknesses.
+    march. copies: mirror images that make up the whole fruit. damping: per step, while marching; swing_damping and
+    calm_damping: while a stage settles (see `path.Path`). residual, drift: at which a stage counts as settled (see
+    `path.State`). swing_steps, calm_steps: longest turn of each way of settling. settle_steps: after which a stage does
+    not settle. clearance: gap that self-contact keeps, in exocarp thicknesses.
     """
 
     n: int
@@ -48,11 +48,12 @@ class Settings:
     start: float
     clearance: float = 0.1
     full_levels: int = 1000
+    copies: int = 1
 
     @property
     def elements(self) -> int:
-        """Number of hexahedra."""
-        return 6 * self.n**2 * (len(self.core) + 1)
+        """Number of hexahedra that are solved for."""
+        return 6 * self.n**2 * (len(self.core) + 1) // self.copies
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,8 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
     wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
     n = math.ceil(np.pi / 2 * q.per_wavelength / wavelength)
     n = min(max(n, q.fewest), q.most)
+    if params.mirrors:
+        n += n % 2  # a mirror plane is a line of nodes
     # where flesh is more than twice as thick as on average, layers are counted on it
     flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), flesh_span(params)[1] / 2)
     core = layer_fractions(max(flesh, 0.05), _FIRST_LAYER * min(wavelength, 0.4), _GROWTH)
@@ -124,6 +127,7 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
         settle_steps=round(_SETTLE_STEPS * scale),
         start=margin * onset / loading.peak,
         full_levels=q.full_levels,
+        copies=2 ** len(params.mirrors),
     )
 
 

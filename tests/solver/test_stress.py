@@ -45,8 +45,8 @@ def test_broken_promises_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def folded(path: Path, state: Any, *rest: Any) -> Any:
         found = settle(path, state, *rest)
-        state[path.surface_nodes[0]] = state[path.surface_nodes[0] - 2]
-        state[path.surface_nodes[0], 1] -= 2**25
+        state[path.mesh.surface_nodes[0]] = state[path.mesh.surface_nodes[0] - 2]
+        state[path.mesh.surface_nodes[0], 1] -= 2**25
         return found
 
     def late(path: Path, state: Any, velocity: Any, rest: Any, shrinkage: float) -> Any:

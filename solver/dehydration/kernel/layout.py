@@ -80,6 +80,8 @@ class Layout:
     """(nodes,): scaled mass, of fixed nodes too"""
     full_levels: int
     """outermost core levels that are integrated fully even where the one-point core is asked for"""
+    planes: NDArray[np.int32]
+    """places in the flat (nn, 4) state of coordinates that stay 0: nodes on mirror planes"""
 
     @property
     def force_rows(self) -> int:
@@ -156,6 +158,7 @@ def build_layout(
     safety: float = 1.5,
     one_point: bool = True,
     full_levels: int = 0,
+    mirrored: ArrayLike = (),
 ) -> Layout:
     """Prepare a mesh for `march`.
 
@@ -164,7 +167,7 @@ def build_layout(
     fixed: (nn,) nodes that never move (the stone). safety: factor on the scaled masses against stiffening while the
     fruit deforms; the critical time step is at least sqrt(safety) at rest and a unit step is marched. Swelling to
     theta > 1 stiffens by theta: multiply safety by it. one_point: prepare the one-point core element as well.
-    full_levels: see `Layout`.
+    full_levels: see `Layout`. mirrored: numbers 3 node + axis of coordinates that stay 0.
 
     Raises ValueError with what to change for inputs that are not a mesh.
     """
@@ -216,4 +219,11 @@ def build_layout(
         fresh=fresh,
         mass=mass.astype(np.float64, copy=False),
         full_levels=full_levels,
+        planes=_places(mirrored),
     )
+
+
+def _places(mirrored: ArrayLike) -> NDArray[np.int32]:
+    """Places in a state of four numbers per node of coordinates 3 node + axis."""
+    chosen = np.asarray(mirrored, np.int64)
+    return (chosen // 3 * 4 + chosen % 3).astype(np.int32)

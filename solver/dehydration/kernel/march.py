@@ -45,7 +45,16 @@ def _nobody() -> Skin:
     """A skin of one quad: stands in where no contact is wanted, and gives numba the type."""
     node = np.zeros(1, np.float32)
     contact = make_contact(range(4), [[0, 1, 2, 3]], [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 0.0, 1.0)
-    return Skin(contact, np.zeros(1, np.int32), node.reshape(1, 1), node.reshape(1, 1), node, node)
+    image, own = np.ones((1, 3), np.float32), np.ones(1, np.bool_)
+    return Skin(contact, np.zeros(1, np.int32), image, own, node, node.reshape(1, 1), node.reshape(1, 1), node, node)
+
+
+@njit(error_model="numpy")
+def stay(planes: State, state: State, velocity: Singles) -> None:
+    """Keep the coordinates at the places `planes` of the flat state and velocity at 0."""
+    for k in range(planes.size):
+        state[planes[k]] = 0
+        velocity[planes[k]] = np.float32(0)
 
 
 _NOBODY = _nobody()
@@ -69,6 +78,7 @@ _SIGNATURE = types.int64(
     _FLAT,  # force rows
     types.boolean,  # record
     _FLAT,  # squares
+    _INDICES,  # coordinates on mirror planes
     types.boolean,  # touching
     typeof(_NOBODY),
 )
@@ -89,7 +99,7 @@ def _build(stamp: int) -> Callable[..., int]:
         steps: int, state: State, velocity: Singles, strips: NDArray[np.int64], face_offsets: State, core: Singles,
         one_point: Singles, exocarp: Singles, full: int, row_start: State, rows: State, inverse_mass: Singles,
         theta0: float, theta1: float, damping: float, forces: Singles, record: bool, squares: Singles,
-        touching: bool, skin: Skin,
+        planes: State, touching: bool, skin: Skin,
     ) -> int:  # fmt: skip
         source = stamp  # noqa: F841  a captured cell is part of numba's cache key
         keep = np.float32((1 - damping / 2) / (1 + damping / 2))
@@ -106,8 +116,11 @@ def _build(stamp: int) -> Callable[..., int]:
             if not record:
                 for node in prange(inverse_mass.shape[0]):
                     update_node(forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(node))
+                # a part's nodes on a mirror plane feel half of what balances across it
+                stay(planes, state, velocity)
                 if touching:
                     keep_apart(skin, state, velocity)
+                    stay(planes, state, velocity)
         return steps
 
     compiled_loop: Callable[..., int] = advance
@@ -200,7 +213,7 @@ def march(
     while left:
         made = run(
             left, _flat("state", state, np.int32, layout), _flat("velocity", velocity, np.float32, layout),
-            *_arrays(layout, one_point), begin, end, damping, forces, False, _NOTHING,
+            *_arrays(layout, one_point), begin, end, damping, forces, False, _NOTHING, layout.planes,
             skin is not None, skin or _NOBODY,
         )  # fmt: skip
         begin += (end - begin) * made / left
@@ -245,7 +258,7 @@ def internal_force(
     squares = aligned_zeros((layout.force_rows // ROW,), np.float32)
     compiled(backend or default_backend())(
         1, _flat("state", state, np.int32, layout), _NOTHING, *_arrays(layout, one_point),
-        theta, theta, 0.0, forces, True, squares, False, _NOBODY,
+        theta, theta, 0.0, forces, True, squares, layout.planes, False, _NOBODY,
     )  # fmt: skip
     nodal, total = np.zeros((layout.nodes, 3)), np.zeros(layout.nodes)
     _sum_rows(layout.row_start, layout.rows, forces, squares, nodal, total)

@@ -24,7 +24,13 @@ class Skin(NamedTuple):
     contact: Contact
     """in the numbering of the skin: its state is `position`, not the fruit's"""
     rows: NDArray[np.int32]
-    """(ns,) node of the fruit"""
+    """(ns,) node of the fruit, or the one that it is a mirror image of"""
+    sign: NDArray[np.float32]
+    """(ns, 3) of its coordinates: -1 where it is an image"""
+    own: NDArray[np.bool_]
+    """(ns,) whether it is that node itself: images are read, never written"""
+    share: NDArray[np.float32]
+    """(ns,) of its mass that the fruit carries: half on a mirror plane"""
     position: NDArray[np.float32]
     """(ns, 4)"""
     velocity: NDArray[np.float32]
@@ -35,26 +41,42 @@ class Skin(NamedTuple):
     """(1,) deepest penetration of the last step that had pairs"""
 
 
-def make_skin(layout: Layout, surface_nodes: ArrayLike, quads: ArrayLike, clearance: float, te: float) -> Skin:
+def make_skin(
+    layout: Layout,
+    surface_nodes: ArrayLike,
+    quads: ArrayLike,
+    clearance: float,
+    te: float,
+    *,
+    sign: ArrayLike | None = None,
+    own: ArrayLike | None = None,
+    share: ArrayLike | None = None,
+) -> Skin:
     """Self-contact of the surface `surface_nodes` (ns,), `quads` (nq, 4) in surface numbering, outward.
 
-    clearance: gap that contact keeps. te: thickness of the exocarp; both in the layout's unit of length.
+    clearance: gap that contact keeps. te: thickness of the exocarp; both in the layout's unit of length. sign, own,
+    share: see `Skin`; without them no node is an image.
     """
     rows = np.ascontiguousarray(surface_nodes, np.int32)
-    rest = positions(layout.fresh)[rows]
+    signs = np.ones((len(rows), 3)) if sign is None else np.asarray(sign)
+    shares = np.ones(len(rows)) if share is None else np.asarray(share)
+    rest = positions(layout.fresh)[rows] * signs
     return Skin(
         make_contact(np.arange(len(rows)), quads, rest, clearance, te),
         rows,
+        np.ascontiguousarray(signs, np.float32),
+        np.ones(len(rows), np.bool_) if own is None else np.ascontiguousarray(own, np.bool_),
+        np.ascontiguousarray(shares, np.float32),
         np.zeros((len(rows), 4), np.float32),
         np.zeros((len(rows), 4), np.float32),
-        np.ascontiguousarray(layout.inverse_mass[rows]),
+        layout.inverse_mass[rows] * shares.astype(np.float32),
         np.zeros(1, np.float32),
     )
 
 
 def forget(skin: Skin, layout: Layout) -> None:
     """Take the layout's masses and drop all that earlier steps left: the next march depends on its state alone."""
-    skin.inverse_mass[:] = layout.inverse_mass[skin.rows]
+    skin.inverse_mass[:] = layout.inverse_mass[skin.rows] * skin.share
     skin.contact.searched[:] = 1e30
     skin.contact.counts[:] = 0
     skin.contact.feet[:] = 0
@@ -72,8 +94,8 @@ def read_skin(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32
     for i in range(skin.rows.size):
         first = 4 * np.int64(skin.rows[i])
         for k in range(3):
-            skin.position[i, k] = np.float32(state[first + k]) * UNIT
-            skin.velocity[i, k] = velocity[first + k]
+            skin.position[i, k] = skin.sign[i, k] * (np.float32(state[first + k]) * UNIT)
+            skin.velocity[i, k] = skin.sign[i, k] * velocity[first + k]
 
 
 @njit(**OPTIONS)
@@ -92,6 +114,8 @@ def keep_apart(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float3
     read_skin(skin, state, velocity)
     skin.deepest[0] = push_apart(skin.contact, skin.position, skin.velocity, skin.inverse_mass)[0]
     for i in range(skin.rows.size):
+        if not skin.own[i]:
+            continue
         first = 4 * np.int64(skin.rows[i])
         for k in range(3):
             push = skin.velocity[i, k] - velocity[first + k]

@@ -1,0 +1,104 @@
+"""A part of a fruit between mirror planes, which stands for the whole: an eighth of the elements with three of them.
+
+Nodes on a plane stay on it. Self-contact sees the whole skin, put together from mirror images, so that folds close on
+the planes as they do elsewhere. What is lost is the freedom to wrinkle without the symmetry: the onset's degree may
+differ by what the planes allow, and a whole fruit never looks like its own mirror image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh import FruitMesh
+
+__all__ = ["Sector", "cut", "evened"]
+
+Array = NDArray[np.float64]
+
+#: Distance from a plane below which a node of the parametric unit sphere lies on it.
+_ON = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Sector:
+    """What is left of a mesh of nc columns, and how the whole is read from it.
+
+    mesh: the part; its `sphere` is that of the whole. image: (nc,) column of the part that each column of the whole is
+    an image of. sign: (nc, 3) of its coordinates. own: (nc,) which columns are in the part, as they are. share: (nc,)
+    of a column's mass that the part carries. planes: flat numbers 3 node + axis of coordinates that stay 0.
+    copies: parts that make up the whole.
+    """
+
+    mesh: FruitMesh
+    image: NDArray[np.int64]
+    sign: Array
+    own: NDArray[np.bool_]
+    share: Array
+    planes: NDArray[np.int64]
+    copies: int
+
+    def whole(self, surface: Array) -> Array:
+        """Return nodes of the whole surface (nc, 3) from those of the part's, in column order."""
+        mirrored: Array = surface[self.image] * self.sign
+        return mirrored
+
+
+def cut(mesh: FruitMesh, mirrors: str) -> Sector:
+    """Return the part of `mesh` where the coordinates named in `mirrors` are not negative; all of it for "".
+
+    Every mirror plane must be a line of nodes: an even number of elements along each edge of the cube.
+    """
+    columns = len(mesh.rays)
+    axes = ["xyz".index(name) for name in mirrors]
+    directions = np.where(np.abs(mesh.sphere.directions) < _ON, 0.0, mesh.sphere.directions)
+    sign = np.ones((columns, 3))
+    sign[:, axes] = np.where(directions[:, axes] < 0, -1.0, 1.0)
+    own: NDArray[np.bool_] = np.all(sign > 0, axis=1)
+    kept = np.flatnonzero(own)
+    number = np.full(columns, -1)
+    number[kept] = np.arange(len(kept))
+    folded = {tuple(key): column for column, key in zip(number[kept], _rounded(directions[kept]), strict=True)}
+    image = np.array([folded[tuple(key)] for key in _rounded(directions * sign)])
+    on = directions[:, axes] == 0
+    levels = np.arange(mesh.levels)
+    inside = own[mesh.connectivity[:, 0] // mesh.levels]
+    for corner in range(1, 8):
+        inside &= own[mesh.connectivity[:, corner] // mesh.levels]
+    connectivity = mesh.connectivity[inside]
+    part = replace(
+        mesh,
+        positions=mesh.positions.reshape(columns, mesh.levels, 3)[kept].reshape(-1, 3),
+        connectivity=number[connectivity // mesh.levels] * mesh.levels + connectivity % mesh.levels,
+        is_exocarp=mesh.is_exocarp[inside],
+        rays=mesh.rays[kept],
+    )
+    planes = [
+        (3 * (np.flatnonzero(on[kept, k])[:, None] * mesh.levels + levels) + axis).ravel()
+        for k, axis in enumerate(axes)
+    ]
+    return Sector(
+        part,
+        image,
+        sign,
+        own,
+        0.5 ** on.sum(axis=1),
+        np.concatenate([*planes, np.empty(0, np.int64)]).astype(np.int64),
+        2 ** len(axes),
+    )
+
+
+def evened(heights: Array, sector: Sector) -> Array:
+    """Return heights (nc,) made equal on all images of a column, as rough as before: their sum over root of copies."""
+    if sector.copies == 1:
+        return heights
+    total = np.bincount(sector.image, weights=heights)
+    count = np.bincount(sector.image)
+    mean: Array = (total / count)[sector.image]
+    return mean * np.sqrt(sector.copies)
+
+
+def _rounded(directions: Array) -> NDArray[np.int64]:
+    return np.round(directions * 1e7).astype(np.int64)
