@@ -22,7 +22,7 @@ QUALITIES = ("preview", "default", "fine")
 
 
 def run(te: float, quality: Quality, seed: int, mirrors: str = "") -> Row:
-    """Dry one fruit, or the part of it between mirror planes; return descriptors, convergence, CPU seconds per stage."""
+    """Dry one fruit, or the part between mirror planes; return descriptors, convergence and CPU seconds per stage."""
     from solver.contract import Context, Need
     from solver.dehydration import SOLVER
 

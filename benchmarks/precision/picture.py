@@ -32,17 +32,21 @@ INK = "#333333"
 
 
 def draw(parts: Mapping[str, Any], path: Path) -> None:
-    """Draw the spheres at both shrinkages, and the descriptors after buckling if they were measured."""
+    """Draw the spheres at both shrinkages, and below them the descriptors after buckling as far as measured."""
     after = parts.get("buckled_summary", [])
     thetas = sorted({row["theta"] for row in parts.get("spheres", [])}, reverse=True)
-    panels = len(thetas) + bool(after)
-    figure, axes = plt.subplots(1, panels, figsize=(5.0 * panels, 4.6), layout="constrained", squeeze=False)
+    kinds = sorted({(row["te"], row["mirrors"]) for row in after}, key=lambda kind: (-kind[0], kind[1]))
+    kinds = [kind for kind in kinds if len({row["quality"] for row in after if _is(row, kind)}) > 1]
+    panels, rows = max(len(thetas), len(kinds)), bool(thetas) + bool(kinds)
+    figure, axes = plt.subplots(rows, panels, figsize=(5.0 * panels, 4.6 * rows), layout="constrained", squeeze=False)
     for at, theta in zip(axes[0], thetas, strict=False):
         _spheres(at, [row for row in parts["spheres"] if row["theta"] == theta and "failed" not in row], theta)
     for at in axes[0, 1 : len(thetas)]:
         at.sharey(axes[0, 0])
-    if after:
-        _buckled(axes[0, -1], after)
+    for at, kind in zip(axes[-1], kinds, strict=False):
+        _buckled(at, [row for row in after if _is(row, kind)])
+    for at in axes.flat:
+        at.set_visible(at.has_data())
     handles, labels = axes[0, 0].get_legend_handles_labels()
     columns = min(len(labels) + 1, 3 * panels - 1)
     ring = Line2D([], [], ls="", marker="o", mfc="none", mec=INK, ms=11, label="shipped setting")
@@ -68,10 +72,13 @@ def _spheres(at: Axes, rows: Sequence[Row], theta: float) -> None:
     _dress(at, f"Sphere at s = {1 - theta:.2g}, {where}", "largest error of the radius [r1]")
 
 
-def _buckled(at: Axes, summary: Sequence[Row]) -> None:
+def _is(row: Row, kind: tuple[float, str]) -> bool:
+    return (row["te"], row["mirrors"]) == kind
+
+
+def _buckled(at: Axes, rows: Sequence[Row]) -> None:
     """Draw means over seeds as deviations from the reference's, with half the range of seeds as bars."""
-    te = summary[0]["te"]
-    rows = [row for row in summary if row["te"] == te]
+    te, part = rows[0]["te"], {"": "sphere", "xyz": "eighth of a sphere"}.get(rows[0]["mirrors"], "part of a sphere")
     for quality, (colour, marker) in QUALITIES.items():
         chosen = [row for row in rows if row["quality"] == quality]
         if not chosen:
@@ -93,7 +100,11 @@ def _buckled(at: Axes, summary: Sequence[Row]) -> None:
     at.axhline(0, color=INK, lw=0.8)
     at.set_xscale("log")
     at.margins(x=0.09, y=0.08)
-    _dress(at, f"Sphere after buckling, te = {te:g}; numbers: stage s", f"mean over seeds against {reference} [%]")
+    _dress(
+        at,
+        f"{part.capitalize()} after buckling, te = {te:g}; numbers: stage s",
+        f"mean over seeds against {reference} [%]",
+    )
     shown = [
         Line2D([], [], color=colour, marker=marker, label=f"{quality}, {_seeds(rows, quality)}")
         for quality, (colour, marker) in QUALITIES.items()

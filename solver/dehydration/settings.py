@@ -101,7 +101,9 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
     q = _QUALITIES[quality]
     wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
     n = math.ceil(np.pi / 2 * q.per_wavelength / wavelength)
-    n = min(max(n, q.fewest), q.most)
+    # the bound is on the cost: an eighth may be eight times as fine in area
+    most = int(q.most * math.sqrt(2 ** len(params.mirrors)))
+    n = min(max(n, q.fewest), most)
     if params.mirrors:
         n += n % 2  # a mirror plane is a line of nodes
     # where flesh is more than twice as thick as on average, layers are counted on it
