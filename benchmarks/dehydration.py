@@ -21,17 +21,17 @@ from .precision import buckled, scaling, skips, spheres
 from .precision.record import ROOT, Record
 
 RESULTS = ROOT / "benchmarks" / "results" / "dehydration.json"
-#: te, quality, seeds, mirrors. Thin skins take long: of them an eighth is solved, and only with --thin.
+#: te, gamma, mirrors, quality, seeds. Thin skins take long: of them an eighth is solved, and only with --thin.
 PLAN = (
-    *((0.04, quality, seeds, "") for quality, seeds in (("preview", 3), ("default", 2), ("fine", 2))),
-    *((0.04, quality, 3, "xyz") for quality in ("preview", "default", "fine")),
+    *((0.04, 10.0, "", quality, seeds) for quality, seeds in (("preview", 3), ("default", 2), ("fine", 2))),
+    *((0.04, gamma, "xyz", quality, 3) for gamma in (10.0, 30.0) for quality in ("preview", "default", "fine")),
 )
 THIN = (
-    (0.02, "preview", 2, "xyz"),
-    (0.02, "default", 2, "xyz"),
-    (0.01, "preview", 1, "xyz"),
-    (0.02, "fine", 1, "xyz"),
-    (0.01, "default", 1, "xyz"),
+    (0.02, 10.0, "xyz", "preview", 2),
+    (0.02, 10.0, "xyz", "default", 2),
+    (0.01, 10.0, "xyz", "preview", 1),
+    (0.02, 10.0, "xyz", "fine", 1),
+    (0.01, 10.0, "xyz", "default", 1),
 )
 #: Meshes of the short form.
 SHORT_EDGES = (12, 20, 32)

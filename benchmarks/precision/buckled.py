@@ -21,12 +21,12 @@ DESCRIPTORS = ("roughness", "dominant_degree")
 QUALITIES = ("preview", "default", "fine")
 
 
-def run(te: float, quality: Quality, seed: int, mirrors: str = "") -> Row:
+def run(te: float, gamma: float, mirrors: str, quality: Quality, seed: int) -> Row:
     """Dry one fruit, or the part between mirror planes; return descriptors, convergence and CPU seconds per stage."""
     from solver.contract import Context, Need
     from solver.dehydration import SOLVER
 
-    params = SOLVER.parse({"te": te, "seed": seed, "mirrors": mirrors})
+    params = SOLVER.parse({"te": te, "gamma": gamma, "seed": seed, "mirrors": mirrors})
     ready = time.process_time()
     at: list[float] = []
 
@@ -53,18 +53,24 @@ def run(te: float, quality: Quality, seed: int, mirrors: str = "") -> Row:
     }
 
 
-def measure(record: Record, plan: Sequence[tuple[float, str, int, str]]) -> None:
-    """Run what the record lacks of `plan`: (te, quality, number of seeds, mirrors)."""
+def kind(row: Row) -> tuple[float, float, str]:
+    """Return what fruit a row is about: te, gamma, mirrors."""
+    return row["te"], row["gamma"], row["mirrors"]
+
+
+def measure(record: Record, plan: Sequence[tuple[float, float, str, str, int]]) -> None:
+    """Run what the record lacks of `plan`: (te, gamma, mirrors, quality, number of seeds)."""
     from solver.dehydration import SOLVER
 
-    for te, quality, seeds, mirrors in plan:
+    for te, gamma, mirrors, quality, seeds in plan:
         for seed in range(seeds):
-            asked: Row = {"te": te, "quality": quality, "seed": seed, "mirrors": mirrors}
+            asked: Row = {"te": te, "gamma": gamma, "mirrors": mirrors, "quality": quality, "seed": seed}
             key = {"version": SOLVER.version, **asked}
             row = record.row("buckled", key, partial(worker, "buckled:run", limit=7200.0, **asked))
             shown = row.get("failed") or " ".join(f"{value:.4f}" for value in row["roughness"])
             print(
-                f"te {te:g} {quality:8} {mirrors or 'whole':5} seed {seed}: {shown}  {row['cpu_process']:.0f} CPU s",
+                f"te {te:g} gamma {gamma:g} {mirrors or 'whole':5} {quality:8} seed {seed}: {shown}  "
+                f"{row['cpu_process']:.0f} CPU s",
                 flush=True,
             )
     record.parts["buckled_summary"] = summary(record.rows("buckled"), SOLVER.version)
@@ -72,17 +78,18 @@ def measure(record: Record, plan: Sequence[tuple[float, str, int, str]]) -> None
 
 
 def summary(rows: Sequence[Row], version: str) -> list[Row]:
-    """Return mean, spread over seeds and error against the finest quality run, by te, mirrors, quality and stage."""
+    """Return mean, spread over seeds and error against the finest quality run, by fruit, quality and stage."""
     good = [row for row in rows if row["version"] == version and "failed" not in row]
     found: list[Row] = []
-    for te, mirrors in sorted({(row["te"], row["mirrors"]) for row in good}, key=lambda c: (-c[0], c[1])):
-        same = [row for row in good if row["te"] == te and row["mirrors"] == mirrors]
+    for te, gamma, mirrors in sorted({kind(row) for row in good}, key=lambda k: (-k[0], *k[1:])):
+        same = [row for row in good if kind(row) == (te, gamma, mirrors)]
         groups = {q: [row for row in same if row["quality"] == q] for q in QUALITIES}
         groups = {quality: group for quality, group in groups.items() if group}
         reference = list(groups)[-1]
         for quality, group in groups.items():
             for stage, s in enumerate(STAGES):
-                line: Row = {"te": te, "mirrors": mirrors, "quality": quality, "seeds": len(group), "stage": s}
+                line: Row = {"te": te, "gamma": gamma, "mirrors": mirrors, "quality": quality}
+                line |= {"seeds": len(group), "stage": s}
                 line["reference"] = reference
                 line["cpu"] = statistics.mean(row["cpu"][stage] for row in group)
                 for name in DESCRIPTORS:

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from .buckled import kind
 from .record import Row
 from .spheres import SHIPPED
 
@@ -35,16 +36,16 @@ def draw(parts: Mapping[str, Any], path: Path) -> None:
     """Draw the spheres at both shrinkages, and below them the descriptors after buckling as far as measured."""
     after = parts.get("buckled_summary", [])
     thetas = sorted({row["theta"] for row in parts.get("spheres", [])}, reverse=True)
-    kinds = sorted({(row["te"], row["mirrors"]) for row in after}, key=lambda kind: (-kind[0], kind[1]))
-    kinds = [kind for kind in kinds if len({row["quality"] for row in after if _is(row, kind)}) > 1]
+    kinds = sorted({kind(row) for row in after}, key=lambda k: (-k[0], *k[1:]))
+    kinds = [one for one in kinds if len({row["quality"] for row in after if kind(row) == one}) > 1]
     panels, rows = max(len(thetas), len(kinds)), bool(thetas) + bool(kinds)
     figure, axes = plt.subplots(rows, panels, figsize=(5.0 * panels, 4.6 * rows), layout="constrained", squeeze=False)
     for at, theta in zip(axes[0], thetas, strict=False):
         _spheres(at, [row for row in parts["spheres"] if row["theta"] == theta and "failed" not in row], theta)
     for at in axes[0, 1 : len(thetas)]:
         at.sharey(axes[0, 0])
-    for at, kind in zip(axes[-1], kinds, strict=False):
-        _buckled(at, [row for row in after if _is(row, kind)])
+    for at, one in zip(axes[-1], kinds, strict=False):
+        _buckled(at, [row for row in after if kind(row) == one])
     for at in axes.flat:
         at.set_visible(at.has_data())
     handles, labels = axes[0, 0].get_legend_handles_labels()
@@ -72,13 +73,10 @@ def _spheres(at: Axes, rows: Sequence[Row], theta: float) -> None:
     _dress(at, f"Sphere at s = {1 - theta:.2g}, {where}", "largest error of the radius [r1]")
 
 
-def _is(row: Row, kind: tuple[float, str]) -> bool:
-    return (row["te"], row["mirrors"]) == kind
-
-
 def _buckled(at: Axes, rows: Sequence[Row]) -> None:
     """Draw means over seeds as deviations from the reference's, with half the range of seeds as bars."""
-    te, part = rows[0]["te"], {"": "sphere", "xyz": "eighth of a sphere"}.get(rows[0]["mirrors"], "part of a sphere")
+    te, gamma, mirrors = kind(rows[0])
+    part = {"": "sphere", "xyz": "eighth of a sphere"}.get(mirrors, "part of a sphere")
     for quality, (colour, marker) in QUALITIES.items():
         chosen = [row for row in rows if row["quality"] == quality]
         if not chosen:
@@ -102,7 +100,7 @@ def _buckled(at: Axes, rows: Sequence[Row]) -> None:
     at.margins(x=0.09, y=0.08)
     _dress(
         at,
-        f"{part.capitalize()} after buckling, te = {te:g}; numbers: stage s",
+        f"{part.capitalize()} after buckling, te {te:g}, gamma {gamma:g}; numbers: s",
         f"mean over seeds against {reference} [%]",
     )
     shown = [

@@ -176,7 +176,8 @@ def _qualities(summary: list[Row]) -> list[Row]:
     """Compare preview with default, and an eighth with the whole, at the last stage."""
     last: dict[tuple[float, str, str], Row] = {}
     for row in summary:
-        last[row["te"], row["mirrors"], row["quality"]] = row
+        if row["gamma"] == 10:
+            last[row["te"], row["mirrors"], row["quality"]] = row
     rows = []
     for te in sorted({te for te, _, _ in last}, reverse=True):
         usual = last.get((te, "", "default"))
