@@ -91,6 +91,8 @@ _KAPPA = 1000.0
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
 _SECONDS_PER_ELEMENT_STEP = 5e-8
+#: Seconds until compiled kernels are loaded and the mesh is made.
+_LOADING = 2.0
 
 
 def choose(params: DehydrationParams, quality: str) -> Settings:
@@ -140,4 +142,4 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     # most stages settle for two thirds of the steps they may take
     steps = max(last - settings.start, 0.0) / settings.pace + 2 / 3 * settings.settle_steps * len(need.stages)
     seconds = steps * settings.elements * _SECONDS_PER_ELEMENT_STEP / (os.cpu_count() or 1)
-    return Cost(seconds, settings.elements * 1200 + 150_000_000)
+    return Cost(_LOADING + seconds, settings.elements * 1200 + 150_000_000)
