@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 __all__ = ["baked"]
 
@@ -19,6 +18,8 @@ Array = NDArray[Any]
 
 def baked(field: Array, size: int) -> Array:
     """Return a field (n, 2n) or (n, 2n, c) as a picture (size, size) or (size, size, c), first row on top, float32."""
+    from scipy import ndimage
+
     values = np.asarray(field, np.float32)
     if values.ndim == 3:
         return np.stack([baked(values[..., k], size) for k in range(values.shape[2])], axis=-1)

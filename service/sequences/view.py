@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import meshes
 from solver.fruit import lattice as angles
 from store import spectra
 from sweeps import colours
@@ -179,6 +178,8 @@ class Sequence:
     def _bare(self, index: int) -> Surface:
         stage = float(self.run["stage"][index])
         if not self.lattice:
+            from solver import meshes  # brings xarray, which those who look up shapes do without
+
             found = meshes.frame(self.run, index)
             fields = {n: np.asarray(v, "f4") for n, v in found.fields.items() if np.ndim(v) == 1}
             vertices, triangles = np.asarray(found.vertices, "f4"), np.asarray(found.triangles, "u4")
