@@ -1,7 +1,8 @@
 """Any solver's result as a sequence of triangle meshes: what every writer of this package reads.
 
 A result holds either the fruit's lattice (`position` or `displacement` on colatitude x azimuth; topology and texture
-coordinates of `service.formats.mesh`) or meshes (`solver.meshes`). Lengths are in the result's own unit, y is up for
+coordinates of `service.formats.mesh`) or meshes (`solver.meshes`).
+Fields without a shape are shown on the fresh fruit. Lengths are in the result's own unit, y is up for
 fruits; nothing is turned or scaled here but by `Sequence.scaled`.
 """
 
@@ -201,7 +202,7 @@ def of_run(run: xr.Dataset) -> Sequence:
     if "mesh_position" in run and indices:
         return Sequence(run, indices, kept="stage" in run["mesh_position"].dims)
     region = json.loads(run.attrs.get("need", "{}")).get("region")
-    if region is None and {"colatitude", "azimuth"} <= set(run.dims) and {"position", "displacement"} & set(run):
+    if region is None and {"colatitude", "azimuth"} <= set(run.dims):
         return Sequence(run, indices, True, run.sizes["colatitude"])
     raise UnfitFormat(
         "this result holds no whole surface.",
@@ -225,9 +226,9 @@ def _positions(run: xr.Dataset, index: int) -> NDArray[Any]:
         return run["position"].values[index]
     from solver import registry
 
-    moved = run["displacement"].values[index]
     params: Any = registry.get(str(run.attrs["solver"])).parse(json.loads(run.attrs["params"]))
-    return moved + params.surface(*angles(len(moved))).astype(moved.dtype)
+    fresh = params.surface(*angles(run.sizes["colatitude"])).astype("f4")
+    return fresh + run["displacement"].values[index] if "displacement" in run else fresh
 
 
 def _flat(values: NDArray[Any]) -> Floats:
