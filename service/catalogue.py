@@ -16,6 +16,7 @@ from store.tables import TableInfo
 from . import page, problems, vocabulary
 from .formats import FORMATS
 from .live import LiveTables
+from .sequences import EXPORTS
 
 __all__ = ["open_router", "router"]
 
@@ -46,7 +47,8 @@ def index(request: Request) -> Response:
         "schema": "/openapi.json",
     }
     formats = {f.name: {"media_type": f.media_type, "title": f.title} for f in FORMATS.values()}
-    body = {"name": "wizen", "version": __version__, "links": links, "formats": formats}
+    exports = {e.name: {"media_type": e.media_type, "title": e.title} for e in EXPORTS.values()}
+    body = {"name": "wizen", "version": __version__, "links": links, "formats": formats, "result_formats": exports}
     return JSONResponse(body, headers={"Vary": "Accept"})
 
 

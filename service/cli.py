@@ -16,6 +16,8 @@ from sweeps.console import note
 from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
 
+from . import cli_export
+
 if TYPE_CHECKING:
     from sweeps.formats import Encoder, Made
 
@@ -109,6 +111,7 @@ def _encode(chosen: Format, made: Made) -> bytes:
 
 
 extend(_formats)
+cli_export.add_to(app)
 
 if __name__ == "__main__":
     main()

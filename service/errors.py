@@ -22,7 +22,9 @@ __all__ = [
     "TooCostly",
     "TooManyListeners",
     "Unauthorized",
+    "Unavailable",
     "UncertainBatch",
+    "UnfitFormat",
     "UnknownSolver",
     "Wrong",
 ]
@@ -98,6 +100,18 @@ class NotAcceptable(ServiceError):
     """No representation that the asker accepts."""
 
     code = "not-acceptable"
+
+
+class UnfitFormat(InvalidQuery):
+    """A format that cannot hold this result, though it can hold others."""
+
+    code = "unfit-format"
+
+
+class Unavailable(ServiceError):
+    """A format whose library is not installed here."""
+
+    code = "format-unavailable"
 
 
 class UnknownSolver(ServiceError):

@@ -1,12 +1,13 @@
-"""`GET /v1/jobs/{id}/result`: the whole run as netCDF, or one stage of it as a shape, by `Accept`."""
+"""`GET /v1/jobs/{id}/result`: the whole run as netCDF, a scene, a cache or a map, or one stage as a shape."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import quote
 
 import mimeparse
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import FileResponse, Response
 
 from solver import registry
@@ -18,19 +19,45 @@ from store.store import Store
 
 from . import problems, vocabulary
 from .errors import InvalidQuery, JobFailed, NotAcceptable, NotDone, Wrong
-from .formats import FORMATS, About, Format, negotiate
+from .formats import FORMATS, About, Format
 from .jobs import JobId, stored_job
+from .sequences import EXPORTS, STILLS, Export, Options, prepared, write
+from .settings import Settings
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["router"]
 
 router = APIRouter(tags=["jobs"])
 
 NETCDF = "application/x-netcdf"
-_NAMES = ("netcdf", *FORMATS)
+_NAMES = ("netcdf", *FORMATS, *EXPORTS)
 _BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
 _CONTENT = {NETCDF: _BINARY} | {
     f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()
 }
+
+
+def _said(name: str) -> str:
+    return str(Options.model_fields[name].description)
+
+
+_CONTENT |= {e.media_type.partition(";")[0]: _BINARY for e in EXPORTS.values()}
+
+
+def _options(
+    colour: Annotated[str | None, Query(max_length=100, description=_said("colour"))] = None,
+    scale: Annotated[float | None, Query(gt=0, le=1e6, allow_inf_nan=False, description=_said("scale"))] = None,
+    fps: Annotated[float | None, Query(ge=1, le=240, allow_inf_nan=False, description=_said("fps"))] = None,
+    step: Annotated[float | None, Query(gt=0, le=1000, allow_inf_nan=False, description=_said("step"))] = None,
+    textures: Annotated[int | None, Query(ge=0, le=4096, description=_said("textures"))] = None,
+    map: Annotated[str | None, Query(max_length=100, description=_said("map"))] = None,
+    size: Annotated[int | None, Query(ge=2, le=8192, description=_said("size"))] = None,
+    low: Annotated[float | None, Query(allow_inf_nan=False, description=_said("low"))] = None,
+    high: Annotated[float | None, Query(allow_inf_nan=False, description=_said("high"))] = None,
+) -> Options:
+    return Options.parse(dict(locals()))
 
 
 @router.get(
@@ -40,23 +67,26 @@ _CONTENT = {NETCDF: _BINARY} | {
     responses={
         200: {"description": "The result", "content": _CONTENT},
         304: {"description": "The result that the asker has is the one"},
-        **problems.responses(404, 406, 409, 422, 503),
+        **problems.responses(404, 406, 409, 422, 501, 503),
     },
 )
 def result(
     request: Request,
     id: JobId,
+    options: Annotated[Options, Depends(_options)],
     stage: Annotated[
-        float | None, Query(allow_inf_nan=False, description="Which stage, for a shape; the last one if left out")
+        float | None,
+        Query(allow_inf_nan=False, description="Which stage; left out, all where a format holds them, else the last"),
     ] = None,
     format: Annotated[
         str | None,
         Query(description="Representation; goes before the Accept header", json_schema_extra={"enum": list(_NAMES)}),
     ] = None,
 ) -> Response:
-    """Fetch what a job computed: the whole run as netCDF-4/HDF5, or one stage's surface in any format of the shapes.
+    """Fetch what a job computed: the whole run as netCDF-4/HDF5, as a scene, a vertex cache or maps, or one stage.
 
-    netCDF opens with `xarray.open_dataset(path, engine="h5netcdf")` and answers who accepts anything.
+    netCDF opens with `xarray.open_dataset(path, engine="h5netcdf")` and answers who accepts anything. docs/formats.md
+    says which program reads which format, and what each one needs.
     """
     job = stored_job(request, id)
     chosen = _negotiate(request.headers.get("accept"), format)
@@ -64,7 +94,9 @@ def result(
     store: Store = request.app.state.tables.store
     name = chosen.name if chosen else "netcdf"
     settings = request.app.state.settings
-    tag = f'"{job.digest}-{name}{"" if stage is None or chosen is None else f"-{stage!r}"}"'
+    asked = options.model_dump(exclude_defaults=True)
+    word = "".join(f"-{key}={value!r}" for key, value in sorted({"stage": stage, **asked}.items()) if value is not None)
+    tag = f'"{job.digest}-{name}{"" if chosen is None else quote(word, safe="=-")}"'
     headers = {
         "ETag": tag,
         "Vary": "Accept",
@@ -74,13 +106,51 @@ def result(
         return Response(status_code=304, headers=headers)
     if chosen is None:
         return _shard(store, job, headers)
-    body = _shape(store, job, stage, chosen)
+    run = store.get(job.key)
+    if isinstance(chosen, Export) or (chosen.name in STILLS and _is_scene(run, asked)):
+        body = _scene(run, stage, chosen, options, settings)
+    else:
+        body = _shape(run, job, stage, chosen)
     if chosen.name != "json":
         headers["Content-Disposition"] = f'attachment; filename="{job.solver}-{job.key[:12]}{chosen.suffix}"'
-    return Response(body, headers=headers, media_type=chosen.media_type)
+    return Response(body, headers=headers, media_type=chosen.media_type.partition(";")[0])
 
 
-def _negotiate(accept: str | None, explicit: str | None) -> Format | None:
+def _is_scene(run: xr.Dataset, asked: dict[str, Any]) -> bool:
+    """Return whether a stage as glb or obj is more than the bare lattice: a mesh, colours, another scale."""
+    return bool(asked) or "mesh_position" in run or bool({"rot", "mould"} & set(run.data_vars))
+
+
+def _scene(
+    run: xr.Dataset, stage: float | None, chosen: Format | Export, options: Options, settings: Settings
+) -> bytes:
+    """Return a result, or one stage of it, in a format of whole results.
+
+    Raises:
+        UnfitFormat: the format cannot hold this result.
+        InvalidQuery: no such stage or field, or more than the service sends.
+
+    """
+    sequence = prepared(run, options, stage, single=not isinstance(chosen, Export) or chosen.single)
+    pixels = max(options.size if chosen.name in ("png", "exr") else 0, options.textures)
+    if pixels > settings.max_map:
+        raise InvalidQuery.of([Wrong("size", f"{pixels} pixels are more than {settings.max_map}", "Ask for fewer.")])
+    if sequence.samples + len(sequence) * options.textures**2 > settings.max_export_samples:
+        raise InvalidQuery.of(
+            [
+                Wrong(
+                    "format",
+                    f"the file would hold {sequence.samples} vertices, more than {settings.max_export_samples}",
+                    "Ask for one stage, or take the netCDF and write the file with `wizen export`.",
+                )
+            ]
+        )
+    if isinstance(chosen, Export):
+        return write(sequence, chosen, options)
+    return STILLS[chosen.name](sequence, options)
+
+
+def _negotiate(accept: str | None, explicit: str | None) -> Format | Export | None:
     """Return the format asked for; None is netCDF.
 
     Raises:
@@ -91,23 +161,22 @@ def _negotiate(accept: str | None, explicit: str | None) -> Format | None:
     if explicit is not None:
         if explicit == "netcdf":
             return None
-        if explicit not in FORMATS:
+        if explicit not in _NAMES:
             advice = f"Formats: {', '.join(_NAMES)}."
             raise InvalidQuery.of([Wrong("format", f"there is no format {explicit[:40]!r}", advice)])
-        return FORMATS[explicit]
-    offered = [*(f.media_type for f in FORMATS.values()), NETCDF]
+        return EXPORTS.get(explicit) or FORMATS[explicit]
+    known: dict[str, Format | Export] = {e.media_type: e for e in EXPORTS.values()}
+    known |= {f.media_type: f for f in FORMATS.values()}
     try:
-        best = mimeparse.best_match(offered, (accept or "").strip().lower() or "*/*")
+        best = mimeparse.best_match([*known, NETCDF], (accept or "").strip().lower() or "*/*")
     except mimeparse.MimeTypeParseException:
         best = ""
     if best == NETCDF:
         return None
     if not best:
-        listed = f"{NETCDF} (format=netcdf), " + ", ".join(
-            f"{f.media_type} (format={f.name})" for f in FORMATS.values()
-        )
+        listed = f"{NETCDF} (format=netcdf), " + ", ".join(f"{t} (format={f.name})" for t, f in known.items())
         raise NotAcceptable(f"no representation fits Accept: {accept}.", advice=f"Ask for one of {listed}.")
-    return negotiate(best)
+    return known[best]
 
 
 def _check_done(job: Job) -> None:
@@ -136,7 +205,7 @@ def _shard(store: Store, job: Job, headers: dict[str, str]) -> Response:
     return FileResponse(path, headers=headers, media_type=NETCDF, filename=f"{job.solver}-{job.key[:12]}.h5")
 
 
-def _shape(store: Store, job: Job, stage: float | None, chosen: Format) -> bytes:
+def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> bytes:
     """Return one stage of a run in a format of the shapes.
 
     Raises:
@@ -144,10 +213,8 @@ def _shape(store: Store, job: Job, stage: float | None, chosen: Format) -> bytes
         InvalidQuery: it has no such stage.
 
     """
-    # the batch floor is not loaded for those who look up shapes
     from sweeps.outputs import of_result
 
-    run = store.get(job.key)
     solver = vocabulary.solver_named(job.solver)
     params = _params(solver, job)
     stages = [float(value) for value in run["stage"].values]

@@ -57,6 +57,7 @@ STATUS: Mapping[type[Exception], int] = {
     errors.InvalidQuery: 422,
     errors.BatchTooLarge: 413,
     errors.NotAcceptable: 406,
+    errors.Unavailable: 501,
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,

@@ -29,6 +29,10 @@ class Settings(BaseSettings):
     max_resolution: int = Field(512, ge=8, le=2048, description="Most colatitude samples of one shape")
     max_batch: int = Field(4096, ge=1, description="Most shapes of one batch")
     max_batch_samples: int = Field(1 << 25, ge=128, description="Most lattice points of one batch, over all its shapes")
+    max_export_samples: int = Field(
+        1 << 22, ge=128, description="Most vertices, over all stages, of a result's file; textures count their pixels"
+    )
+    max_map: int = Field(4096, ge=2, le=8192, description="Most pixels of a map or texture, along and down")
     max_query: int = Field(4096, ge=64, description="Longest query string [bytes]")
     max_body: int = Field(1 << 20, ge=0, description="Largest request body [bytes]")
     timeout: float = Field(30.0, gt=0, description="Longest wait for an answer to begin [s]")

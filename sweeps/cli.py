@@ -15,6 +15,7 @@ from solver import __version__
 
 from . import cli_onset, cli_queue, cli_refine, cli_tables
 from .console import Root, emit, grid, note
+from .errors import InvalidOption
 from .options import As_json, Out, Preset, Quality, Seed, Set, Stages, StorePath, assignments, numbers
 
 __all__ = ["app"]
@@ -91,6 +92,9 @@ def solve(
     quality: Quality = None,
     seed: Seed = None,
     out: Out = None,
+    cut: Annotated[
+        str | None, typer.Option("--cut", metavar="PLANE", help=".png: cut open along an azimuth [degree], or equator.")
+    ] = None,
     as_json: As_json = False,
 ) -> None:
     """Run a solver once, here and now, without a store.
@@ -102,6 +106,8 @@ def solve(
     wizen solve dehydration --preset sphere --set te=0.04 --set gamma=30 --stages 0.1,0.2 --out run.h5
 
     wizen solve dehydration --preset plum1 --quality preview --stages 0.3 --out plum.png --json
+
+    wizen solve decay --preset orange --stages 0,4,8 --out inside.png --cut 35
     """
     from solver import registry
     from solver.contract import Context, Need
@@ -112,6 +118,12 @@ def solve(
     from .plan import job, units_of
     from .words import per_stage, show_run
 
+    if cut is not None:
+        from . import section
+
+        section.plane(cut)
+        if out is None or out.suffix != ".png":
+            raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
     chosen = registry.get(solver)
     values = assignments(set_)
     if seed is not None:
@@ -143,7 +155,9 @@ def solve(
         shapes = [outputs.of_result(result, axes, i) for i in range(len(need.stages))] if "position" in result else []
         title = f"{chosen.title}: {preset or solver}"
         symbol, units = chosen.stages.symbol, units_of(solver)
-        made = Made(shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key)
+        made = Made(
+            shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key, cut=cut
+        )
         outputs.save(out, made)
     emit(document, as_json, lambda console: show_run(console, document))
 

@@ -19,7 +19,8 @@ class Made:
     """What a command has to write: shapes by stage, what it says about them, and the whole run if there was one.
 
     `table` and `fixed` are the look-up table's name and the parameters that are the same in all of it; `units` are
-    those of the parameters and of the stage, whose symbol is `stage_symbol`.
+    those of the parameters and of the stage, whose symbol is `stage_symbol`. `cut` is the plane in which a
+    picture shows the run cut open.
     """
 
     shapes: Sequence[Shape]
@@ -32,6 +33,7 @@ class Made:
     units: Mapping[str, str] = field(default_factory=dict)
     run: xr.Dataset | None = None
     key: str = ""
+    cut: str | None = None
 
 
 @dataclass(frozen=True)

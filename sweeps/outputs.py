@@ -42,6 +42,10 @@ def _npz(made: Made) -> bytes:
 
 
 def _png(made: Made) -> bytes:
+    if made.cut is not None and made.run is not None:
+        from . import section
+
+        return section.picture(made.run, section.plane(made.cut), title=made.title, symbol=made.stage_symbol)
     from . import colours
     from .picture import Panel, sheet
 

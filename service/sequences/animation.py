@@ -1,0 +1,214 @@
+"""Binary glTF of all stages: morph targets where only the shape changes, otherwise a mesh per stage.
+
+Where triangles stay and no colour changes, stage 0 is the mesh and every further one a morph target (positions and
+normals), with weights that fade from stage to stage. Otherwise each stage is a node of its own, and an animation of
+scales, 1 for the stage that is shown and 0 for the others, switches between them: what glTF says of a node of scale 0
+is that it need not be drawn. Vertex colours (COLOR_0) are linear light; so are fields, as attributes `_NAME`.
+With `textures`, colours and roughness are baked to pictures on the fruit's texture coordinates instead.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sweeps import colours
+
+from ..errors import UnfitFormat
+from ..formats.about import GENERATOR
+from ..formats.gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack
+from .bake import baked
+from .options import Options
+
+if TYPE_CHECKING:
+    from .view import Sequence, Surface
+
+__all__ = ["animation"]
+
+Json = dict[str, Any]
+
+#: The largest 16-bit index is reserved by WebGL as a restart mark.
+_SHORT = 0xFFFF
+#: Skin of fruits that say nothing about it.
+_PLAIN = {"baseColorFactor": [0.45, 0.09, 0.06, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.6}
+
+
+def animation(sequence: Sequence, options: Options) -> bytes:
+    """Return a sequence as a GLB file; a single stage has no animation.
+
+    Raises:
+        UnfitFormat: textures of a surface without texture coordinates, or without colours.
+
+    """
+    if options.textures and (sequence.seam is None or not sequence.coloured):
+        lacks = "texture coordinates" if sequence.seam is None else "colours"
+        raise UnfitFormat(f"textures need {lacks}, and this result has none.", advice="Leave textures out.")
+    file = _File(sequence, options)
+    if sequence.kept and not sequence.coloured and len(sequence) > 1:
+        file.morph()
+    else:
+        file.switch()
+    return file.bytes()
+
+
+class _File:
+    def __init__(self, sequence: Sequence, options: Options) -> None:
+        self.sequence, self.options = sequence, options
+        self.buffer = Buffer()
+        self.nodes: list[Json] = []
+        self.meshes: list[Json] = []
+        self.images: list[Json] = []
+        self.animations: list[Json] = []
+        textured = bool(options.textures)
+        white = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
+        self.materials: list[Json] = (
+            [] if textured else [{"name": "skin", "pbrMetallicRoughness": white if sequence.coloured else _PLAIN}]
+        )
+        seam = sequence.seam
+        self.copies = slice(None) if seam is None else seam.copies
+        self.uv = None if seam is None else self.buffer.add(seam.uv, FLOAT, "VEC2", VERTICES)
+        self.shared = self._indices(seam.triangles, len(seam.uv)) if seam is not None else None
+
+    @property
+    def _name(self) -> str:
+        return str(self.sequence.about["solver"]) or "result"
+
+    @property
+    def _times(self) -> np.ndarray:
+        return np.arange(len(self.sequence) + 1) * self.options.step / self.options.fps
+
+    def _indices(self, triangles: np.ndarray, count: int) -> int:
+        small = count < _SHORT
+        array = triangles.ravel().astype("<u2" if small else "<u4")
+        return self.buffer.add(array, USHORT if small else UINT, "SCALAR", INDICES)
+
+    def _attributes(self, surface: Surface) -> Json:
+        points = surface.vertices[self.copies]
+        found: Json = {
+            "POSITION": self.buffer.add(points, FLOAT, "VEC3", VERTICES, bounds(points)),
+            "NORMAL": self.buffer.add(surface.normals()[self.copies], FLOAT, "VEC3", VERTICES),
+        }
+        if self.uv is not None:
+            found["TEXCOORD_0"] = self.uv
+        if surface.colour is not None and not self.options.textures:
+            found["COLOR_0"] = self.buffer.add(np.clip(surface.colour, 0, 1)[self.copies], FLOAT, "VEC3", VERTICES)
+        for name, values in surface.fields.items():
+            word = "_" + re.sub("[^A-Z0-9_]", "_", name.upper())
+            found[word] = self.buffer.add(values[self.copies], FLOAT, "SCALAR", VERTICES)
+        return found
+
+    def _primitive(self, surface: Surface) -> Json:
+        if self.shared is None or not self.sequence.kept:
+            indices = self._indices(surface.triangles, len(surface.vertices))
+            if self.sequence.kept:
+                self.shared = indices
+        else:
+            indices = self.shared
+        material = self._textured(surface) if self.options.textures else 0
+        return {"attributes": self._attributes(surface), "indices": indices, "material": material}
+
+    def morph(self) -> None:
+        """Add one mesh with a target per further stage, and weights that fade from each to the next."""
+        surfaces = iter(self.sequence)
+        first = next(surfaces)
+        # fields belong to stages, and a target has none
+        primitive = self._primitive(first._replace(fields={}))
+        base, straight = first.vertices[self.copies], first.normals()[self.copies]
+        primitive["targets"] = []
+        for surface in surfaces:
+            moved, turned = surface.vertices[self.copies] - base, surface.normals()[self.copies] - straight
+            primitive["targets"].append(
+                {
+                    "POSITION": self.buffer.add(moved, FLOAT, "VEC3", VERTICES, bounds(moved)),
+                    "NORMAL": self.buffer.add(turned, FLOAT, "VEC3", VERTICES),
+                }
+            )
+        count = len(primitive["targets"])
+        names = [f"{stage:g}" for stage in self.sequence.stages[1:]]
+        self.meshes.append(
+            {
+                "name": self._name,
+                "primitives": [primitive],
+                "weights": [0.0] * count,
+                "extras": {"targetNames": names},
+            }
+        )
+        self.nodes.append({"mesh": 0, "name": self._name, "extras": self.sequence.about})
+        weights = np.eye(count + 1, dtype=np.float32)[:, 1:]
+        times = self._times[:-1].astype(np.float32)
+        self._animate([(0, "weights", times, weights.ravel(), "SCALAR")], "LINEAR")
+
+    def switch(self) -> None:
+        """Add a mesh and a node per stage, and scales that show one at a time."""
+        count = len(self.sequence)
+        root: Json = {"name": self._name, "extras": self.sequence.about}
+        self.nodes.append(root)
+        if count > 1:
+            root["children"] = list(range(1, count + 1))
+        channels = []
+        for number, surface in enumerate(self.sequence):
+            name = f"{self._name} {surface.stage:g}"
+            self.meshes.append({"name": name, "primitives": [self._primitive(surface)]})
+            if count == 1:
+                root["mesh"] = 0
+                return
+            self.nodes.append({"mesh": number, "name": name, "scale": [float(number == 0)] * 3})
+            keys = sorted({0, number, number + 1})
+            shown = np.array([[float(key == number)] * 3 for key in keys], np.float32)
+            if number + 1 == count:
+                shown[-1] = 1  # the last stage stays
+            channels.append((number + 1, "scale", self._times[keys].astype(np.float32), shown, "VEC3"))
+        self._animate(channels, "STEP")
+
+    def _animate(self, channels: list[tuple[int, str, np.ndarray, np.ndarray, str]], way: str) -> None:
+        samplers: list[Json] = []
+        targets: list[Json] = []
+        for node, path, times, values, kind in channels:
+            at = self.buffer.add(times, FLOAT, "SCALAR", None, bounds(times[:, None]))
+            samplers.append({"input": at, "output": self.buffer.add(values, FLOAT, kind), "interpolation": way})
+            targets.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
+        self.animations.append({"name": "stages", "samplers": samplers, "channels": targets})
+
+    def _textured(self, surface: Surface) -> int:
+        """Add the colours and the roughness of a stage as pictures, and return the number of the material."""
+        n, size = self.sequence.lattice, self.options.textures
+        assert surface.colour is not None
+        inner = slice(0, 2 * n * n)  # the poles are no samples of their own
+        base = colours.encoded(baked(surface.colour[inner].reshape(n, 2 * n, 3), size))
+        pbr: Json = {"baseColorTexture": {"index": self._image(base)}, "metallicFactor": 0.0, "roughnessFactor": 0.6}
+        if surface.roughness is not None:
+            rough = np.zeros((size, size, 3), np.uint8)  # green is roughness, blue is metal
+            share = baked(surface.roughness[inner].reshape(n, 2 * n), size)
+            rough[..., 1] = np.clip(255 * share + 0.5, 0, 255).astype(np.uint8)
+            pbr |= {"metallicRoughnessTexture": {"index": self._image(rough)}, "roughnessFactor": 1.0}
+        self.materials.append({"name": f"skin {surface.stage:g}", "pbrMetallicRoughness": pbr})
+        return len(self.materials) - 1
+
+    def _image(self, pixels: np.ndarray) -> int:
+        from PIL import Image
+
+        out = io.BytesIO()
+        Image.fromarray(pixels).save(out, "PNG")
+        self.images.append({"bufferView": self.buffer.raw(out.getvalue()), "mimeType": "image/png"})
+        return len(self.images) - 1
+
+    def bytes(self) -> bytes:
+        """Return the whole file."""
+        document: Json = {
+            "asset": {"version": "2.0", "generator": GENERATOR},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": self.nodes,
+            "meshes": self.meshes,
+            "materials": self.materials,
+        }
+        if self.images:
+            document["images"] = self.images
+            document["samplers"] = [{"wrapS": 10497, "wrapT": 33071}]  # around in azimuth, not across the poles
+            document["textures"] = [{"source": i, "sampler": 0} for i in range(len(self.images))]
+        if self.animations:
+            document["animations"] = self.animations
+        return pack(document, self.buffer)

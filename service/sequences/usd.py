@@ -1,0 +1,109 @@
+"""Universal Scene Description: one mesh whose points, and if need be triangles, are sampled over time.
+
+y is up and the unit of length is written where it is known. Colours are `displayColor` in linear light, fields of the
+vertices are primvars under their own names. Texture coordinates are face-varying, v upwards. Needs usd-core.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import Unavailable
+from .options import Options
+
+if TYPE_CHECKING:
+    from .view import Seam, Sequence, Surface
+
+__all__ = ["usda", "usdc"]
+
+
+def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
+    """Return a sequence as a USD file of the kind that the suffix names.
+
+    Raises:
+        Unavailable: usd-core is not installed.
+
+    """
+    try:
+        from pxr import Usd, UsdGeom
+    except ImportError:
+        raise Unavailable("USD needs the package usd-core.", advice="pip install 'wizen[usd]'.") from None
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, sequence.unit or 1.0)
+    stage.SetTimeCodesPerSecond(options.fps)
+    stage.SetFramesPerSecond(options.fps)
+    stage.SetStartTimeCode(1)
+    stage.SetEndTimeCode(1 + (len(sequence) - 1) * options.step)
+    name = str(sequence.about["solver"]) or "result"
+    mesh = UsdGeom.Mesh.Define(stage, f"/{name}")
+    stage.SetDefaultPrim(mesh.GetPrim())
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    about = sequence.about
+    mesh.GetPrim().SetCustomData(
+        {"solver": name, "length": about["units"]["length"], "stageUnits": about["stages"]["units"]}
+    )
+    mesh.GetPrim().SetCustomDataByKey("stages", _doubles(about["stages"]["values"]))
+    if sequence.seam is not None:
+        _texture(mesh, sequence.seam)
+    for number, surface in enumerate(sequence):
+        at = 1 + number * options.step
+        if number == 0 or not sequence.kept:
+            # triangles that stay have no time of their own
+            _triangles(mesh, surface, None if sequence.kept else at)
+        _sample(mesh, surface, at)
+    with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
+        path = Path(folder) / f"result.{suffix}"
+        stage.GetRootLayer().Export(str(path))
+        return path.read_bytes()
+
+
+usdc, usda = partial(_encode, "usdc"), partial(_encode, "usda")
+
+
+def _doubles(values: Any) -> Any:
+    from pxr import Vt
+
+    return Vt.DoubleArray.FromNumpy(np.asarray(values, float))
+
+
+def _triangles(mesh: Any, surface: Surface, at: float | None) -> None:
+    from pxr import Usd, Vt
+
+    when = Usd.TimeCode.Default() if at is None else at
+    count = len(surface.triangles)
+    mesh.CreateFaceVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, 3, np.int32)), when)
+    corners = np.ascontiguousarray(surface.triangles.ravel(), np.int32)
+    mesh.CreateFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(corners), when)
+
+
+def _sample(mesh: Any, surface: Surface, at: float) -> None:
+    from pxr import Sdf, UsdGeom, Vt
+
+    points = surface.vertices
+    mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points)), at)
+    mesh.CreateNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(surface.normals()), at)
+    ends = np.stack([points.min(axis=0), points.max(axis=0)])
+    mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(ends), at)
+    if surface.colour is not None:
+        colour = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+        colour.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(surface.colour)), at)
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    for name, values in surface.fields.items():
+        own = primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
+        own.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(values)), at)
+
+
+def _texture(mesh: Any, seam: Seam) -> None:
+    from pxr import Sdf, UsdGeom, Vt
+
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
+    st.Set(Vt.Vec2fArray.FromNumpy(np.column_stack([seam.uv[:, 0], 1 - seam.uv[:, 1]]).astype("f4")))
+    st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(seam.triangles.ravel(), np.int32)))

@@ -1,0 +1,236 @@
+"""Any solver's result as a sequence of triangle meshes: what every writer of this package reads.
+
+A result holds either the fruit's lattice (`position` or `displacement` on colatitude x azimuth; topology and texture
+coordinates of `service.formats.mesh`) or meshes (`solver.meshes`).
+Fields without a shape are shown on the fresh fruit. Lengths are in the result's own unit, y is up for
+fruits; nothing is turned or scaled here but by `Sequence.scaled`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.fruit import lattice as angles
+from store import spectra
+from sweeps import colours
+
+from ..errors import InvalidQuery, UnfitFormat, Wrong
+from ..formats import mesh
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Seam", "Sequence", "Surface", "of_run"]
+
+Floats = NDArray[np.float32]
+Indices = NDArray[np.uint32]
+
+
+class Surface(NamedTuple):
+    """One stage: vertices (v, 3), triangles (f, 3) counter-clockwise from outside, fields of the vertices (v).
+
+    colour: (v, 3), linear light. roughness: (v). Both None where nothing says what the surface looks like.
+    """
+
+    stage: float
+    vertices: Floats
+    triangles: Indices
+    fields: Mapping[str, Floats]
+    colour: Floats | None = None
+    roughness: Floats | None = None
+
+    def normals(self) -> Floats:
+        """Return outward unit normals (v, 3), weighted by area; (0, 1, 0) where no triangle has any."""
+        a, b, c = (self.vertices[self.triangles[:, k]].astype(float) for k in range(3))
+        areas = np.cross(b - a, c - a)
+        total = np.zeros(self.vertices.shape)
+        for axis in range(3):
+            for corner in range(3):
+                total[:, axis] += np.bincount(self.triangles[:, corner], areas[:, axis], len(total))
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return np.where(length > 1e-30, total / np.maximum(length, 1e-30), [0.0, 1.0, 0.0]).astype(np.float32)
+
+
+class Seam(NamedTuple):
+    """Texture coordinates (w, 2), v down, of a mesh cut open: `copies` (w) says which vertex each one repeats.
+
+    triangles: (f, 3), the mesh's own in the same order, as indices into the w copies.
+    """
+
+    uv: Floats
+    copies: NDArray[np.intp]
+    triangles: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """Stages of a result, made one at a time. `kept`: all have the same triangles.
+
+    colour: `auto` (layers of skin, rot and mould where the result has them), `none`, or a field's name.
+    unit: metres per unit of length, 0 where nobody knows. observe: told the share that is done.
+    """
+
+    run: xr.Dataset
+    indices: tuple[int, ...]
+    kept: bool
+    lattice: int = 0
+    colour: str = "auto"
+    scale: float = 1.0
+    observe: Callable[[float], None] = field(default=lambda share: None)
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def __iter__(self) -> Iterator[Surface]:
+        for done, index in enumerate(self.indices):
+            yield self._surface(index)
+            self.observe((done + 1) / len(self))
+
+    @property
+    def stages(self) -> tuple[float, ...]:
+        """The values on the solver's stage axis."""
+        return tuple(float(self.run["stage"][i]) for i in self.indices)
+
+    @property
+    def samples(self) -> int:
+        """Vertices of all stages together: what a file's size goes with."""
+        if self.lattice:
+            return len(self) * (2 * self.lattice**2 + 2)
+        if self.kept:
+            return len(self) * self.run.sizes["vertex"]
+        return int(self.run["vertex_count"].values[list(self.indices)].sum())
+
+    @property
+    def seam(self) -> Seam | None:
+        """Texture coordinates, where the surface has some."""
+        n = self.lattice
+        return Seam(mesh.texture(n), mesh.seam(n), mesh.seam_triangles(n)) if n else None
+
+    @cached_property
+    def params(self) -> Mapping[str, Any]:
+        """The solver's parameters."""
+        return json.loads(self.run.attrs.get("params", "{}"))
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What every file says of itself, as plain values."""
+        stage = self.run["stage"].attrs
+        return {
+            "solver": str(self.run.attrs.get("solver", "")),
+            "params": dict(self.params),
+            "stages": {"values": list(self.stages), "units": stage.get("units", "1"), "of": stage.get("long_name", "")},
+            "units": {"length": self.length},
+        }
+
+    @property
+    def unit(self) -> float:
+        """Metres per unit of length in the file; 0 where nobody knows."""
+        return float(self.run.attrs.get("metres_per_unit", 0.0)) / self.scale
+
+    @property
+    def length(self) -> str:
+        """The unit of length in words."""
+        base = "r1" if self.lattice else f"{self.unit * self.scale:g} m" if self.unit else "the solver's own"
+        return base if self.scale == 1 else f"{base} / {self.scale:g}"
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the scalar fields of the vertices."""
+        return tuple(self._bare(self.indices[0]).fields)
+
+    def at(self, position: int) -> Sequence:
+        """Return the sequence of one of the stages alone."""
+        return replace(self, indices=(self.indices[position],))
+
+    @cached_property
+    def _range(self) -> tuple[float, float]:
+        """The least and the largest value of the field that gives the colours."""
+        found = [self._bare(i).fields[self.colour] for i in self.indices]
+        return float(min(f.min() for f in found)), float(max(f.max() for f in found))
+
+    @property
+    def coloured(self) -> bool:
+        """Whether surfaces come with colours."""
+        return self._surface(self.indices[0]).colour is not None
+
+    def _surface(self, index: int) -> Surface:
+        bare = self._bare(index)
+        if self.scale != 1:
+            bare = bare._replace(vertices=bare.vertices * np.float32(self.scale))
+        if self.colour == "none":
+            return bare
+        if self.colour == "auto":
+            skin = colours.layered(bare.fields, self.params)
+            if skin is None:
+                return bare
+            return bare._replace(colour=skin.colour.astype("f4"), roughness=skin.roughness.astype("f4"))
+        if self.colour not in bare.fields:
+            known = ", ".join(bare.fields) or "none in this result"
+            raise InvalidQuery.of([Wrong("colour", f"there is no field {self.colour[:40]!r}", f"Fields: {known}.")])
+        return bare._replace(colour=colours.by_field(bare.fields[self.colour], *self._range).astype("f4"))
+
+    def _bare(self, index: int) -> Surface:
+        stage = float(self.run["stage"][index])
+        if not self.lattice:
+            from solver import meshes  # brings xarray, which those who look up shapes do without
+
+            found = meshes.frame(self.run, index)
+            fields = {n: np.asarray(v, "f4") for n, v in found.fields.items() if np.ndim(v) == 1}
+            vertices, triangles = np.asarray(found.vertices, "f4"), np.asarray(found.triangles, "u4")
+            return Surface(stage, vertices, triangles, fields)
+        position = _positions(self.run, index)
+        vertices = mesh.vertices(position, spectra.poles(spectra.spectrum(position)))
+        fields = {name: _flat(values) for name, values in lattice_fields(self.run, index).items()}
+        return Surface(stage, vertices, mesh.triangles(self.lattice), fields)
+
+
+def of_run(run: xr.Dataset) -> Sequence:
+    """Return a result as a sequence of meshes.
+
+    Raises:
+        UnfitFormat: it holds neither a whole lattice with positions nor meshes.
+
+    """
+    indices = tuple(range(run.sizes.get("stage", 0)))
+    if "mesh_position" in run and indices:
+        return Sequence(run, indices, kept="stage" in run["mesh_position"].dims)
+    region = json.loads(run.attrs.get("need", "{}")).get("region")
+    if region is None and {"colatitude", "azimuth"} <= set(run.dims):
+        return Sequence(run, indices, True, run.sizes["colatitude"])
+    raise UnfitFormat(
+        "this result holds no whole surface.",
+        advice="Solve again with the field 'position' (or the solver's mesh) and no region; netCDF holds the rest.",
+    )
+
+
+def lattice_fields(run: xr.Dataset, index: int) -> dict[str, NDArray[Any]]:
+    """Return the scalar fields (n, 2n) of one stage on the lattice; vectors as name_x, name_y, name_z."""
+    found: dict[str, NDArray[Any]] = {}
+    for name, variable in run.data_vars.items():
+        if variable.dims == ("stage", "colatitude", "azimuth"):
+            found[str(name)] = variable.values[index]
+        elif name == "displacement":
+            found |= {f"{name}_{axis}": variable.values[index][..., k] for k, axis in enumerate("xyz")}
+    return found
+
+
+def _positions(run: xr.Dataset, index: int) -> NDArray[Any]:
+    if "position" in run:
+        return run["position"].values[index]
+    from solver import registry
+
+    params: Any = registry.get(str(run.attrs["solver"])).parse(json.loads(run.attrs["params"]))
+    fresh = params.surface(*angles(run.sizes["colatitude"])).astype("f4")
+    return fresh + run["displacement"].values[index] if "displacement" in run else fresh
+
+
+def _flat(values: NDArray[Any]) -> Floats:
+    """Return a field (n, 2n) at the closed mesh's vertices; a pole has the mean of its row."""
+    return np.concatenate([values.ravel(), [values[0].mean(), values[-1].mean()]]).astype("f4")

@@ -1,0 +1,142 @@
+"""`wizen export`, and the same formats over HTTP."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from service.cli import app
+from solver import registry
+from solver.contract import Need
+from store import shards
+from store.store import Store
+from sweeps.plan import job
+
+from .conftest import client_of
+from .test_problems import checked
+from .test_sequences import splitting
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> tuple[Store, str]:
+    """A store with one finished job of decay."""
+    store = Store.open(tmp_path_factory.mktemp("export") / "store", create=True)
+    solver = registry.get("decay")
+    params = solver.parse({}, "orange")
+    need = solver.settle(Need(quality="preview", resolution=12, stages=(0.0, 0.1), fields=("rot", "mould")))
+    spec = job(solver, params, need)
+    store.ledger.want([spec], "test")
+    assert store.ledger.claim("tester", 60) is not None
+    store.ledger.done(spec.key, store.put(spec.key, solver.solve(params, need)), 0.1)
+    return store, spec.key
+
+
+def run(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["export", *words])
+    return done.exit_code, done.output
+
+
+def test_the_command_line_writes_by_key_and_by_file(stored: tuple[Store, str], tmp_path: Path) -> None:
+    store, key = stored
+    code, said = run(key[:10], "--store", str(store.root), "--out", str(tmp_path / "a.ply.zip"), "--json")
+    assert code == 0, said
+    document = json.loads(said)
+    assert (document["format"], document["stages"], document["vertices"]) == ("ply-zip", [0.0, 0.1], 2 * 290)
+    assert len(zipfile.ZipFile(tmp_path / "a.ply.zip").namelist()) == 3
+    path = tmp_path / "run.h5"
+    shards.write(path, store.get(key), key)
+    code, said = run(str(path), "--out", str(tmp_path / "rot.png"), "--size", "16")
+    assert code == 0, said
+    assert (tmp_path / "rot.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_mesh_of_one_s_own_gets_its_cache(stored: tuple[Store, str], tmp_path: Path) -> None:
+    store, key = stored
+    ball = trimesh.creation.icosphere(3, radius=4)
+    ball.export(tmp_path / "my.stl")
+    words = [key, "--store", str(store.root), "--mesh", str(tmp_path / "my.stl")]
+    code, said = run(*words, "--out", str(tmp_path / "my.pc2"), "--json")
+    assert code == 0, said
+    points = np.frombuffer((tmp_path / "my.pc2").read_bytes(), "<f4", offset=32).reshape(2, -1, 3)
+    assert np.allclose(np.linalg.norm(points, axis=2), 4, atol=1e-5)  # this fruit does not move
+    code, _ = run(*words, "--out", str(tmp_path / "my.glb"))
+    assert code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["nothing.h5", "--out", "a.glb"], "no file"),
+        (["abc", "--out", "a.glb"], "--store"),
+        (["{file}", "--out", "a.doc"], "Formats"),
+        (["{file}"], "--format"),
+        (["{file}", "--out", "a.pc2"], "stay"),
+        (["{file}", "--out", "a.glb", "--stage", "3"], "no stage"),
+    ],
+)
+def test_what_cannot_be_written_is_said(
+    words: list[str], why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shards.write(tmp_path / "run.h5", splitting(), "0" * 64)
+    code, said = run(*(word.format(file="run.h5") for word in words))
+    assert code == 2
+    assert why in said
+    assert not list(tmp_path.glob("a.*"))
+
+
+def test_the_service_sends_the_same_formats(stored: tuple[Store, str]) -> None:
+    store, key = stored
+    with client_of(store.root, jobs_workers=0, max_map=64) as client:
+        url = f"/v1/jobs/{key}/result"
+        for accept, start in (
+            ("application/x-pc2", b"POINTCACHE2\0"),
+            ("model/vnd.usdc", b"PXR-USDC"),
+            ("image/png", b"\x89PNG"),
+            ("image/x-exr", b"\x76\x2f\x31\x01"),
+            ("model/x-ply", b"ply\n"),
+        ):
+            answer = client.get(url, params={"size": 16}, headers={"Accept": accept})
+            assert answer.content[: len(start)] == start
+            assert answer.headers["content-type"] == accept
+        film = client.get(url, headers={"Accept": "model/gltf-binary; stages=all"})
+        assert film.headers["content-type"] == "model/gltf-binary"
+        assert len(trimesh.load(io.BytesIO(film.content), file_type="glb").geometry) == 2
+        still = client.get(url, headers={"Accept": "model/gltf-binary"})
+        assert len(trimesh.load(io.BytesIO(still.content), file_type="glb").geometry) == 1
+        assert b"COLOR_0" in still.content
+        other = client.get(url, params={"format": "png", "size": 16, "map": "mould"})
+        assert other.headers["etag"] != client.get(url, params={"format": "png", "size": 16}).headers["etag"]
+        assert client.get(other.url, headers={"If-None-Match": other.headers["etag"]}).status_code == 304
+        checked(client.get(url, params={"format": "png", "size": 65}), 422, "invalid-query")
+        checked(client.get(url, params={"format": "png", "map": "moss"}), 422, "invalid-query")
+        checked(client.get(url, params={"format": "usdc", "fps": 0}), 422, "invalid-query")
+        problem = checked(client.get(url, headers={"Accept": "model/fbx"}), 406, "not-acceptable")
+        assert "format=pc2" in problem["advice"]
+        assert "usdc" in client.get("/").json()["result_formats"]
+
+
+def test_the_service_says_what_a_changing_mesh_cannot_be(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store", create=True)
+    solver = registry.get("decay")
+    need = solver.settle(Need(stages=(0.0,)))
+    spec = job(solver, solver.parse({}), need)
+    store.ledger.want([spec], "test")
+    store.ledger.claim("tester", 60)
+    store.ledger.done(spec.key, store.put(spec.key, splitting()), 0.1)
+    with client_of(store.root, jobs_workers=0, max_export_samples=200) as client:
+        url = f"/v1/jobs/{spec.key}/result"
+        large = checked(client.get(url, params={"format": "animation"}), 422, "invalid-query")
+        assert "wizen export" in large["advice"]
+        still = client.get(url, params={"format": "obj", "stage": 0})
+        assert len(trimesh.load(io.BytesIO(still.content), file_type="obj").faces) == 12
+    with client_of(store.root, jobs_workers=0) as client:
+        problem = checked(client.get(url, params={"format": "pc2"}), 422, "unfit-format")
+        assert "usdc" in problem["advice"]

@@ -1,0 +1,339 @@
+"""Whole results in every format, read back by readers that are not ours."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import png
+import pytest
+import trimesh
+import xarray as xr
+from PIL import Image
+from pxr import Usd, UsdGeom
+from scipy.special import sph_harm_y
+
+from service.errors import InvalidQuery, UnfitFormat
+from service.sequences import EXPORTS, STILLS, Options, Sequence, of_run, prepared, write
+from service.sequences.bake import baked
+from solver import meshes, registry
+from solver.fruit import directions, lattice
+from sweeps import colours
+
+STAGES = (0.0, 2.0, 5.0)
+
+
+def shrinking(n: int = 8, **fields: np.ndarray) -> xr.Dataset:
+    ball = directions(*lattice(n))
+    position = np.stack([(1 - 0.1 * k) * ball + [0.3 * k, 0, 0] for k in range(len(STAGES))])
+    data = {"position": (("stage", "colatitude", "azimuth", "component"), position.astype("f4"))}
+    data |= {name: (("stage", "colatitude", "azimuth"), values) for name, values in fields.items()}
+    return xr.Dataset(data, {"stage": list(STAGES)}, {"solver": "decay"})
+
+
+def rotting(n: int = 8) -> xr.Dataset:
+    """An orange whose rot falls from pole to pole and grows by stage."""
+    theta, _ = lattice(n)
+    rot = np.stack([k / 2 * (1 + np.cos(theta)) / 2 for k in range(3)]).astype("f4")
+    run = shrinking(n, rot=rot, mould=rot / 2, mould_active=rot / 4)
+    run.attrs["params"] = registry.get("decay").parse({}, "orange").model_dump_json()
+    return run
+
+
+def splitting(metres: float = 0.01) -> xr.Dataset:
+    """A box that becomes a ball: triangles change."""
+    solids = [trimesh.creation.box(), trimesh.creation.icosphere(2), trimesh.creation.icosphere(1)]
+    frames = [
+        meshes.Frame(np.array(s.vertices, "f4"), np.array(s.faces), {"heat": np.array(s.vertices[:, 1], "f4")})
+        for s in solids
+    ]
+    return xr.Dataset(meshes.changing(frames), {"stage": list(STAGES)}, {"metres_per_unit": metres, "solver": "growth"})
+
+
+def made(run: xr.Dataset, name: str, stage: float | None = None, **options: object) -> bytes:
+    chosen, asked = EXPORTS[name], Options.parse(dict(options))
+    return write(prepared(run, asked, stage, chosen.single), chosen, asked)
+
+
+def vertices(run: xr.Dataset) -> list[np.ndarray]:
+    return [surface.vertices for surface in of_run(run)]
+
+
+# --- vertex caches: numpy's own records, from the layouts in the formats' documents -------------------------------
+
+
+def test_pc2_is_the_documented_header_and_the_points() -> None:
+    run = shrinking()
+    data = made(run, "pc2", step=6)
+    head = np.dtype([("mark", "S12"), ("version", "<i4"), ("points", "<i4"), ("start", "<f4"), ("rate", "<f4")])
+    head = np.dtype([*head.descr, ("samples", "<i4")])
+    said = np.frombuffer(data, head, 1)[0]
+    assert head.itemsize == 32
+    assert data[:12] == b"POINTCACHE2\0"
+    assert (said["version"], said["points"], said["start"], said["rate"], said["samples"]) == (1, 130, 1, 6, 3)
+    read = np.frombuffer(data, "<f4", offset=32).reshape(3, 130, 3)
+    assert np.array_equal(read, vertices(run))
+
+
+def test_mdd_is_big_endian_with_times() -> None:
+    run = shrinking()
+    data = made(run, "mdd", step=6, fps=12)
+    assert struct.unpack(">ii", data[:8]) == (3, 130)
+    assert np.frombuffer(data, ">f4", 3, 8).tolist() == [0.0, 0.5, 1.0]
+    assert np.array_equal(np.frombuffer(data, ">f4", offset=20).reshape(3, 130, 3), vertices(run))
+
+
+@pytest.mark.parametrize("name", ["pc2", "mdd"])
+def test_changing_triangles_have_no_cache(name: str) -> None:
+    with pytest.raises(UnfitFormat) as caught:
+        made(splitting(), name)
+    assert "usdc" in caught.value.advice
+    assert made(splitting(), name, stage=2.0)
+
+
+# --- USD, by its own library -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["usdc", "usda"])
+def test_usd_keeps_one_topology_and_samples_points(kind: str, tmp_path: Path) -> None:
+    run = rotting()
+    (tmp_path / f"fruit.{kind}").write_bytes(made(run, kind))
+    stage = Usd.Stage.Open(str(tmp_path / f"fruit.{kind}"))
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetTimeCodesPerSecond()) == (1, 25, 24)
+    mesh = UsdGeom.Mesh(stage.GetDefaultPrim())
+    assert mesh.GetPointsAttr().GetTimeSamples() == [1, 13, 25]
+    assert mesh.GetFaceVertexIndicesAttr().GetNumTimeSamples() == 0
+    assert UsdGeom.Mesh.ValidateTopology(
+        mesh.GetFaceVertexIndicesAttr().Get(), mesh.GetFaceVertexCountsAttr().Get(), 130
+    )
+    for at, surface in zip((1, 13, 25), of_run(run), strict=True):
+        assert np.array_equal(mesh.GetPointsAttr().Get(at), surface.vertices)
+        assert np.allclose(mesh.GetDisplayColorAttr().Get(at), surface.colour)
+        own = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("rot")
+        assert np.allclose(own.Get(at), surface.fields["rot"])
+    st = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st")
+    assert len(st.ComputeFlattened()) == 3 * 4 * 8 * 8
+    assert list(mesh.GetPrim().GetCustomDataByKey("stages")) == list(STAGES)
+
+
+def test_usd_samples_triangles_that_change_and_knows_the_metre(tmp_path: Path) -> None:
+    (tmp_path / "m.usdc").write_bytes(made(splitting(), "usdc", scale=10, step=1))
+    stage = Usd.Stage.Open(str(tmp_path / "m.usdc"))
+    mesh = UsdGeom.Mesh(stage.GetDefaultPrim())
+    assert UsdGeom.GetStageMetersPerUnit(stage) == pytest.approx(0.001)
+    for at, surface in enumerate(of_run(splitting()), 1):
+        points, corners = mesh.GetPointsAttr().Get(at), mesh.GetFaceVertexIndicesAttr().Get(at)
+        assert np.allclose(points, 10 * surface.vertices)
+        assert np.array_equal(corners, surface.triangles.ravel())
+        assert UsdGeom.Mesh.ValidateTopology(corners, mesh.GetFaceVertexCountsAttr().Get(at), len(points))
+
+
+# --- animated glTF, by trimesh and by its JSON --------------------------------------------------------------------
+
+
+def parsed(data: bytes) -> tuple[dict, bytes]:
+    length = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20 : 20 + length]), data[28 + length :]
+
+
+def accessor(document: dict, binary: bytes, index: int) -> np.ndarray:
+    found = document["accessors"][index]
+    view = document["bufferViews"][found["bufferView"]]
+    kind = {5126: "<f4", 5123: "<u2", 5125: "<u4"}[found["componentType"]]
+    values = np.frombuffer(binary[view["byteOffset"] :][: view["byteLength"]], kind)
+    return values.reshape(found["count"], -1)
+
+
+def test_a_moving_shape_is_one_mesh_with_morph_targets() -> None:
+    document, binary = parsed(made(shrinking(), "animation"))
+    (primitive,) = document["meshes"][0]["primitives"]
+    base = accessor(document, binary, primitive["attributes"]["POSITION"])
+    copies = of_run(shrinking()).seam.copies
+    for target, wanted in zip(primitive["targets"], vertices(shrinking())[1:], strict=True):
+        assert np.allclose(base + accessor(document, binary, target["POSITION"]), wanted[copies], atol=1e-6)
+    (sampler,) = document["animations"][0]["samplers"]
+    assert accessor(document, binary, sampler["input"]).ravel().tolist() == [0.0, 0.5, 1.0]
+    assert accessor(document, binary, sampler["output"]).ravel().tolist() == [0, 0, 1, 0, 0, 1]
+    assert document["meshes"][0]["extras"]["targetNames"] == ["2", "5"]
+
+
+@pytest.mark.parametrize("run", [rotting(), splitting()], ids=["colours", "triangles"])
+def test_other_changes_switch_between_meshes(run: xr.Dataset) -> None:
+    data = made(run, "animation")
+    document, binary = parsed(data)
+    scene = trimesh.load(io.BytesIO(data), file_type="glb", process=False)
+    assert len(scene.geometry) == 3
+    for mesh, surface in zip(scene.geometry.values(), of_run(run), strict=True):
+        assert len(mesh.faces) == len(surface.triangles)
+        assert np.allclose(mesh.bounds, [surface.vertices.min(axis=0), surface.vertices.max(axis=0)], atol=1e-6)
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        assert mesh.is_watertight
+    # at any time exactly one stage is there
+    for time in (0.0, 0.4, 0.5, 0.99, 1.0, 1.5):
+        shown = []
+        for channel, sampler in zip(*(document["animations"][0][k] for k in ("channels", "samplers")), strict=True):
+            assert channel["target"]["path"] == "scale"
+            keys = accessor(document, binary, sampler["input"]).ravel()
+            values = accessor(document, binary, sampler["output"])[:, 0]
+            shown.append(values[max(np.searchsorted(keys, time, side="right") - 1, 0)])
+        assert sorted(shown) == [0, 0, 1]
+        assert shown[min(int(time / 0.5), 2)] == 1
+
+
+def test_vertex_colours_are_linear_light() -> None:
+    document, binary = parsed(made(rotting(), "animation", stage=5.0))
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    sequence = of_run(rotting())
+    last = list(sequence)[-1]
+    assert np.allclose(accessor(document, binary, attributes["COLOR_0"]), last.colour[sequence.seam.copies])
+    assert np.allclose(accessor(document, binary, attributes["_ROT"])[:, 0], last.fields["rot"][sequence.seam.copies])
+    assert "animations" not in document
+
+
+def test_textures_hold_what_the_vertices_do() -> None:
+    scene = trimesh.load(io.BytesIO(made(rotting(32), "animation", stage=5.0, textures=64)), file_type="glb")
+    (mesh,) = scene.geometry.values()
+    material = mesh.visual.material
+    picture = np.asarray(material.baseColorTexture.convert("RGB"))
+    assert picture.shape == (64, 64, 3)
+    run = rotting(32)
+    skin = colours.of_run(run, 2)
+    assert np.abs(picture[1::2, 0].astype(int) - colours.encoded(skin[:, 0])).max() <= 12
+    # the rotten and mouldy pole on top is rougher than the fresh one below
+    rough = np.asarray(material.metallicRoughnessTexture.convert("RGB"))
+    assert rough[0, 0, 1] > rough[-1, 0, 1] + 50
+    assert rough[..., 2].max() == 0
+    with pytest.raises(UnfitFormat, match="textures"):
+        made(splitting(), "animation", textures=64)
+
+
+# --- PLY and OBJ, by trimesh -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("run", [rotting(), splitting()], ids=["lattice", "meshes"])
+@pytest.mark.parametrize("kind", ["ply", "obj"])
+def test_zips_hold_a_mesh_per_stage(run: xr.Dataset, kind: str) -> None:
+    data = made(run, f"{kind}-zip")
+    assert data == made(run, f"{kind}-zip")
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        about = json.loads(archive.read("stages.json"))
+        assert list(about["files"].values()) == list(STAGES)
+        for name, surface in zip(about["files"], of_run(run), strict=True):
+            mesh = trimesh.load(io.BytesIO(archive.read(name)), file_type=kind, process=False, maintain_order=True)
+            closed = trimesh.Trimesh(mesh.vertices, mesh.faces)
+            assert closed.is_watertight
+            assert closed.volume == pytest.approx(trimesh.Trimesh(surface.vertices, surface.triangles).volume, rel=1e-5)
+
+
+def test_ply_has_colours_and_fields() -> None:
+    mesh = trimesh.load(io.BytesIO(made(rotting(), "ply")), file_type="ply", process=False)
+    last = list(of_run(rotting()))[-1]
+    assert np.array_equal(mesh.vertices.astype("f4"), last.vertices)
+    assert np.array_equal(mesh.visual.vertex_colors[:, :3], colours.encoded(last.colour))
+    rows = mesh.metadata["_ply_raw"]["vertex"]["data"]
+    assert np.array_equal(rows["rot"].ravel(), last.fields["rot"])
+
+
+def test_obj_gives_the_order_of_a_cache() -> None:
+    sequence, options = of_run(rotting()), Options()
+    words = [line.split() for line in STILLS["obj"](sequence.at(0), options).decode().splitlines()]
+    read = np.float32([w[1:] for w in words if w[0] == "v"])
+    assert np.array_equal(read[:, :3], vertices(rotting())[0])
+    assert np.allclose(read[:, 3:], colours.encoded(next(iter(sequence)).colour) / 255)
+
+
+# --- maps --------------------------------------------------------------------------------------------------------
+
+
+def test_a_map_lies_where_its_field_lies() -> None:
+    """Real spherical harmonics have a value everywhere: bilinear reaches it in second order, over poles and seam."""
+    size, errors = 96, []
+    theta, phi = np.meshgrid(*((np.arange(size) + 0.5) / size * top for top in (np.pi, 2 * np.pi)), indexing="ij")
+    for n in (16, 32, 64):
+        field = sph_harm_y(5, 3, *lattice(n)).real
+        errors.append(np.abs(baked(field, size) - sph_harm_y(5, 3, theta, phi).real).max())
+    assert errors[-1] < 3e-3
+    assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2, abs=0.3)
+
+
+def test_png_is_sixteen_bits_and_says_its_range() -> None:
+    data = made(rotting(16), "png", map="rot", size=40)
+    width, height, rows, info = png.Reader(bytes=data).read()
+    assert (width, height, info["bitdepth"], info["greyscale"]) == (40, 40, 16, True)
+    levels = np.vstack([np.frombuffer(row, np.uint16) for row in map(bytes, rows)])
+    assert np.abs(levels / 65535 - baked(rotting(16)["rot"].values[2], 40)).max() < 1e-5
+    said = json.loads(Image.open(io.BytesIO(data)).text["wizen"])
+    assert (said["low"], said["high"], said["field"], said["stage"]) == (0, 1, "rot", 5.0)
+    other = made(rotting(16), "png", map="rot", size=40, low=0.5, high=0.75)
+    assert np.asarray(Image.open(io.BytesIO(other))).max() == 65535
+    with pytest.raises(InvalidQuery, match="not above"):
+        made(rotting(16), "png", low=1, high=0)
+    with pytest.raises(InvalidQuery, match="no field"):
+        made(rotting(16), "png", map="moss")
+
+
+def test_exr_holds_the_values_themselves(tmp_path: Path) -> None:
+    path = tmp_path / "maps.exr"
+    path.write_bytes(made(rotting(16), "exr", size=48, stage=2.0))
+    with OpenEXR.File(str(path)) as file:
+        channels = file.channels()
+        assert set(channels) == {"rot", "mould", "mould_active"}
+        assert np.array_equal(channels["rot"].pixels, baked(rotting(16)["rot"].values[1], 48))
+
+
+@pytest.mark.parametrize("name", ["png", "exr"])
+def test_maps_need_texture_coordinates_and_a_field(name: str) -> None:
+    with pytest.raises(UnfitFormat, match="texture coordinates"):
+        made(splitting(), name)
+    with pytest.raises(UnfitFormat, match="no field"):
+        made(shrinking(), name)
+
+
+# --- the view ----------------------------------------------------------------------------------------------------
+
+
+def test_a_field_colours_the_whole_sequence_on_one_scale() -> None:
+    sequence = prepared(splitting(), Options.parse({"colour": "heat"}))
+    low, high = colours.by_field(np.array([-1.0, 1.0]), -1, 1)
+    ball = list(sequence)[1]
+    assert np.allclose(ball.colour[ball.fields["heat"].argmax()], high, atol=1e-6)
+    assert np.allclose(ball.colour[ball.fields["heat"].argmin()], low, atol=1e-6)
+    with pytest.raises(InvalidQuery, match="moss"):
+        made(splitting(), "ply", colour="moss")
+
+
+def test_displacement_alone_is_laid_on_the_fresh_fruit() -> None:
+    params = registry.get("dehydration").parse({}, "plum1")
+    fresh = params.surface(*lattice(12))
+    data = {"displacement": (("stage", "colatitude", "azimuth", "component"), -0.1 * fresh[None].astype("f4"))}
+    attrs = {"solver": "dehydration", "params": params.model_dump_json()}
+    run = xr.Dataset(data, {"stage": [0.1]}, attrs)
+    (surface,) = of_run(run)
+    assert np.allclose(surface.vertices[:-2].reshape(12, 24, 3), 0.9 * fresh, atol=1e-6)
+
+
+def test_results_without_a_surface_are_refused() -> None:
+    with pytest.raises(UnfitFormat, match="whole surface"):
+        of_run(xr.Dataset({"mean_rot": ("stage", [0.0])}, {"stage": [0.0]}))
+    part = rotting().assign_attrs(need=json.dumps({"region": {"colatitude": [0, 90]}}))
+    with pytest.raises(UnfitFormat, match="region"):
+        of_run(part)
+
+
+@pytest.mark.parametrize("wrong", [{"fps": 0}, {"textures": 1}, {"size": 10**6}, {"scale": float("nan")}, {"hue": 1}])
+def test_wrong_choices_are_named(wrong: dict[str, float]) -> None:
+    with pytest.raises(InvalidQuery, match=next(iter(wrong))):
+        Options.parse(wrong)
+
+
+def test_progress_is_told_by_stage() -> None:
+    told: list[float] = []
+    base = of_run(rotting())
+    list(Sequence(base.run, base.indices, base.kept, base.lattice, observe=told.append))
+    assert told == pytest.approx([1 / 3, 2 / 3, 1])
