@@ -1,8 +1,8 @@
 """Rest curvature as a tensor of each triangle, and as angles of hinges: exact ways there and back.
 
 A triangle whose corners lie on a surface with second form b meets the tangent plane of the surface at the middle of an
-edge under the angle (b(m, m) - b(e, e) / 4) / (2 height), m from that middle to the opposite corner. In the basis of the
-triangle's own edges that is (b12, b11 - b12, b22 - b12) / (2 height) for the edges opposite to corners 0, 1, 2:
+edge under the angle (b(m, m) - b(e, e) / 4) / (2 height), m from that middle to the opposite corner. In the basis of
+the triangle's own edges that is (b12, b11 - b12, b22 - b12) / (2 height) for the edges opposite to corners 0, 1, 2:
 three angles for three numbers. A hinge's rest angle is the sum of both sides.
 """
 
