@@ -181,7 +181,7 @@ class Engine:
             # a tool that starts within this step is placed on the shape at its beginning
             if number in shares or number in spots or number in curves:
                 continue
-            if tool.start > state.time + self.params.step:
+            if tool.start > state.time + self.params.step - 1e-9:
                 continue
             if isinstance(tool, HotSurface):
                 shares[number] = share(tool.where, mesh, _border(state.mesh), self.params.seed + number)

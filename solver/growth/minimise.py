@@ -152,6 +152,6 @@ def conjugate_gradients(energy: Energy, x: Floats) -> Iterator[Point]:
                 return
             d = -g
             continue
-        trial = t
+        trial, x, f = t, x + t * d, value
         d = -gradient + max(0.0, float(np.vdot(gradient, gradient - g) / np.vdot(g, g))) * d
-        x, f, g = x + t * d, value, gradient
+        g = gradient

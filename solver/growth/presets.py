@@ -76,7 +76,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
             {
                 "kind": "surface",
                 "where": {"kind": "band", "along": "z", "low": 1.4, "high": 0.0},
-                "stretch": (2.0, 1.0),
+                "stretch": (4.0, 1.0),
             },
         ),
     },

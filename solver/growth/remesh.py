@@ -1,7 +1,7 @@
 """Splitting of long rest edges: the shape stays where it is, and so does the membrane's energy.
 
 A marked triangle is cut from the middle of its longest edge first (Rivara's 4T-LE), so that repeated splitting keeps
-angles at no less than half. Children have the parent's metric, as seen from their own edges; rest curvature goes through
+angles at no less than half. Children have the parent's metric, seen from their own edges; rest curvature goes through
 the tensor of the parent, so that a coarse sphere's children bend like the sphere and not like its facets.
 """
 
@@ -20,7 +20,7 @@ __all__ = ["split"]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Children by which edges are cut (bit 1: bc, the longest; 2: ca; 4: ab); corners a b c, middles p of bc, q of ca, s of ab.
+#: Children by cut edges (bit 1: bc, the longest; 2: ca; 4: ab); corners a b c, middles p of bc, q of ca, s of ab.
 _A, _B, _C, _P, _Q, _S = range(6)
 _WHERE = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
 _CHILDREN = {
