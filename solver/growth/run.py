@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from .. import shell
 from ..contract import Context, InvalidInput, Need, SolverError
@@ -33,6 +34,12 @@ def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     """
     if need.region is not None:
         raise InvalidInput("growth has no lattice to cut a region from.", advice="Ask without a region.")
+    # sums in BLAS depend on the number of threads, and buckling makes much of little
+    with threadpool_limits(1, user_api="blas"):
+        return _run(params, need, context)
+
+
+def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     settings = choose(need.quality)
     begun = time.perf_counter()
     engine = Engine(params, settings.vertices, settings.tolerance)

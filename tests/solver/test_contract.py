@@ -24,6 +24,7 @@ from solver.contract import (
     Unstable,
     finish,
 )
+from solver.meshes import frame
 from solver.quantities import QUANTITIES, Quantity, register
 
 #: Per solver: small parameters, cheap stages, and more expensive stages to cancel.
@@ -96,9 +97,14 @@ def test_nothing_beyond_the_last_stage_is_solved(solver):
 
 def test_a_stage_does_not_depend_on_the_other_stages_asked_for(solver):
     params, need, _ = small(solver)
-    both = solver.solve(params, need).isel(stage=-1)
-    last = solver.solve(params, need.model_copy(update={"stages": need.stages[-1:]})).isel(stage=-1)
+    both = solver.solve(params, need)
+    last = solver.solve(params, need.model_copy(update={"stages": need.stages[-1:]}))
+    if "vertex_count" in both:
+        assert all(np.array_equal(a, b) for a, b in zip(frame(both, -1)[:2], frame(last, -1)[:2], strict=True))
+    both, last = both.isel(stage=-1), last.isel(stage=-1)
     for name in solver.default_fields:
+        if "vertex" in both[name].dims:
+            continue  # end to end with those of other stages: compared as a frame
         assert np.array_equal(both[name], last[name]), name
 
 

@@ -204,6 +204,8 @@ HOSTILE = {
     "plastic and remeshed": {"plasticity": 1.0, "remesh": 1.1, "tools": [surface(stretch=(2.5, 1.0))], "step": 0.25},
     "paper thin": {"thickness": 0.001, "tools": [{"kind": "spot", "at": (0, 0, 1), "stretch": (3.0, 3.0)}]},
 }
+#: Which of them end in an error, with the last equilibrium kept.
+MAY_FAIL: frozenset[str] = frozenset()
 
 
 @pytest.mark.parametrize("name", HOSTILE)
@@ -211,14 +213,18 @@ def test_hostile_growth_ends_in_an_equilibrium_or_a_typed_error(name):
     values = {"thickness": 0.05, "step": 0.2, **HOSTILE[name]}
     solver = registry.get("growth")
     engine = Engine(solver.parse(values), 150, 1e-3, most=600)
+    failure: SolverError | None = None
     try:
         while engine.state.time < 0.99:
             engine.advance(1e9, until=engine.state.time + engine.params.step)
-        assert engine.residual <= 1e-3
     except SolverError as error:
-        assert isinstance(error, NotConverged)
-        assert error.advice
+        failure = error
+    assert engine.residual <= 1e-3
     assert np.isfinite(engine.state.x).all()
+    if failure is not None:
+        assert isinstance(failure, NotConverged)
+        assert failure.advice
+        assert name in MAY_FAIL
 
 
 def test_tools_that_the_shape_cannot_have_are_refused():
