@@ -207,7 +207,7 @@ def _begin(params: GrowthParams, mesh: Mesh) -> State:
     held = np.zeros(mesh.x.shape, bool)
     for attachment in params.attached:
         inside = share(attachment.where, mesh, _border(top), params.seed) >= 0.5
-        held[np.ix_(inside, ["xyz".index(axis) for axis in attachment.axes])] = True
+        held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
     angles = shell.angles(mesh.x, top.hinges)
     x = mesh.x + np.where(held, 0.0, offset[:, None] * normals)
     return State(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from ..contract import Params
 from .places import Place
@@ -45,7 +45,7 @@ class SolidBall(_Model):
 Solid = Annotated[Plane | SolidBall, Field(discriminator="kind")]
 
 
-def _units(units: str) -> dict[str, str]:
+def _units(units: str) -> dict[str, JsonValue]:
     return {"units": units}
 
 

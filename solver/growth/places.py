@@ -95,7 +95,8 @@ def share(place: Place, mesh: Mesh, border: NDArray[np.int64], seed: int) -> Flo
         return _smooth(1 - np.linalg.norm(x - np.array(place.centre), axis=1) / place.radius)
     if isinstance(place, Band):
         v = np.hypot(x[:, 0], x[:, 1]) if place.along == "radius" else x[:, "xyz".index(place.along)]
-        return _smooth((v - place.low) / (place.high - place.low or 1e-12))
+        span = place.high - place.low
+        return _smooth(np.asarray((v - place.low) / (span if span else 1e-12)))
     if isinstance(place, Rim):
         if not len(border):
             raise InvalidInput("a closed surface has no rim.", advice="Start from a disc, a strip or a tube.")

@@ -236,3 +236,14 @@ def test_tools_that_the_shape_cannot_have_are_refused():
         solver.solve(solver.parse({"tools": [surface(where={"kind": "painted", "values": [1.0]})]}), need)
     with pytest.raises(InvalidInput, match="rise"):
         solver.parse({"tools": [surface(activation=[(1.0, 1.0), (0.5, 0.0)])]})
+
+
+def test_the_bulge_of_a_hot_spot_converges_with_the_mesh():
+    """Second order: 1.86 was measured between 640, 2560 and 10240 vertices; here smaller meshes."""
+    spot = {"kind": "spot", "at": (0.0, 0.0, 1.0), "radius": 0.8, "stretch": (1.3, 1.3)}
+    heights = []
+    for vertices in (160, 640, 2560):
+        engine = grow(vertices, 1.0, 1e-5, imperfection=0, remesh=0, thickness=0.1, step=0.25, tools=[spot])
+        heights.append(np.ptp(engine.state.x[:, 2]))
+    order = np.log2((heights[1] - heights[0]) / (heights[2] - heights[1]))
+    assert order > 1.5
