@@ -78,8 +78,8 @@ class Painted(_Model):
 Place = Annotated[Everywhere | Ball | Band | Rim | Meridians | Noise | Painted, Field(discriminator="kind")]
 
 
-def _smooth(v: Floats) -> Floats:
-    v = np.clip(v, 0, 1)
+def _smooth(values: Floats | float) -> Floats:
+    v = np.clip(np.asarray(values, float), 0, 1)
     return v * v * (3 - 2 * v)
 
 
@@ -92,7 +92,7 @@ def share(place: Place, mesh: Mesh, border: NDArray[np.int64], seed: int) -> Flo
     """
     x = mesh.x
     if isinstance(place, Ball):
-        return _smooth(1 - np.linalg.norm(x - np.array(place.centre), axis=1) / place.radius)
+        return _smooth(1 - np.asarray(np.linalg.norm(x - np.array(place.centre), axis=1)) / place.radius)
     if isinstance(place, Band):
         v = np.hypot(x[:, 0], x[:, 1]) if place.along == "radius" else x[:, "xyz".index(place.along)]
         span = place.high - place.low

@@ -50,18 +50,21 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     },
     # (c) hot surfaces
     "pumpkin": {
+        "thickness": 0.1,
+        "pressure": 0.05,
         "tools": (
-            {"kind": "surface", "where": {"kind": "meridians", "count": 8, "width": 0.3}, "stretch": (1.6, 1.6)},
+            {"kind": "surface", "where": {"kind": "meridians", "count": 8, "width": 0.3}, "stretch": (1.35, 1.35)},
         ),
     },
     "leaf": {
+        "thickness": 0.008,
         "shape": "half_disc",
         "curved": False,
         "attached": ({"where": {"kind": "ball", "centre": (0.0, 0.0, 0.0), "radius": 0.2}},),
         "tools": (
             {
                 "kind": "surface",
-                "where": {"kind": "band", "along": "radius", "low": 0.55, "high": 1.0},
+                "where": {"kind": "band", "along": "radius", "low": 0.7, "high": 1.0},
                 "stretch": (2.2, 1.0),
             },
         ),
