@@ -103,3 +103,13 @@ register(
     vertex_count=Quantity("1", "number of vertices of this stage's mesh", "n_v"),
     face_count=Quantity("1", "number of triangles of this stage's mesh", "n_f"),
 )
+
+# growth: thin shells
+register(
+    elastic_strain=Quantity(
+        "1", "mean principal stretch of the membrane less 1, averaged over a vertex's triangles", "e"
+    ),
+    rest_area=Quantity("1", "area of the grown rest state, in the start shape's unit squared", "A_g"),
+    mesh_area=Quantity("1", "area of the shape, in the start shape's unit squared", "A"),
+    stored_energy=Quantity("1", "elastic energy, membrane and bending, in units of mu l^2", "E"),
+)

@@ -24,11 +24,13 @@ from solver.contract import (
     Unstable,
     finish,
 )
+from solver.meshes import frame
 from solver.quantities import QUANTITIES, Quantity, register
 
 #: Per solver: small parameters, cheap stages, and more expensive stages to cancel.
 SMALL = {
     "decay": ({"growth": 50.0}, (0.3, 0.6), (110.0,)),
+    "growth": ({"step": 0.2, "thickness": 0.1}, (0.1, 0.25), (3.0,)),
     "dehydration": ({"te": 0.1, "gamma": 3.0}, (0.01, 0.02), (0.5,)),
 }
 
@@ -95,9 +97,14 @@ def test_nothing_beyond_the_last_stage_is_solved(solver):
 
 def test_a_stage_does_not_depend_on_the_other_stages_asked_for(solver):
     params, need, _ = small(solver)
-    both = solver.solve(params, need).isel(stage=-1)
-    last = solver.solve(params, need.model_copy(update={"stages": need.stages[-1:]})).isel(stage=-1)
+    both = solver.solve(params, need)
+    last = solver.solve(params, need.model_copy(update={"stages": need.stages[-1:]}))
+    if "vertex_count" in both:
+        assert all(np.array_equal(a, b) for a, b in zip(frame(both, -1)[:2], frame(last, -1)[:2], strict=True))
+    both, last = both.isel(stage=-1), last.isel(stage=-1)
     for name in solver.default_fields:
+        if "vertex" in both[name].dims:
+            continue  # end to end with those of other stages: compared as a frame
         assert np.array_equal(both[name], last[name]), name
 
 
@@ -184,8 +191,13 @@ def test_a_partial_result_survives_pickling(solver):
 
 def test_region_returns_a_part_of_the_whole(solver):
     params, need, _ = small(solver)
+    asked = need.model_copy(update={"region": Region(colatitude=(30, 90), azimuth=(0, 180))})
     whole = solver.solve(params, need)
-    part = solver.solve(params, need.model_copy(update={"region": Region(colatitude=(30, 90), azimuth=(0, 180))}))
+    if "colatitude" not in whole.dims:
+        with pytest.raises(InvalidInput, match="no lattice"):
+            solver.solve(params, asked)
+        return
+    part = solver.solve(params, asked)
     assert 0 < part.sizes["colatitude"] < whole.sizes["colatitude"]
     cut = whole.sel(colatitude=part.colatitude, azimuth=part.azimuth)
     fields = [name for name in part.data_vars if "colatitude" in part[name].dims]

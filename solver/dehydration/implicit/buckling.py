@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from ...multifrontal import Factor
 from .hexahedron import PRESSURE, SHAPE_GRADIENTS, WEIGHTS
-from .multifrontal import Factor
 from .newton import Equilibrium, Model, masked
 
 __all__ = ["Crossing", "first_crossing", "parities", "stress_stiffness", "tangent_at"]

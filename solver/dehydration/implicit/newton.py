@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...contract import Context, InvalidInput, NotConverged
+from ...multifrontal import Analysis, Factor, analyse, factorise
 from ..params import DehydrationParams
 from .assembly import Assembled, Pattern, assemble, build_pattern
 from .hexahedron import POINTS, PRESSURE, shape
 from .mesh import QuadraticMesh
-from .multifrontal import Analysis, Factor, analyse, factorise
 
 __all__ = ["Equilibrium", "Loading", "Model", "build_model", "equilibrium", "masked"]
 

@@ -50,8 +50,8 @@ class Analysis:
         return 3 * (len(self.indptr) - 1)
 
 
-def analyse(stacks: Ints, centres: Floats, per_column: int, indptr: Ints, indices: Ints) -> Analysis:
-    """Dissect the quads of a surface until parts hold `LEAF` of them.
+def analyse(stacks: Ints, centres: Floats, per_column: int, indptr: Ints, indices: Ints, leaf: int = LEAF) -> Analysis:
+    """Dissect the quads of a surface until parts hold `leaf` of them.
 
     stacks: (ns, c) columns under each quad. centres: (ns, 3) where it is. per_column: nodes of a column; the nodes of
     column c are c * per_column onwards. indptr, indices: pattern of the matrix by nodes, both triangles.
@@ -61,7 +61,7 @@ def analyse(stacks: Ints, centres: Floats, per_column: int, indptr: Ints, indice
 
     def dissect(part: Ints) -> tuple[int, Ints]:
         children: tuple[int, ...] = ()
-        if len(part) > LEAF:
+        if len(part) > leaf:
             at = centres[part]
             along = at[:, np.argmax(np.ptp(at, axis=0))]
             order = np.argsort(along, kind="stable")

@@ -1,0 +1,44 @@
+"""Growth of thin shells (Combaz and Neyret 2004): tools grow the rest state, the shape follows by equilibrium."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..contract import Context, Cost, Need, Solver, StageAxis
+from .params import GrowthParams
+from .presets import PRESETS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["SOLVER", "GrowthParams"]
+
+
+def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
+    # the kernels cost a second to import; parameters and schemas must not
+    from .run import run
+
+    return run(params, need, context)
+
+
+def _cost(params: GrowthParams, need: Need) -> Cost:
+    from .settings import expected_cost
+
+    return expected_cost(params, need)
+
+
+SOLVER = Solver(
+    name="growth",
+    version="1",
+    title="Growth of thin shells",
+    params=GrowthParams,
+    fields=("mesh_position", "elastic_strain", "mesh_area", "stored_energy", "rest_area"),
+    default_fields=("mesh_position", "mesh_area", "rest_area", "stored_energy"),
+    stages=StageAxis("t", "growth time", "1", 0.0, 100.0, (0.25, 0.5, 0.75, 1.0)),
+    default_resolution={"preview": 16, "default": 32, "fine": 64},
+    # error of the height of a smooth hot spot's bulge, by extrapolation over three meshes (docs/growth.md)
+    tolerances={"preview": 0.04, "default": 0.01, "fine": 0.003},
+    presets=PRESETS,
+    run=_run,
+    cost=_cost,
+)

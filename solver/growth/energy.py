@@ -1,0 +1,127 @@
+"""The energy of one growth step: membrane, bending, pressure as a dead load, solids as penalties, held vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .. import shell
+from ..multifrontal import Analysis
+from ..shell.factor import Packed, dissect, factor
+from .params import Plane, SolidBall
+from .state import State
+
+__all__ = ["StepEnergy", "Tangent"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
+_SHIFT = 1e-5
+#: Penalty of solids per area and depth [mu / l^2].
+_HARDNESS = 30.0
+
+
+class Tangent:
+    """Pattern, order of elimination and last factor of one topology; outlives the growth steps between remeshings."""
+
+    def __init__(self, mesh: shell.Topology) -> None:
+        self.mesh = mesh
+        self.pattern = shell.pattern(mesh)
+        self.analysis: Analysis | None = None
+        self.factor: Packed | None = None
+        self.factors = 0
+
+    def take(self, blocks: Floats, x: Floats) -> None:
+        """Factor `blocks` (nnz, 3, 3)."""
+        if self.analysis is None:
+            self.analysis = dissect(self.mesh, self.pattern, x)
+        self.factor = factor(self.analysis, blocks)
+        self.factors += 1
+
+
+class StepEnergy:
+    """Energy of positions (n, 3) against a state's rest metrics and angles, in mu l^2."""
+
+    def __init__(
+        self,
+        state: State,
+        material: shell.Material,
+        pressure: float,
+        solids: Sequence[Plane | SolidBall],
+        tangent: Tangent,
+    ) -> None:
+        self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
+        self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
+        self.load = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
+        self.free = ~state.held
+        self.areas = np.bincount(state.mesh.triangles.ravel(), np.repeat(shell.areas(state.g) / 3, 3), len(state.x))
+
+    def __call__(self, x: Floats) -> tuple[float, Floats]:
+        """Return energy and gradient; the gradient of held directions is 0."""
+        state, gradient = self.state, np.zeros_like(x)
+        energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient)
+        energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
+        if self.load is not None:
+            energy -= float(np.vdot(self.load, x - state.x))
+            gradient -= self.load
+        for solid in self.solids:
+            depth, normal = _depth(solid, x)
+            energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
+            gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
+        gradient[state.held] = 0.0
+        return energy, gradient
+
+    def refactor(self, x: Floats) -> None:
+        """Factor the positive semidefinite tangent at x, shifted."""
+        state, pattern = self.state, self.tangent.pattern
+        blocks = np.zeros((pattern.blocks, 3, 3))
+        shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
+        shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
+        blocks[pattern.diagonal] += _SHIFT * np.eye(3)
+        for solid in self.solids:
+            depth, normal = _depth(solid, x)
+            weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
+            blocks[pattern.diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
+        if state.held.any():
+            _hold(blocks, pattern.indptr, pattern.indices, self.free)
+        self.tangent.take(blocks, x)
+
+    def precondition(self, v: Floats) -> Floats:
+        """Return the last factor's inverse applied to v (n, 3)."""
+        if self.tangent.factor is None:
+            self.refactor(self.state.x)
+        assert self.tangent.factor is not None
+        return np.where(self.free, self.tangent.factor.solve(np.ascontiguousarray(v)), 0.0)
+
+
+def _area_vectors(x: Floats, triangles: Ints) -> Floats:
+    """Return a third of the area vectors of each vertex's triangles (n, 3)."""
+    p = x[triangles]
+    third = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6
+    return np.stack([np.bincount(triangles.ravel(), np.repeat(third[:, c], 3), len(x)) for c in range(3)], -1)
+
+
+def _depth(solid: Plane | SolidBall, x: Floats) -> tuple[Floats, Floats]:
+    """Return how deep vertices are in a solid (n,), 0 outside, and the way out (n, 3)."""
+    if isinstance(solid, Plane):
+        normal = np.array(solid.normal) / np.linalg.norm(solid.normal)
+        return np.maximum((np.array(solid.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
+    way = x - np.array(solid.centre)
+    distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
+    return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]
+
+
+@njit(cache=True)
+def _hold(blocks: Floats, indptr: Ints, indices: Ints, free: NDArray[np.bool_]) -> None:
+    """Make rows and columns of held directions those of the unit matrix."""
+    for row in range(len(free)):
+        for at in range(indptr[row], indptr[row + 1]):
+            column = indices[at]
+            for d in range(3):
+                for h in range(3):
+                    if not (free[row, d] and free[column, h]):
+                        blocks[at, d, h] = 1.0 if row == column and d == h else 0.0

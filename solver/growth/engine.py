@@ -1,0 +1,275 @@
+"""A growing shell that is advanced from outside, in slices of time, while tools are added.
+
+Growth goes in fixed steps: grow the rest state, find the equilibrium, forget what is plastic, cut what is long. A slice
+may end anywhere within the search for an equilibrium; what comes out does not depend on the slices. A tool added
+between slices starts with the next step, and `script` gives the parameters whose batch run is the same.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import shell
+from ..contract import Context, NotConverged, Unstable
+from .energy import StepEnergy, Tangent
+from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
+from .params import GrowthParams
+from .places import share
+from .rates import grown, rates
+from .remesh import split
+from .shapes import Mesh, start
+from .state import Spot, State, place
+from .tools import HotCurve, HotSpot, HotSurface, Tool
+
+__all__ = ["Engine"]
+
+Floats = NDArray[np.float64]
+
+_WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
+#: A mesh does not grow beyond this many times its first vertices.
+_MOST = 20
+
+
+class Engine:
+    """A run that can be advanced, given tools, and undone."""
+
+    def __init__(self, params: GrowthParams, vertices: int, tolerance: float = 1e-3, most: int = 4000) -> None:
+        """Start from the parameters' shape with about `vertices`; tolerance: residual; most: steps to an equilibrium.
+
+        Raises:
+            InvalidInput: a tool or an attachment that the shape cannot have.
+
+        """
+        self.params, self.tolerance, self._most = params, tolerance, most
+        self._material = shell.Material(params.thickness, params.poisson)
+        self._tools: list[Tool] = list(params.tools)
+        self._history: list[tuple[State, int]] = []
+        self._work: Iterator[float] | None = None
+        self.state = _begin(params, start(params.shape, vertices, params.aspect))
+        self._longest = params.remesh * self.state.length
+        self._largest = _MOST * len(self.state.x)
+        self._tangent = Tangent(self.state.mesh)
+        self._steps = 0
+
+    @property
+    def residual(self) -> float:
+        """Largest out-of-balance force of the last equilibrium, over mu l."""
+        return self.state.forces
+
+    @property
+    def script(self) -> GrowthParams:
+        """Return the parameters of which this run is the batch run."""
+        return self.params.model_copy(update={"tools": tuple(self._tools)})
+
+    def add(self, tool: Tool) -> None:
+        """Let a tool act from the next step on: its start is put there if it lies before."""
+        following = (self._steps + (self._work is not None)) * self.params.step
+        self._tools.append(tool.model_copy(update={"start": max(tool.start, following)}))
+
+    def advance(self, budget: float, until: float = np.inf) -> bool:
+        """Work for about `budget` seconds; return whether a step was completed. Goes no further than `until`.
+
+        Raises:
+            NotConverged: an equilibrium was not found; the state before the step stands.
+            Unstable: the shape left the finite.
+
+        """
+        end, completed = clock.perf_counter() + budget, False
+        while clock.perf_counter() < end and (self._steps + 1) * self.params.step <= until + 1e-9:
+            if self._work is None:
+                self._work = self._step(self.params.step)
+            try:
+                next(self._work)
+            except StopIteration:
+                self._work = None
+                completed = True
+            except Exception:
+                self._work = None
+                raise
+        return completed
+
+    def undo(self) -> bool:
+        """Go back by one step, and drop tools added since; return whether there was one."""
+        if self._work is not None:
+            self._work.close()  # type: ignore[attr-defined]
+            self._work = None
+        if not self._history:
+            return False
+        self.state, tools = self._history.pop()
+        self._steps -= 1
+        del self._tools[tools:]
+        # the same way on from here as the first time needs the same start
+        self._tangent = Tangent(self.state.mesh)
+        return True
+
+    def reach(self, time: float, context: Context) -> State:
+        """Return the state at a growth time; the run itself stays at the last whole step before it.
+
+        Raises:
+            NotConverged, Unstable: as `advance`. Cancelled: the observer asked to stop.
+
+        """
+        while (self._steps + 1) * self.params.step <= time + 1e-9:
+            for _ in self._step(self.params.step):
+                context.check_cancelled()
+        rest = time - self._steps * self.params.step
+        if rest <= 1e-9 and self._steps:
+            return self.state
+        # a step of its own, which leaves no trace
+        kept = self.state, list(self._history), self._tangent, self._steps
+        self._tangent = Tangent(self.state.mesh)
+        try:
+            for _ in self._step(max(rest, 0.0)):
+                context.check_cancelled()
+            return self.state
+        finally:
+            self.state, self._history, self._tangent, self._steps = kept
+
+    def _step(self, dt: float) -> Iterator[float]:
+        """Grow by dt and find the equilibrium; yields the residual after every piece of work."""
+        before, tools = self.state, len(self._tools)
+        state = self._started(before)
+        middle = state.time + dt / 2
+        acting = dict(enumerate(self._tools[:tools]))
+        g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
+        state = replace(state, g=g, rest=rest, time=state.time + dt)
+        point, spent = Point(state.x, 0.0, np.inf), 0
+        energy = StepEnergy(state, self._material, self.params.pressure, self.params.solids, self._tangent)
+        goal = self.tolerance * state.length
+        for point in _WAYS[self.params.solver](energy, state.x):
+            if point.gradient <= goal or point.stuck:
+                break
+            if not np.isfinite(point.gradient):
+                raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
+            if spent >= self._most:
+                break
+            spent += 1
+            yield point.gradient / state.length
+        if not point.gradient <= goal:
+            raise NotConverged(
+                f"no equilibrium at growth time {state.time:g}: residual {point.gradient / state.length:.1e}.",
+                advice="Take a shorter step or a thicker sheet.",
+                last_stage=before.time,
+                residual=point.gradient / state.length,
+            )
+        forces = point.gradient / state.length
+        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent)
+        if self.params.plasticity:
+            state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
+        state = _branched(state, acting)
+        if self.params.remesh:
+            while len(state.x) < self._largest:
+                finer = split(state, self._longest)
+                if finer is state:
+                    break
+                state = finer
+                self._tangent = Tangent(state.mesh)
+        self._history.append((before, tools))
+        self.state = state
+        self._steps += 1
+
+    def _started(self, state: State) -> State:
+        """Place the tools that start now."""
+        shares, spots, curves = dict(state.shares), dict(state.spots), dict(state.curves)
+        mesh = Mesh(state.x, state.mesh.triangles)
+        for number, tool in enumerate(self._tools):
+            # a tool that starts within this step is placed on the shape at its beginning
+            if number in shares or number in spots or number in curves:
+                continue
+            if tool.start > state.time + self.params.step - 1e-9:
+                continue
+            if isinstance(tool, HotSurface):
+                shares[number] = share(tool.where, mesh, _border(state.mesh), self.params.seed + number)
+            elif isinstance(tool, HotCurve):
+                curves[number] = place(np.array(tool.points), *mesh)
+            else:
+                spots[number] = (Spot(place(np.array([tool.at]), *mesh), tool.radius),)
+        return replace(state, shares=shares, spots=spots, curves=curves)
+
+
+def _border(mesh: shell.Topology) -> NDArray[np.int64]:
+    return np.unique(mesh.edges[mesh.border])
+
+
+def _begin(params: GrowthParams, mesh: Mesh) -> State:
+    """Return the start: rest state of the perfect shape, shape with its imperfection."""
+    top = shell.topology(mesh.triangles, len(mesh.x))
+    p = mesh.x[mesh.triangles]
+    normals = np.zeros_like(mesh.x)
+    np.add.at(normals, mesh.triangles, np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, None, :])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
+    held = np.zeros(mesh.x.shape, bool)
+    for attachment in params.attached:
+        inside = share(attachment.where, mesh, _border(top), params.seed) >= 0.5
+        held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
+    angles = shell.angles(mesh.x, top.hinges)
+    x = mesh.x + np.where(held, 0.0, offset[:, None] * normals)
+    return State(
+        time=0.0,
+        x=x,
+        mesh=top,
+        g=shell.metric(mesh.x, mesh.triangles),
+        rest=angles if params.curved else np.zeros_like(angles),
+        shares={},
+        held=held,
+        spots={},
+        curves={},
+    )
+
+
+def _forgotten(state: State, k: float, threshold: float) -> Floats:
+    """Return rest metrics after plastic flow: principal stretches beyond 1 +- alpha move by k towards that bound."""
+    a = shell.metric(state.x, state.mesh.triangles)
+    mixed = np.linalg.solve(_matrix(state.g), _matrix(a))
+    squares, vectors = np.linalg.eig(mixed)
+    stretches = np.sqrt(np.maximum(squares.real, 1e-12))
+    vectors = vectors.real
+    beyond = stretches / np.clip(stretches, 1 - threshold, 1 + threshold)
+    factors = (1 + k * (beyond - 1)) ** 2
+    found = _matrix(state.g) @ (vectors * factors[:, None, :]) @ np.linalg.inv(vectors)
+    changed = (beyond != 1).any(axis=1)
+    g = np.stack([found[:, 0, 0], (found[:, 0, 1] + found[:, 1, 0]) / 2, found[:, 1, 1]], -1)
+    return np.where(changed[:, None], g, state.g)
+
+
+def _matrix(g: Floats) -> Floats:
+    return np.stack([g[:, [0, 1]], g[:, [1, 2]]], axis=1)
+
+
+def _branched(state: State, tools: dict[int, Tool]) -> State:
+    """Split the spots whose time has come."""
+    spots = dict(state.spots)
+    for number, tool in tools.items():
+        if not isinstance(tool, HotSpot) or number not in spots:
+            continue
+        while spots[number][0].splits < len(tool.splits) and (
+            state.time - tool.start >= tool.splits[spots[number][0].splits] - 1e-9
+        ):
+            spots[number] = tuple(child for spot in spots[number] for child in _children(state, spot, tool))
+    return replace(state, spots=spots)
+
+
+def _children(state: State, spot: Spot, tool: HotSpot) -> Sequence[Spot]:
+    x, triangles = state.x, state.mesh.triangles
+    centre = spot.anchor.at(x, triangles)[0]
+    p = x[triangles[spot.anchor.faces[0]]]
+    normal = np.cross(p[1] - p[0], p[2] - p[0])
+    normal /= np.linalg.norm(normal)
+    # every generation splits at right angles to the one before
+    side = np.cross(normal, np.array(tool.frame))
+    if np.linalg.norm(side) < 1e-6:
+        side = p[1] - p[0]
+    side /= np.linalg.norm(side)
+    other = np.cross(normal, side)
+    found = []
+    for k in range(tool.branches):
+        turn = 2 * np.pi * k / tool.branches + (np.pi / 2 if spot.splits % 2 else 0.0)
+        target = centre + tool.spread * spot.radius * (np.cos(turn) * side + np.sin(turn) * other)
+        found.append(Spot(place(target[None], x, triangles), spot.radius * tool.shrink, spot.splits + 1))
+    return found

@@ -1,0 +1,128 @@
+"""Parameters of a growth run: the start shape, its sheet, what holds it, and the tools that grow it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from ..contract import Params
+from .places import Place
+from .shapes import Shape
+from .tools import HotSurface, Tool
+
+__all__ = ["Attachment", "GrowthParams", "Plane", "Solid", "SolidBall"]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Attachment(_Model):
+    """Vertices that are held where they start, in some directions."""
+
+    where: Place = Field(description="Vertices whose share is at least one half")
+    axes: tuple[Literal["x", "y", "z"], ...] = Field(("x", "y", "z"), min_length=1, description="Held directions")
+
+
+class Plane(_Model):
+    """A half-space that the surface cannot enter."""
+
+    kind: Literal["plane"] = "plane"
+    point: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="A point of the plane [start shape's unit]")
+    normal: tuple[float, float, float] = Field((0.0, 0.0, 1.0), description="Out of the solid [1]")
+
+
+class SolidBall(_Model):
+    """A ball that the surface cannot enter."""
+
+    kind: Literal["ball"] = "ball"
+    centre: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
+    radius: float = Field(1.0, gt=0, le=100, description="Radius [start shape's unit]")
+
+
+Solid = Annotated[Plane | SolidBall, Field(discriminator="kind")]
+
+
+def _units(units: str) -> dict[str, JsonValue]:
+    return {"units": units}
+
+
+class GrowthParams(Params):
+    """Combaz and Neyret 2004: a thin shell whose rest state is grown by tools; quasi-static."""
+
+    axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {
+        "thickness": ("thickness", None),
+        "pressure": ("pressure", None),
+        "plasticity": ("plasticity", None),
+    }
+
+    shape: Shape = Field("sphere", description="Start shape", json_schema_extra=_units("1"))
+    aspect: float = Field(
+        4.0,
+        ge=0.2,
+        le=50,
+        description="Length over width of a strip, height over radius of a tube",
+        json_schema_extra=_units("1"),
+    )
+    tools: tuple[Tool, ...] = Field(
+        (HotSurface.model_validate({"where": {"kind": "everywhere"}}),),
+        max_length=200,
+        description="What grows it, and when",
+        json_schema_extra=_units("1"),
+    )
+    thickness: float = Field(
+        0.03,
+        ge=0.001,
+        le=0.5,
+        description="Thickness of the sheet: thicker folds wider",
+        json_schema_extra=_units("start shape's unit"),
+    )
+    poisson: float = Field(0.3, ge=0, le=0.49, description="Poisson's ratio", json_schema_extra=_units("1"))
+    curved: bool = Field(
+        True,
+        description="Whether the start shape's curvature is its rest curvature (else it wants to be flat)",
+        json_schema_extra=_units("1"),
+    )
+    imperfection: float = Field(
+        0.02,
+        ge=0,
+        le=1,
+        description="Rms of the random normal offset that breaks symmetry, over the thickness",
+        json_schema_extra=_units("1"),
+    )
+    pressure: float = Field(
+        0.0,
+        ge=-10,
+        le=10,
+        description="Pressure along the normal, frozen in each step, over mu per unit length",
+        json_schema_extra=_units("1"),
+    )
+    plasticity: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="Share k of the strain beyond the yield that is forgotten in each step",
+        json_schema_extra=_units("1"),
+    )
+    yield_strain: float = Field(
+        0.05, ge=0, le=1, description="Strain alpha below which nothing is forgotten", json_schema_extra=_units("1")
+    )
+    attached: tuple[Attachment, ...] = Field(
+        (), max_length=20, description="What is held", json_schema_extra=_units("1")
+    )
+    solids: tuple[Solid, ...] = Field((), max_length=20, description="Static solids", json_schema_extra=_units("1"))
+    step: float = Field(
+        0.05, ge=0.001, le=10, description="Growth between two equilibria", json_schema_extra=_units("growth time")
+    )
+    remesh: float = Field(
+        1.6,
+        ge=0,
+        le=10,
+        description="Rest edges longer than this, over those of the start, are split; 0 never",
+        json_schema_extra=_units("1"),
+    )
+    solver: Literal["quasi_newton", "lbfgs", "cg"] = Field(
+        "quasi_newton", description="Way to equilibrium; cg is the paper's", json_schema_extra=_units("1")
+    )

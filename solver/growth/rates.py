@@ -1,0 +1,202 @@
+"""What the tools do at one time: tensors of growth and of curving on each triangle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
+
+from .. import shell
+from .state import State
+from .tools import HotCurve, HotSpot, HotSurface, Tool, intensity
+
+__all__ = ["Rates", "grown", "rates"]
+
+Floats = NDArray[np.float64]
+
+#: Along the surface, how many radii a tool reaches at most: what is nearer through the air is another part.
+_DETOUR = 1.6
+
+
+class Rates(NamedTuple):
+    """Per unit time, in each triangle's orthonormal rest frame (f, 3: 11, 12, 22): logarithmic strain, curvature."""
+
+    strain: Floats
+    curving: Floats
+
+
+def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
+    """Return the sum of what all tools do at a growth time."""
+    count = len(state.mesh.triangles)
+    strain, curving = np.zeros((count, 3)), np.zeros((count, 3))
+    for number, tool in tools.items():
+        strength = intensity(tool, time)
+        if strength == 0:
+            continue
+        if isinstance(tool, HotSurface):
+            share, along = _surface(state, tool, number)
+        elif isinstance(tool, HotCurve):
+            share, along = _curve(state, tool, state.curves[number].at(state.x, state.mesh.triangles))
+        else:
+            share, along = _spots(state, tool, number, time)
+        first, second = np.log(_stretches(state, tool, number))
+        v = _in_rest_frame(state, along)
+        strain += _tensor(strength * share * first, strength * share * second, v)
+        if isinstance(tool, HotSurface) and any(tool.curl):
+            curving += _tensor(strength * share * tool.curl[0], strength * share * tool.curl[1], v)
+    return Rates(strain, curving)
+
+
+def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
+    """Return rest metrics (f, 3) and rest angles (h,) after dt: G = exp(2 dt strain) in each triangle's rest frame.
+
+    Angles stay under stretching (so that a sphere's curvature scales by 1/s) and take what curving adds.
+    """
+    h11, h12, h22 = (dt * found.strain).T
+    mean, half = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
+    slope = np.where(half > 1e-12, np.sinh(half) / np.maximum(half, 1e-300), 1.0)
+    even = np.cosh(half)
+    e11 = np.exp(mean) * (even + slope * (h11 - h22) / 2)
+    e22 = np.exp(mean) * (even - slope * (h11 - h22) / 2)
+    e12 = np.exp(mean) * slope * h12
+    l11, l12, l22 = _frames(state.g)
+    # rows of the stretched frame: U L
+    u11, u12 = e11 * l11, e11 * l12 + e12 * l22
+    u21, u22 = e12 * l11, e12 * l12 + e22 * l22
+    g = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)
+    # what does not grow keeps its numbers
+    still = (found.strain == 0).all(axis=1)
+    g[still] = state.g[still]
+    rest = state.rest
+    if found.curving.any():
+        k11, k12, k22 = (dt * found.curving).T
+        b = np.stack(
+            [
+                k11 * u11 * u11 + 2 * k12 * u11 * u21 + k22 * u21 * u21,
+                k11 * u11 * u12 + k12 * (u11 * u22 + u21 * u12) + k22 * u21 * u22,
+                k11 * u12 * u12 + 2 * k12 * u12 * u22 + k22 * u22 * u22,
+            ],
+            -1,
+        )
+        rest = rest + shell.added_angles(b, g, state.mesh)
+    return g, rest
+
+
+def _frames(g: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return L = [[l11, l12], [0, l22]] with L^T L = g: the edges in the triangle's own orthonormal frame."""
+    l11 = np.sqrt(g[:, 0])
+    l12 = g[:, 1] / l11
+    return l11, l12, np.sqrt(g[:, 2] - l12 * l12)
+
+
+def _in_rest_frame(state: State, along: Floats) -> Floats:
+    """Return unit vectors (f, 2) of directions in space (f, 3), carried back to the rest frames by the shape."""
+    p = state.x[state.mesh.triangles]
+    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    aa, ab, bb = (a * a).sum(-1), (a * b).sum(-1), (b * b).sum(-1)
+    va, vb = (along * a).sum(-1), (along * b).sum(-1)
+    s, t = bb * va - ab * vb, aa * vb - ab * va
+    l11, l12, l22 = _frames(state.g)
+    v = np.stack([l11 * s + l12 * t, l22 * t], -1)
+    size = np.linalg.norm(v, axis=1, keepdims=True)
+    # a direction along the normal has no projection: any frame is as good
+    return np.where(size > 1e-12, v / np.maximum(size, 1e-300), np.array([1.0, 0.0]))
+
+
+def _tensor(first: Floats, second: Floats, v: Floats) -> Floats:
+    """Return first v v^T + second (1 - v v^T), (f, 3)."""
+    c, s = v.T
+    return np.stack([first * c * c + second * s * s, (first - second) * c * s, first * s * s + second * c * c], -1)
+
+
+def _corners(state: State, share: Floats) -> Floats:
+    """Return the mean of the corners' shares (the paper's average over an edge's tips)."""
+    return share[state.mesh.triangles].mean(axis=1)
+
+
+def _stretches(state: State, tool: Tool, number: int) -> Floats:
+    first, second = tool.stretch
+    if isinstance(tool, HotCurve) and tool.normalised:
+        # D_T = 1 + lambda (D_N - 1) r_e gamma; r_e: radius times the kernel's integral, 8/15; gamma: mean curvature
+        line = state.curves[number].at(state.x, state.mesh.triangles)
+        first += tool.normalised * (second - 1) * tool.radius * 8 / 15 * _turning(line, tool.closed)
+    return np.array([max(first, 0.1), second])
+
+
+def _turning(line: Floats, closed: bool) -> float:
+    """Return the total turning of a polyline over its length."""
+    ways = np.diff(np.concatenate([line, line[:2]]) if closed else line, axis=0)
+    lengths = np.linalg.norm(ways, axis=1)
+    ways = ways / np.maximum(lengths[:, None], 1e-300)
+    turns = np.arccos(np.clip((ways[1:] * ways[:-1]).sum(-1), -1, 1))
+    return float(turns.sum() / (lengths[:-1] if closed else lengths).sum())
+
+
+def _surface(state: State, tool: HotSurface, number: int) -> tuple[Floats, Floats]:
+    share = _corners(state, state.shares[number])
+    if tool.frame == "around":
+        middle = state.x[state.mesh.triangles].mean(axis=1)
+        return share, np.stack([-middle[:, 1], middle[:, 0], np.zeros(len(middle))], -1)
+    return share, np.broadcast_to(np.array(tool.frame), (len(share), 3))
+
+
+def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Floats, Floats]:
+    triangles, x = state.mesh.triangles, state.x
+    share = np.zeros(len(x))
+    for spot in state.spots[number]:
+        centre = spot.anchor.at(x, triangles)[0]
+        r = np.linalg.norm(x - centre, axis=1) / spot.radius
+        r[~_near(state, triangles[spot.anchor.faces[0]], spot.radius)] = np.inf
+        share = np.maximum(share, _kernel(tool.kernel, r))
+    p = x[triangles]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    axis = np.array(tool.frame)
+    axis = axis - (normal @ axis)[:, None] * normal
+    turn = np.radians(tool.angle + tool.turning * (time - tool.start))
+    return _corners(state, share), np.cos(turn) * axis + np.sin(turn) * np.cross(normal, axis)
+
+
+def _kernel(name: str, r: Floats) -> Floats:
+    inside = r < 1
+    if name == "flat":
+        return inside.astype(float)
+    near = np.where(inside, r, 1.0)
+    return 1 - near if name == "cone" else (1 - near * near) ** 2
+
+
+def _curve(state: State, tool: HotCurve, line: Floats) -> tuple[Floats, Floats]:
+    x, triangles = state.x, state.mesh.triangles
+    tails, heads = line, np.roll(line, -1, axis=0)
+    if not tool.closed:
+        tails, heads = tails[:-1], heads[:-1]
+    strengths = np.array(tool.intensities or (1.0,) * len(line))
+    share, along = np.zeros(len(x)), np.zeros((len(x), 3))
+    best = np.full(len(x), np.inf)
+    for k, (tail, head) in enumerate(zip(tails, heads, strict=True)):
+        way = head - tail
+        u = np.clip((x - tail) @ way / max(way @ way, 1e-300), 0, 1)
+        gap = np.linalg.norm(x - tail - u[:, None] * way, axis=1)
+        nearer = gap < best
+        best = np.where(nearer, gap, best)
+        value = (1 - u) * strengths[k] + u * strengths[(k + 1) % len(line)]
+        share = np.where(nearer, value, share)
+        along[nearer] = way
+    r = best / tool.radius
+    r[~_near(state, np.unique(KDTree(x).query(line)[1]), tool.radius)] = np.inf
+    return _corners(state, share * _kernel("smooth", r)), along[triangles].mean(axis=1)
+
+
+def _near(state: State, sources: NDArray[np.int64], radius: float) -> NDArray[np.bool_]:
+    """Return which vertices lie within reach of `sources` along the edges."""
+    i, j = state.mesh.edges.T
+    lengths = np.maximum(np.linalg.norm(state.x[i] - state.x[j], axis=1), 1e-300)
+    graph = csr_matrix((lengths, (i, j)), shape=(len(state.x),) * 2)
+    reach = _DETOUR * radius + 2 * lengths.mean()
+    away = dijkstra(graph, directed=False, indices=np.unique(sources), limit=reach, min_only=True)
+    return np.isfinite(away)

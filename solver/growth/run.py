@@ -1,0 +1,105 @@
+"""A growth run: reach the wanted growth times and keep what is needed of each."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from .. import shell
+from ..contract import Context, InvalidInput, Need, SolverError
+from ..meshes import Frame, changing
+from .engine import Engine
+from .params import GrowthParams
+from .settings import choose
+from .state import State
+
+__all__ = ["run"]
+
+_MESH = frozenset({"mesh_position", "elastic_strain"})
+
+
+def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
+    """Return meshes and numbers of the wanted growth times; see `solver.quantities` for units.
+
+    Raises:
+        InvalidInput: a region, which a mesh of its own has not.
+        NotConverged, Unstable: with the stages before.
+        Cancelled: the observer asked to stop.
+
+    """
+    if need.region is not None:
+        raise InvalidInput("growth has no lattice to cut a region from.", advice="Ask without a region.")
+    # sums in BLAS depend on the number of threads, and buckling makes much of little
+    with threadpool_limits(1, user_api="blas"):
+        return _run(params, need, context)
+
+
+def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
+    settings = choose(need.quality)
+    begun = time.perf_counter()
+    engine = Engine(params, settings.vertices, settings.tolerance)
+    rows: list[dict[str, Any]] = []
+    frames: list[Frame] = []
+    try:
+        for stage in need.stages:
+            state = engine.reach(stage, context)
+            rows.append(_row(state, params, need, settings.tolerance, stage, time.perf_counter() - begun))
+            if _MESH & set(need.fields):
+                fields = {"elastic_strain": _strain(state)} if "elastic_strain" in need.fields else {}
+                frames.append(Frame(state.x, state.mesh.triangles, fields))
+            context.report(stage / max(need.stages[-1], 1e-9), f"growth time {stage:g} settled")
+    except SolverError as error:
+        error.partial = _dataset(rows, frames, need, params) if rows else None
+        error.last_stage = rows[-1]["stage"] if rows else None
+        raise
+    return _dataset(rows, frames, need, params)
+
+
+def _row(
+    state: State, params: GrowthParams, need: Need, tolerance: float, stage: float, seconds: float
+) -> dict[str, Any]:
+    material = shell.Material(params.thickness, params.poisson)
+    row: dict[str, Any] = {
+        "stage": stage,
+        "converged": state.forces <= tolerance,
+        "residual": state.forces,
+        "iterations": state.iterations,
+        "seconds": seconds,
+    }
+    if "rest_area" in need.fields:
+        row["rest_area"] = float(shell.areas(state.g).sum())
+    if "mesh_area" in need.fields:
+        row["mesh_area"] = float(shell.areas(shell.metric(state.x, state.mesh.triangles)).sum())
+    if "stored_energy" in need.fields:
+        spare = np.zeros_like(state.x)
+        stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
+        row["stored_energy"] = shell.membrane(
+            state.x, state.mesh.triangles, state.g, material.lame, spare
+        ) + shell.bending(state.x, state.mesh.hinges, state.rest, stiffness, spare)
+    return row
+
+
+def _strain(state: State) -> NDArray[np.float64]:
+    """Return the mean elastic stretch less 1 of each vertex's triangles (n,)."""
+    t = state.mesh.triangles
+    ratio = np.sqrt(shell.areas(shell.metric(state.x, t)) / shell.areas(state.g)) - 1
+    count = np.bincount(t.ravel(), minlength=len(state.x))
+    return np.bincount(t.ravel(), np.repeat(ratio, 3), len(state.x)) / np.maximum(count, 1)
+
+
+def _dataset(rows: list[dict[str, Any]], frames: list[Frame], need: Need, params: GrowthParams) -> xr.Dataset:
+    data: dict[str, Any] = {}
+    for name in rows[0]:
+        values = np.array([row[name] for row in rows])
+        if name != "stage":
+            data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
+    coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
+    if frames:
+        data |= changing(frames[: len(rows)], need.dtype)
+        coords["component"] = ["x", "y", "z"]
+    return xr.Dataset(data, coords, {"path": params.solver})

@@ -1,0 +1,97 @@
+"""Everything that a growing shell is at one time; immutable, so that undo is to keep it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import shell
+
+__all__ = ["Anchors", "Spot", "State", "on_surface", "place"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """Points that ride on the surface: faces (m,) and barycentric weights (m, 3)."""
+
+    faces: Ints
+    weights: Floats
+
+    def at(self, x: Floats, triangles: Ints) -> Floats:
+        """Return where they are (m, 3)."""
+        return np.einsum("mk,mkc->mc", self.weights, x[triangles[self.faces]])
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A hot spot on its way: radius, and how often it has split."""
+
+    anchor: Anchors
+    radius: float
+    splits: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Shape and rest state.
+
+    time: growth time. x: (n, 3). mesh: topology. g: rest metrics (f, 3). rest: rest angles (h,). shares: (n, k) of
+    hot surfaces that have started. held: (n, 3) directions that are held, bool. spots, curves: by number of the tool.
+    forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far.
+    """
+
+    time: float
+    x: Floats
+    mesh: shell.Topology
+    g: Floats
+    rest: Floats
+    shares: dict[int, Floats]
+    held: NDArray[np.bool_]
+    spots: dict[int, tuple[Spot, ...]]
+    curves: dict[int, Anchors]
+    forces: float = 0.0
+    iterations: int = 0
+
+    @property
+    def length(self) -> float:
+        """Mean rest edge."""
+        g = self.g
+        return float(np.sqrt(np.concatenate([g[:, 0], g[:, 2], g[:, 0] + g[:, 2] - 2 * g[:, 1]])).mean())
+
+
+def place(points: Floats, x: Floats, triangles: Ints) -> Anchors:
+    """Return the nearest points of a surface to `points` (m, 3)."""
+    faces, weights = zip(*(_nearest(point, x, triangles) for point in np.atleast_2d(points)), strict=True)
+    return Anchors(np.array(faces, np.int64), np.array(weights))
+
+
+def on_surface(anchors: Anchors, x: Floats, triangles: Ints, new_x: Floats, new_triangles: Ints) -> Anchors:
+    """Return the anchors of the same places on a mesh that took the place of another."""
+    return place(anchors.at(x, triangles), new_x, new_triangles)
+
+
+def _nearest(point: Floats, x: Floats, triangles: Ints) -> tuple[int, Floats]:
+    """Return triangle and barycentric weights of the point of the surface nearest to `point`."""
+    p = x[triangles]
+    a, b, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], point - p[:, 0]
+    aa, ab, bb = (a * a).sum(-1), (a * b).sum(-1), (b * b).sum(-1)
+    av, bv = (a * v).sum(-1), (b * v).sum(-1)
+    determinant = np.maximum(aa * bb - ab * ab, 1e-300)
+    s, t = (bb * av - ab * bv) / determinant, (aa * bv - ab * av) / determinant
+    inner = np.stack([1 - s - t, s, t], -1)
+    candidates = [np.where((inner >= 0).all(axis=1, keepdims=True), inner, np.nan)]
+    for k in range(3):
+        start, way = p[:, k], p[:, (k + 1) % 3] - p[:, k]
+        u = np.clip(((point - start) * way).sum(-1) / np.maximum((way * way).sum(-1), 1e-300), 0, 1)
+        weights = np.zeros((len(p), 3))
+        weights[:, k], weights[:, (k + 1) % 3] = 1 - u, u
+        candidates.append(weights)
+    stacked = np.stack(candidates)
+    gaps = np.linalg.norm(np.einsum("cfk,fkd->cfd", stacked, p) - point, axis=-1)
+    best, face = np.unravel_index(np.nanargmin(gaps), gaps.shape)
+    return int(face), stacked[best, face]
