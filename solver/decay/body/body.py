@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 #: Density of fresh fruit [kg/m^3].
 _DENSITY = 1000.0
-#: Stiffness of the floor under one point, over the fresh modulus and an edge: it gives way by a thousandth of r1.
+#: Stiffness of the floor per area, over the fresh modulus and an edge: it gives way by a thousandth of r1.
 _FLOOR = 30.0
 #: Stiffness per volume of the springs that keep the core from sliding, over the fresh modulus; how far the core goes.
 _TETHER, _CORE = 0.1, 0.5
@@ -39,6 +39,7 @@ class Body:
     def __init__(self, params: DecayParams, surface: Surface, level: int, layers: int, tolerance: float) -> None:
         self._params = params
         self.solid = fill(params, layers)
+        self._surface = surface
         self._level, self._layers = level, layers
         self._tolerance = tolerance
         self._pattern = blocks(self.solid.tets, len(self.solid.points))
@@ -73,8 +74,11 @@ class Body:
             return Loads(zero, None, zero, zero, start)
         shared = np.repeat(solid.volume / 4, 4)
         mass: Array = np.bincount(solid.tets.ravel(), shared * np.repeat(state.mass, 4), count).astype(float)
+        corners = solid.points[solid.skin[solid.faces]]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
         contact = zero.copy()
-        contact[solid.skin] = _FLOOR * fresh * float(np.cbrt(solid.volume.mean()))
+        contact[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(areas / 3, 3), len(solid.skin))
+        contact *= _FLOOR * fresh / float(np.cbrt(solid.volume.mean()))
         core = np.linalg.norm(solid.points, axis=1) < _CORE
         volume = np.bincount(solid.tets.ravel(), shared, count)
         tether = np.where(core, _TETHER * fresh * volume, 0.0)
@@ -82,12 +86,25 @@ class Body:
 
     def on_lattice(self, balance: Balance, resolution: int) -> Array:
         """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""
-        moved = (balance.points - self.solid.points)[self.solid.skin]
-        return (_outwards(self._layers, resolution) @ moved).reshape(resolution, -1, 3)
+        even, rest = self._parted(balance)
+        fresh = self._params.surface(*lattice(resolution))
+        return even * fresh + (_outwards(self._layers, resolution) @ rest).reshape(fresh.shape)
 
     def on_surface(self, balance: Balance) -> Array:
         """Return the displacement of the surface's vertices (v, 3)."""
-        return _onto(self._level, self._layers) @ (balance.points - self.solid.points)[self.solid.skin]
+        even, rest = self._parted(balance)
+        return even * self._surface.points + _onto(self._level, self._layers) @ rest
+
+    def _parted(self, balance: Balance) -> tuple[float, Array]:
+        """Return the even part of the skin's displacement, over its place, and the rest (s, 3), which is interpolated.
+
+        Facets would take the even part as shrinking chords; taken apart, a fruit that shrinks evenly stays exact.
+        """
+        skin = self.solid.skin
+        fresh, moved = self.solid.points[skin], (balance.points - self.solid.points)[skin]
+        about = fresh - fresh.mean(axis=0)
+        even = float(np.sum(about * moved) / np.sum(about * about))
+        return even, moved - even * fresh
 
 
 def _skin(layers: int) -> tuple[Array, NDArray[np.int64]]:
