@@ -1,0 +1,32 @@
+"""Thin shells as triangles: a membrane against a rest metric, hinges against rest angles, an SPD tangent.
+
+Energies are in units of mu l^2 (mu: the membrane's shear modulus times its thickness, force per length; l: the
+solver's unit of length), forces in mu l. Every kernel takes arrays and returns arrays; none knows of time or tools.
+"""
+
+from .bending import angles, bending, bending_tangent, hinge_stiffness
+from .curvature import added_angles, from_angles, to_angles
+from .material import Material
+from .membrane import areas, membrane, membrane_tangent, metric, metric_of_lengths
+from .pattern import Pattern, pattern
+from .topology import Topology, topology
+
+__all__ = [
+    "Material",
+    "Pattern",
+    "Topology",
+    "added_angles",
+    "angles",
+    "areas",
+    "bending",
+    "bending_tangent",
+    "from_angles",
+    "hinge_stiffness",
+    "membrane",
+    "membrane_tangent",
+    "metric",
+    "metric_of_lengths",
+    "pattern",
+    "to_angles",
+    "topology",
+]

@@ -1,0 +1,100 @@
+"""Bending by hinges: each pair of neighbouring triangles wants its rest angle (Grinspun et al. 2003).
+
+Energy k (theta - rest)^2 with k = D l^2 / (2 (A1 + A2)). On equilateral triangles that is exactly the plate's
+D kappa^2 / 2 per area for a cylinder, whatever way it lies; the Poisson ratio in bending is -1/3 there (sum over the
+three edge directions of (k_n - k_t / 3)^2), so that spheres are softer and saddles stiffer than a plate's.
+Angles are positive where the surface is convex towards its normals.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .membrane import areas
+from .topology import Topology
+
+__all__ = ["angles", "bending", "bending_tangent", "hinge_stiffness"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def hinge_stiffness(g: Floats, mesh: Topology, flexural: float) -> Floats:
+    """Return k (h,) from rest metrics g (f, 3); the rest length of an edge is the mean of its two triangles'."""
+    a, b = mesh.hinge_faces.T
+    square = 0.5 * (_squares(g)[a, mesh.hinge_corners[:, 0]] + _squares(g)[b, mesh.hinge_corners[:, 1]])
+    area = areas(g)
+    return flexural * square / (2 * (area[a] + area[b]))
+
+
+def _squares(g: Floats) -> Floats:
+    """Return the squared rest edges (f, 3), edge k opposite to corner k."""
+    return np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
+
+
+@njit(cache=True, error_model="numpy")
+def angles(x: Floats, hinges: Ints) -> Floats:
+    """Return the angle (h,) between the normals of each hinge's triangles [radian]."""
+    found = np.empty(len(hinges))
+    slopes = np.empty((4, 3))
+    for t in range(len(hinges)):
+        found[t] = _hinge(x, hinges[t], slopes)
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _hinge(x: Floats, hinge: Ints, slopes: Floats) -> float:
+    """Return the angle and write its derivatives by the four points to `slopes` (4, 3)."""
+    i, j, k, m = hinge[0], hinge[1], hinge[2], hinge[3]
+    ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+    ux, uy, uz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    wx, wy, wz = x[m, 0] - x[i, 0], x[m, 1] - x[i, 1], x[m, 2] - x[i, 2]
+    nx, ny, nz = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
+    ox, oy, oz = wy * ez - wz * ey, wz * ex - wx * ez, wx * ey - wy * ex
+    square = ex * ex + ey * ey + ez * ez
+    length = np.sqrt(square)
+    first, second = nx * nx + ny * ny + nz * nz, ox * ox + oy * oy + oz * oz
+    cx, cy, cz = ny * oz - nz * oy, nz * ox - nx * oz, nx * oy - ny * ox
+    angle = np.arctan2((cx * ex + cy * ey + cz * ez) / length, nx * ox + ny * oy + nz * oz)
+    # a triangle without area has no normal: its hinge exerts no force
+    p = -length / first if first > 0 else 0.0
+    q = -length / second if second > 0 else 0.0
+    s, r = (ux * ex + uy * ey + uz * ez) / square, (wx * ex + wy * ey + wz * ez) / square
+    slopes[2, 0], slopes[2, 1], slopes[2, 2] = p * nx, p * ny, p * nz
+    slopes[3, 0], slopes[3, 1], slopes[3, 2] = q * ox, q * oy, q * oz
+    for d in range(3):
+        slopes[1, d] = -(s * slopes[2, d] + r * slopes[3, d])
+        slopes[0, d] = -((1 - s) * slopes[2, d] + (1 - r) * slopes[3, d])
+    return angle
+
+
+@njit(cache=True, error_model="numpy")
+def bending(x: Floats, hinges: Ints, rest: Floats, stiffness: Floats, gradient: Floats) -> float:
+    """Return the bending energy and add its gradient to `gradient` (n, 3); rest and stiffness (h,)."""
+    energy = 0.0
+    slopes = np.empty((4, 3))
+    for t in range(len(hinges)):
+        gap = _hinge(x, hinges[t], slopes) - rest[t]
+        energy += stiffness[t] * gap * gap
+        force = 2 * stiffness[t] * gap
+        for v in range(4):
+            at = hinges[t, v]
+            for d in range(3):
+                gradient[at, d] += force * slopes[v, d]
+    return energy
+
+
+@njit(cache=True, error_model="numpy")
+def bending_tangent(x: Floats, hinges: Ints, stiffness: Floats, places: Ints, blocks: Floats) -> None:
+    """Add the Gauss-Newton tangent 2 k grad(theta) grad(theta)^T to `blocks` (nnz, 3, 3); places (h, 16)."""
+    slopes = np.empty((4, 3))
+    for t in range(len(hinges)):
+        _hinge(x, hinges[t], slopes)
+        for u in range(4):
+            for v in range(4):
+                at = places[t, 4 * u + v]
+                for d in range(3):
+                    for h in range(3):
+                        blocks[at, d, h] += 2 * stiffness[t] * slopes[u, d] * slopes[v, h]
