@@ -95,6 +95,8 @@ register(
     budget_error=Quantity("1", "what is missing of theta n + u + v, over what there was and was added", "e"),
     body_residual=Quantity("1", "out-of-balance force of the body over the forces in it, relative L2", "|r|/|f|"),
     body_steps=Quantity("1", "Newton steps of the body in this stage", "n"),
+    skin_residual=Quantity("1", "out-of-balance force of the skin over the forces in it, relative L2", "|r|/|f|"),
+    skin_steps=Quantity("1", "quasi-Newton steps of the skin in this stage", "n"),
     water_lost=Quantity("1", "water lost by transpiration, over the fresh weight", "w"),
 )
 

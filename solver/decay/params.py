@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from ..fruit import Fruit
-from .body.flesh import Flesh
+from .body.flesh import Flesh, Skin
 from .colony import MOULDS, SOFT_ROT, Colony
 
 __all__ = ["DecayParams", "Weather", "Wound"]
@@ -149,6 +149,11 @@ class DecayParams(Fruit):
         80.0, ge=0.01, le=1000, description="Firmness of the fresh flesh (Table 2)", json_schema_extra={"units": "1"}
     )
     flesh: Flesh = Field(Flesh(), description="What water and rot do to the flesh", json_schema_extra={"units": "1"})
+    skin: Skin | None = Field(
+        None,
+        description="A skin that wrinkles on the body that moves; without one the surface follows the body",
+        json_schema_extra={"units": "1"},
+    )
     skin_colour: tuple[Share, Share, Share] = Field(
         (0.62, 0.10, 0.06), description="Fresh skin, linear red, green, blue", json_schema_extra={"units": "1"}
     )

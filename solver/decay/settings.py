@@ -23,7 +23,8 @@ VECTORS = ("position", "displacement")
 class Settings:
     """level: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day].
 
-    layers: shells of the body. balance: out-of-balance force of a settled body over the forces in it.
+    layers: shells of the body. balance: out-of-balance force of body and skin over the forces in them.
+    skin: level of the skin's own mesh.
     """
 
     level: int
@@ -31,6 +32,7 @@ class Settings:
     longest: float
     layers: int
     balance: float
+    skin: int
 
     @property
     def vertices(self) -> int:
@@ -39,13 +41,19 @@ class Settings:
 
 
 _LEVELS: dict[Quality, tuple[int, float]] = {"preview": (5, 1e-4), "default": (6, 3e-5), "fine": (7, 1e-5)}
-_BODIES: dict[Quality, tuple[int, float]] = {"preview": (6, 1e-3), "default": (8, 1e-3), "fine": (16, 1e-4)}
+_BODIES: dict[Quality, tuple[int, float, int]] = {
+    "preview": (6, 1e-3, 4),
+    "default": (8, 1e-3, 5),
+    "fine": (16, 1e-4, 5),
+}
 #: Longest step, in units of the quicker organism's own time.
 _LONGEST = 4.0
 #: Measured on one busy core: seconds per step and vertex with both organisms, and a typical step in model time.
 _SECONDS, _STEP = 4e-7, 0.2
 #: Seconds per settled body and tetrahedron.
-_BODY_SECONDS = 1e-5
+_BODY_SECONDS = 2e-5
+#: Seconds per wrinkled skin and vertex.
+_SKIN_SECONDS = 8e-4
 #: Working memory per vertex, mesh and states of both organisms.
 _BYTES = 1000
 
@@ -79,6 +87,7 @@ def expected_cost(params: DecayParams, need: Need) -> Cost:
     seconds = 1e-5 * settings.vertices + steps * settings.vertices * _SECONDS * organisms / 2
     if moved(params, wanted):
         seconds += len(need.stages) * 20 * settings.layers**3 * _BODY_SECONDS
+        seconds += len(need.stages) * 10 * 4**settings.skin * _SKIN_SECONDS * (params.skin is not None)
     return Cost(seconds, len(need.stages) * (values * width + 200) + settings.vertices * _BYTES)
 
 

@@ -11,7 +11,7 @@ from ..contract import Context, Need
 from ..fruit import lattice, window
 from .environment import water_lost
 from .params import DecayParams
-from .settings import Settings, moved
+from .settings import BODY, Settings, moved
 from .surface import Surface, lay
 
 __all__ = ["Shape"]
@@ -28,11 +28,15 @@ class Shape:
         moves = moved(params, self._wanted)
         meshed = {"water_lost", "volume", "mesh_position", "triangle"} & self._wanted
         self._surface = lay(params, settings.level) if moves or meshed else None
-        self._body = None
+        self._body = self._wrinkles = None
         if moves and self._surface is not None:
             from .body.body import Body
 
             self._body = Body(params, self._surface, settings.level, settings.layers, settings.balance)
+            if params.skin is not None:
+                from .body.wrinkles import Wrinkles
+
+                self._wrinkles = Wrinkles(params, params.skin, self._body, settings)
 
     @property
     def triangles(self) -> NDArray[np.int32]:
@@ -44,7 +48,7 @@ class Shape:
         """Return the wanted shape of a day, with rot (v) on the surface's vertices.
 
         Raises:
-            NotConverged: the body found no equilibrium.
+            NotConverged: body or skin found no equilibrium.
 
         """
         wanted, need = self._wanted, self._need
@@ -56,6 +60,10 @@ class Shape:
         if self._body is not None:
             balance = self._body.settled(self._body.state(lost, rot), context.check_cancelled)
             row |= {"body_residual": balance.residual, "body_steps": balance.steps}
+        folds = None
+        if self._wrinkles is not None and balance is not None and (wanted & BODY) - {"least_jacobian"}:
+            folds, residual, steps = self._wrinkles.at(balance, context.check_cancelled)
+            row |= {"skin_residual": residual, "skin_steps": steps}
         if "least_jacobian" in wanted:
             row["least_jacobian"] = balance.least_jacobian if balance else 1.0
         if wanted & {"position", "displacement"}:
@@ -63,6 +71,8 @@ class Shape:
             inside = window(need.resolution, need.region)
             fresh = self._params.surface(*lattice(need.resolution))
             gone = self._body.on_lattice(balance, need.resolution) if self._body and balance else np.zeros_like(fresh)
+            if self._wrinkles and folds is not None:
+                gone = gone + self._wrinkles.on_lattice(folds, need.resolution)
             for name, values in (("position", fresh + gone), ("displacement", gone)):
                 if name in wanted:
                     row[name] = values[inside].astype(need.dtype)
@@ -71,6 +81,8 @@ class Shape:
             points = self._surface.points
             if self._body and balance:
                 points = points + self._body.on_surface(balance)
+            if self._wrinkles and folds is not None:
+                points = points + self._wrinkles.on_surface(folds)
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
             if "volume" in wanted:

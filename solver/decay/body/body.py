@@ -86,16 +86,20 @@ class Body:
 
     def on_lattice(self, balance: Balance, resolution: int) -> Array:
         """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""
-        even, rest = self._parted(balance)
+        even, rest = self.parted(balance)
         fresh = self._params.surface(*lattice(resolution))
         return even * fresh + (_outwards(self._layers, resolution) @ rest).reshape(fresh.shape)
 
     def on_surface(self, balance: Balance) -> Array:
         """Return the displacement of the surface's vertices (v, 3)."""
-        even, rest = self._parted(balance)
-        return even * self._surface.points + _onto(self._level, self._layers) @ rest
+        even, rest = self.parted(balance)
+        return even * self._surface.points + self.onto(self._level) @ rest
 
-    def _parted(self, balance: Balance) -> tuple[float, Array]:
+    def onto(self, level: int) -> sparse.csr_array:
+        """Return the matrix that takes a field (s) of the body's skin to the vertices of a sphere of `level`."""
+        return _onto(level, self._layers)
+
+    def parted(self, balance: Balance) -> tuple[float, Array]:
         """Return the even part of the skin's displacement, over its place, and the rest (s, 3), which is interpolated.
 
         Facets would take the even part as shrinking chords; taken apart, a fruit that shrinks evenly stays exact.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Flesh", "Softened", "softened"]
+__all__ = ["Flesh", "Skin", "Softened", "softened"]
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,16 @@ class Flesh(BaseModel):
     def heeds_rot(self) -> bool:
         """Whether rot changes anything."""
         return self.rot_collapse > 0 or self.rot_softness > 0
+
+
+class Skin(BaseModel):
+    """Constants of the skin; its thickness is `exocarp_thickness`. The paper leaves them to a cloth solver."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    stiffness: float = Field(50.0, gt=0, le=10000, description="Young's modulus of the skin, over the flesh's [1]")
+    shrinkage: float = Field(0.0, ge=0, le=1, description="Share of the body's even shrinkage that the skin joins [1]")
+    depth: float = Field(0.1, ge=0.01, le=1, description="Depth of the flesh that holds the skin [r1]")
 
 
 class Softened(NamedTuple):
