@@ -93,6 +93,10 @@ register(
     mean_mould=Quantity("1", "area-weighted mean of the mould", "m_mean"),
     mean_nutrient=Quantity("1", "area-weighted mean of the nutrient in the skin", "n_mean"),
     budget_error=Quantity("1", "what is missing of theta n + u + v, over what there was and was added", "e"),
+    body_residual=Quantity("1", "out-of-balance force of the body over the forces in it, relative L2", "|r|/|f|"),
+    body_steps=Quantity("1", "Newton steps of the body in this stage", "n"),
+    skin_residual=Quantity("1", "out-of-balance force of the skin over the forces in it, relative L2", "|r|/|f|"),
+    skin_steps=Quantity("1", "quasi-Newton steps of the skin in this stage", "n"),
     water_lost=Quantity("1", "water lost by transpiration, over the fresh weight", "w"),
 )
 

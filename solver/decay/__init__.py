@@ -34,7 +34,10 @@ SOLVER = Solver(
     version="1",
     title="Decay of fruits: rot and mould",
     params=DecayParams,
-    fields=("position", "rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
+    fields=(
+        *("position", "displacement", "mesh_position", "triangle", "volume", "least_jacobian"),
+        *("rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
+    ),
     default_fields=("rot", "mould", "mould_active", "nutrient", *_SHARES),
     stages=StageAxis("t", "time since the wounds", "day", 0.0, 120.0, (5.0, 10.0, 15.0, 20.0)),
     default_resolution={"preview": 64, "default": 128, "fine": 256},

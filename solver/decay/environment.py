@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .params import DecayParams
 from .surface import Surface
 
-__all__ = ["air", "damping", "deficit", "saturation", "water_lost"]
+__all__ = ["air", "damping", "deficit", "reference_radius", "saturation", "water_lost"]
 
 Array = NDArray[np.float64]
 
@@ -61,11 +61,16 @@ def water_lost(params: DecayParams, surface: Surface, days: float) -> float:
 
     The fruit's size follows from its weight, its shape and a density of 1 g/cm^3.
     """
-    a, b, c = (surface.points[surface.faces[:, k]] for k in range(3))
-    volume = float(np.sum(a * np.cross(b, c))) / 6
-    r1 = (params.weight / (_DENSITY * volume)) ** (1 / 3)
+    r1 = reference_radius(params, surface)
     grams = params.transpiration * surface.total(1.0) * r1**2 * _dryness(params, days) * 1e-6 * _SECONDS
     return float(min(grams / params.weight, params.water_content / 100))
+
+
+def reference_radius(params: DecayParams, surface: Surface) -> float:
+    """Return r1 [m] of a fruit of this shape and weight, at a density of 1 g/cm^3."""
+    a, b, c = (surface.points[surface.faces[:, k]] for k in range(3))
+    volume = float(np.sum(a * np.cross(b, c))) / 6
+    return float((params.weight / (_DENSITY * volume)) ** (1 / 3))
 
 
 def _dryness(params: DecayParams, days: float) -> float:

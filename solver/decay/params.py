@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from ..fruit import Fruit
+from .body.flesh import Flesh, Skin
 from .colony import MOULDS, SOFT_ROT, Colony
 
 __all__ = ["DecayParams", "Weather", "Wound"]
@@ -47,6 +48,7 @@ class DecayParams(Fruit):
         "water": ("water_content", None),
         "growth": ("growth_rate", None),
         "propagation": ("propagation_rate", None),
+        "firmness": ("firmness", None),
     }
 
     temperature: float = Field(
@@ -136,6 +138,20 @@ class DecayParams(Fruit):
         (Wound(colatitude=0), Wound(colatitude=180)),
         max_length=64,
         description="Where rot and mould enter on day 0; by default the stem and the point the fruit rests on",
+        json_schema_extra={"units": "1"},
+    )
+    body: Literal["none", "quasi-static"] = Field(
+        "none",
+        description="How the fruit's body moves: not at all, or from equilibrium to equilibrium",
+        json_schema_extra={"units": "1"},
+    )
+    firmness: float = Field(
+        80.0, ge=0.01, le=1000, description="Firmness of the fresh flesh (Table 2)", json_schema_extra={"units": "1"}
+    )
+    flesh: Flesh = Field(Flesh(), description="What water and rot do to the flesh", json_schema_extra={"units": "1"})
+    skin: Skin | None = Field(
+        None,
+        description="A skin that wrinkles on the body that moves; without one the surface follows the body",
         json_schema_extra={"units": "1"},
     )
     skin_colour: tuple[Share, Share, Share] = Field(

@@ -19,6 +19,7 @@ def _fruit(
     water: float,
     k: float,
     porosity: float,
+    firmness: float,
     rates: tuple[float, float],
     mould: str,
     skin: tuple[float, float, float],
@@ -30,6 +31,7 @@ def _fruit(
         "water_content": water,
         "transpiration": k,
         "porosity": porosity,
+        "firmness": firmness,
         "growth_rate": rates[0],
         "propagation_rate": rates[1],
         "mould": MOULDS[mould].model_dump(),
@@ -44,9 +46,10 @@ _GREY_BLUE = (0.20, 0.27, 0.31)
 _GREY = (0.10, 0.10, 0.09)
 _PALE = (0.45, 0.40, 0.30)
 
-_APPLE: dict[str, Any] = {"radii": (1.0, 1.04, 1.1, 1.15, 1.14, 1.08, 1.0, 1.15)}
+_APPLE: dict[str, Any] = {"radii": (1.0, 1.04, 1.1, 1.15, 1.14, 1.08, 1.0, 1.15), "stone": (0.3, 0.25)}
 _PEAR: dict[str, Any] = {"radii": (1.0, 1.02, 1.03, 0.98, 0.92, 1.0, 1.2, 0.98), "stone": (0.3, 0.3)}
-_TOMATO: dict[str, Any] = {"radii": (1.0, 1.05, 1.13, 1.18, 1.13, 1.05, 1.0, 1.18)}
+_TOMATO: dict[str, Any] = {"radii": (1.0, 1.05, 1.13, 1.18, 1.13, 1.05, 1.0, 1.18), "stone": (0, 0)}
+_ORANGE: dict[str, Any] = {"stone": (0, 0)}
 
 #: Four climates: temperature [degC] and relative humidity [percent]. Temperate is the paper's 72 F and 50 %.
 ENVIRONMENTS: Mapping[str, Mapping[str, float]] = {
@@ -57,12 +60,14 @@ ENVIRONMENTS: Mapping[str, Mapping[str, float]] = {
 }
 
 _FRUITS: Mapping[str, Mapping[str, Any]] = {
-    "apple": _fruit(138, 84, 0.17, 25, (20, 5), "penicillium-expansum", (0.55, 0.06, 0.04), _BLUE, **_APPLE),
-    "apple-neofabraea": _fruit(138, 84, 0.17, 25, (20, 5), "neofabraea", (0.50, 0.42, 0.08), _PALE, **_APPLE),
-    "orange": _fruit(140, 87, 8.48, 60, (50, 3), "penicillium-digitatum", (0.85, 0.28, 0.02), _GREY_BLUE),
-    "peach": _fruit(87, 88, 14.1, 25, (20, 5), "rhizopus", (0.80, 0.35, 0.18), _GREY),
-    "pear": _fruit(166, 84, 0.68, 25, (20, 5), "penicillium-expansum", (0.55, 0.52, 0.10), _BLUE, **_PEAR),
-    "tomato": _fruit(123, 94, 0.9, 40, (75, 1), "rhizopus", (0.70, 0.06, 0.03), _GREY, **_TOMATO),
+    "apple": _fruit(138, 84, 0.17, 25, 80, (20, 5), "penicillium-expansum", (0.55, 0.06, 0.04), _BLUE, **_APPLE),
+    "apple-neofabraea": _fruit(138, 84, 0.17, 25, 80, (20, 5), "neofabraea", (0.50, 0.42, 0.08), _PALE, **_APPLE),
+    "orange": _fruit(
+        140, 87, 8.48, 60, 40, (50, 3), "penicillium-digitatum", (0.85, 0.28, 0.02), _GREY_BLUE, **_ORANGE
+    ),
+    "peach": _fruit(87, 88, 14.1, 25, 80, (20, 5), "rhizopus", (0.80, 0.35, 0.18), _GREY),
+    "pear": _fruit(166, 84, 0.68, 25, 80, (20, 5), "penicillium-expansum", (0.55, 0.52, 0.10), _BLUE, **_PEAR),
+    "tomato": _fruit(123, 94, 0.9, 40, 50, (75, 1), "rhizopus", (0.70, 0.06, 0.03), _GREY, **_TOMATO),
 }
 
 #: Fruits in the temperate climate, and every fruit in each of the others as e.g. `orange-tropical`.

@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ..contract import Context, Need, SolverError
-from ..fruit import azimuths, colatitudes, lattice, window
-from .environment import deficit, water_lost
+from ..fruit import azimuths, colatitudes, window
+from .environment import deficit
 from .params import DecayParams
-from .settings import FIELDS, MOULD, ROT, choose
+from .settings import FIELDS, MOULD, VECTORS, choose, stepped
+from .shape import Shape
 from .stepping import Reached, march
-from .surface import lay, sampler
+from .surface import sampler
 from .system import System
 
 __all__ = ["run"]
@@ -29,6 +31,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
 
     Raises:
         Unstable: no step was short enough; carries the stages before.
+        NotConverged: the body found no equilibrium; carries the stages before.
         Cancelled: the observer asked to stop.
 
     """
@@ -36,22 +39,19 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     begun = time.perf_counter()
     wanted = set(need.fields)
     attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": float(deficit(params))}
-    if not wanted & {*ROT, *MOULD, "budget_error"}:
-        fresh = lay(params, settings.level) if "water_lost" in wanted else None
-        rows = []
-        for day in need.stages:
-            row = _row(day, 0, 0.0, True, time.perf_counter() - begun)
-            if fresh is not None:
-                row["water_lost"] = water_lost(params, fresh, day)
-            rows.append(_positions(row, params, need))
-            context.report(day / max(need.stages[-1], 1e-9), f"day {day:.2f} settled")
-        return _dataset(rows, need, attrs | {"path": "closed-form"})
-    with_mould = bool(wanted & MOULD)
-    context.report(0.0, f"laying {settings.vertices} points on the fruit")
-    system = System(params, settings.level, with_mould)
-    attrs["path"] = "rot-and-mould" if with_mould else "rot"
-    rows = []
+    shape = Shape(params, need, settings)
+    rows: list[dict[str, Any]] = []
     try:
+        if not stepped(params, wanted):
+            attrs["path"] = "closed-form"
+            for day in need.stages:
+                row = _row(day, 0, 0.0, True)
+                _finish(rows, row, shape, None, begun, need, context)
+            return _dataset(rows, need, attrs, shape)
+        with_mould = bool(wanted & MOULD)
+        context.report(0.0, f"laying {settings.vertices} points on the fruit")
+        system = System(params, settings.level, with_mould)
+        attrs["path"] = "rot-and-mould" if with_mould else "rot"
         for reached in march(system, need.stages, settings.tolerance, settings.longest, context):
             errors = [
                 layer.budget_error(state)
@@ -59,25 +59,37 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
                 if layer is not None and state is not None
             ]
             sound = reached.error <= 1 and max(errors) <= _ROUND_OFF
-            seconds = time.perf_counter() - begun
-            row = _row(reached.day, reached.steps, reached.error * settings.tolerance, sound, seconds)
+            row = _row(reached.day, reached.steps, reached.error * settings.tolerance, sound)
             if "budget_error" in wanted:
                 row["budget_error"] = max(errors)
-            if "water_lost" in wanted:
-                row["water_lost"] = water_lost(params, system.surface, reached.day)
             row |= _fields(system, reached, need, settings.level)
-            rows.append(_positions(row, params, need))
-            context.report(reached.day / max(need.stages[-1], 1e-9), f"day {reached.day:.2f} settled")
+            _finish(rows, row, shape, system.rot.share(reached.state.rot), begun, need, context)
     except SolverError as error:
         if rows:
-            error.partial = _dataset(rows, need, attrs)
+            error.partial = _dataset(rows, need, attrs, shape)
             error.last_stage = rows[-1]["stage"]
         raise
-    return _dataset(rows, need, attrs)
+    return _dataset(rows, need, attrs, shape)
 
 
-def _row(day: float, steps: int, residual: float, converged: bool, seconds: float) -> dict[str, Any]:
-    return {"stage": day, "residual": residual, "converged": converged, "iterations": steps, "seconds": seconds}
+def _finish(
+    rows: list[dict[str, Any]],
+    row: dict[str, Any],
+    shape: Shape,
+    rot: NDArray[np.float64] | None,
+    begun: float,
+    need: Need,
+    context: Context,
+) -> None:
+    """Add the stage's shape and seconds to its row, and the row to the others."""
+    row |= shape.at(row["stage"], rot, context)
+    row["seconds"] = time.perf_counter() - begun
+    rows.append(row)
+    context.report(row["stage"] / max(need.stages[-1], 1e-9), f"day {row['stage']:.2f} settled")
+
+
+def _row(day: float, steps: int, residual: float, converged: bool) -> dict[str, Any]:
+    return {"stage": day, "residual": residual, "converged": converged, "iterations": steps}
 
 
 def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[str, Any]:
@@ -110,21 +122,14 @@ def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[st
     return row
 
 
-def _positions(row: dict[str, Any], params: DecayParams, need: Need) -> dict[str, Any]:
-    if "position" in need.fields:
-        assert need.resolution is not None
-        row["position"] = params.surface(*lattice(need.resolution))[window(need.resolution, need.region)].astype(
-            need.dtype
-        )
-    return row
-
-
-def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any]) -> xr.Dataset:
+def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shape: Shape) -> xr.Dataset:
     assert need.resolution is not None
-    data: dict[str, Any] = {}
+    data: dict[str, Any] = {"triangle": (("face", "corner"), shape.triangles)} if "triangle" in need.fields else {}
     for name in rows[0]:
         values = np.array([row[name] for row in rows])
-        if name == "position":
+        if name == "mesh_position":
+            data[name] = (("stage", "vertex", "component"), values)
+        elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
         elif name in FIELDS:
             data[name] = (("stage", "colatitude", "azimuth"), values)
@@ -135,6 +140,6 @@ def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any]) -> x
         down, along = window(need.resolution, need.region)
         coords["colatitude"] = colatitudes(need.resolution)[down]
         coords["azimuth"] = azimuths(need.resolution)[along]
-    if "position" in data:
+    if not data.keys().isdisjoint({*VECTORS, "mesh_position"}):
         coords["component"] = ["x", "y", "z"]
     return xr.Dataset(data, coords, attrs)

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ..contract import Cost, Need, Quality
 from .params import DecayParams
 
-__all__ = ["Settings", "choose", "expected_cost"]
+__all__ = ["BODY", "FIELDS", "MOULD", "ROT", "VECTORS", "Settings", "choose", "expected_cost", "moved", "stepped"]
 
 #: What has a layer to be stepped for.
 ROT = frozenset({"rot", "substrate", "rotten_share", "mean_rot"})
 MOULD = frozenset({"mould", "mould_active", "nutrient", "mouldy_share", "mean_mould", "mean_nutrient"})
-FIELDS = ("position", "rot", "substrate", "mould", "mould_active", "nutrient")
+#: What a body has to be settled for, if the fruit has one; `position` is where the surface is.
+BODY = frozenset({"position", "displacement", "volume", "least_jacobian", "mesh_position"})
+FIELDS = ("position", "displacement", "rot", "substrate", "mould", "mould_active", "nutrient")
+VECTORS = ("position", "displacement")
 
 
 @dataclass(frozen=True)
 class Settings:
-    """level: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day]."""
+    """level: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day].
+
+    layers: shells of the body. balance: out-of-balance force of body and skin over the forces in them.
+    skin: level of the skin's own mesh.
+    """
 
     level: int
     tolerance: float
     longest: float
+    layers: int
+    balance: float
+    skin: int
 
     @property
     def vertices(self) -> int:
@@ -30,10 +41,19 @@ class Settings:
 
 
 _LEVELS: dict[Quality, tuple[int, float]] = {"preview": (5, 1e-4), "default": (6, 3e-5), "fine": (7, 1e-5)}
+_BODIES: dict[Quality, tuple[int, float, int]] = {
+    "preview": (6, 1e-3, 4),
+    "default": (8, 1e-3, 5),
+    "fine": (16, 1e-4, 5),
+}
 #: Longest step, in units of the quicker organism's own time.
 _LONGEST = 4.0
 #: Measured on one busy core: seconds per step and vertex with both organisms, and a typical step in model time.
 _SECONDS, _STEP = 4e-7, 0.2
+#: Seconds per settled body and tetrahedron.
+_BODY_SECONDS = 2e-5
+#: Seconds per wrinkled skin and vertex.
+_SKIN_SECONDS = 8e-4
 #: Working memory per vertex, mesh and states of both organisms.
 _BYTES = 1000
 
@@ -41,18 +61,33 @@ _BYTES = 1000
 def choose(params: DecayParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
     level, tolerance = _LEVELS[quality]
-    return Settings(level, tolerance, _LONGEST / max(_clock(params), 0.1))
+    return Settings(level, tolerance, _LONGEST / max(_clock(params), 0.1), *_BODIES[quality])
+
+
+def moved(params: DecayParams, wanted: Collection[str]) -> bool:
+    """Return whether the wanted fields ask for a body that moves."""
+    return params.body != "none" and not BODY.isdisjoint(wanted)
+
+
+def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
+    """Return whether rot has to be stepped: it is wanted, or bears on a body that moves."""
+    bears = moved(params, wanted) and params.flesh.heeds_rot and len(params.wounds) > 0
+    return bears or not {*ROT, *MOULD, "budget_error"}.isdisjoint(wanted)
 
 
 def expected_cost(params: DecayParams, need: Need) -> Cost:
     """Return what a run is expected to take."""
     settings = choose(params, need.quality)
-    organisms = 2 if MOULD & set(need.fields) else 1 if ({*ROT, "budget_error"} & set(need.fields)) else 0
+    wanted = set(need.fields)
+    organisms = 2 if MOULD & wanted else 1 if stepped(params, wanted) else 0
     steps = need.stages[-1] * _clock(params) / _STEP + len(need.stages)
     assert need.resolution is not None  # settled
     width = 8 if need.dtype == "float64" else 4
-    values = sum((3 if f == "position" else 1) for f in FIELDS if f in need.fields) * 2 * need.resolution**2
+    values = sum((3 if f in VECTORS else 1) for f in FIELDS if f in wanted) * 2 * need.resolution**2
     seconds = 1e-5 * settings.vertices + steps * settings.vertices * _SECONDS * organisms / 2
+    if moved(params, wanted):
+        seconds += len(need.stages) * 20 * settings.layers**3 * _BODY_SECONDS
+        seconds += len(need.stages) * 10 * 4**settings.skin * _SKIN_SECONDS * (params.skin is not None)
     return Cost(seconds, len(need.stages) * (values * width + 200) + settings.vertices * _BYTES)
 
 

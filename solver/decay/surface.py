@@ -20,16 +20,28 @@ from scipy.spatial import KDTree
 from ..contract import InvalidGeometry
 from ..fruit import Fruit, directions, lattice
 
-__all__ = ["Surface", "geodesic", "lay", "sampler", "triangulated"]
+__all__ = [
+    "GOLDEN_ICOSAHEDRON",
+    "GOLDEN_POINTS",
+    "Surface",
+    "geodesic",
+    "lay",
+    "sampler",
+    "shares_at",
+    "triangulated",
+]
 
 Array = NDArray[np.float64]
 
 _GOLDEN = (1 + 5**0.5) / 2
 #: Corners of its triangles, of three golden rectangles of four corners each.
-_ICOSAHEDRON = (
+GOLDEN_ICOSAHEDRON = (
     *(0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4, 11, 10, 2, 10, 7, 6, 7, 1, 8),
     *(3, 9, 4, 3, 4, 2, 3, 2, 6, 3, 6, 8, 3, 8, 9, 4, 9, 5, 2, 4, 11, 6, 2, 10, 8, 6, 7, 9, 8, 1),
 )
+_RECTANGLE = np.array([[-1, _GOLDEN, 0], [1, _GOLDEN, 0], [-1, -_GOLDEN, 0], [1, -_GOLDEN, 0]])
+#: Its corners (12, 3), of length 1.
+GOLDEN_POINTS: Array = np.concatenate([np.roll(_RECTANGLE, k, axis=1) for k in range(3)]) / np.hypot(1, _GOLDEN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +76,8 @@ def geodesic(level: int) -> tuple[Array, NDArray[np.int64]]:
 
     Vertices are numbered so that neighbours lie close in memory.
     """
-    g = _GOLDEN
-    rectangle = np.array([[-1, g, 0], [1, g, 0], [-1, -g, 0], [1, -g, 0]])
-    points = np.concatenate([np.roll(rectangle, k, axis=1) for k in range(3)]) / np.hypot(1, g)
-    faces = np.array(_ICOSAHEDRON).reshape(20, 3)
+    points = GOLDEN_POINTS
+    faces = np.array(GOLDEN_ICOSAHEDRON).reshape(20, 3)
     for _ in range(level):
         edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
         unique, back = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_inverse=True)
@@ -129,9 +139,11 @@ def lay(fruit: Fruit, level: int) -> Surface:
 @lru_cache(maxsize=4)
 def sampler(level: int, resolution: int) -> sparse.csr_array:
     """Return the matrix that takes a field on `geodesic(level)` to the common lattice (n * 2n rows), linearly."""
-    rays, faces = geodesic(level)
-    theta, phi = lattice(resolution)
-    wanted = directions(theta, phi).reshape(-1, 3)
+    return shares_at(*geodesic(level), directions(*lattice(resolution)).reshape(-1, 3))
+
+
+def shares_at(rays: Array, faces: NDArray[np.int64], wanted: Array) -> sparse.csr_array:
+    """Return the matrix (w rows) that takes a field on a triangulated sphere of unit rays to wanted rays (w, 3)."""
     corners = rays[faces]
     _, candidates = KDTree(corners.mean(axis=1)).query(wanted, k=4)
     best, weights = np.full(len(wanted), -np.inf), np.zeros((len(wanted), 3))

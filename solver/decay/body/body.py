@@ -1,0 +1,134 @@
+"""The fruit's body on one fruit: from water lost and rot on the skin to the shape it settles to, stage by stage.
+
+Every stage is settled from the evenly shrunk fresh shape, so that it does not depend on the stages before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...fruit import directions, lattice
+from ..environment import reference_radius
+from ..params import DecayParams
+from ..surface import Surface, geodesic, shares_at
+from .equilibrium import Balance, Loads, rested, settle
+from .flesh import Softened, softened
+from .material import blocks
+from .solid import ball, fill
+
+__all__ = ["Body"]
+
+Array = NDArray[np.float64]
+
+#: Density of fresh fruit [kg/m^3].
+_DENSITY = 1000.0
+#: Stiffness of the floor per area, over the fresh modulus and an edge: it gives way by a thousandth of r1.
+_FLOOR = 30.0
+#: Stiffness per volume of the springs that keep the core from sliding, over the fresh modulus; how far the core goes.
+_TETHER, _CORE = 0.1, 0.5
+
+
+class Body:
+    """Tetrahedra of one fruit under a surface of `level`; tolerance: of the out-of-balance force."""
+
+    def __init__(self, params: DecayParams, surface: Surface, level: int, layers: int, tolerance: float) -> None:
+        self._params = params
+        self.solid = fill(params, layers)
+        self._surface = surface
+        self._level, self._layers = level, layers
+        self._tolerance = tolerance
+        self._pattern = blocks(self.solid.tets, len(self.solid.points))
+        self._pressure = _DENSITY * params.flesh.gravity * reference_radius(params, surface)
+
+    def state(self, water: float, rot: Array | None) -> Softened:
+        """Return the flesh after a share of the weight has gone as water; rot: on the surface's vertices (v)."""
+        solid, flesh = self.solid, self._params.flesh
+        inside = np.zeros(len(solid.tets))
+        if rot is not None:
+            at = _inwards(self._level, self._layers) @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
+            inside = at[solid.tets].mean(axis=1)
+        return softened(flesh, self._params.firmness, water, inside, solid.stone)
+
+    def settled(self, state: Softened, watch: Callable[[], None] = lambda: None) -> Balance:
+        """Return the shape that the flesh settles to.
+
+        Raises:
+            NotConverged: it does not.
+
+        """
+        solid, fresh = self.solid, self._params.flesh.unit * self._params.firmness
+        rest = rested(solid.points, solid.tets, state.shrinkage, state.young, self._params.flesh.poisson)
+        even = float(np.cbrt(np.average(state.shrinkage**3, weights=solid.volume)))
+        start = even * solid.points
+        return settle(start, rest, self._loads(state, start, fresh), self._pattern, self._tolerance, watch)
+
+    def _loads(self, state: Softened, start: Array, fresh: float) -> Loads:
+        solid, count = self.solid, len(self.solid.points)
+        zero = np.zeros(count)
+        if self._pressure == 0:
+            return Loads(zero, None, zero, zero, start)
+        shared = np.repeat(solid.volume / 4, 4)
+        mass: Array = np.bincount(solid.tets.ravel(), shared * np.repeat(state.mass, 4), count).astype(float)
+        corners = solid.points[solid.skin[solid.faces]]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+        contact = zero.copy()
+        contact[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(areas / 3, 3), len(solid.skin))
+        contact *= _FLOOR * fresh / float(np.cbrt(solid.volume.mean()))
+        core = np.linalg.norm(solid.points, axis=1) < _CORE
+        volume = np.bincount(solid.tets.ravel(), shared, count)
+        tether = np.where(core, _TETHER * fresh * volume, 0.0)
+        return Loads(self._pressure * mass, float(solid.points[:, 1].min()), contact, tether, start)
+
+    def on_lattice(self, balance: Balance, resolution: int) -> Array:
+        """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""
+        even, rest = self.parted(balance)
+        fresh = self._params.surface(*lattice(resolution))
+        return even * fresh + (_outwards(self._layers, resolution) @ rest).reshape(fresh.shape)
+
+    def on_surface(self, balance: Balance) -> Array:
+        """Return the displacement of the surface's vertices (v, 3)."""
+        even, rest = self.parted(balance)
+        return even * self._surface.points + self.onto(self._level) @ rest
+
+    def onto(self, level: int) -> sparse.csr_array:
+        """Return the matrix that takes a field (s) of the body's skin to the vertices of a sphere of `level`."""
+        return _onto(level, self._layers)
+
+    def parted(self, balance: Balance) -> tuple[float, Array]:
+        """Return the even part of the skin's displacement, over its place, and the rest (s, 3), which is interpolated.
+
+        Facets would take the even part as shrinking chords; taken apart, a fruit that shrinks evenly stays exact.
+        """
+        skin = self.solid.skin
+        fresh, moved = self.solid.points[skin], (balance.points - self.solid.points)[skin]
+        about = fresh - fresh.mean(axis=0)
+        even = float(np.sum(about * moved) / np.sum(about * about))
+        return even, moved - even * fresh
+
+
+def _skin(layers: int) -> tuple[Array, NDArray[np.int64]]:
+    rays, _, _, skin, faces = ball(layers)
+    return rays[skin], faces
+
+
+@lru_cache(maxsize=4)
+def _inwards(level: int, layers: int) -> sparse.csr_array:
+    """Return the matrix that takes a field of the surface to the body's points, along rays."""
+    rays = ball(layers)[0].copy()
+    rays[~rays.any(axis=1)] = (0.0, 1.0, 0.0)  # the centre has no ray, and lies too deep for one
+    return shares_at(*geodesic(level), rays)
+
+
+@lru_cache(maxsize=4)
+def _outwards(layers: int, resolution: int) -> sparse.csr_array:
+    return shares_at(*_skin(layers), directions(*lattice(resolution)).reshape(-1, 3))
+
+
+@lru_cache(maxsize=4)
+def _onto(level: int, layers: int) -> sparse.csr_array:
+    return shares_at(*_skin(layers), geodesic(level)[0])

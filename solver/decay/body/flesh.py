@@ -1,0 +1,75 @@
+"""Constants of the flesh, and what water and rot do to it: rest lengths (Eq. 1), softening, collapse of what is rotten.
+
+Eq. 1 prints a cube root that shrinks sixty times too much: volume goes with the cube of lengths, so losing the share x
+of a volume takes dL = -L (1 - (1 - x)^(1/3)) from each length. Steps of it multiply to (1 - X)^(1/3), with X the share
+lost so far, whatever the steps; the stiffness, dK = -c K x per step, to (1 - X)^c likewise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["Flesh", "Skin", "Softened", "softened"]
+
+Array = NDArray[np.float64]
+
+
+class Flesh(BaseModel):
+    """Constants of the body; the paper gives none of these numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    unit: float = Field(1e4, gt=0, le=1e8, description="Young's modulus of the flesh at firmness 1 [Pa]")
+    poisson: float = Field(0.3, ge=0, le=0.45, description="Poisson's ratio [1]")
+    stone: float = Field(
+        30.0, ge=1, le=1000, description="Stiffness of stone or core, over that of the fresh flesh [1]"
+    )
+    shrinkage: float = Field(
+        1.0, ge=0, le=1, description="Share of the lost water's volume that is not air, c of Eq. 1 [1]"
+    )
+    softening: float = Field(1.0, ge=0, le=10, description="c of the change of stiffness: (1 - X)^c is left [1]")
+    rot_depth: float = Field(0.5, gt=0, le=3, description="Depth at which the skin's rot has faded out [r1]")
+    rot_collapse: float = Field(0.25, ge=0, le=0.7, description="Share of its length that rotten flesh loses [1]")
+    rot_softness: float = Field(0.98, ge=0, le=0.999, description="Share of its stiffness that rotten flesh loses [1]")
+    gravity: float = Field(9.81, ge=0, le=100, description="Gravity; 0 is a fruit that floats [m/s2]")
+
+    @property
+    def heeds_rot(self) -> bool:
+        """Whether rot changes anything."""
+        return self.rot_collapse > 0 or self.rot_softness > 0
+
+
+class Skin(BaseModel):
+    """Constants of the skin; its thickness is `exocarp_thickness`. The paper leaves them to a cloth solver."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    stiffness: float = Field(50.0, gt=0, le=10000, description="Young's modulus of the skin, over the flesh's [1]")
+    shrinkage: float = Field(0.0, ge=0, le=1, description="Share of the body's even shrinkage that the skin joins [1]")
+    depth: float = Field(0.1, ge=0.01, le=1, description="Depth of the flesh that holds the skin [r1]")
+
+
+class Softened(NamedTuple):
+    """Per tetrahedron (t): lengths over fresh ones, Young's modulus [Pa], mass over fresh mass."""
+
+    shrinkage: Array
+    young: Array
+    mass: Array
+
+
+def softened(flesh: Flesh, firmness: float, water: float, rot: Array, stone: NDArray[np.bool_]) -> Softened:
+    """Return the state of tetrahedra after a share of the weight has gone as water; rot (t), 0 to 1.
+
+    A stone neither shrinks nor rots.
+    """
+    left = 1 - flesh.shrinkage * water
+    young = flesh.unit * firmness
+    return Softened(
+        np.where(stone, 1.0, np.cbrt(left) * (1 - flesh.rot_collapse * rot)),
+        np.where(stone, young * flesh.stone, young * left**flesh.softening * (1 - flesh.rot_softness * rot)),
+        np.where(stone, 1.0, 1 - water),
+    )

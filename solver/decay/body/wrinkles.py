@@ -1,0 +1,55 @@
+"""A fruit's skin on its moving body: how far it stands off from where the body carries it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...contract import Context
+from ..params import DecayParams
+from ..settings import Settings
+from ..surface import geodesic, lay, sampler, shares_at
+from .body import Body
+from .equilibrium import Balance
+from .flesh import Skin
+from .skin import Shell
+
+__all__ = ["Wrinkles"]
+
+Array = NDArray[np.float64]
+
+
+class Wrinkles:
+    """The skin of one fruit on a geodesic sphere of its own level, between the body's and the fields'."""
+
+    def __init__(self, params: DecayParams, skin: Skin, body: Body, settings: Settings) -> None:
+        self._body, self._skin, self._seed = body, skin, params.seed
+        self._level, self._fields, self._tolerance = settings.skin, settings.level, settings.balance
+        surface = lay(params, settings.skin)
+        self._points = surface.points
+        self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
+        self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness)
+
+    def at(self, balance: Balance, watch: Callable[[], None] = lambda: None) -> tuple[Array, float, int]:
+        """Return how far the skin stands off (v, 3) from the settled body, residual and steps.
+
+        Raises:
+            NotConverged: the skin found no equilibrium.
+
+        """
+        even, rest = self._body.parted(balance)
+        carried = (1 + even) * self._points + self._body.onto(self._level) @ rest
+        share = 1 + self._skin.shrinkage * even
+        generator = Context.generator(self._seed)
+        found, residual, steps = self._shell.wrinkled(carried, share, self._normals, generator, self._tolerance, watch)
+        return found - carried, residual, steps
+
+    def on_lattice(self, folds: Array, resolution: int) -> Array:
+        """Return what `at` found on the common lattice (n, 2 n, 3)."""
+        return (sampler(self._level, resolution) @ folds).reshape(resolution, -1, 3)
+
+    def on_surface(self, folds: Array) -> Array:
+        """Return what `at` found on the vertices of the fields' surface (v, 3)."""
+        return shares_at(*geodesic(self._level), geodesic(self._fields)[0]) @ folds

@@ -1,0 +1,95 @@
+"""Where the surface is in a stage: on the fresh fruit, or moved with a body that lost water and rotted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contract import Context, Need
+from ..fruit import lattice, window
+from .environment import water_lost
+from .params import DecayParams
+from .settings import BODY, Settings, moved
+from .surface import Surface, lay
+
+__all__ = ["Shape"]
+
+Array = NDArray[np.float64]
+
+
+class Shape:
+    """What the need asks of the fruit's shape, water lost included; nothing else is laid, filled or settled."""
+
+    def __init__(self, params: DecayParams, need: Need, settings: Settings) -> None:
+        self._params, self._need = params, need
+        self._wanted = set(need.fields)
+        moves = moved(params, self._wanted)
+        meshed = {"water_lost", "volume", "mesh_position", "triangle"} & self._wanted
+        self._surface = lay(params, settings.level) if moves or meshed else None
+        self._body = self._wrinkles = None
+        if moves and self._surface is not None:
+            from .body.body import Body
+
+            self._body = Body(params, self._surface, settings.level, settings.layers, settings.balance)
+            if params.skin is not None:
+                from .body.wrinkles import Wrinkles
+
+                self._wrinkles = Wrinkles(params, params.skin, self._body, settings)
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """Faces (f, 3) of the surface whose vertices are `mesh_position`."""
+        assert self._surface is not None
+        return self._surface.faces.astype(np.int32)
+
+    def at(self, day: float, rot: Array | None, context: Context) -> dict[str, Any]:
+        """Return the wanted shape of a day, with rot (v) on the surface's vertices.
+
+        Raises:
+            NotConverged: body or skin found no equilibrium.
+
+        """
+        wanted, need = self._wanted, self._need
+        row: dict[str, Any] = {}
+        lost = water_lost(self._params, self._surface, day) if self._surface is not None else 0.0
+        if "water_lost" in wanted:
+            row["water_lost"] = lost
+        balance = None
+        if self._body is not None:
+            balance = self._body.settled(self._body.state(lost, rot), context.check_cancelled)
+            row |= {"body_residual": balance.residual, "body_steps": balance.steps}
+        folds = None
+        if self._wrinkles is not None and balance is not None and (wanted & BODY) - {"least_jacobian"}:
+            folds, residual, steps = self._wrinkles.at(balance, context.check_cancelled)
+            row |= {"skin_residual": residual, "skin_steps": steps}
+        if "least_jacobian" in wanted:
+            row["least_jacobian"] = balance.least_jacobian if balance else 1.0
+        if wanted & {"position", "displacement"}:
+            assert need.resolution is not None  # settled
+            inside = window(need.resolution, need.region)
+            fresh = self._params.surface(*lattice(need.resolution))
+            gone = self._body.on_lattice(balance, need.resolution) if self._body and balance else np.zeros_like(fresh)
+            if self._wrinkles and folds is not None:
+                gone = gone + self._wrinkles.on_lattice(folds, need.resolution)
+            for name, values in (("position", fresh + gone), ("displacement", gone)):
+                if name in wanted:
+                    row[name] = values[inside].astype(need.dtype)
+        if wanted & {"mesh_position", "volume"}:
+            assert self._surface is not None
+            points = self._surface.points
+            if self._body and balance:
+                points = points + self._body.on_surface(balance)
+            if self._wrinkles and folds is not None:
+                points = points + self._wrinkles.on_surface(folds)
+            if "mesh_position" in wanted:
+                row["mesh_position"] = points.astype(need.dtype)
+            if "volume" in wanted:
+                row["volume"] = _volume(points, self._surface)
+        return row
+
+
+def _volume(points: Array, surface: Surface) -> float:
+    a, b, c = (points[surface.faces[:, k]] for k in range(3))
+    return float(np.sum(a * np.cross(b, c))) / 6

@@ -1,0 +1,75 @@
+"""The skin against the buckling of a shell on springs: when it wrinkles, and how wide."""
+
+import numpy as np
+import pytest
+
+from solver.contract import Context, Need
+from solver.decay import SOLVER
+from solver.decay.body.flesh import Skin
+from solver.decay.body.skin import Shell
+from solver.decay.surface import lay
+from solver.fruit import Fruit
+
+THICKNESS, RADIUS, POISSON = 0.06, 1.06, 0.3
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    return lay(Fruit(exocarp_thickness=THICKNESS, stone=(0, 0)), 4)
+
+
+def onset():
+    """Return the critical shrinkage of a sphere's flesh and the wave number of its skin (flesh modulus 1).
+
+    Shallow-shell buckling on springs k: k + E t / R^2 is what resists a wave, D = E t^3 / (12 (1 - nu^2)); the shell
+    also stands off evenly by 2 N / (k R), which takes that share of the shrinkage.
+    """
+    skin = Skin()
+    sheet, springs = skin.stiffness * THICKNESS, 1 / skin.depth
+    bending = sheet * THICKNESS**2 / (12 * (1 - POISSON**2))
+    resisting = springs + sheet / RADIUS**2
+    force = 2 * np.sqrt(resisting * bending)
+    shrinkage = force * (1 - POISSON) / sheet + 2 * force / (springs * RADIUS**2)
+    return float(shrinkage), float((resisting / bending) ** 0.25)
+
+
+def heights(sphere, shrinkage):
+    """Return the wrinkles' rms height, over the thickness, and their mean wave number."""
+    shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
+    outward = sphere.points / RADIUS
+    carried = (1 - shrinkage) * sphere.points
+    found, residual, _ = shell.wrinkled(carried, 1.0, outward, Context.generator(0), 1e-5)
+    assert residual <= 1e-5
+    h = np.einsum("vi,vi->v", found - carried, outward)
+    h -= sphere.mean(h)
+    own = np.repeat(np.arange(len(h)), np.diff(sphere.start))
+    slopes = np.sum(sphere.weight * (h[own] - h[sphere.near]) ** 2) / 2
+    return np.sqrt(sphere.mean(h**2)) / THICKNESS, np.sqrt(slopes / sphere.total(h**2))
+
+
+def test_a_skin_wrinkles_past_the_critical_shrinkage_with_the_width_of_theory(sphere):
+    critical, wave = onset()
+    assert heights(sphere, 0.85 * critical)[0] < 0.02
+    tall, found = heights(sphere, 1.25 * critical)
+    assert tall > 0.1
+    assert found == pytest.approx(wave, rel=0.1)
+
+
+def test_a_skin_that_shrinks_with_its_body_stays_on_it(sphere):
+    shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
+    carried = 0.7 * sphere.points
+    found, _, _ = shell.wrinkled(carried, 0.7, sphere.points / RADIUS, Context.generator(0), 1e-6)
+    assert found == pytest.approx(carried, abs=1e-6)
+
+
+def test_wrinkles_come_on_top_of_the_body_and_only_with_a_skin():
+    need = Need(fields=("displacement",), stages=(3.0,), quality="preview", resolution=64)
+    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "flesh": {"gravity": 0}}
+    bare = SOLVER.solve(SOLVER.parse(values, "orange"), need)
+    skinned = SOLVER.solve(SOLVER.parse({**values, "skin": {}}, "orange"), need)
+    assert "skin_residual" not in bare
+    assert (skinned.skin_residual <= 1e-3).all()
+    apart = (skinned.displacement - bare.displacement).values
+    assert 0.01 < np.abs(apart).max() < 0.3
+    again = SOLVER.solve(SOLVER.parse({**values, "skin": {}}, "orange"), need)
+    assert np.array_equal(again.displacement, skinned.displacement)
