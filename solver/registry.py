@@ -12,7 +12,7 @@ from .contract import InvalidInput, Solver
 __all__ = ["get", "names"]
 
 #: Our own solvers: name -> "module:attribute". Others join through the entry-point group `wizen.solvers`.
-_OURS = {"decay": "solver.decay:SOLVER", "dehydration": "solver.dehydration:SOLVER"}
+_OURS = {"decay": "solver.decay:SOLVER", "dehydration": "solver.dehydration:SOLVER", "wood": "solver.wood:SOLVER"}
 
 
 @cache

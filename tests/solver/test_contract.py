@@ -30,6 +30,7 @@ from solver.quantities import QUANTITIES, Quantity, register
 SMALL = {
     "decay": ({"growth": 50.0}, (0.3, 0.6), (110.0,)),
     "dehydration": ({"te": 0.1, "gamma": 3.0}, (0.01, 0.02), (0.5,)),
+    "wood": ({"rods": 8, "vertices": 16, "bend": 0.01, "length": 0.15}, (2e-4, 4e-4), (50.0,)),
 }
 
 
