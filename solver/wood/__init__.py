@@ -48,7 +48,7 @@ SOLVER = Solver(
     stages=StageAxis("t", "time", "s", 0.0, 60.0, (0.005, 0.01, 0.015, 0.02)),
     default_resolution={"preview": 32, "default": 64, "fine": 128},
     # largest error of the elastica's tip (docs/wood.md)
-    tolerances={"preview": 0.01, "default": 0.003, "fine": 0.001},
+    tolerances={"preview": 0.003, "default": 0.001, "fine": 0.0003},
     presets=PRESETS,
     run=_run,
     cost=_cost,

@@ -12,7 +12,7 @@ from .arrays import Bodies, Bonds, Rods, Turns
 from .explicit import Motion, Scratch
 from .grain import Field
 from .params import WoodParams
-from .section import areas, place
+from .section import areas, balanced, place
 
 __all__ = ["SAMPLES", "Wood", "lay", "scratch_for"]
 
@@ -39,6 +39,7 @@ class Wood:
     rod: np.ndarray  # (e,) int32 rod of an edge, ghosts too
     grid: np.ndarray  # (rods, vertices) int32: vertex numbers as laid
     cut: np.ndarray  # (e,) where an edge is cut, 0 to 1; -1: it is not
+    parent: np.ndarray  # (v,) int32 vertex that one was split from; itself as laid
 
     def copied(self) -> Wood:
         """Return a copy that can be stepped without touching this one."""
@@ -97,12 +98,15 @@ def _started(rest: np.ndarray, params: WoodParams) -> np.ndarray:
     x = rest.copy()
     if params.bend:
         xi = rest[..., 0] / params.length
-        shape = {
-            "none": np.sin(np.pi * xi) - 2 / np.pi,
-            "start": np.maximum(xi, 0) ** 2 * (3 - xi) / 2,
-            "both": (1 - np.cos(2 * np.pi * np.clip(xi, 0, 1))) / 2,
+        inside = np.clip(xi, 0, 1)
+        shape, slope = {
+            "none": (np.sin(np.pi * xi) - 2 / np.pi, np.pi * np.cos(np.pi * xi)),
+            "start": (inside**2 * (3 - inside) / 2, inside * (6 - 3 * inside) / 2),
+            "both": ((1 - np.cos(2 * np.pi * inside)) / 2, np.pi * np.sin(2 * np.pi * inside)),
         }[params.clamp]
         x[..., 2] += params.bend * params.length * shape
+        # sections stay plane and square to the axis; without it the bonds would start sheared
+        x[..., 0] -= params.bend * rest[..., 2] * slope
     return x
 
 
@@ -154,6 +158,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     if not least > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
     area = areas(points, params.radius)
+    points = balanced(points, area, params.radius)
     rods = len(points)
     s = _along(rods, vertices, params, generator)
     grain = Field(params.grain.along, params.grain.across, generator)
@@ -253,6 +258,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         rod,
         grid,
         np.full(len(a), -1.0),
+        number.ravel(),
     )
 
 

@@ -158,6 +158,7 @@ def _split(wood: Wood, h: int) -> Wood:
         wood,
         motion=Motion(*(grown.get(name, getattr(m, name)) for name in Motion._fields)),
         bonds=Bonds(*(np.concatenate([getattr(bonds, name), more[name]]) for name in Bonds._fields)),
+        parent=np.append(wood.parent, np.int32(i)),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
-__all__ = ["areas", "place"]
+__all__ = ["areas", "balanced", "place"]
 
 #: Below this many rods there is no inside: they stand evenly on one ring.
 _RING = 8
@@ -78,3 +78,17 @@ def areas(points: np.ndarray, radius: float) -> np.ndarray:
     rings = radius * np.sqrt((np.arange(count) + 0.5) / count)
     owner = cKDTree(points).query(np.column_stack([rings * np.cos(turn), rings * np.sin(turn)]))[1]
     return np.bincount(owner, minlength=len(points)) * (np.pi * radius**2 / count)
+
+
+def balanced(points: np.ndarray, area: np.ndarray, radius: float) -> np.ndarray:
+    """Return points (k, 2) [m] moved and scaled so that centroid and polar second moment are the disk's.
+
+    Rods that stand on the rim of the sampling would make the section a fifth too stiff at 20 rods; scaled, their
+    centres lie about their own radius below the surface.
+    """
+    centred = points - area @ points / area.sum()
+    spread = float(area @ (centred**2).sum(1))
+    own = float((area**2).sum() / (2 * np.pi))
+    if spread == 0:
+        return centred
+    return centred * np.sqrt(max(np.pi * radius**4 / 2 - own, 0.0) / spread)

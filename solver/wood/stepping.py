@@ -13,7 +13,7 @@ from .explicit import BENDING, BONDS, CONTACT, LOST, STRETCH, WORK, Scratch, for
 from .fracture import break_worst, overstress
 from .params import WoodParams
 
-__all__ = ["Reached", "State", "begin", "broken", "explicit", "kinetic"]
+__all__ = ["Reached", "State", "balanced", "begin", "broken", "copied", "explicit", "floor", "kinetic"]
 
 #: Steps between looks for breaks, so many that they cost little and a wave passes few edges meanwhile.
 _LOOK, _FEWEST, _MOST = 6000, 4, 32
@@ -49,6 +49,11 @@ def kinetic(wood: Wood) -> float:
     free = m.held == 0
     spin = 0.5 * float((wood.turns.inertia * m.spin**2).sum()) if wood.turning else 0.0
     return 0.5 * float((m.mass[free, None] * m.v[free] ** 2).sum()) + spin
+
+
+def floor(wood: Wood, params: WoodParams) -> float:
+    """Return a small energy [J] below which nothing counts: a billionth of what the rods bear before they break."""
+    return 0.5e-9 * float(wood.rods.k @ wood.rods.rest) * params.strain_limit**2
 
 
 def begin(wood: Wood) -> State:
@@ -120,7 +125,8 @@ def _advance(state: State, params: WoodParams, time: float, dt: float, steps: in
     return state._replace(steps=state.steps + steps)
 
 
-def _copied(state: State) -> State:
+def copied(state: State) -> State:
+    """Return a state that can be stepped without touching this one."""
     wood = state.wood.copied()
     return state._replace(
         wood=wood,
@@ -145,7 +151,7 @@ def explicit(
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking = params.fracture != "none"
     chunk = look if breaking else max(_BATCH // len(wood.motion.x) // look, 1) * look
-    scale, since = 0.0, 0
+    scale, since = floor(wood, params), 0
     for wanted in times:
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
         while state.steps + look <= ahead:
@@ -158,24 +164,24 @@ def explicit(
             if since > _BATCH:
                 since = 0
                 context.check_cancelled()
-                found = _reach(state, state.steps * dt, start, scale, tolerance)
+                found = balanced(state, state.steps * dt, start, scale, tolerance)
                 scale = _scale(found.energy, scale)
                 context.report(state.steps * dt / times[-1], f"t = {state.steps * dt:.4g} s")
-        shown = _copied(state)
+        shown = copied(state)
         rest = ahead - state.steps
         if rest:
             shown = _advance(shown, params, state.steps * dt, dt, rest)
         if wanted - ahead * dt > 1e-9 * dt:
             shown = _advance(shown, params, ahead * dt, wanted - ahead * dt, 1)
-        yield _reach(shown, wanted, start, scale, tolerance)
+        yield balanced(shown, wanted, start, scale, tolerance)
 
 
 def _scale(energy: tuple[float, float, float, float, float], scale: float) -> float:
     kinetic_, elastic, lost, work, start = energy
-    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost), 1e-300)
+    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost))
 
 
-def _reach(state: State, time: float, start: float, scale: float, tolerance: float) -> Reached:
+def balanced(state: State, time: float, start: float, scale: float, tolerance: float) -> Reached:
     """Return the stage with its balance; a balance lost altogether is a run that blew up.
 
     Raises:

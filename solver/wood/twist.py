@@ -18,26 +18,36 @@ __all__ = ["carry", "turn", "twists"]
 _FLAT = 1e-9
 
 
-@njit(cache=True, error_model="numpy")
-def _dot(a: np.ndarray, b: np.ndarray) -> float:
+_Vector = tuple[float, float, float]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _row(a: np.ndarray, n: int) -> _Vector:
+    return a[n, 0], a[n, 1], a[n, 2]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _dot(a: _Vector, b: _Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, error_model="numpy")
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    out = np.empty(3)
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return out
+@njit(cache=True, error_model="numpy", inline="always")
+def _cross(a: _Vector, b: _Vector) -> _Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _sum(p: float, a: _Vector, q: float, b: _Vector) -> _Vector:
+    """Return p a + q b."""
+    return p * a[0] + q * b[0], p * a[1] + q * b[1], p * a[2] + q * b[2]
 
 
 @njit(cache=True, error_model="numpy")
-def _moved(d: np.ndarray, old: np.ndarray, new: np.ndarray) -> np.ndarray:
-    """Return d (3,) turned by the least rotation that takes the unit vector old to new."""
+def _moved(d: _Vector, old: _Vector, new: _Vector) -> _Vector:
+    """Return d turned by the least rotation that takes the unit vector old to new."""
     axis = _cross(old, new)
-    more = max(1.0 + _dot(old, new), _FLAT)
-    return d * _dot(old, new) + _cross(axis, d) + axis * (_dot(axis, d) / more)
+    c = _dot(old, new)
+    return _sum(1.0, _sum(c, d, 1.0, _cross(axis, d)), _dot(axis, d) / max(1.0 + c, _FLAT), axis)
 
 
 @njit(cache=True, error_model="numpy")
@@ -46,10 +56,14 @@ def carry(d: np.ndarray, old: np.ndarray, t: np.ndarray, rods: Rods) -> None:
     for e in range(len(rods.a)):
         if rods.alive[e] == 0:
             continue
-        moved = _moved(d[e], old[e], t[e])
-        moved -= t[e] * _dot(moved, t[e])
-        d[e] = moved / np.sqrt(_dot(moved, moved))
-        old[e] = t[e]
+        now = _row(t, e)
+        moved = _moved(_row(d, e), _row(old, e), now)
+        # round-off must not tilt it over millions of steps
+        moved = _sum(1.0, moved, -_dot(moved, now), now)
+        scale = 1.0 / np.sqrt(_dot(moved, moved))
+        for c in range(3):
+            d[e, c] = moved[c] * scale
+            old[e, c] = now[c]
 
 
 @njit(cache=True, error_model="numpy")
@@ -60,8 +74,10 @@ def twists(d: np.ndarray, t: np.ndarray, rods: Rods, reference: np.ndarray) -> N
             continue
         p = rods.before[h]
         q = rods.after[h]
-        u = _moved(d[p], t[p], t[q])
-        angle = np.arctan2(_dot(t[q], _cross(u, d[q])), _dot(u, d[q]))
+        w = _row(t, q)
+        u = _moved(_row(d, p), _row(t, p), w)
+        own = _row(d, q)
+        angle = np.arctan2(_dot(w, _cross(u, own)), _dot(u, own))
         reference[h] = angle + 2.0 * np.pi * np.round((reference[h] - angle) / (2.0 * np.pi))
 
 
@@ -84,20 +100,22 @@ def turn(
             continue
         p = rods.before[h]
         q = rods.after[h]
-        u = t[p]
-        w = t[q]
-        up = _cross(u, d[p])
-        wq = _cross(w, d[q])
+        u = _row(t, p)
+        w = _row(t, q)
+        dp = _row(d, p)
+        dq = _row(d, q)
+        up = _cross(u, dp)
+        wq = _cross(w, dq)
         cp = np.cos(theta[p])
         sp = np.sin(theta[p])
         cq = np.cos(theta[q])
         sq = np.sin(theta[q])
-        p1 = cp * d[p] + sp * up
-        p2 = cp * up - sp * d[p]
-        q1 = cq * d[q] + sq * wq
-        q2 = cq * wq - sq * d[q]
-        more = max(1.0 + _dot(u, w), _FLAT)
-        kb = _cross(u, w) * (2.0 / more)
+        p1 = _sum(cp, dp, sp, up)
+        p2 = _sum(cp, up, -sp, dp)
+        q1 = _sum(cq, dq, sq, wq)
+        q2 = _sum(cq, wq, -sq, dq)
+        less = 1.0 / max(1.0 + _dot(u, w), _FLAT)
+        kb = _sum(2.0 * less, _cross(u, w), 0.0, u)
         k1 = 0.5 * (_dot(p2, kb) + _dot(q2, kb))
         k2 = -0.5 * (_dot(p1, kb) + _dot(q1, kb))
         o1 = k1 - turns.kappa[h, 0]
@@ -109,13 +127,11 @@ def turn(
         w1 = 2.0 * stiff * o1
         w2 = 2.0 * stiff * o2
         wt = 2.0 * tight * tau
-        mean = (u + w) / more
-        m1 = (p1 + q1) / more
-        m2 = (p2 + q2) / more
-        common = mean * (-w1 * k1 - w2 * k2)
-        half = kb * (0.5 * wt)
-        gp = (common + _cross(w, m2 * w1 - m1 * w2) + half) * inverse[p]
-        gq = (common - _cross(u, m2 * w1 - m1 * w2) + half) * inverse[q]
+        along = -(w1 * k1 + w2 * k2) * less
+        common = _sum(1.0, _sum(along, u, along, w), 0.5 * wt, kb)
+        across = _sum(w1 * less, _sum(1.0, p2, 1.0, q2), -w2 * less, _sum(1.0, p1, 1.0, q1))
+        gp = _sum(inverse[p], common, inverse[p], _cross(w, across))
+        gq = _sum(inverse[q], common, -inverse[q], _cross(u, across))
         torque[p] += 0.5 * (w1 * _dot(kb, p1) + w2 * _dot(kb, p2)) + wt
         torque[q] += 0.5 * (w1 * _dot(kb, q1) + w2 * _dot(kb, q2)) - wt
         a = rods.a[p]
