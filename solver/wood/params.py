@@ -178,7 +178,7 @@ class WoodParams(Params):
         0.0,
         ge=-0.3,
         le=0.3,
-        description="Deflection at the start over the length: half a sine between free ends, a loaded beam from a clamp",
+        description="Deflection at the start over the length: half a sine if free, a loaded beam if clamped",
         json_schema_extra={"units": "1"},
     )
     gravity: float = Field(0.0, ge=-100, le=100, description="Gravity along -z", json_schema_extra={"units": "m s-2"})

@@ -186,6 +186,10 @@ def test_a_partial_result_survives_pickling(solver):
 def test_region_returns_a_part_of_the_whole(solver):
     params, need, _ = small(solver)
     whole = solver.solve(params, need)
+    if "colatitude" not in whole.coords:
+        with pytest.raises(InvalidInput, match="colatitude"):
+            solver.solve(params, need.model_copy(update={"region": Region()}))
+        return
     part = solver.solve(params, need.model_copy(update={"region": Region(colatitude=(30, 90), azimuth=(0, 180))}))
     assert 0 < part.sizes["colatitude"] < whole.sizes["colatitude"]
     cut = whole.sel(colatitude=part.colatitude, azimuth=part.azimuth)
