@@ -100,7 +100,7 @@ class _Solver:
         m = wood.motion
         free = m.held == 0
         inertia = (1 / bdt + p.damping) / bdt
-        least = 2e9 * floor(wood, p) / p.strain_limit / p.length * 1e-7
+        least = 2e9 * floor(wood, p) / p.strain_limit / p.length * 1e-10
 
         def residual() -> np.ndarray:
             m.v[free] = (m.x[free] - xh[free]) / bdt
