@@ -205,7 +205,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         np.sqrt(section / np.pi),
     )
     mass = np.bincount(a, section * solid, len(flat)) + np.bincount(b, section * solid, len(flat))
-    mass *= params.density / 2
+    mass = mass * (params.density / 2)
     held = np.zeros((rods, count), np.uint8)
     if ghosts[0]:
         held[:, :2] = 1
@@ -213,9 +213,9 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         held[:, -2:] = 1
     load = np.zeros((rods, count, 3))
     load[:, -1] = area[:, None] / area.sum() * np.array(params.tip_load)
-    load = load.reshape(-1, 3)
-    load[:, 2] -= mass * params.gravity
-    load[held.ravel() == 1] = 0.0
+    loads = load.reshape(-1, 3)
+    loads[:, 2] -= mass * params.gravity
+    loads[held.ravel() == 1] = 0.0
     x = _started(rest, params).reshape(-1, 3)
     speed = np.clip(straight[..., :1] / params.length, 0, 1) * np.array(params.pull)
     tangent = vector / length[:, None]
@@ -225,7 +225,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         speed.reshape(-1, 3).copy(),
         np.where(mass > 0, mass, 1.0),
         held.ravel(),
-        load,
+        loads,
         director,
         (x[b] - x[a]) / np.linalg.norm(x[b] - x[a], axis=1)[:, None],
         np.zeros(len(a)),

@@ -185,7 +185,7 @@ class Stiffness:
         """Return K [N/m] with `diagonal` (free dof,) and `blocks` (free vertices, 3, 3) added."""
         _fill(x, rods, bonds, self._elements)
         data = np.bincount(self._place, self._elements[self._inside], self._nnz)
-        data[self._diagonal] += diagonal
+        data[self._diagonal] = data[self._diagonal] + diagonal
         if blocks is not None:
             np.add.at(data, self._block, blocks)
         return sp.csc_matrix((data, self._indices, self._pointer), shape=(self.size, self.size))
