@@ -204,8 +204,10 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         np.ones(len(before), np.uint8),
         np.sqrt(section / np.pi),
     )
-    mass = np.bincount(a, section * solid, len(flat)) + np.bincount(b, section * solid, len(flat))
-    mass = mass * (params.density / 2)
+    tributary = section * solid * params.density / 2
+    mass = np.zeros(len(flat))
+    np.add.at(mass, a, tributary)
+    np.add.at(mass, b, tributary)
     held = np.zeros((rods, count), np.uint8)
     if ghosts[0]:
         held[:, :2] = 1

@@ -8,7 +8,7 @@ The formula damps what it does not resolve; how much that takes is reported as m
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse.linalg import splu
@@ -48,7 +48,7 @@ class _Solver:
     def __init__(self, params: WoodParams) -> None:
         self._params = params
         self._stiffness: Stiffness | None = None
-        self._lu = None
+        self._lu: Any = None
         self._key: tuple[object, ...] = ()
         self.factors = 0
 
