@@ -117,3 +117,18 @@ register(
     mesh_area=Quantity("1", "area of the shape, in the start shape's unit squared", "A"),
     stored_energy=Quantity("1", "elastic energy, membrane and bending, in units of mu l^2", "E"),
 )
+
+# wood: rods and bonds
+register(
+    kinetic_energy=Quantity("J", "kinetic energy of what is not held", "E_k"),
+    elastic_energy=Quantity("J", "energy of stretching, bending, twist, bonds and contacts", "E_e"),
+    lost_energy=Quantity("J", "energy lost by breaks, friction and damping since the start", "E_l"),
+    work=Quantity("J", "work of loads, weight, grips and bodies since the start", "W"),
+    broken_rods=Quantity("1", "breaks of rods since the start", "n_r"),
+    broken_bonds=Quantity("1", "bonds broken or left without a rod since the start", "n_b"),
+    impulse=Quantity("N s", "impulse that the rigid bodies received from the rods since the start", "J"),
+    tip_position=Quantity("m", "mean position of the rods' far ends, weighted with their sections", "x_tip"),
+    rod_position=Quantity("m", "positions of both ends of every edge of the rods", "x"),
+    rod_cut=Quantity("1", "where an edge is cut, 0 to 1 from its first end; -1 where it is not", "c"),
+    rod=Quantity("1", "number of the rod that an edge belongs to", "-"),
+)

@@ -16,6 +16,7 @@ _OURS = {
     "decay": "solver.decay:SOLVER",
     "dehydration": "solver.dehydration:SOLVER",
     "growth": "solver.growth:SOLVER",
+    "wood": "solver.wood:SOLVER",
 }
 
 

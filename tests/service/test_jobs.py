@@ -355,7 +355,13 @@ def test_the_page_shows_every_solver_s_own_model(queue_only: httpx.Client) -> No
     document = queue_only.get("/openapi.json").json()
     validate(document)
     schemas = document["components"]["schemas"]
-    assert set(schemas["JobRequest"]["discriminator"]["mapping"]) == {"decay", "dehydration", "shrinking"}
+    assert set(schemas["JobRequest"]["discriminator"]["mapping"]) == {
+        "decay",
+        "dehydration",
+        "growth",
+        "shrinking",
+        "wood",
+    }
     form = schemas["JobRequest_dehydration"]["properties"]
     assert form["params"]["properties"]["modulus_ratio"]["maximum"] == 1000
     assert form["params"]["properties"]["gamma"]["maximum"] == 1000

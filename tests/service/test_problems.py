@@ -60,6 +60,8 @@ EXPECTED: dict[type[Exception], int] = {
     errors.JobEnded: 409,
     errors.TooManyListeners: 429,
     errors.UncertainBatch: 422,
+    errors.UnfitFormat: 422,
+    errors.Unavailable: 501,
     errors.BatchTooLarge: 413,
 }
 

@@ -1,0 +1,55 @@
+"""Wood (Sutherland 2012): discrete elastic rods, bonded into bundles that bend, splinter and break, in seconds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..contract import Context, Cost, Need, Solver, StageAxis
+from .params import Body, Grain, Notch, Waypoint, WoodParams
+from .presets import PRESETS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["SOLVER", "Body", "Grain", "Notch", "Waypoint", "WoodParams"]
+
+
+def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
+    # the numerics cost a second to import; parameters and schemas must not
+    from .run import run
+
+    return run(params, need, context)
+
+
+def _cost(params: WoodParams, need: Need) -> Cost:
+    from .settings import expected_cost
+
+    return expected_cost(params, need)
+
+
+_NUMBERS = (
+    "kinetic_energy",
+    "elastic_energy",
+    "lost_energy",
+    "work",
+    "broken_rods",
+    "broken_bonds",
+    "impulse",
+    "tip_position",
+)
+
+SOLVER = Solver(
+    name="wood",
+    version="1",
+    title="Wood: bonded rods and splinters",
+    params=WoodParams,
+    fields=("rod_cut", *_NUMBERS, "rod_position"),
+    default_fields=("rod_cut", *_NUMBERS, "rod_position"),
+    stages=StageAxis("t", "time", "s", 0.0, 60.0, (0.005, 0.01, 0.015, 0.02)),
+    default_resolution={"preview": 32, "default": 64, "fine": 128},
+    # largest error of the elastica's tip (docs/wood.md)
+    tolerances={"preview": 0.003, "default": 0.001, "fine": 0.0003},
+    presets=PRESETS,
+    run=_run,
+    cost=_cost,
+)

@@ -1,0 +1,65 @@
+"""The arrays that kernels work on: edges and hinges of all rods, bonds between them, bodies about them.
+
+Vertices are rows of arrays of positions x (v, 3) [m]. An edge joins two vertices; a hinge is where two edges of one
+rod meet. A clamped end has a ghost edge behind it: an edge without stiffness, whose held vertices only give the
+clamp's direction.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+__all__ = ["Bodies", "Bonds", "Rods", "Turns"]
+
+
+class Rods(NamedTuple):
+    """Edges (e,) and hinges (h,) of all rods."""
+
+    a: np.ndarray  # (e,) int32 first vertex
+    b: np.ndarray  # (e,) int32 second vertex
+    rest: np.ndarray  # (e,) rest length [m]
+    k: np.ndarray  # (e,) axial stiffness E A [N]; 0 for ghosts
+    alive: np.ndarray  # (e,) uint8
+    before: np.ndarray  # (h,) int32 edge before the hinge
+    after: np.ndarray  # (h,) int32 edge after it
+    span: np.ndarray  # (h,) rest length that it stands for, twice [m]
+    alpha: np.ndarray  # (h,) bending stiffness E I [N m2]
+    whole: np.ndarray  # (h,) uint8
+    radius: np.ndarray  # (e,) of the round rod of the same area [m]
+
+
+class Bonds(NamedTuple):
+    """Bonds (b,) from a vertex to a point of another rod's edge."""
+
+    i: np.ndarray  # (b,) int32 vertex
+    j: np.ndarray  # (b,) int32 edge
+    share: np.ndarray  # (b,) where on the edge, 0 to 1; beyond it on a stub that the edge carries
+    rest: np.ndarray  # (b,) rest distance [m]
+    k: np.ndarray  # (b,) transverse stiffness [N]: energy k s^2 rest / 2
+    s: np.ndarray  # (b,) shear stiffness S of Eq. 3.12 [J]
+    cosine: np.ndarray  # (b,) cosine of the shear angle at rest
+    limit: np.ndarray  # (b,) energy at which it breaks [J]
+    on: np.ndarray  # (b,) uint8
+
+
+class Turns(NamedTuple):
+    """What twist and curved rest shapes need besides: frames of edges and rest values of hinges."""
+
+    beta: np.ndarray  # (h,) torsional stiffness G J [N m2]
+    kappa: np.ndarray  # (h, 2) curvature at rest in the material frame, integrated over the hinge
+    tau: np.ndarray  # (h,) twist at rest [radian]
+    inertia: np.ndarray  # (e,) about the edge's own axis [kg m2]
+
+
+class Bodies(NamedTuple):
+    """Rigid bodies (r,) on given paths."""
+
+    kind: np.ndarray  # (r,) int32: 0 box, 1 cylinder
+    axis: np.ndarray  # (r,) int32: of a cylinder
+    half: np.ndarray  # (r, 3) half sides of a box [m]; radius, half length, 0 of a cylinder
+    friction: np.ndarray  # (r,)
+    times: np.ndarray  # (r, w) [s], rising
+    points: np.ndarray  # (r, w, 3) centre at these times [m]
+    k: np.ndarray  # (r,) contact stiffness of a vertex [N/m]

@@ -1,0 +1,137 @@
+"""Contact of vertices with rigid bodies on given paths: a penalty with Coulomb friction, impulse and work accounted.
+
+The thesis (3.2.5) reflects vertices as in elastic collisions. A penalty E = k g^2 / 2 in the depth g has an energy of
+its own, so that what a body puts in can be balanced, and the same force serves the implicit scheme.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .arrays import Bodies
+
+__all__ = ["pose", "press"]
+
+_TINY = 1e-30
+
+
+@njit(cache=True, error_model="numpy")
+def pose(bodies: Bodies, time: float, centre: np.ndarray, speed: np.ndarray) -> None:
+    """Write centres (r, 3) [m] and velocities (r, 3) [m/s] at `time` [s]; bodies rest before and after their path."""
+    for r in range(len(bodies.kind)):
+        n = bodies.times.shape[1]
+        last = 0
+        while last + 1 < n and bodies.times[r, last + 1] <= time:
+            last += 1
+        for c in range(3):
+            centre[r, c] = bodies.points[r, last, c]
+            speed[r, c] = 0.0
+        if last + 1 < n and time >= bodies.times[r, last]:
+            width = bodies.times[r, last + 1] - bodies.times[r, last]
+            if width > 0.0:
+                for c in range(3):
+                    speed[r, c] = (bodies.points[r, last + 1, c] - bodies.points[r, last, c]) / width
+                    centre[r, c] += speed[r, c] * (time - bodies.times[r, last])
+
+
+@njit(cache=True, error_model="numpy")
+def press(
+    x: np.ndarray,
+    v: np.ndarray,
+    f: np.ndarray,
+    mass: np.ndarray,
+    held: np.ndarray,
+    bodies: Bodies,
+    centre: np.ndarray,
+    speed: np.ndarray,
+    dt: float,
+    rubbing: float,
+    push: np.ndarray,
+    power: np.ndarray,
+) -> float:
+    """Add contact forces to f (v, 3) [N]; return the energy of the contacts [J].
+
+    push (r, 3) [N] gets the force on each body; power[0] the power of the bodies, power[1] the power lost by friction
+    [W]. With `rubbing` above 0 friction has its full size beyond this slip [m/s] and grows evenly below (the implicit
+    scheme needs that); with 0 it is limited to what stops a vertex in half a step `dt` [s].
+    """
+    energy = 0.0
+    for r in range(len(bodies.kind)):
+        reach = bodies.half[r]
+        axis = bodies.axis[r]
+        for i in range(len(x)):
+            if held[i] == 1:
+                continue
+            o0 = x[i, 0] - centre[r, 0]
+            o1 = x[i, 1] - centre[r, 1]
+            o2 = x[i, 2] - centre[r, 2]
+            n0 = 0.0
+            n1 = 0.0
+            n2 = 0.0
+            if bodies.kind[r] == 0:
+                g0 = reach[0] - abs(o0)
+                g1 = reach[1] - abs(o1)
+                g2 = reach[2] - abs(o2)
+                gap = min(g0, min(g1, g2))
+                if gap <= 0.0:
+                    continue
+                if gap == g2:
+                    n2 = 1.0 if o2 > 0 else -1.0
+                elif gap == g1:
+                    n1 = 1.0 if o1 > 0 else -1.0
+                else:
+                    n0 = 1.0 if o0 > 0 else -1.0
+            else:
+                along = o0 if axis == 0 else (o1 if axis == 1 else o2)
+                cap = reach[1] - abs(along)
+                if cap <= 0.0:
+                    continue
+                c0 = 0.0 if axis == 0 else o0
+                c1 = 0.0 if axis == 1 else o1
+                c2 = 0.0 if axis == 2 else o2
+                away = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
+                gap = reach[0] - away
+                if gap <= 0.0:
+                    continue
+                if gap <= cap or away == 0.0:
+                    n0 = c0 / max(away, _TINY)
+                    n1 = c1 / max(away, _TINY)
+                    n2 = c2 / max(away, _TINY)
+                    if away == 0.0:
+                        n2 = 1.0 if axis != 2 else 0.0
+                        n1 = 0.0 if axis != 2 else 1.0
+                else:
+                    gap = cap
+                    side = 1.0 if along > 0 else -1.0
+                    n0 = side if axis == 0 else 0.0
+                    n1 = side if axis == 1 else 0.0
+                    n2 = side if axis == 2 else 0.0
+            normal = bodies.k[r] * gap
+            energy += 0.5 * normal * gap
+            s0 = v[i, 0] - speed[r, 0]
+            s1 = v[i, 1] - speed[r, 1]
+            s2 = v[i, 2] - speed[r, 2]
+            sn = s0 * n0 + s1 * n1 + s2 * n2
+            s0 -= sn * n0
+            s1 -= sn * n1
+            s2 -= sn * n2
+            slip = np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
+            drag = 0.0
+            if bodies.friction[r] > 0.0 and slip > 0.0:
+                if rubbing > 0.0:
+                    drag = bodies.friction[r] * normal * min(slip / rubbing, 1.0) / slip
+                else:
+                    drag = min(bodies.friction[r] * normal, 0.5 * mass[i] * slip / dt) / slip
+            p0 = normal * n0 - drag * s0
+            p1 = normal * n1 - drag * s1
+            p2 = normal * n2 - drag * s2
+            f[i, 0] += p0
+            f[i, 1] += p1
+            f[i, 2] += p2
+            push[r, 0] -= p0
+            push[r, 1] -= p1
+            push[r, 2] -= p2
+            power[0] += p0 * speed[r, 0] + p1 * speed[r, 1] + p2 * speed[r, 2]
+            power[1] += drag * slip * slip
+    return energy

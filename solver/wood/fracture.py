@@ -1,0 +1,248 @@
+"""Where rods and bonds break, and what a break does to the arrays.
+
+By `vertex` a rod breaks where mean edge ratio x bending ratio (Sutherland 2012, Eq. 3.24; h is the diameter) exceeds
+1 + the strain limit. By `stress` it breaks anywhere: axial strain is even between the middles of edges, curvature
+between hinges, and the strain of the outer fibre is held against the strength of each place. A break near a vertex
+splits the vertex; one inside an edge ends its tension and leaves two stubs, which the neighbouring edges carry. So no
+tiny edge is made and the stable step stays what it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from .arrays import Bonds, Rods
+from .bundle import SAMPLES, Wood
+from .explicit import Motion
+
+__all__ = ["Breaks", "break_worst", "overstress"]
+
+#: A break closer to a vertex than this, over the edge, is one at the vertex.
+_NEAR = 0.25
+
+
+class Breaks(NamedTuple):
+    """What one pass broke."""
+
+    wood: Wood
+    rods: int
+    bonds: int
+
+
+@njit(cache=True, error_model="numpy")
+def _hinges(rods: Rods, t: np.ndarray, theta: np.ndarray, reference: np.ndarray, turning: bool) -> np.ndarray:
+    """Return curvature [1/m] and twist [radian/m] (h, 2) of whole hinges."""
+    out = np.zeros((len(rods.before), 2))
+    for h in range(len(rods.before)):
+        if rods.whole[h] == 0:
+            continue
+        p = rods.before[h]
+        q = rods.after[h]
+        c = t[p, 0] * t[q, 0] + t[p, 1] * t[q, 1] + t[p, 2] * t[q, 2]
+        # 2 tan(phi / 2) over half the span
+        out[h, 0] = 4.0 * np.sqrt(max(1.0 - c, 0.0) / max(1.0 + c, 1e-9)) / rods.span[h]
+        if turning:
+            out[h, 1] = 2.0 * (theta[q] - theta[p] + reference[h]) / rods.span[h]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def overstress(
+    rods: Rods,
+    t: np.ndarray,
+    inverse: np.ndarray,
+    strength: np.ndarray,
+    theta: np.ndarray,
+    reference: np.ndarray,
+    turning: bool,
+    anywhere: bool,
+    ratio: np.ndarray,
+    place: np.ndarray,
+) -> float:
+    """Write strain over strength (e,) of every edge and where it is highest (e,) [0 to 1]; return the highest.
+
+    Without `anywhere` an edge stands for the hinge at its first vertex (its place is 0), by Eq. 3.24. Twist lengthens
+    the outer fibre by sqrt(1 + (radius x twist)^2) (sec. 6.1).
+    """
+    bent = _hinges(rods, t, theta, reference, turning)
+    count = len(rods.a)
+    ratio[:] = 0.0
+    place[:] = 0.0
+    top = 0.0
+    last = strength.shape[1] - 1
+    left = np.full(count, -1, np.int64)
+    right = np.full(count, -1, np.int64)
+    for h in range(len(rods.before)):
+        if rods.whole[h] == 1:
+            right[rods.before[h]] = h
+            left[rods.after[h]] = h
+    for e in range(count):
+        if rods.alive[e] == 0 or rods.k[e] == 0.0:
+            continue
+        own = 1.0 / (inverse[e] * rods.rest[e]) - 1.0
+        r = rods.radius[e]
+        h = left[e]
+        g = right[e]
+        # strain and curvature at both ends; beyond an end without a hinge nothing bends
+        s0 = own
+        s1 = own
+        c0 = 0.0
+        c1 = 0.0
+        w0 = 0.0
+        w1 = 0.0
+        if h >= 0:
+            p = rods.before[h]
+            c0 = bent[h, 0]
+            w0 = bent[h, 1]
+            if rods.k[p] > 0.0:
+                other = 1.0 / (inverse[p] * rods.rest[p]) - 1.0
+                s0 = (own * rods.rest[p] + other * rods.rest[e]) / (rods.rest[p] + rods.rest[e])
+        if g >= 0:
+            q = rods.after[g]
+            c1 = bent[g, 0]
+            w1 = bent[g, 1]
+            if rods.k[q] > 0.0:
+                other = 1.0 / (inverse[q] * rods.rest[q]) - 1.0
+                s1 = (own * rods.rest[q] + other * rods.rest[e]) / (rods.rest[q] + rods.rest[e])
+        if not anywhere:
+            if h < 0 or rods.k[rods.before[h]] == 0.0:
+                continue
+            # the mean of the two edges' ratios, as the thesis takes it, whatever their lengths
+            mean = 0.5 * (own + 1.0 / (inverse[rods.before[h]] * rods.rest[rods.before[h]]) - 1.0)
+            long = (1.0 + mean) * (1.0 + r * c0) * np.sqrt(1.0 + (r * w0) ** 2) - 1.0
+            ratio[e] = long / strength[e, 0]
+            top = max(top, ratio[e])
+            continue
+        for m in range(last + 1):
+            u = m / last
+            strain = s0 + (own - s0) * 2.0 * u if u < 0.5 else own + (s1 - own) * (2.0 * u - 1.0)
+            bow = (1.0 - u) * c0 + u * c1
+            wring = (1.0 - u) * w0 + u * w1
+            long = strain + r * bow + 0.5 * (r * wring) ** 2
+            if long > ratio[e] * strength[e, m]:
+                ratio[e] = long / strength[e, m]
+                place[e] = u
+        top = max(top, ratio[e])
+    return top
+
+
+def _split(wood: Wood, h: int) -> Wood:
+    """Split the vertex of hinge h in two, one for each edge; mass, load and bonds by their shares."""
+    m, rods, bonds = wood.motion, wood.rods, wood.bonds
+    p, q = int(rods.before[h]), int(rods.after[h])
+    i, new = int(rods.b[p]), len(m.x)
+    lengths = np.where(rods.k[[p, q]] > 0, rods.rest[[p, q]], 0.0)
+    part = lengths[1] / lengths.sum()
+    rods.whole[h] = 0
+    rods.a[q] = new
+    grown = {
+        "x": np.vstack([m.x, m.x[i]]),
+        "v": np.vstack([m.v, m.v[i]]),
+        "mass": np.append(m.mass, m.mass[i] * part),
+        "held": np.append(m.held, np.uint8(0)),
+        "load": np.vstack([m.load, m.load[i] * part]),
+    }
+    grown["mass"][i] *= 1 - part
+    grown["load"][i] *= 1 - part
+    mine = np.flatnonzero((bonds.i == i) & (bonds.on == 1))
+    more = {name: getattr(bonds, name)[mine] for name in Bonds._fields}
+    more["i"] = np.full(len(mine), new, np.int32)
+    for name in ("k", "s", "limit"):
+        more[name] = more[name] * part
+        getattr(bonds, name)[mine] *= 1 - part
+    return replace(
+        wood,
+        motion=Motion(*(grown.get(name, getattr(m, name)) for name in Motion._fields)),
+        bonds=Bonds(*(np.concatenate([getattr(bonds, name), more[name]]) for name in Bonds._fields)),
+        parent=np.append(wood.parent, np.int32(i)),
+    )
+
+
+def _sever(wood: Wood, e: int, place: float) -> int:
+    """Cut edge e at `place`; its bonds go to the neighbours that carry the stubs. Return how many bonds had none."""
+    rods, bonds = wood.rods, wood.bonds
+    ends = (
+        np.flatnonzero((rods.after == e) & (rods.whole == 1)),
+        np.flatnonzero((rods.before == e) & (rods.whole == 1)),
+    )
+    mine = np.flatnonzero((bonds.j == e) & (bonds.on == 1))
+    first = bonds.share[mine] < place
+    dropped = 0
+    if len(ends[0]):
+        p = rods.before[ends[0][0]]
+        bonds.j[mine[first]] = p
+        bonds.share[mine[first]] = 1 + bonds.share[mine[first]] * rods.rest[e] / rods.rest[p]
+    else:
+        bonds.on[mine[first]] = 0
+        dropped += int(first.sum())
+    if len(ends[1]):
+        q = rods.after[ends[1][0]]
+        bonds.j[mine[~first]] = q
+        bonds.share[mine[~first]] = (bonds.share[mine[~first]] - 1) * rods.rest[e] / rods.rest[q]
+    else:
+        bonds.on[mine[~first]] = 0
+        dropped += int((~first).sum())
+    rods.alive[e] = 0
+    for found in ends:
+        rods.whole[found] = 0
+    wood.cut[e] = place
+    return dropped
+
+
+def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, each: np.ndarray, allowed: float) -> Breaks:
+    """Break what is most overstressed, until it has released `allowed` [J]; the worst breaks in any case.
+
+    ratio (e,) and place (e,) as from `overstress`, each (b,) energies of the bonds [J].
+    """
+    over = np.where(wood.bonds.on == 1, each / wood.bonds.limit, 0.0)
+    edges, bonds = np.flatnonzero(ratio > 1), np.flatnonzero(over > 1)
+    what = np.concatenate([ratio[edges], over[bonds]])
+    order = np.argsort(-what, kind="stable")
+    rods = wood.rods
+    spent, broken, gone = 0.0, 0, 0
+    for n in order:
+        if n >= len(edges):
+            b = int(bonds[n - len(edges)])
+            cost = float(each[b])
+        else:
+            e = int(edges[n])
+            strain = float(wood.strength[e, round(float(place[e]) * (len(SAMPLES) - 1))]) * float(ratio[e])
+            cost = 0.5 * float(rods.k[e] * rods.rest[e]) * strain**2
+        if spent > 0 and spent + cost > allowed:
+            break
+        spent += cost
+        if n >= len(edges):
+            if wood.bonds.on[b]:
+                wood.bonds.on[b] = 0
+                gone += 1
+            continue
+        if not rods.alive[e]:
+            continue
+        hinge = _hinge_near(rods, e, float(place[e]))
+        if hinge >= 0:
+            wood = _split(wood, hinge)
+            rods = wood.rods
+            broken += 1
+        elif _NEAR <= place[e] <= 1 - _NEAR:
+            gone += _sever(wood, e, float(place[e]))
+            broken += 1
+        else:
+            # the vertex beyond is already split or a clamp's: cut as close to it as a stub allows
+            gone += _sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
+            broken += 1
+    return Breaks(wood, broken, gone)
+
+
+def _hinge_near(rods: Rods, e: int, place: float) -> int:
+    """Return the whole hinge between real edges at which a break at `place` of edge e splits a vertex, or -1."""
+    if _NEAR <= place <= 1 - _NEAR:
+        return -1
+    own, other = (rods.after, rods.before) if place < 0.5 else (rods.before, rods.after)
+    found = np.flatnonzero((own == e) & (rods.whole == 1))
+    if not len(found) or rods.k[other[found[0]]] == 0:
+        return -1
+    return int(found[0])

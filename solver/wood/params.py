@@ -1,0 +1,231 @@
+"""Parameters of a wood run: the bundle of rods, its material and grain, what holds, loads and hits it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ..contract import Params
+
+__all__ = ["Body", "Grain", "Notch", "Waypoint", "WoodParams"]
+
+Metres = Annotated[float, Field(ge=-10, le=10)]
+Vector = tuple[Metres, Metres, Metres]
+Rate = tuple[
+    Annotated[float, Field(ge=-100, le=100)],
+    Annotated[float, Field(ge=-100, le=100)],
+    Annotated[float, Field(ge=-100, le=100)],
+]
+Newtons = Annotated[float, Field(ge=-1e7, le=1e7)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Grain(_Part):
+    """How stiffness and strength vary over the section and along the rods: a smooth field from the run's seed."""
+
+    stiffness: float = Field(0.0, ge=0, le=0.5, description="Relative deviation of the stiffness [1]")
+    strength: float = Field(0.1, ge=0, le=0.5, description="Relative deviation of the strength [1]")
+    along: float = Field(0.02, gt=1e-5, le=10, description="Correlation length along the rods [m]")
+    across: float = Field(0.003, gt=1e-6, le=1, description="Correlation length across them [m]")
+
+
+class Notch(_Part):
+    """A place where all rods are weaker, as if cut in from all sides."""
+
+    position: float = Field(ge=0, le=10, description="Along the bundle [m]")
+    depth: float = Field(ge=0, lt=1, description="Depth over the rod's radius [1]")
+    width: float = Field(1e-3, gt=0, le=1, description="Length of the bundle that it weakens [m]")
+
+
+class Waypoint(_Part):
+    """Where a body's centre is at a time; between two of them it moves evenly."""
+
+    time: float = Field(ge=0, le=1000, description="Time [s]")
+    position: Vector = Field(description="Centre [m]")
+
+
+class Body(_Part):
+    """A rigid body on a given path."""
+
+    shape: Literal["box", "cylinder"] = Field("box", description="Shape; it does not turn")
+    size: tuple[float, float, float] = Field(
+        description="Sides of a box along x, y, z; diameter, length and 0 of a cylinder [m]"
+    )
+    axis: Literal["x", "y", "z"] = Field("y", description="Axis of a cylinder")
+    path: tuple[Waypoint, ...] = Field(min_length=1, max_length=64, description="Its way; it rests before and after")
+    friction: float = Field(0.3, ge=0, le=2, description="Coulomb friction with the rods [1]")
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        wanted = self.size if self.shape == "box" else self.size[:2]
+        if min(wanted) <= 0:
+            raise ValueError("sides, diameter and length must be positive")
+        if any(a.time >= b.time for a, b in pairwise(self.path)):
+            raise ValueError("the times of the path must rise: sort them, and give each once")
+        return self
+
+
+class WoodParams(Params):
+    """Sutherland 2012: discrete elastic rods along x, bonded into a round bundle about the x axis. SI units."""
+
+    axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {
+        "length": ("length", None),
+        "radius": ("radius", None),
+        "stiffness": ("stiffness", None),
+        "strength": ("strain_limit", None),
+        "toughness": ("bond_energy", None),
+        "gravity": ("gravity", None),
+    }
+
+    length: float = Field(0.15, ge=1e-3, le=10, description="Length of the rods", json_schema_extra={"units": "m"})
+    radius: float = Field(0.01, ge=1e-5, le=1, description="Radius of the bundle", json_schema_extra={"units": "m"})
+    rods: int = Field(
+        200,
+        ge=1,
+        le=5000,
+        description="Rods wanted; the sampling comes within some percent",
+        json_schema_extra={"units": "1"},
+    )
+    vertices: int = Field(
+        30,
+        ge=3,
+        le=2000,
+        description="Vertices of a rod at quality default; preview has half the edges, fine twice as many",
+        json_schema_extra={"units": "1"},
+    )
+    unevenness: float = Field(
+        0.3,
+        ge=0,
+        le=0.9,
+        description="Random part of the vertices' places; edges are within 1 +- this of their mean length",
+        json_schema_extra={"units": "1"},
+    )
+    reach: float = Field(
+        1.7,
+        ge=0,
+        le=4,
+        description="Rods closer than this are bonded, over the mean distance of rods; 0 bonds none",
+        json_schema_extra={"units": "1"},
+    )
+    curvature: float = Field(
+        0.0,
+        ge=-100,
+        le=100,
+        description="Curvature of the unloaded axis, in the x-z plane",
+        json_schema_extra={"units": "1/m"},
+    )
+    stiffness: float = Field(
+        10e9, ge=1e3, le=1e12, description="Young's modulus along the rods", json_schema_extra={"units": "Pa"}
+    )
+    density: float = Field(600.0, ge=1, le=2e4, description="Density", json_schema_extra={"units": "kg m-3"})
+    transverse: float = Field(
+        0.5e9, ge=0, le=1e12, description="Young's modulus across the rods", json_schema_extra={"units": "Pa"}
+    )
+    shear: float = Field(
+        0.7e9, ge=0, le=1e12, description="Shear modulus along the rods", json_schema_extra={"units": "Pa"}
+    )
+    twist: bool = Field(
+        False,
+        description="Whether single rods resist twist (explicit only); a bonded bundle does so by its bonds",
+        json_schema_extra={"units": "1"},
+    )
+    grain: Grain = Field(Grain(), description="Variation of the material", json_schema_extra={"units": "1"})
+    notches: tuple[Notch, ...] = Field(
+        (), max_length=64, description="Places of lower strength", json_schema_extra={"units": "1"}
+    )
+    fracture: Literal["none", "vertex", "stress"] = Field(
+        "stress",
+        description="Where rods break: nowhere, at vertices by Eq. 3.24, or anywhere by the strain of the outer fibre",
+        json_schema_extra={"units": "1"},
+    )
+    strain_limit: float = Field(
+        0.01, gt=0, le=10, description="Tensile strain at which a rod breaks", json_schema_extra={"units": "1"}
+    )
+    bond_energy: float = Field(
+        4.6e4,
+        gt=0,
+        le=1e12,
+        description="Energy at which a bond breaks, per volume of wood",
+        json_schema_extra={"units": "J m-3"},
+    )
+    cascade: float = Field(
+        0.02,
+        gt=0,
+        le=1,
+        description="Most elastic energy that one pass of breaking may release, over what there is",
+        json_schema_extra={"units": "1"},
+    )
+    clamp: Literal["none", "start", "both"] = Field(
+        "start", description="Ends held in place and direction", json_schema_extra={"units": "1"}
+    )
+    pull: Rate = Field(
+        (0.0, 0.0, 0.0),
+        description="Velocity of the far clamp (clamp both); the rods between start with their even share of it",
+        json_schema_extra={"units": "m/s"},
+    )
+    tip_load: tuple[Newtons, Newtons, Newtons] = Field(
+        (0.0, 0.0, 0.0),
+        description="Dead load on the far end, shared by the rods by their area",
+        json_schema_extra={"units": "N"},
+    )
+    bend: float = Field(
+        0.0,
+        ge=-0.3,
+        le=0.3,
+        description="Deflection at the start over the length: half a sine if free, a loaded beam if clamped",
+        json_schema_extra={"units": "1"},
+    )
+    gravity: float = Field(0.0, ge=-100, le=100, description="Gravity along -z", json_schema_extra={"units": "m s-2"})
+    damping: float = Field(
+        0.0, ge=0, le=1e5, description="Rate at which velocities decay", json_schema_extra={"units": "1/s"}
+    )
+    bodies: tuple[Body, ...] = Field(
+        (), max_length=32, description="Rigid bodies on given paths", json_schema_extra={"units": "1"}
+    )
+    contact_stiffness: float | None = Field(
+        None,
+        gt=0,
+        le=1e12,
+        description="Stiffness of a vertex's contact; by default a tenth of an edge's",
+        json_schema_extra={"units": "N/m"},
+    )
+    mode: Literal["explicit", "implicit", "static"] = Field(
+        "explicit",
+        description="Explicit (the truth), implicit (BDF2, for long runs), or equilibrium at every stage",
+        json_schema_extra={"units": "1"},
+    )
+    step: float | None = Field(
+        None,
+        gt=0,
+        le=10,
+        description="Step; explicit runs shorten one that is not stable. By default it follows from the quality",
+        json_schema_extra={"units": "s"},
+    )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.radius > self.length:
+            raise ValueError("the bundle is wider than long: take a smaller radius or a longer length")
+        if abs(self.curvature) * self.radius > 0.5:
+            raise ValueError("the axis is curved more sharply than the bundle is thick: take a smaller curvature")
+        if abs(self.curvature) * self.length > 6.28:
+            raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
+        if self.mode != "explicit" and (self.twist or self.curvature):
+            raise ValueError("twist and curved axes need the explicit mode: set mode explicit")
+        if self.mode == "static" and (self.clamp == "none" or self.bodies or any(self.pull)):
+            raise ValueError("equilibria need a clamped end, no bodies and no pull: set clamp start, or another mode")
+        if any(self.pull) and self.clamp != "both":
+            raise ValueError("a pull needs both ends clamped: set clamp both")
+        if any(self.tip_load) and self.clamp == "both":
+            raise ValueError("the far end is clamped and carries no load: set clamp start, or pull")
+        if self.bend and self.curvature:
+            raise ValueError("a bent start of a curved bundle is not defined: set one of them to 0")
+        if any(n.position > self.length for n in self.notches):
+            raise ValueError("a notch lies beyond the end: its position is at most the length")
+        return self

@@ -1,0 +1,60 @@
+"""The thesis' experiments and a few others, as parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+__all__ = ["PRESETS"]
+
+
+def _block(x: float, z: float, down: float = 0.0, until: float = 3.0) -> dict[str, Any]:
+    """Return a cylinder across the bundle, 1 cm thick, that moves `down` [m] until a time [s]."""
+    path = [{"time": 0.0, "position": (x, 0.0, z)}]
+    if down:
+        path.append({"time": until, "position": (x, 0.0, z - down)})
+    return {"shape": "cylinder", "axis": "y", "size": (0.01, 0.06, 0.0), "path": path, "friction": 0.3}
+
+
+PRESETS: Mapping[str, Mapping[str, Any]] = {
+    # one round fibre under its end load, at rest: the elastica's case
+    "cantilever": {
+        "rods": 1,
+        "vertices": 40,
+        "radius": 0.002,
+        "tip_load": (0.0, 0.0, -5.0),
+        "mode": "static",
+        "fracture": "none",
+        "grain": {"stiffness": 0.0, "strength": 0.0},
+    },
+    # bent at the start, free, unbreakable: Fig. 4.1's energy
+    "fig-4.1": {"rods": 50, "clamp": "none", "bend": 0.0133, "fracture": "none"},
+    # three blocks press on a branch of 15 cm: Fig. 4.2
+    "fig-4.2": {
+        "rods": 200,
+        "clamp": "none",
+        "bodies": [_block(0.02, -0.015), _block(0.13, -0.015), _block(0.075, 0.015, 0.03)],
+        "gravity": 9.81,
+        "damping": 50.0,
+    },
+    # a bent branchlet, held at one end, hit near the other
+    "twig": {
+        "rods": 19,
+        "vertices": 24,
+        "length": 0.12,
+        "radius": 0.003,
+        "curvature": 4.0,
+        "damping": 50.0,
+        "bodies": [_block(0.10, 0.05, 0.10, 0.05)],
+    },
+    # drawn out by both ends until it parts
+    "pulled": {
+        "rods": 50,
+        "vertices": 24,
+        "length": 0.1,
+        "radius": 0.005,
+        "clamp": "both",
+        "pull": (1.0, 0.0, 0.0),
+        "grain": {"stiffness": 0.05, "strength": 0.15},
+    },
+}

@@ -1,0 +1,125 @@
+"""A wood run: lay the bundle, choose a step, march or settle, and keep what is needed of each stage."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..contract import Context, InvalidInput, Need, SolverError
+from .bundle import Wood, lay
+from .params import WoodParams
+from .settings import choose
+from .stability import longest_step
+from .stepping import Reached, explicit
+
+__all__ = ["run"]
+
+#: Energy that may be missing from the balance of a sound stage, over the largest energy of the run.
+_BALANCE = {"preview": 0.05, "default": 0.01, "fine": 0.003}
+
+
+def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
+    """Return energies, counts and centre lines at the wanted times; see `solver.quantities` for units.
+
+    Raises:
+        InvalidInput: the need names a part of a fruit's surface.
+        Unstable: the run blew up; carries the stages before.
+        NotConverged: an implicit step or an equilibrium was not found; carries the stages before.
+        Cancelled: the observer asked to stop.
+
+    """
+    if need.region is not None:
+        raise InvalidInput("wood has no colatitude and azimuth.", advice="Leave the region out.")
+    settings = choose(params, need.quality)
+    begun = time.perf_counter()
+    context.report(0.0, "laying the bundle")
+    wood = lay(params, settings.vertices)
+    attrs: dict[str, Any] = {
+        "path": params.mode,
+        "rods": len(wood.grid),
+        "vertices": settings.vertices,
+        "bonds": len(wood.bonds.i),
+    }
+    balance = _BALANCE[need.quality]
+    marching: Iterator[Reached]
+    if params.mode == "explicit":
+        longest = longest_step(wood)
+        dt = min(settings.courant * longest, params.step or np.inf)
+        attrs |= {"step": dt, "longest_stable_step": longest}
+        marching = explicit(wood, params, need.stages, dt, balance, context)
+    else:
+        from .implicit import implicit, static
+
+        if params.mode == "implicit":
+            attrs["step"] = settings.step
+            marching = implicit(wood, params, need.stages, settings.step, context)
+        else:
+            marching = static(wood, params, need.stages, context)
+    rows: list[dict[str, Any]] = []
+    try:
+        for reached in marching:
+            rows.append(_row(reached, wood, need, time.perf_counter() - begun))
+            context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
+    except SolverError as error:
+        if rows:
+            error.partial = _dataset(rows, wood, need, attrs)
+            error.last_stage = rows[-1]["stage"]
+        raise
+    return _dataset(rows, wood, need, attrs)
+
+
+def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, Any]:
+    """Return what is wanted of a stage."""
+    state = reached.state
+    wood = state.wood
+    moving, elastic, lost, work, _ = reached.energy
+    ends = wood.grid[:, -1]
+    weight = wood.rods.radius[np.searchsorted(wood.rod, np.arange(len(wood.grid)))] ** 2
+    found: dict[str, Any] = {
+        "kinetic_energy": moving,
+        "elastic_energy": elastic,
+        "lost_energy": lost,
+        "work": work,
+        "broken_rods": state.rods,
+        "broken_bonds": state.bonds,
+        "impulse": state.impulse.sum(0),
+        "tip_position": weight @ wood.motion.x[ends] / weight.sum(),
+    }
+    real = laid.rods.k > 0
+    if "rod_position" in need.fields:
+        ends = np.stack([wood.rods.a[real], wood.rods.b[real]], 1)
+        found["rod_position"] = wood.motion.x[ends].astype(need.dtype)
+    if "rod_cut" in need.fields:
+        found["rod_cut"] = wood.cut[real].astype(need.dtype)
+    return {
+        "stage": reached.time,
+        "residual": reached.error,
+        "converged": reached.sound,
+        "iterations": state.steps,
+        "seconds": seconds,
+        **{name: value for name, value in found.items() if name in need.fields},
+    }
+
+
+def _dataset(rows: list[dict[str, Any]], wood: Wood, need: Need, attrs: dict[str, Any]) -> xr.Dataset:
+    dims = {
+        "impulse": ("stage", "component"),
+        "tip_position": ("stage", "component"),
+        "rod_position": ("stage", "rod_edge", "end", "component"),
+        "rod_cut": ("stage", "rod_edge"),
+    }
+    data: dict[str, Any] = {}
+    for name in rows[0]:
+        values = np.array([row[name] for row in rows])
+        if name != "stage":
+            data[name] = (dims.get(name, ("stage",)), values.astype(np.int8) if name == "converged" else values)
+    coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
+    if any("component" in entry[0] for entry in data.values()):
+        coords["component"] = ["x", "y", "z"]
+    if any("rod_edge" in entry[0] for entry in data.values()):
+        coords["rod"] = ("rod_edge", wood.rod[wood.rods.k > 0])
+    return xr.Dataset(data, coords, attrs)
