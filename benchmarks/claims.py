@@ -23,6 +23,8 @@ from benchmarks.pattern import Pattern, patterns
 STAGE = 0.3
 #: A trend counts if its ends differ by more than twice what another seed changes (about 5 %).
 CLEAR = 0.10
+#: Wrinkles are local to the thick flesh if they are at least that many times as high there.
+LOCAL = 1.5
 
 
 class Claim(NamedTuple):
@@ -118,17 +120,19 @@ def slenderness(found: Sequence[Pattern]) -> Claim:
 
 
 def fruits(found: Sequence[Pattern]) -> Claim:
-    """C6, from Table 1: ridged or reticular."""
-    said = {
-        "jujube1": True, "raisin": True, "wolfberry": True, "jujube2": False, "plum1": False, "plum2": False,
-    }  # fmt: skip
+    """C6, from Table 1: ridged or reticular, and where plum 1 buckles at all."""
+    said = {"jujube1": True, "raisin": True, "wolfberry": True, "jujube2": False, "plum2": False}
     parts, right = [], []
     for pattern in found:
+        if pattern.name == "plum1":
+            right.append(pattern.thick_to_thin > LOCAL)
+            parts.append(f"plum1: wrinkles {pattern.thick_to_thin:.2g} times as high where the flesh is thick")
+            continue
         ridged = abs(pattern.equator_anisotropy) > 0.3
         right.append(ridged == said.get(pattern.name, ridged))
         parts.append(f"{pattern.name} {pattern.equator_anisotropy:+.2f} ({'ridged' if ridged else 'reticular'})")
     verdict = "holds" if all(right) else f"holds for {sum(right)} of {len(right)}"
-    return Claim("C6", "jujube 1, raisin, wolfberry ridged; jujube 2, plums reticular", "; ".join(parts), verdict)
+    return Claim("C6", "jujube 1, raisin, wolfberry ridged; jujube 2, plum 2 reticular; plum 1 where thick", "; ".join(parts), verdict)
 
 
 def judge(root: Path) -> list[Claim]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from solver.dehydration.harmonics import remove_low
+from solver.dehydration.mesh import inner_distance
 from solver.dehydration.params import DehydrationParams
 from solver.fruit import PRESETS, azimuths, colatitudes
 from store.errors import StoreError
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 LOWEST_DEGREE = 3
 #: Colatitudes [degree] that count as the poles (nearer than this) and the equator (nearer to 90 than this).
 POLES, EQUATOR = 35.0, 30.0
+#: Degrees below this are the fruit's shape on a stone that is not round, not wrinkles.
+SHAPE_DEGREE = 12
 #: Pits smaller than this share of the mean one say nothing about their shape.
 SMALL = 0.25
 
@@ -41,6 +44,7 @@ class Pattern(NamedTuple):
     poles_to_equator: float
     equator_anisotropy: float
     polar_anisotropy: float
+    thick_to_thin: float
     residual: float
     penetration: float
 
@@ -72,8 +76,12 @@ def _pattern(data: xr.Dataset) -> Pattern:
     ring = (latitude > 45) & (latitude < 75)
     slopes = np.gradient(height, np.pi / n, axis=0) / along, _around(height) / around
 
-    def rms(where: NDArray[np.bool_]) -> float:
-        return float(np.sqrt((area * height**2)[where].sum() / area[where].sum()))
+    flesh = np.linalg.norm(fresh, axis=-1) - inner_distance(params, ray)
+    thick = flesh > np.median(flesh)
+    waves = remove_low(height, SHAPE_DEGREE)
+
+    def rms(where: NDArray[np.bool_], of: Array = height) -> float:
+        return float(np.sqrt((area * of**2)[where].sum() / area[where].sum()))
 
     def anisotropy(where: NDArray[np.bool_]) -> float:
         a, b = ((area * slope**2)[where].sum() for slope in slopes)
@@ -92,6 +100,7 @@ def _pattern(data: xr.Dataset) -> Pattern:
         poles_to_equator=rms(poles) / rms(equator),
         equator_anisotropy=anisotropy(equator),
         polar_anisotropy=anisotropy(ring),
+        thick_to_thin=rms(thick, waves) / rms(~thick, waves),
         residual=float(data["residual"]),
         penetration=float(data["penetration"]) / params.exocarp_thickness,
     )
