@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from solver.fruit import colatitudes
@@ -25,9 +24,12 @@ Array = NDArray[Any]
 LOWEST = 3
 
 
+@lru_cache(maxsize=16)
 def area(n: int) -> Array:
     """Return the share (n, 1) that each cell of the lattice of `n` has in the unit sphere; all cells sum to 1."""
-    return _fejer(n)[:, None] / (4 * n)
+    shares = _fejer(n)[:, None] / (4 * n)
+    shares.flags.writeable = False
+    return shares
 
 
 def degrees(spectrum: Array) -> Array:
@@ -65,6 +67,8 @@ def shares(band: int) -> Array:
 
     Degrees are taken with random phases. Modes are not orthogonal over the sphere, so small parts are negative.
     """
+    import scipy.fft
+
     n = 2 * band + 2
     functions = legendre(band, n)
     series = np.zeros((band + 1, band + 1, band + 1))
