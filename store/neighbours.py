@@ -97,6 +97,8 @@ class Neighbours:
         """Scaled distance (count,) from each sample to the nearest other one; infinite where there is none."""
         if self._count == 1:
             return np.full(1, np.inf)
+        if self._count <= _FEW:
+            return np.array([self._nearest(scaled, 2)[0][1] for scaled in self._scaled])
         return np.asarray(self._tree.query(self._scaled, k=[2])[0])[:, 0]
 
     def pairs(self) -> list[tuple[int, int]]:
