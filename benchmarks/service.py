@@ -211,12 +211,12 @@ def _pss(root: Path | None, workers: int) -> float:
     return total
 
 
-def swaps(root: Path, times: int) -> dict[str, Any]:
+def swaps(root: Path, times: int, resolution: int = 48) -> dict[str, Any]:
     """Swap two generations back and forth under load; every swap waits until an answer comes from the new one."""
     store = Store.open(root)
     manifest = root / "tables" / "default" / "current.json"
     first = manifest.read_bytes()
-    tables.build(store, axes=DehydrationParams.axes, resolution=48)
+    tables.build(store, axes=DehydrationParams.axes, resolution=resolution)
     kinds = [first, manifest.read_bytes()]
     digests = [json.loads(text)["digest"] for text in kinds]
     done = 0
