@@ -94,11 +94,11 @@ def _functions(highest: int, n: int) -> Array:
     for m in range(1, highest + 1):
         found[m, m] = np.sqrt((2 * m + 1) / (2 * m)) * y * found[m - 1, m - 1]
     for j in range(1, highest + 1):
-        m = np.arange(j)
-        a = np.sqrt((4 * j**2 - 1) / (j**2 - m**2))
+        orders = np.arange(j)
+        a = np.sqrt((4 * j**2 - 1) / (j**2 - orders**2))
         found[:j, j] = a[:, None] * x * found[:j, j - 1]
         if j > 1:  # for m = j - 1 the second term is nothing
-            b = np.sqrt((2 * j + 1) * (j - 1 + m) * (j - 1 - m) / ((2 * j - 3) * (j**2 - m**2)))
+            b = np.sqrt((2 * j + 1) * (j - 1 + orders) * (j - 1 - orders) / ((2 * j - 3) * (j**2 - orders**2)))
             found[:j, j] -= b[:, None] * found[:j, j - 2]
     return found
 

@@ -254,11 +254,9 @@ def query(
             [key, *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
             for key in shapes[-1].descriptors
         ]
-        if all(shape.expected_error for shape in shapes):
-            rows += [
-                [f"expected error {measure}", *(f"{shape.expected_error[measure]:.3g}" for shape in shapes)]
-                for measure in shapes[0].expected_error
-            ]
+        errors = [shape.expected_error for shape in shapes if shape.expected_error is not None]
+        if len(errors) == len(shapes):
+            rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
         rows += [["exact", *(str(shape.exact) for shape in shapes)]]
         grid(console, ["", *(f"s = {shape.stage:g}" for shape in shapes)], rows)
         if out is not None:

@@ -89,7 +89,7 @@ class Targets:
     def _powers(self, point: Array, samples: Array, weights: Array, stages: list[int]) -> Array:
         """Return the powers (stages, bands) wanted at stored stages."""
         step = point - weights @ self._points[samples]
-        at = np.ix_(samples, stages)
+        at = np.ix_(samples, np.array(stages))
         total = np.exp(weights @ self._total[at] + self._total_slope[stages] @ step)
         moved = np.einsum("t,tsq->sq", weights, self._quantiles[at])
         moved += (self._centroid_slope[stages] @ step)[:, None]
