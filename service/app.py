@@ -13,7 +13,7 @@ from fastapi import Depends, FastAPI
 from solver import __version__
 from store.tokens import Tokens
 
-from . import batch, catalogue, jobs, jobs_events, jobs_results, page, problems, shapes
+from . import batch, catalogue, jobs, jobs_events, jobs_results, memory, page, problems, shapes
 from .answers import Answers, Repeats
 from .jobs_runner import JobRunner
 from .limits import Limits
@@ -50,6 +50,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     The store and its tables are opened by the first request that needs them, so the service may start before they
     exist and says what is missing until they do.
     """
+    memory.settle()
     settings = settings or Settings()
     app = Documented(
         title="wizen",
