@@ -132,7 +132,8 @@ def fruits(found: Sequence[Pattern]) -> Claim:
         right.append(ridged == said.get(pattern.name, ridged))
         parts.append(f"{pattern.name} {pattern.equator_anisotropy:+.2f} ({'ridged' if ridged else 'reticular'})")
     verdict = "holds" if all(right) else f"holds for {sum(right)} of {len(right)}"
-    return Claim("C6", "jujube 1, raisin, wolfberry ridged; jujube 2, plum 2 reticular; plum 1 where thick", "; ".join(parts), verdict)
+    statement = "jujube 1, raisin, wolfberry ridged; jujube 2, plum 2 reticular; plum 1 only where thick"
+    return Claim("C6", statement, "; ".join(parts), verdict)
 
 
 def judge(root: Path) -> list[Claim]:

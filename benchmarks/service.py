@@ -52,8 +52,24 @@ uvicorn.run(xpublish.Rest({"d": data}).app, host="127.0.0.1", port=int(sys.argv[
 
 
 def ours(i: int, n: int = RESOLUTION) -> str:
-    """Return the address of one of many shapes between the samples."""
-    return QUERY.format(te=0.02 + 0.04 * (i * 0.618 % 1), gamma=10 + 50 * (i * 0.383 % 1), n=n)
+    """Return the address of a shape between the samples; no two are the same."""
+    return QUERY.format(te=0.02 + 0.04 * (i * 0.6180339887 % 1), gamma=10 + 50 * (i * 0.3819660113 % 1), n=n)
+
+
+def again(i: int) -> str:
+    """Return the address of one of 40 shapes, in turn: what a slider that goes to and fro asks for."""
+    return ours(i % 40)
+
+
+LIMIT = """
+import sys, uvicorn
+body = bytes(196000)
+async def app(scope, receive, send):
+    if scope["type"] == "http":
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"196000")]})
+        await send({"type": "http.response.body", "body": body})
+uvicorn.run(app, host="127.0.0.1", port=int(sys.argv[1]), log_level="error")
+"""
 
 
 def theirs(i: int) -> str:
@@ -119,8 +135,12 @@ def start(root: Path, times: int = 5) -> dict[str, Any]:
 
 def load(root: Path, peer: str | None, seconds: float, rounds: int) -> list[dict[str, Any]]:
     """Drive ours and the peer's servers in turns; every row is the median of its rounds."""
-    with service(root) as (_, port, _):
-        sides: dict[str, Any] = {"wizen, interpolated": (port, ours)}
+    with service(root) as (_, port, _), running([sys.executable, "-c", LIMIT, "{port}"], "/") as (_, limit, _):
+        sides: dict[str, Any] = {
+            "wizen, all distinct": (port, ours),
+            "wizen, 40 repeated": (port, again),
+            "uvicorn, constant bytes": (limit, lambda _: "/"),
+        }
         if peer is None:
             return _turns(sides, seconds, rounds)
         command = [peer, "-c", PEER, "{port}"]
@@ -131,9 +151,12 @@ def load(root: Path, peer: str | None, seconds: float, rounds: int) -> list[dict
 
 def _turns(sides: dict[str, Any], seconds: float, rounds: int) -> list[dict[str, Any]]:
     found: dict[str, list[Any]] = {name: [] for name in sides}
+    asked = 0
     for _ in range(rounds):
         for name, (port, path) in sides.items():
-            found[name].append(drive(port, path, 16, seconds))
+            run = drive(port, lambda i, path=path, first=asked: path(first + i), 16, seconds)  # type: ignore[misc]
+            asked += len(run.latencies) + 16
+            found[name].append(run)
     return [
         {
             "server": name,
@@ -188,12 +211,12 @@ def _pss(root: Path | None, workers: int) -> float:
     return total
 
 
-def swaps(root: Path, times: int) -> dict[str, Any]:
+def swaps(root: Path, times: int, resolution: int = 48) -> dict[str, Any]:
     """Swap two generations back and forth under load; every swap waits until an answer comes from the new one."""
     store = Store.open(root)
     manifest = root / "tables" / "default" / "current.json"
     first = manifest.read_bytes()
-    tables.build(store, axes=DehydrationParams.axes, resolution=48)
+    tables.build(store, axes=DehydrationParams.axes, resolution=resolution)
     kinds = [first, manifest.read_bytes()]
     digests = [json.loads(text)["digest"] for text in kinds]
     done = 0

@@ -13,7 +13,8 @@ from fastapi import Depends, FastAPI
 from solver import __version__
 from store.tokens import Tokens
 
-from . import batch, catalogue, jobs, jobs_events, jobs_results, page, problems, shapes
+from . import batch, catalogue, jobs, jobs_events, jobs_results, memory, page, problems, shapes
+from .answers import Answers, Repeats
 from .jobs_runner import JobRunner
 from .limits import Limits
 from .live import LiveTables
@@ -49,6 +50,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     The store and its tables are opened by the first request that needs them, so the service may start before they
     exist and says what is missing until they do.
     """
+    memory.settle()
     settings = settings or Settings()
     app = Documented(
         title="wizen",
@@ -60,6 +62,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.tables = LiveTables(settings.store, settings.reload_interval)
+    app.state.answers = Answers(settings.cache_bytes)
     app.state.tokens = Tokens(settings.store)
     # looking at jobs has threads of its own, so that listeners do not wait for shapes, nor shapes for them
     app.state.listeners, app.state.listening = 0, anyio.CapacityLimiter(2)
@@ -83,6 +86,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
     # the last one added is the outermost
     app.add_middleware(Limits, settings=settings)
+    if settings.public_read and settings.cache_bytes:
+        app.add_middleware(Repeats, state=app.state)
     app.add_middleware(Telemetry, metrics=metrics)
     return app
 

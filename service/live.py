@@ -6,6 +6,7 @@ Readers hold the `ShapeTable` that they were given until they are done; a swap o
 from __future__ import annotations
 
 import difflib
+import math
 import threading
 import time
 from dataclasses import dataclass
@@ -42,6 +43,7 @@ class LiveTables:
         self._root = root
         self._interval = interval
         self._open: dict[str, _Open] = {}
+        self._chosen: dict[str, tuple[str, float]] = {}
         self._opening = threading.Lock()
         self._looking = threading.Lock()
         self._store: Store | None = None
@@ -128,6 +130,18 @@ class LiveTables:
                     f"Ask /v1/shapes/{found}, or choose another table.",
                 )
             return name
+        chosen, looked = self._chosen.get(solver, ("", -math.inf))
+        if time.monotonic() - looked < self._interval and chosen in self._open:
+            return chosen  # the directory is not listed for every request
+        found = self._usual(solver)
+        self._chosen[solver] = found, time.monotonic()
+        return found
+
+    def is_ready(self, solver: str, name: str | None = None) -> bool:
+        """Return whether `choose` and `get` will find an open table at once."""
+        return (self._chosen.get(solver, ("", 0.0))[0] if name is None else name) in self._open
+
+    def _usual(self, solver: str) -> str:
         names = self.names()
         own = [n for n in names if self._belongs(n, solver)]
         for usual in (solver, "default"):

@@ -39,6 +39,9 @@ class Settings(BaseSettings):
     threads: int = Field(8, ge=1, le=256, description="Shapes computed at the same time; each holds its arrays")
     reload_interval: float = Field(0.5, ge=0, description="How often a table's manifest is looked at, at most [s]")
     cache_age: int = Field(60, ge=0, description="How long a client may reuse a shape without asking again [s]")
+    cache_bytes: int = Field(
+        16 << 20, ge=0, description="Answers kept for those who ask again, in each process [bytes]"
+    )
     public_read: bool = Field(True, description="Serve shapes, tables, solvers and the state of jobs without a token")
     jobs_workers: int = Field(
         1, ge=0, le=1024, description="Processes that run jobs; 0 leaves them to `wizen work` or another service"

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from solver import __version__
@@ -19,6 +20,7 @@ from store.lookup import ShapeTable
 
 from . import detail as level
 from . import exact, problems, vocabulary
+from .answers import Answer, Answers, matches
 from .errors import OutsideRanges
 from .formats import FORMATS, About, Format, negotiate
 from .live import LiveTables
@@ -28,6 +30,11 @@ from .settings import Settings
 __all__ = ["router", "words_of"]
 
 router = APIRouter(tags=["shapes"])
+
+#: Formats and largest lattice [colatitudes] of shapes that take less time than to hand them to another thread and wait
+#: for the interpreter there.
+_QUICK = ("points", "npz", "json")
+_SMALL = 128
 
 _BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
 _CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()}
@@ -44,12 +51,52 @@ _CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" els
         **problems.responses(401, 403, 404, 406, 409, 413, 414, 422, 429, 500, 503, 507),
     },
 )
-def shape(request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Response:
+async def shape(
+    request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")
+) -> Response:
     """Interpolate the table at a point of its axes and a stage.
 
     Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Every answer
     says what error to expect (`expected_error`, by measure) and whether it lies between the runs (`inside`);
     `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table.
+    """
+    given = request.query_params
+    if not request.app.state.tables.is_ready(solver, given.get("table")):
+        return await run_in_threadpool(_shape, request, solver)  # opening a large table takes seconds
+    asked = _ask(request, solver)
+    if asked.is_quick:
+        return _settle(request, asked)
+    return await run_in_threadpool(_settle, request, asked)
+
+
+class _Asked(NamedTuple):
+    """A question understood: what to look up where, and in which format to send it."""
+
+    solver: Solver
+    name: str
+    table: ShapeTable
+    words: Words
+    query: ShapeQuery
+    detail: level.Detail
+    chosen: Format
+    resolution: int
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether a shape is small, and no job is to be asked for."""
+        return self.resolution <= _SMALL and self.chosen.name in _QUICK and not self.query.exact
+
+
+def _shape(request: Request, solver: str) -> Response:
+    return _settle(request, _ask(request, solver))
+
+
+def _ask(request: Request, solver: str) -> _Asked:
+    """Return the question of a request.
+
+    Raises:
+        ServiceError, StoreError: it cannot be understood, or there is no table for it.
+
     """
     settings: Settings = request.app.state.settings
     tables: LiveTables = request.app.state.tables
@@ -61,26 +108,23 @@ def shape(request: Request, solver: str = Path(description="Name of a solver; GE
     words = words_of(known, table, settings.max_resolution)
     detail = level.read(given)
     query = parse(given.multi_items(), words, detail.refused(chosen))
+    resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
+    return _Asked(known, name, table, words, query, detail, chosen, resolution)
+
+
+def _settle(request: Request, asked: _Asked) -> Response:
+    """Return the shape, or send its asker to the run of it."""
     try:
-        if query.outside:
-            raise OutsideRanges.of(query.outside)
-        return _answer(request, known, name, table, words, query, detail, chosen)
+        if asked.query.outside:
+            raise OutsideRanges.of(asked.query.outside)
+        return _answer(request, asked)
     except (OutsideRanges, TooUncertain) as error:
-        if not query.exact:
+        if not asked.query.exact:
             raise exact.offered(error) from None
-        return exact.redirect(request, known, table, query, chosen)
+        return exact.redirect(request, asked.solver, asked.table, asked.query, asked.chosen)
 
 
-def _answer(
-    request: Request,
-    solver: Solver,
-    name: str,
-    table: ShapeTable,
-    words: Words,
-    query: ShapeQuery,
-    detail: level.Detail,
-    chosen: Format,
-) -> Response:
+def _answer(request: Request, asked: _Asked) -> Response:
     """Return the shape, or that the asker has it already.
 
     Raises:
@@ -88,15 +132,20 @@ def _answer(
 
     """
     settings: Settings = request.app.state.settings
-    resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
+    answers: Answers = request.app.state.answers
+    solver, name, table, words, query, detail, chosen, resolution = asked
     tag = _tag(chosen, name, table.digest, query, resolution, *detail.key)
     headers = {
         "ETag": tag,
         "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
         "Vary": "Accept",
     }
-    if _matches(request.headers.get("if-none-match", ""), tag):
+    if matches(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers=headers)
+    kept = answers.get(tag)
+    if kept is not None:
+        answers.remember(request.scope, solver.name, request.query_params.get("table"), table.digest, tag)
+        return _whole(kept)
 
     begin = time.perf_counter()
     found = table.at(
@@ -121,10 +170,23 @@ def _answer(
     )
     body = chosen.encode(found, about)
     encoded = time.perf_counter()
-    headers["Server-Timing"] = f"lookup;dur={1e3 * (looked - begin):.3f}, encode;dur={1e3 * (encoded - looked):.3f}"
-    if chosen.name != "json":
-        headers["Content-Disposition"] = f'attachment; filename="{_filename(solver.name, query, words.stage, chosen)}"'
-    return Response(body, headers=headers, media_type=chosen.media_type)
+    timing = f"lookup;dur={1e3 * (looked - begin):.3f}, encode;dur={1e3 * (encoded - looked):.3f}"
+    if chosen.name == "json":  # its timings and its links are this request's own
+        return Response(body, headers={**headers, "Server-Timing": timing}, media_type=chosen.media_type)
+    headers["Content-Disposition"] = f'attachment; filename="{_filename(solver.name, query, words.stage, chosen)}"'
+    headers["Content-Type"], headers["Content-Length"] = chosen.media_type, str(len(body))
+    wire = tuple((key.lower().encode("latin-1"), value.encode("latin-1")) for key, value in headers.items())
+    made = Answer(tag, (*wire, (b"server-timing", b"kept;desc=answered-before")), body)
+    answers.keep(made)
+    answers.remember(request.scope, solver.name, request.query_params.get("table"), table.digest, tag)
+    return _whole(Answer(tag, (*wire, (b"server-timing", timing.encode("latin-1"))), body))
+
+
+def _whole(answer: Answer) -> Response:
+    """Return an answer as a response; its headers are complete."""
+    response = Response(answer.body)
+    response.raw_headers = list(answer.headers)
+    return response
 
 
 def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
@@ -148,11 +210,6 @@ def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: 
     words += [query.method, query.max_error]
     text = hashlib.sha256(canonical(words)).hexdigest()[:32]
     return f'W/"{text}"' if chosen.name == "json" else f'"{text}"'
-
-
-def _matches(header: str, tag: str) -> bool:
-    """Return whether an If-None-Match header names the tag; the comparison is the weak one, as RFC 9110 has it."""
-    return tag.removeprefix("W/") in {part.strip().removeprefix("W/") for part in header.split(",")}
 
 
 def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str, str]:

@@ -76,7 +76,7 @@ class Telemetry:
             await send(message)
 
         if method == "HEAD":
-            scope["method"] = "GET"
+            scope = {**scope, "method": "GET"}  # the server's own still says that no body is to be sent
         try:
             await self.app(scope, receive, watched)
         except Exception:

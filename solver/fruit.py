@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
-from scipy.interpolate import CubicSpline
 
 from .contract import Params, Region
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 __all__ = ["PRESETS", "Fruit", "azimuths", "colatitudes", "directions", "lattice", "window"]
 
@@ -86,7 +88,8 @@ class Fruit(Params):
         angle = np.unwrap(np.arctan2(outline[:, 1], outline[:, 0]))
         if outline[:, 0].min() < -1e-9 or np.diff(angle).min() <= 0:
             raise ValueError("the outline folds over itself as seen from the centre: bring neighbouring radii closer")
-        dent = _dent(outline)
+        # a circle has none, and the convex hull takes long to import
+        dent = _dent(outline) if len(set(self.radii[:7])) > 1 else 0.0
         if dent > MAX_DENT:
             raise ValueError(
                 f"the outline is concave, dented by {dent:.3f} r1 (at most {MAX_DENT}): bring r2..r7 closer to "
@@ -160,6 +163,8 @@ class Fruit(Params):
 
 def _spline(radii: tuple[float, ...]) -> CubicSpline:
     """Return the clamped cubic spline (x(phi), y(phi)) through the seven control points."""
+    from scipy.interpolate import CubicSpline  # spheres need none, and it takes half of a service's start to import
+
     knots = np.linspace(-np.pi / 2, np.pi / 2, 7)
     r = np.asarray(radii)
     points = np.stack([r * np.cos(knots), r * np.sin(knots)], axis=-1)

@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from solver.fruit import colatitudes
@@ -25,9 +24,12 @@ Array = NDArray[Any]
 LOWEST = 3
 
 
+@lru_cache(maxsize=16)
 def area(n: int) -> Array:
     """Return the share (n, 1) that each cell of the lattice of `n` has in the unit sphere; all cells sum to 1."""
-    return _fejer(n)[:, None] / (4 * n)
+    shares = _fejer(n)[:, None] / (4 * n)
+    shares.flags.writeable = False
+    return shares
 
 
 def degrees(spectrum: Array) -> Array:
@@ -66,31 +68,38 @@ def shares(band: int) -> Array:
     Degrees are taken with random phases. Modes are not orthogonal over the sphere, so small parts are negative.
     """
     n = 2 * band + 2
-    functions = legendre(band, n)
-    series = np.zeros((band + 1, band + 1, band + 1))
-    series[0::2] = scipy.fft.dct(functions[0::2], 2, axis=2)[..., : band + 1] / n
+    angles = np.outer(colatitudes(n), np.arange(band + 1))
+    functions = _functions(band, n) * (2 / n)
+    series = np.empty((band + 1, band + 1, band + 1))
+    series[0::2], series[1::2] = functions[0::2] @ np.cos(angles), functions[1::2] @ np.sin(angles)
     series[0::2, :, 0] /= 2
-    series[1::2, :, 1:] = scipy.fft.dst(functions[1::2], 2, axis=2)[..., :band] / n
     both = np.where(np.arange(band + 1) == 0, 1.0, 2.0)
     found = np.einsum("m,mlk->lmk", both, series * _matrices(band))
     return found / (2 * np.arange(band + 1) + 1)[:, None, None]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=64)
 def legendre(highest: int, n: int) -> Array:
-    """Return the normalised associated Legendre functions (m, l, n) at the lattice's colatitudes, m, l <= `highest`."""
+    """Return the normalised associated Legendre functions (m, l, n) at the lattice's colatitudes, m, l <= `highest`.
+
+    They are kept: ask for low degrees.
+    """
+    return _functions(highest, n)
+
+
+def _functions(highest: int, n: int) -> Array:
     x, y = np.cos(colatitudes(n)), np.sin(colatitudes(n))
     found = np.zeros((highest + 1, highest + 1, n))
     found[0, 0] = 1
     for m in range(1, highest + 1):
         found[m, m] = np.sqrt((2 * m + 1) / (2 * m)) * y * found[m - 1, m - 1]
-    for m in range(highest + 1):
-        for j in range(m + 1, highest + 1):
-            a = np.sqrt((4 * j**2 - 1) / (j**2 - m**2))
-            found[m, j] = a * x * found[m, j - 1]
-            if j > m + 1:
-                b = np.sqrt((2 * j + 1) * (j - 1 + m) * (j - 1 - m) / ((2 * j - 3) * (j**2 - m**2)))
-                found[m, j] -= b * found[m, j - 2]
+    for j in range(1, highest + 1):
+        orders = np.arange(j)
+        a = np.sqrt((4 * j**2 - 1) / (j**2 - orders**2))
+        found[:j, j] = a[:, None] * x * found[:j, j - 1]
+        if j > 1:  # for m = j - 1 the second term is nothing
+            b = np.sqrt((2 * j + 1) * (j - 1 + orders) * (j - 1 - orders) / ((2 * j - 3) * (j**2 - orders**2)))
+            found[:j, j] -= b[:, None] * found[:j, j - 2]
     return found
 
 
@@ -106,7 +115,7 @@ def _matrices(band: int) -> Array:
     """Return the matrices (m, l, k) from amplitudes of the spectrum to harmonics."""
     n = 2 * band + 2
     angles = np.outer(np.arange(band + 1), colatitudes(n))
-    weighted = legendre(band, n) * _fejer(n) / 2
+    weighted = _functions(band, n) * _fejer(n) / 2
     found = np.empty((band + 1, band + 1, band + 1))
     found[0::2] = weighted[0::2] @ np.cos(angles).T
     found[1::2] = weighted[1::2] @ np.sin(angles).T
@@ -116,13 +125,11 @@ def _matrices(band: int) -> Array:
 @lru_cache(maxsize=8)
 def low_series(band: int) -> Array:
     """Return the amplitudes (m, l, k) of the harmonics below `LOWEST`."""
-    from .spectra import spectrum
-
-    n = band
-    found = np.zeros((LOWEST, LOWEST, band + 1))
-    phi = np.arange(2 * n) * np.pi / n
-    for m in range(LOWEST):
-        for j in range(m, LOWEST):
-            field = legendre(LOWEST - 1, n)[m, j][:, None] * np.cos(m * phi)
-            found[m, j] = spectrum(field)[m].real * (1 if m == 0 else 2)
-    return found
+    # sums rather than transforms: these few lines are no reason to import scipy.fft
+    n = 2 * band + 2
+    angles = np.outer(colatitudes(n), np.arange(band + 1))
+    found = _functions(LOWEST - 1, n) * (2 / n)
+    series = np.empty((LOWEST, LOWEST, band + 1))
+    series[0::2], series[1::2] = found[0::2] @ np.cos(angles), found[1::2] @ np.sin(angles)
+    series[0::2, :, 0] /= 2
+    return series

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from . import harmonics, spectra, surface
 
@@ -134,6 +133,8 @@ def _patchiness(energy: Array, area: Array) -> float:
 
 def _smooth(field: Array) -> Array:
     """Average over a window of one width on the sphere: fixed in colatitude, widening in azimuth towards the poles."""
+    from scipy import ndimage  # no look-up needs it
+
     n = len(field)
     doubled = np.concatenate([field, np.roll(field[::-1], n, axis=1)])
     cells = _WINDOW * n / np.pi

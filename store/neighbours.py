@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 __all__ = ["SAME", "Neighbours", "Weighted"]
 
@@ -14,6 +17,8 @@ Array = NDArray[Any]
 
 #: Scaled distance below which a query is the sample itself: round-off of parameters that went through text.
 SAME = 1e-9
+#: Samples that are all looked at faster than a tree is walked.
+_FEW = 500
 
 
 class Weighted(NamedTuple):
@@ -32,18 +37,32 @@ class Neighbours:
         self._span = values.max(axis=0) - self._low
         self._count = len(values)
         self._scaled = (values - self._low) / self._span
-        self._tree = cKDTree(self._scaled)
 
     def distance(self, query: Array) -> float:
         """Return the scaled distance to the nearest sample; 0 where it is hit."""
-        found = float(self._tree.query((query - self._low) / self._span)[0])
+        found = float(self._nearest((query - self._low) / self._span, 1)[0][0])
         return found if found >= SAME else 0.0
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree  # takes half of a service's start to import, and few tables need it
+
+        return cKDTree(self._scaled)
+
+    def _nearest(self, scaled: Array, count: int) -> tuple[Array, Array]:
+        """Return the distances (count,) and numbers (count,) of the nearest samples, the nearest first."""
+        if self._count > _FEW:
+            found = self._tree.query(scaled, k=np.arange(1, count + 1))
+            return np.asarray(found[0]), np.asarray(found[1])
+        offsets = self._scaled - scaled
+        squares = np.einsum("ij,ij->i", offsets, offsets)
+        order = squares.argsort(kind="stable")[:count] if count > 1 else squares.argmin(keepdims=True)
+        return np.sqrt(squares[order]), order
 
     def weigh(self, query: Array, m: int, eta: float) -> Weighted:
         """Weigh the `m` nearest samples by distance^-eta; a sample that is hit takes all."""
         scaled = (query - self._low) / self._span
-        found = self._tree.query(scaled, k=np.arange(1, min(m, self._count) + 1))
-        distance, samples = np.asarray(found[0]), np.asarray(found[1])
+        distance, samples = self._nearest(scaled, min(m, self._count))
         nearest = float(distance[0])
         if nearest < SAME:
             return Weighted(samples[:1], np.ones(1), 0.0)
@@ -58,8 +77,7 @@ class Neighbours:
         """
         if m >= self._count:
             return self.weigh(query, m, eta)
-        found = self._tree.query((query - self._low) / self._span, k=np.arange(1, m + 2))
-        distance, samples = np.asarray(found[0]), np.asarray(found[1])
+        distance, samples = self._nearest((query - self._low) / self._span, m + 1)
         nearest, reach = float(distance[0]), float(distance[-1])
         if nearest < SAME:
             return Weighted(samples[:1], np.ones(1), 0.0)
@@ -79,6 +97,8 @@ class Neighbours:
         """Scaled distance (count,) from each sample to the nearest other one; infinite where there is none."""
         if self._count == 1:
             return np.full(1, np.inf)
+        if self._count <= _FEW:
+            return np.array([self._nearest(scaled, 2)[0][1] for scaled in self._scaled])
         return np.asarray(self._tree.query(self._scaled, k=[2])[0])[:, 0]
 
     def pairs(self) -> list[tuple[int, int]]:

@@ -17,18 +17,18 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
-# where dask is installed, pyfftw would import all of it for an interface that is not used here: half a second
-_hidden = sys.modules.setdefault("dask", None) is None  # type: ignore[arg-type]
+# pyfftw would import all of dask and scipy's older transforms, for interfaces that are not used here: up to a second
+_hidden = [name for name in ("dask", "scipy.fftpack", "scipy.fft") if name not in sys.modules]
+sys.modules.update(dict.fromkeys(_hidden))  # type: ignore[arg-type]
 try:
     import pyfftw
 except ImportError:
     pyfftw = None
 finally:
-    if _hidden:
-        del sys.modules["dask"]
+    for _name in _hidden:
+        del sys.modules[_name]
 
 __all__ = ["Synthesis", "analyse", "backend", "borrow"]
 
@@ -60,6 +60,8 @@ def analyse(field: Array) -> Array:
     Rows of even m hold cosine sums k = 0..n-1 (DCT-II), rows of odd m sine sums k = 1..n (DST-II). Always by scipy:
     it is off the path of queries, and a table's digest must not depend on what else is installed.
     """
+    import scipy.fft
+
     count, n, _ = field.shape
     rows = np.ascontiguousarray(scipy.fft.rfft(field, axis=2).transpose(0, 2, 1))
     parts = rows.view(field.dtype).reshape(count, n + 1, n, 2)
@@ -100,6 +102,8 @@ class Synthesis:
             for plan in self._plans:
                 plan.execute()
             return self._field
+        import scipy.fft
+
         for (source, target), transform in ((self._cosines, scipy.fft.dct), (self._sines, scipy.fft.dst)):
             target[...] = transform(source, 3, axis=2)
         return scipy.fft.irfft(self._rows, 2 * self._n, axis=1, norm="forward").transpose(0, 2, 1)

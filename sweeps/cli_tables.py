@@ -194,6 +194,11 @@ def query(
     stages: Stages = None,
     name: TableName = "default",
     resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None,
+    method: Annotated[str | None, typer.Option("--method", help="How to look up, as `table score` names it.")] = None,
+    max_error: Annotated[
+        str | None,
+        typer.Option("--max-error", metavar="X|M:X,...", help="Refuse worse: 0.05 (roughness), rgh:0.05,dB:1.5."),
+    ] = None,
     out: Out = None,
     as_json: As_json = False,
 ) -> None:
@@ -205,9 +210,13 @@ def query(
 
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.2 --out shape.obj
 
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --method idw --out paper.glb
+
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --max-error rgh:0.1,dB:3
+
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
-    from store import starter
+    from store import methods, starter
     from store.lookup import ShapeTable
 
     from . import outputs
@@ -223,11 +232,14 @@ def query(
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
         fields = outputs.fields_for(out, False)
-    values = assignments(set_)
-    shapes = [table.at(values, stage, resolution=resolution, fields=fields) for stage in wanted]
+    values, how, limits = assignments(set_), method or methods.DEFAULT, _limits(max_error)
+    shapes = [
+        table.at(values, stage, resolution=resolution, fields=fields, method=how, max_error=limits) for stage in wanted
+    ]
     document = {
         "table": name,
         "digest": table.digest,
+        "method": shapes[0].method,
         "parameters": {**table.fixed, **shapes[0].parameters},
         "path": None if out is None else str(out),
         "stages": [_document(shape) for shape in shapes],
@@ -242,6 +254,9 @@ def query(
             [key, *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
             for key in shapes[-1].descriptors
         ]
+        errors = [shape.expected_error for shape in shapes if shape.expected_error is not None]
+        if len(errors) == len(shapes):
+            rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
         rows += [["exact", *(str(shape.exact) for shape in shapes)]]
         grid(console, ["", *(f"s = {shape.stage:g}" for shape in shapes)], rows)
         if out is not None:
@@ -250,12 +265,30 @@ def query(
     emit(document, as_json, show)
 
 
+def _limits(text: str | None) -> dict[str, float] | None:
+    """Return the limits by measure that `0.05` (of the roughness) or `rgh:0.05,dB:1.5` set.
+
+    Raises:
+        InvalidOption: the text sets none.
+
+    """
+    if text is None:
+        return None
+    pairs = [part.rpartition(":") for part in text.split(",")]
+    try:
+        return {name or "rgh": float(value) for name, _, value in pairs}
+    except ValueError:
+        raise InvalidOption(f"--max-error {text}: limits no error.", "Write 0.05, or rgh:0.05,dB:1.5.") from None
+
+
 def _document(shape: Any) -> dict[str, Any]:
     return {
         "stage": shape.stage,
         "exact": shape.exact,
         "converged": shape.converged,
         "nearest": shape.nearest,
+        "inside": shape.inside,
+        "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
         "weights": dict(shape.weights),
         "descriptors": {
             name: {"value": value, "units": shape.units.get(name, "")} for name, value in shape.descriptors.items()

@@ -8,6 +8,7 @@ and `env` (local amplitude).
 from __future__ import annotations
 
 import difflib
+from functools import lru_cache
 from typing import NamedTuple
 
 from ..errors import OutsideTable
@@ -36,6 +37,7 @@ class Method(NamedTuple):
         return "+".join((self.weighting, *self.corrections))
 
 
+@lru_cache(maxsize=64)
 def parse(name: str) -> Method:
     """Return the method of a name; corrections come out in the order in which they act.
 

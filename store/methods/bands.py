@@ -80,17 +80,22 @@ class Targets:
 
         `point` (axes,) is the query among `Samples.points`.
         """
-        wanted = sum(t * np.sqrt(self._power(point, samples, weights, j)) for j, t in stages.items()) ** 2
+        places = list(stages)
+        amplitudes = np.sqrt(self._powers(point, samples, weights, places))
+        wanted = (np.array(list(stages.values())) @ amplitudes) ** 2
         least = _FAINT * mean.mean() + _NOTHING
-        return np.clip(np.sqrt((wanted + least) / (mean + least)), 1 / _MOST, _MOST)
+        return np.minimum(np.maximum(np.sqrt((wanted + least) / (mean + least)), 1 / _MOST), _MOST)
 
-    def _power(self, point: Array, samples: Array, weights: Array, stage: int) -> Array:
-        """Return the power (bands,) wanted at a stored stage."""
+    def _powers(self, point: Array, samples: Array, weights: Array, stages: list[int]) -> Array:
+        """Return the powers (stages, bands) wanted at stored stages."""
         step = point - weights @ self._points[samples]
-        total = np.exp(weights @ self._total[samples, stage] + step @ self._total_slope[stage])
-        moved = weights @ self._quantiles[samples, stage] + step @ self._centroid_slope[stage]
-        shares = self._shares(moved) * (weights @ self._mended[samples, stage])
-        return np.maximum(total - _NOTHING, 0) * shares / shares.sum()
+        at = np.ix_(samples, np.array(stages))
+        total = np.exp(weights @ self._total[at] + self._total_slope[stages] @ step)
+        moved = np.einsum("t,tsq->sq", weights, self._quantiles[at])
+        moved += (self._centroid_slope[stages] @ step)[:, None]
+        shares = np.array([self._shares(row) for row in moved])
+        shares *= np.einsum("t,tsb->sb", weights, self._mended[at])
+        return np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
 
     def _shares(self, quantiles: Array) -> Array:
         """Return the shares (bands,) of a distribution given by its quantiles; no band is quite empty."""

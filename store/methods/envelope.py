@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import harmonics, spectra, window
+from solver.fruit import azimuths, colatitudes
+
+from .. import harmonics, window
 from ..harmonics import legendre
 from ..window import Patch
 from .cells import COARSE
@@ -63,6 +65,15 @@ def apply(planes: Array, ratio: Array, low: Array, patch: Patch) -> None:
 @lru_cache(maxsize=1)
 def _analysis() -> Array:
     """Return the matrix (places, parts) from fields on the coarse lattice to spectra: cheaper than small transforms."""
-    places = 2 * COARSE * COARSE
-    waves = spectra.spectrum(np.eye(places).reshape(places, COARSE, 2 * COARSE))
-    return np.ascontiguousarray(waves.reshape(places, -1)).view(float)
+    # `spectra.spectrum` as sums: these few lines are no reason to import scipy.fft
+    n, waves = COARSE, np.arange(COARSE + 1)
+    angles = np.outer(colatitudes(n), waves)
+    cosines, sines = np.cos(angles), np.sin(angles)
+    cosines[:, 0] /= 2
+    cosines[:, n] = 0  # the lattice does not hold it
+    sines[:, n] /= 2
+    down = np.where((waves % 2 == 0)[:, None, None], cosines, sines) * (2 / n)
+    along = np.exp(-1j * np.outer(azimuths(n), waves)) / (2 * n)
+    along[:, n] /= 2
+    found = np.einsum("pm,mtk->tpmk", along, down)
+    return found.reshape(2 * n * n, -1).view(float)

@@ -32,24 +32,36 @@ def highest_degree(power: NDArray[np.floating]) -> int:
 def keep_off(waves: Array, degree: int) -> Array:
     """Return waves (c, m, k) of fields with nothing at latitudes where waves m of degrees up to `degree` cannot be."""
     count, band = len(waves), waves.shape[1] - 1
-    rows = np.ascontiguousarray(waves.transpose(1, 2, 0)).view(waves.real.dtype).reshape(band + 1, band + 1, 2 * count)
-    kept = np.matmul(_windows(band, degree, rows.dtype.str), rows)
-    return np.ascontiguousarray(kept).view(waves.dtype).reshape(band + 1, band + 1, count).transpose(2, 0, 1)
+    real = waves.real.dtype
+    parts = waves.view(real).reshape(count, band + 1, band + 1, 2)
+    kept = np.zeros_like(parts)
+    # a window is the same on both hemispheres, so even and odd k do not mix: half the products
+    for first, windows in enumerate(_windows(band, degree, real.str)):
+        rows = np.ascontiguousarray(parts[:, : len(windows), first::2].transpose(1, 0, 3, 2))
+        lines = rows.reshape(len(windows), 2 * count, -1) @ windows
+        kept[:, : len(windows), first::2] = lines.reshape(rows.shape).transpose(1, 0, 3, 2)
+    return kept.view(waves.dtype)[..., 0]
 
 
 @lru_cache(maxsize=16)
-def _windows(band: int, degree: int, dtype: str) -> Array:
-    """Return the windows as matrices (m, k, k) on cosine (even m) or sine (odd m) amplitudes."""
+def _windows(band: int, degree: int, dtype: str) -> tuple[Array, Array]:
+    """Return the windows on cosine (even m) or sine (odd m) amplitudes, those of even k and those of odd k, each as
+    matrices (m, k, k) from the right; the waves m beyond them have no room anywhere.
+    """
     n = 2 * (band + 1)
     colatitude = (np.arange(n) + 0.5) * np.pi / n
     waves = np.arange(band + 1)
     cosines, sines = np.cos(np.outer(colatitude, waves)), np.sin(np.outer(colatitude, waves))
     weight = np.where(waves == 0, 1 / n, 2 / n)
-    result = np.empty((band + 1, band + 1, band + 1), dtype)
-    for m in waves:
+    kept = min(band, int(degree / _NONE))
+    even, odd = (np.empty((kept + 1, len(k), len(k)), dtype) for k in (waves[::2], waves[1::2]))
+    for m in range(kept + 1):
         room = np.sin(colatitude) * degree / max(m, 1)
         part = np.clip((room - _NONE) / (_ALL - _NONE), 0, 1) if m > 1 else np.ones(n)
         basis = sines if m % 2 else cosines
-        result[m] = (weight[:, None] * basis.T) @ ((part * part * (3 - 2 * part))[:, None] * basis)
-    result.flags.writeable = False
-    return result
+        shape = (part * part * (3 - 2 * part))[:, None] * basis
+        for first, windows in ((0, even), (1, odd)):
+            # transposed: it acts on rows
+            windows[m] = ((weight[:, None] * basis.T)[first::2] @ shape[:, first::2]).T
+    even.flags.writeable = odd.flags.writeable = False
+    return even, odd

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from ..neighbours import SAME, Neighbours, Weighted
 
@@ -75,6 +74,8 @@ class Samples:
         if self._grid is not None:
             point = self.scale(query)
             return bool(((point >= -SAME) & (point <= 1 + SAME)).all())
+        from scipy.optimize import nnls  # not for grids: it takes long to import
+
         system, right = self._hull, np.append(self.scale(query), 1.0)
         return bool(nnls(system, right)[1] < 1e-7)
 

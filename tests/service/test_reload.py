@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import httpx
 import pytest
@@ -119,3 +120,17 @@ def test_choosing(own: Store) -> None:
     build(own, "another")
     with pytest.raises(AmbiguousTable, match="another, other"):
         live.choose("dehydration")
+
+
+@pytest.mark.slow
+def test_twenty_generations_under_load(tmp_path: Path) -> None:
+    """The benchmark's 200 swaps in little: 16 connections, and every swap waits until it is answered from."""
+    from benchmarks.service import swaps
+
+    store = Store.open(tmp_path / "store", create=True)
+    fill(store, te=[0.02, 0.06], gamma=[10.0, 60.0])
+    build(store)
+    found = swaps(store.root, 20, resolution=8)
+    assert found["swaps"] == 20
+    assert found["failed"] == 0
+    assert found["requests"] > 100

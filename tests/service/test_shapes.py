@@ -99,7 +99,7 @@ def test_fixed_parameters_may_be_named(client: httpx.Client) -> None:
 
 
 def test_timing_and_caching_headers(client: httpx.Client) -> None:
-    answer = ask(client, {**QUERY, "format": "glb"})
+    answer = ask(client, {**QUERY, "te": 0.0333, "format": "glb"})
     assert answer.headers["server-timing"].startswith("lookup;dur=")
     assert "encode;dur=" in answer.headers["server-timing"]
     assert "max-age=60" in answer.headers["cache-control"]

@@ -244,6 +244,17 @@ def test_query(table: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(radius, 1.025 * 0.85, rtol=2e-3)
 
 
+def test_query_by_a_method_within_an_error(table: Path) -> None:
+    query = ("query", "--store", table, "--set", "te=0.03", "--set", "gamma=20", "--stages", "0.15", "--json")
+    said = document(wizen(*query, "--method", "idw"))
+    assert said["method"] == "idw"
+    assert "there is no look-up method 'kriging'" in wizen(*query, "--method", "kriging").stderr
+    assert "limits no error" in wizen(*query, "--max-error", "rgh:little").stderr
+    refused = wizen(*query, "--method", "idw", "--max-error", "0.5")
+    assert refused.exit_code != 0
+    assert "does not say how far" in refused.stderr
+
+
 def test_query_swollen(site: None, tmp_path: Path) -> None:
     store, out = tmp_path / "store", tmp_path / "shape.npz"
     plan = write(tmp_path / "swollen.toml", gamma="[10]", stages="[-0.2, -0.1]")
