@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 from ..contract import InvalidInput
@@ -32,12 +33,11 @@ def harmonic(x: Floats, triangles: Ints, painted: Ints, values: Floats) -> Float
     found[painted] = values
     if not len(inner):
         return found
-    rows = csr_matrix(matrix)[inner]
-    with np.errstate(all="ignore"):
-        solved = spsolve(rows[:, inner].tocsc(), -(rows[:, painted] @ found[painted]))
-    if not np.isfinite(solved).all():
+    parts, part = connected_components(weights, directed=False)
+    if len(np.unique(part[painted])) < parts:
         raise InvalidInput("nothing is painted on a part of the surface.", advice="Paint each part at least once.")
-    found[inner] = solved
+    rows = csr_matrix(matrix)[inner]
+    found[inner] = spsolve(rows[:, inner].tocsc(), -(rows[:, painted] @ found[painted]))
     return found
 
 

@@ -127,10 +127,12 @@ def _corners(state: State, share: Floats) -> Floats:
 def _stretches(state: State, tool: Tool, number: int) -> Floats:
     first, second = tool.stretch
     if isinstance(tool, HotCurve) and tool.normalised:
-        # D_T = 1 + lambda (D_N - 1) r_e gamma; r_e: radius times the kernel's integral, 8/15; gamma: mean curvature
+        # the paper's D_T = 1 + lambda (D_N - 1) r_e gamma for small steps, where D - 1 is log D: what grows out moves
+        # the curve by log(D_N) r_e; r_e: radius times the kernel's integral, 8/15; gamma: mean curvature
         line = state.curves[number].at(state.x, state.mesh.triangles)
-        first += tool.normalised * (second - 1) * tool.radius * 8 / 15 * _turning(line, tool.closed)
-    return np.array([max(first, 0.1), second])
+        share = tool.normalised * tool.radius * 8 / 15 * _turning(line, tool.closed)
+        first *= second**share
+    return np.array([np.clip(first, 0.1, 10.0), second])
 
 
 def _turning(line: Floats, closed: bool) -> float:
@@ -207,7 +209,10 @@ def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[Fl
     if tool.offsets or tool.paces:
         share = share * intensities(tool, (since - local[:, 1]) * local[:, 2])
     r = best / tool.radius
-    r[~_near(state, np.unique(KDTree(x).query(line)[1]), tool.radius)] = np.inf
+    # a curve is near all along, and not only where its control points are
+    pieces = max(2, int(np.linalg.norm(heads - tails, axis=1).max(initial=0) / (0.5 * tool.radius)) + 1)
+    path = (tails[:, None] + np.linspace(0, 1, min(pieces, 200))[:, None] * (heads - tails)[:, None]).reshape(-1, 3)
+    r[~_near(state, np.unique(KDTree(x).query(path)[1]), tool.radius)] = np.inf
     return _corners(state, share * _kernel("smooth", r)), along[triangles].mean(axis=1)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from solver.contract import InvalidInput
+from solver.contract import InvalidInput, Need
+from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.harmonic import harmonic, harmonic_tensors
 from solver.growth.params import GrowthParams
@@ -53,8 +54,7 @@ def test_a_part_without_paint_is_refused():
     mesh = start("disc", 100, 1.0)
     two = np.concatenate([mesh.triangles, mesh.triangles + len(mesh.x)])
     apart = np.concatenate([mesh.x, mesh.x + 5.0])
-    with np.testing.suppress_warnings() as quiet, pytest.raises(InvalidInput, match="part"):
-        quiet.filter(UserWarning)
+    with pytest.raises(InvalidInput, match="part"):
         harmonic(apart, two, np.array([0]), np.array([1.0]))
 
 
@@ -202,3 +202,24 @@ def test_a_hanging_strip_stretches_by_its_weight():
     )
     made.advance(1e9, until=0.05)
     assert made.state.x[:, 0].max() - 1.0 == pytest.approx(weight * (length - 0.05) ** 2 / 4, rel=0.03)
+
+
+def test_normalised_outgrowth_stays_flat():
+    """G19: kept in its plane, what grows out at a disc's rim fits best at lambda = 1."""
+    energies = []
+    for share in (0.0, 1.0, 2.0):
+        turns = 2 * np.pi * np.arange(32) / 32
+        rim = {
+            "kind": "curve",
+            "points": [(np.cos(t), np.sin(t), 0.0) for t in turns],
+            "closed": True,
+            "radius": 0.5,
+            "stretch": (1.0, 2.0),
+            "normalised": share,
+        }
+        held = {"where": {"kind": "everywhere"}, "axes": ["z"]}
+        values = {"shape": "disc", "tools": [rim], "attached": [held]}
+        run = SOLVER.solve(SOLVER.parse(values), Need(stages=(0.5,), quality="preview", fields=("stored_energy",)))
+        energies.append(float(run.stored_energy[0]))
+    print(energies)
+    assert energies[1] < 0.25 * min(energies[0], energies[2])
