@@ -53,12 +53,16 @@ class StepEnergy:
         pressure: float,
         solids: Sequence[Plane | SolidBall],
         tangent: Tangent,
+        gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self.load = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
         self.areas = np.bincount(state.mesh.triangles.ravel(), np.repeat(shell.areas(state.g) / 3, 3), len(state.x))
+        if any(gravity):
+            weight = self.areas[:, None] * np.array(gravity)
+            self.load = weight if self.load is None else self.load + weight
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient; the gradient of held directions is 0."""

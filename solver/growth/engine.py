@@ -8,7 +8,7 @@ between slices starts with the next step, and `script` gives the parameters whos
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,11 +20,12 @@ from .energy import StepEnergy, Tangent
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 from .params import GrowthParams
 from .places import share
+from .placing import border, branched, started
 from .rates import grown, rates
 from .remesh import split
 from .shapes import Mesh, start
-from .state import Spot, State, place
-from .tools import HotCurve, HotSpot, HotSurface, Tool
+from .state import State
+from .tools import Tool
 
 __all__ = ["Engine"]
 
@@ -133,13 +134,15 @@ class Engine:
     def _step(self, dt: float) -> Iterator[float]:
         """Grow by dt and find the equilibrium; yields the residual after every piece of work."""
         before, tools = self.state, len(self._tools)
-        state = self._started(before)
+        state = started(before, self._tools, self.params.step, self.params.seed)
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         point, spent = Point(state.x, 0.0, np.inf), 0
-        energy = StepEnergy(state, self._material, self.params.pressure, self.params.solids, self._tangent)
+        energy = StepEnergy(
+            state, self._material, self.params.pressure, self.params.solids, self._tangent, self.params.gravity
+        )
         goal = self.tolerance * state.length
         for point in _WAYS[self.params.solver](energy, state.x):
             if point.gradient <= goal or point.stuck:
@@ -161,7 +164,7 @@ class Engine:
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent)
         if self.params.plasticity:
             state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
-        state = _branched(state, acting)
+        state = branched(state, acting, self.params.seed)
         if self.params.remesh:
             while len(state.x) < self._largest:
                 finer = split(state, self._longest)
@@ -172,28 +175,6 @@ class Engine:
         self._history.append((before, tools))
         self.state = state
         self._steps += 1
-
-    def _started(self, state: State) -> State:
-        """Place the tools that start now."""
-        shares, spots, curves = dict(state.shares), dict(state.spots), dict(state.curves)
-        mesh = Mesh(state.x, state.mesh.triangles)
-        for number, tool in enumerate(self._tools):
-            # a tool that starts within this step is placed on the shape at its beginning
-            if number in shares or number in spots or number in curves:
-                continue
-            if tool.start > state.time + self.params.step - 1e-9:
-                continue
-            if isinstance(tool, HotSurface):
-                shares[number] = share(tool.where, mesh, _border(state.mesh), self.params.seed + number)
-            elif isinstance(tool, HotCurve):
-                curves[number] = place(np.array(tool.points), *mesh)
-            else:
-                spots[number] = (Spot(place(np.array([tool.at]), *mesh), tool.radius),)
-        return replace(state, shares=shares, spots=spots, curves=curves)
-
-
-def _border(mesh: shell.Topology) -> NDArray[np.int64]:
-    return np.unique(mesh.edges[mesh.border])
 
 
 def _begin(params: GrowthParams, mesh: Mesh) -> State:
@@ -206,7 +187,7 @@ def _begin(params: GrowthParams, mesh: Mesh) -> State:
     offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
     held = np.zeros(mesh.x.shape, bool)
     for attachment in params.attached:
-        inside = share(attachment.where, mesh, _border(top), params.seed) >= 0.5
+        inside = share(attachment.where, mesh, border(top), params.seed) >= 0.5
         held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
     angles = shell.angles(mesh.x, top.hinges)
     x = mesh.x + np.where(held, 0.0, offset[:, None] * normals)
@@ -240,36 +221,3 @@ def _forgotten(state: State, k: float, threshold: float) -> Floats:
 
 def _matrix(g: Floats) -> Floats:
     return np.stack([g[:, [0, 1]], g[:, [1, 2]]], axis=1)
-
-
-def _branched(state: State, tools: dict[int, Tool]) -> State:
-    """Split the spots whose time has come."""
-    spots = dict(state.spots)
-    for number, tool in tools.items():
-        if not isinstance(tool, HotSpot) or number not in spots:
-            continue
-        while spots[number][0].splits < len(tool.splits) and (
-            state.time - tool.start >= tool.splits[spots[number][0].splits] - 1e-9
-        ):
-            spots[number] = tuple(child for spot in spots[number] for child in _children(state, spot, tool))
-    return replace(state, spots=spots)
-
-
-def _children(state: State, spot: Spot, tool: HotSpot) -> Sequence[Spot]:
-    x, triangles = state.x, state.mesh.triangles
-    centre = spot.anchor.at(x, triangles)[0]
-    p = x[triangles[spot.anchor.faces[0]]]
-    normal = np.cross(p[1] - p[0], p[2] - p[0])
-    normal /= np.linalg.norm(normal)
-    # every generation splits at right angles to the one before
-    side = np.cross(normal, np.array(tool.frame))
-    if np.linalg.norm(side) < 1e-6:
-        side = p[1] - p[0]
-    side /= np.linalg.norm(side)
-    other = np.cross(normal, side)
-    found = []
-    for k in range(tool.branches):
-        turn = 2 * np.pi * k / tool.branches + (np.pi / 2 if spot.splits % 2 else 0.0)
-        target = centre + tool.spread * spot.radius * (np.cos(turn) * side + np.sin(turn) * other)
-        found.append(Spot(place(target[None], x, triangles), spot.radius * tool.shrink, spot.splits + 1))
-    return found

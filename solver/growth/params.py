@@ -99,6 +99,11 @@ class GrowthParams(Params):
         description="Pressure along the normal, frozen in each step, over mu per unit length",
         json_schema_extra=_units("1"),
     )
+    gravity: tuple[float, float, float] = Field(
+        (0.0, 0.0, 0.0),
+        description="Weight of the sheet per rest area, a dead load, over mu; up to 1 each way",
+        json_schema_extra=_units("1"),
+    )
     plasticity: float = Field(
         0.0,
         ge=0,

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from scipy.spatial import KDTree
 
 from ..contract import Context, InvalidInput
+from .harmonic import harmonic
 from .shapes import Mesh
+from .textures import Projection, gray_scott, laid
 
-__all__ = ["Ball", "Band", "Everywhere", "Meridians", "Noise", "Painted", "Place", "Rim", "share"]
+__all__ = [
+    "Ball",
+    "Band",
+    "Everywhere",
+    "Harmonic",
+    "Meridians",
+    "Noise",
+    "Painted",
+    "Place",
+    "Reaction",
+    "Rim",
+    "Texture",
+    "share",
+]
 
 Floats = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
@@ -75,7 +90,52 @@ class Painted(_Model):
     values: tuple[float, ...] = Field(max_length=200_000, description="Share of each vertex, 0 to 1 [1]")
 
 
-Place = Annotated[Everywhere | Ball | Band | Rim | Meridians | Noise | Painted, Field(discriminator="kind")]
+class Texture(_Model):
+    """Values on a grid, laid on the surface by a temporary map when the tool starts."""
+
+    kind: Literal["texture"] = "texture"
+    values: tuple[tuple[float, ...], ...] = Field(min_length=2, max_length=1024, description="Rows from below [1]")
+    projection: Projection = Field("z", description="Axis of view, or round about the z axis")
+
+    @field_validator("values")
+    @classmethod
+    def _even(cls, value: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+        if len(value[0]) < 2 or any(len(row) != len(value[0]) for row in value):
+            raise ValueError("the rows of a texture are equally long, two values at least")
+        return value
+
+
+class Reaction(_Model):
+    """Spots and stripes of Gray and Scott's reaction-diffusion, laid on the surface as a texture."""
+
+    kind: Literal["reaction"] = "reaction"
+    feed: float = Field(0.035, ge=0, le=0.1, description="Feed rate F [1]")
+    kill: float = Field(0.06, ge=0, le=0.1, description="Kill rate k [1]")
+    size: int = Field(64, ge=16, le=256, description="Cells of the grid: more are finer")
+    steps: int = Field(4000, ge=1, le=20_000, description="Steps of the reaction")
+    projection: Projection = Field("z", description="Axis of view, or round about the z axis")
+
+
+class Harmonic(_Model):
+    """Shares painted at points, spread between them by Laplace's equation."""
+
+    kind: Literal["harmonic"] = "harmonic"
+    points: tuple[tuple[float, float, float], ...] = Field(
+        min_length=1, max_length=2000, description="Where; the nearest vertex [start shape's unit]"
+    )
+    values: tuple[float, ...] = Field(min_length=1, max_length=2000, description="Share of each point [1]")
+
+    @model_validator(mode="after")
+    def _matching(self) -> Self:
+        if len(self.points) != len(self.values):
+            raise ValueError("give one value for each point")
+        return self
+
+
+Place = Annotated[
+    Everywhere | Ball | Band | Rim | Meridians | Noise | Painted | Texture | Reaction | Harmonic,
+    Field(discriminator="kind"),
+]
 
 
 def _smooth(values: Floats | float) -> Floats:
@@ -109,6 +169,13 @@ def share(place: Place, mesh: Mesh, border: NDArray[np.int64], seed: int) -> Flo
         waves = generator.normal(size=(64, 3)) * 2 / place.size
         total = np.cos(x @ waves.T + generator.uniform(0, 2 * np.pi, 64)).sum(axis=1) / np.sqrt(32)
         return _smooth(0.5 + 0.5 * place.sharpness * total)
+    if isinstance(place, Texture):
+        return np.clip(laid(np.array(place.values), x, place.projection), 0, 1)
+    if isinstance(place, Reaction):
+        return laid(gray_scott(place.feed, place.kill, place.size, place.steps, seed), x, place.projection)
+    if isinstance(place, Harmonic):
+        painted, first = np.unique(KDTree(x).query(np.array(place.points))[1], return_index=True)
+        return np.clip(harmonic(x, mesh.triangles, painted, np.array(place.values)[first]), 0, 1)
     if isinstance(place, Painted):
         if len(place.values) != len(x):
             raise InvalidInput(

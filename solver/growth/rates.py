@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from .. import shell
 from .state import State
-from .tools import HotCurve, HotSpot, HotSurface, Tool, intensity
+from .tools import HotCurve, HotSpot, HotSurface, Tool, intensities
 
 __all__ = ["Rates", "grown", "rates"]
 
@@ -35,13 +35,18 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
     count = len(state.mesh.triangles)
     strain, curving = np.zeros((count, 3)), np.zeros((count, 3))
     for number, tool in tools.items():
-        strength = intensity(tool, time)
+        # places with clocks of their own have their intensity in their share
+        own = (isinstance(tool, HotCurve) and bool(tool.offsets or tool.paces)) or (
+            isinstance(tool, HotSurface) and tool.later is not None
+        )
+        since = time - tool.start - (tool.delay if isinstance(tool, HotCurve) else 0.0)
+        strength = (1.0 if since >= 0 else 0.0) if own else float(intensities(tool, np.array([since]))[0])
         if strength == 0:
             continue
         if isinstance(tool, HotSurface):
-            share, along = _surface(state, tool, number)
+            share, along = _surface(state, tool, number, time)
         elif isinstance(tool, HotCurve):
-            share, along = _curve(state, tool, state.curves[number].at(state.x, state.mesh.triangles))
+            share, along = _curve(state, tool, state.curves[number].at(state.x, state.mesh.triangles), since)
         else:
             share, along = _spots(state, tool, number, time)
         first, second = np.log(_stretches(state, tool, number))
@@ -122,10 +127,12 @@ def _corners(state: State, share: Floats) -> Floats:
 def _stretches(state: State, tool: Tool, number: int) -> Floats:
     first, second = tool.stretch
     if isinstance(tool, HotCurve) and tool.normalised:
-        # D_T = 1 + lambda (D_N - 1) r_e gamma; r_e: radius times the kernel's integral, 8/15; gamma: mean curvature
+        # the paper's D_T = 1 + lambda (D_N - 1) r_e gamma for small steps, where D - 1 is log D: what grows out moves
+        # the curve by log(D_N) r_e; r_e: radius times the kernel's integral, 8/15; gamma: mean curvature
         line = state.curves[number].at(state.x, state.mesh.triangles)
-        first += tool.normalised * (second - 1) * tool.radius * 8 / 15 * _turning(line, tool.closed)
-    return np.array([max(first, 0.1), second])
+        share = tool.normalised * tool.radius * 8 / 15 * _turning(line, tool.closed)
+        first *= second**share
+    return np.array([np.clip(first, 0.1, 10.0), second])
 
 
 def _turning(line: Floats, closed: bool) -> float:
@@ -137,8 +144,12 @@ def _turning(line: Floats, closed: bool) -> float:
     return float(turns.sum() / (lengths[:-1] if closed else lengths).sum())
 
 
-def _surface(state: State, tool: HotSurface, number: int) -> tuple[Floats, Floats]:
-    share = _corners(state, state.shares[number])
+def _surface(state: State, tool: HotSurface, number: int, time: float) -> tuple[Floats, Floats]:
+    values = state.shares[number]
+    if tool.later is None:
+        share = _corners(state, values)
+    else:
+        share = _corners(state, values[:, 0] * intensities(tool, time - tool.start - tool.offset * values[:, 1]))
     if tool.frame == "around":
         middle = state.x[state.mesh.triangles].mean(axis=1)
         return share, np.stack([-middle[:, 1], middle[:, 0], np.zeros(len(middle))], -1)
@@ -149,6 +160,8 @@ def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Float
     triangles, x = state.mesh.triangles, state.x
     share = np.zeros(len(x))
     for spot in state.spots[number]:
+        if spot.letter and spot.letter in tool.resting:
+            continue
         centre = spot.anchor.at(x, triangles)[0]
         r = np.linalg.norm(x - centre, axis=1) / spot.radius
         r[~_near(state, triangles[spot.anchor.faces[0]], spot.radius)] = np.inf
@@ -170,13 +183,18 @@ def _kernel(name: str, r: Floats) -> Floats:
     return 1 - near if name == "cone" else (1 - near * near) ** 2
 
 
-def _curve(state: State, tool: HotCurve, line: Floats) -> tuple[Floats, Floats]:
+def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[Floats, Floats]:
     x, triangles = state.x, state.mesh.triangles
     tails, heads = line, np.roll(line, -1, axis=0)
     if not tool.closed:
         tails, heads = tails[:-1], heads[:-1]
-    strengths = np.array(tool.intensities or (1.0,) * len(line))
-    share, along = np.zeros(len(x)), np.zeros((len(x), 3))
+    painted = (
+        tool.intensities or (1.0,) * len(line),
+        tool.offsets or (0.0,) * len(line),
+        tool.paces or (1.0,) * len(line),
+    )
+    points = np.array(painted).T
+    local, along = np.zeros((len(x), 3)), np.zeros((len(x), 3))
     best = np.full(len(x), np.inf)
     for k, (tail, head) in enumerate(zip(tails, heads, strict=True)):
         way = head - tail
@@ -184,11 +202,17 @@ def _curve(state: State, tool: HotCurve, line: Floats) -> tuple[Floats, Floats]:
         gap = np.linalg.norm(x - tail - u[:, None] * way, axis=1)
         nearer = gap < best
         best = np.where(nearer, gap, best)
-        value = (1 - u) * strengths[k] + u * strengths[(k + 1) % len(line)]
-        share = np.where(nearer, value, share)
+        value = (1 - u)[:, None] * points[k] + u[:, None] * points[(k + 1) % len(line)]
+        local = np.where(nearer[:, None], value, local)
         along[nearer] = way
+    share = local[:, 0]
+    if tool.offsets or tool.paces:
+        share = share * intensities(tool, (since - local[:, 1]) * local[:, 2])
     r = best / tool.radius
-    r[~_near(state, np.unique(KDTree(x).query(line)[1]), tool.radius)] = np.inf
+    # a curve is near all along, and not only where its control points are
+    pieces = max(2, int(np.linalg.norm(heads - tails, axis=1).max(initial=0) / (0.5 * tool.radius)) + 1)
+    path = (tails[:, None] + np.linspace(0, 1, min(pieces, 200))[:, None] * (heads - tails)[:, None]).reshape(-1, 3)
+    r[~_near(state, np.unique(KDTree(x).query(path)[1]), tool.radius)] = np.inf
     return _corners(state, share * _kernel("smooth", r)), along[triangles].mean(axis=1)
 
 

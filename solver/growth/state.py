@@ -29,11 +29,15 @@ class Anchors:
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A hot spot on its way: radius, and how often it has split."""
+    """A hot spot on its way: radius, how often it has split, its letter.
+
+    anchor: of the spot, and, where it has a heading, of a point ahead: so the heading turns with the surface.
+    """
 
     anchor: Anchors
     radius: float
     splits: int = 0
+    letter: str = ""
 
 
 @dataclass(frozen=True, eq=False)

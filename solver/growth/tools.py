@@ -6,15 +6,20 @@ paper's expansion rates D1 and D2. 1 is no growth, less than 1 is shrinking. Whe
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import accumulate, pairwise
+from string import ascii_uppercase
 from typing import Annotated, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from .places import Place
 
-__all__ = ["HotCurve", "HotSpot", "HotSurface", "Tool", "intensity"]
+__all__ = ["Apex", "HotCurve", "HotSpot", "HotSurface", "Tool", "intensities", "intensity"]
+
+#: Control points of a curve that is made about an apex.
+_AROUND = 24
 
 Stretch = Annotated[float, Field(ge=0.1, le=10)]
 Point = tuple[float, float, float]
@@ -57,13 +62,56 @@ class HotSpot(_Tool):
     branches: int = Field(2, ge=2, le=6, description="Spots that one splits into")
     spread: float = Field(0.6, gt=0, le=1, description="Distance of the new spots from the old one, over its radius")
     shrink: float = Field(0.75, gt=0, le=1, description="Radius of the new spots over that of the old one")
+    axiom: str = Field("A", min_length=1, max_length=1, description="Letter of the first spot, for `rules`")
+    rules: dict[str, tuple[str, ...]] = Field(
+        {},
+        max_length=26,
+        description="What each letter becomes when spots split, one of several by chance: letters are spots, f steps "
+        "on, + and - turn, ! shrinks, [ and ] keep and take back the place",
+    )
+    turn: float = Field(60.0, ge=-360, le=360, description="Angle of + and - in the rules [degree]")
+    resting: str = Field("", max_length=26, description="Letters of spots that do not grow")
+
+    @field_validator("rules")
+    @classmethod
+    def _spelt(cls, value: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        for letter, words in value.items():
+            for word in words:
+                if not set(word) <= set(ascii_uppercase + "f+-![]") or len(word) > 200:
+                    raise ValueError(f"the rule of {letter!r} has signs other than capitals and f+-![]: {word[:40]!r}")
+                depths = list(accumulate((sign == "[") - (sign == "]") for sign in word))
+                if any(depth < 0 for depth in depths) or (depths and depths[-1]):
+                    raise ValueError(f"the brackets of the rule of {letter!r} do not match: {word[:40]!r}")
+            if not words or letter not in ascii_uppercase or len(letter) != 1:
+                raise ValueError(f"a rule is of a capital and gives something, not {letter[:10]!r}")
+        return value
+
+
+class Apex(BaseModel):
+    """A curve about a place, made when its tool starts: an arc of a circle on the surface."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    at: Point | None = Field(None, description="Middle; the nearest point of the surface [start shape's unit]")
+    tool: int | None = Field(None, ge=0, le=199, description="Or the number, from 0, of the hot spot to follow")
+    radius: float = Field(0.3, gt=0, le=100, description="Distance from the middle [start shape's unit]")
+    across: bool = Field(False, description="A line through the middle in place of a circle")
+    frame: Point = Field((1.0, 0.0, 0.0), description="Direction in which it begins, as projected on the surface [1]")
+    arc: float = Field(360.0, gt=0, le=360, description="Part of the circle [degree]")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.at is None) == (self.tool is None):
+            raise ValueError("give either a point or a hot spot's number")
+        return self
 
 
 class HotCurve(_Tool):
     """A line on the surface that grows along itself and outwards."""
 
     kind: Literal["curve"] = "curve"
-    points: tuple[Point, ...] = Field(min_length=2, max_length=500, description="Control points [start shape's unit]")
+    points: tuple[Point, ...] = Field((), max_length=500, description="Control points [start shape's unit]")
+    apex: Apex | None = Field(None, description="In place of control points: made about an apex when it starts")
     closed: bool = Field(False, description="Whether the last point meets the first")
     radius: float = Field(0.2, gt=0, le=100, description="Radius of influence [start shape's unit]")
     stretch: tuple[Stretch, Stretch] = Field((1.0, 1.3), description="Tangential and normal to the curve [1]")
@@ -71,11 +119,18 @@ class HotCurve(_Tool):
         0.0, ge=-5, le=5, description="Share lambda of the tangential growth that keeps the outgrowth flat (1: a plane)"
     )
     intensities: tuple[float, ...] = Field((), max_length=500, description="Intensity at each control point [1]")
+    delay: float = Field(0.0, ge=0, le=1000, description="From its making, when it is attached, to its growing [time]")
+    offsets: tuple[float, ...] = Field((), max_length=500, description="Later start of each control point [time]")
+    paces: tuple[float, ...] = Field((), max_length=500, description="Pace of the activation at each control point [1]")
 
     @model_validator(mode="after")
     def _matching(self) -> Self:
-        if self.intensities and len(self.intensities) != len(self.points):
-            raise ValueError("give one intensity for each control point, or none")
+        if (self.apex is None) == (len(self.points) < 2):
+            raise ValueError("give either two points or more, or an apex")
+        count = len(self.points) if self.apex is None else _AROUND
+        for name in ("intensities", "offsets", "paces"):
+            if getattr(self, name) and len(getattr(self, name)) != count:
+                raise ValueError(f"{name}: give one for each control point ({count}), or none")
         return self
 
 
@@ -88,6 +143,8 @@ class HotSurface(_Tool):
     frame: Point | Literal["around"] = Field(
         "around", description="Direction of the first stretch, projected on the surface; 'around' the z axis [1]"
     )
+    offset: float = Field(0.0, ge=0, le=1000, description="Later start where `later` is 1 [time]")
+    later: Place | None = Field(None, description="Share of `offset` of each vertex")
     curl: tuple[float, float] = Field(
         (0.0, 0.0), description="Rest curvature added along and across, in unit time [1/start shape's unit]"
     )
@@ -98,8 +155,10 @@ Tool = Annotated[HotSpot | HotCurve | HotSurface, Field(discriminator="kind")]
 
 def intensity(tool: HotSpot | HotCurve | HotSurface, time: float) -> float:
     """Return the intensity of a tool at a growth time, 0 outside its duration."""
-    since = time - tool.start
-    if not 0 <= since < tool.duration:
-        return 0.0
+    return float(intensities(tool, np.array([time - tool.start]))[0])
+
+
+def intensities(tool: HotSpot | HotCurve | HotSurface, since: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the intensities at times since the start, of places with clocks of their own; 0 outside the duration."""
     when, value = np.array(tool.activation).T
-    return float(np.interp(since, when, value))
+    return np.where((since >= 0) & (since < tool.duration), np.interp(since, when, value), 0.0)

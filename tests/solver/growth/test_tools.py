@@ -1,0 +1,225 @@
+"""Generators of growth against known answers: harmonic functions, clocks along curves, apexes, L-systems, weight."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from solver.contract import InvalidInput, Need
+from solver.growth import SOLVER
+from solver.growth.engine import Engine
+from solver.growth.harmonic import harmonic, harmonic_tensors
+from solver.growth.params import GrowthParams
+from solver.growth.placing import border, branched, started
+from solver.growth.rates import rates
+from solver.growth.shapes import start
+from solver.growth.textures import gray_scott, laid
+from solver.shell import topology
+
+
+def engine(*tools, **values) -> Engine:
+    return Engine(GrowthParams.parse({"tools": list(tools), "imperfection": 0, "remesh": 0} | values), 900)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_painted_borders_spread_as_harmonic_functions(order):
+    """Re z^k on the rim of a disc is Re z^k inside it; the error falls with the square of the mesh size."""
+    errors = []
+    for count in (400, 1600):
+        mesh = start("disc", count, 1.0)
+        rim = border(topology(mesh.triangles, len(mesh.x)))
+        exact = ((mesh.x[:, 0] + 1j * mesh.x[:, 1]) ** order).real
+        errors.append(float(np.abs(harmonic(mesh.x, mesh.triangles, rim, exact[rim]) - exact).max()))
+    assert errors[1] < 1e-10 if order == 1 else errors[1] < 0.45 * errors[0] < 0.01
+
+
+def test_a_tensor_painted_on_both_sides_turns_in_between_and_keeps_its_rates():
+    """Directions at +-45 degrees on the left and right of a strip: along x, or across it, in the middle."""
+    mesh = start("strip", 600, 2.0)
+    ends = np.flatnonzero(np.abs(np.abs(mesh.x[:, 0]) - 1.0) < 1e-9)
+    left = mesh.x[ends, 0] < 0
+    turn = np.where(left, np.pi / 8, -np.pi / 8)
+    ways = np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
+    pair = np.broadcast_to([0.8, 0.1], (len(ends), 2))
+    found, along = harmonic_tensors(mesh.x, mesh.triangles, ends, ways, pair)
+    middle = np.abs(mesh.x[:, 0]) < 0.05
+    assert found == pytest.approx(np.broadcast_to([0.8, 0.1], found.shape), abs=1e-9)
+    assert np.linalg.norm(along, axis=1) == pytest.approx(np.ones(len(along)))
+    assert np.abs(along[middle, 0]).min() > 0.99
+    assert np.abs((along[ends] * ways).sum(axis=1)) == pytest.approx(np.ones(len(ends)), abs=1e-9)
+
+
+def test_a_part_without_paint_is_refused():
+    mesh = start("disc", 100, 1.0)
+    two = np.concatenate([mesh.triangles, mesh.triangles + len(mesh.x)])
+    apart = np.concatenate([mesh.x, mesh.x + 5.0])
+    with pytest.raises(InvalidInput, match="part"):
+        harmonic(apart, two, np.array([0]), np.array([1.0]))
+
+
+def test_a_texture_lies_where_its_map_says():
+    x = start("square", 400, 1.0).x
+    ramp = np.array([[0.0, 1.0], [0.0, 1.0]])
+    assert laid(ramp, x, "z") == pytest.approx(x[:, 0] + 0.5, abs=1e-9)
+    assert laid(ramp.T, x, "z") == pytest.approx(x[:, 1] + 0.5, abs=1e-9)
+    tube = start("tube", 400, 2.0).x
+    waves = np.cos(2 * np.pi * np.arange(64) / 64)[None, :].repeat(2, axis=0)
+    assert laid(waves, tube, "round") == pytest.approx(tube[:, 0], abs=2e-3)
+
+
+def test_a_reaction_makes_a_pattern_of_its_seed():
+    one, again, other = (gray_scott(0.035, 0.06, 32, 1500, seed) for seed in (1, 1, 2))
+    assert (one == again).all()
+    assert (one != other).any()
+    assert one.std() > 0.2, "no pattern"
+
+
+def test_a_curve_with_offsets_and_paces_runs_by_its_own_clock():
+    """A ramp of intensity that begins later to the right, and goes twice as fast there."""
+    tool = {
+        "kind": "curve",
+        "points": [(-1, 0, 0), (1, 0, 0)],
+        "radius": 0.2,
+        "stretch": (np.e, 1.0),
+        "activation": [(0, 0), (1, 1)],
+    }
+    made = engine(tool | {"offsets": [0.0, 0.4], "paces": [1.0, 2.0]}, shape="strip", aspect=2.0)
+    state = started(made.state, made.script.tools, 0.05, 0)
+    middles = state.x[state.mesh.triangles].mean(axis=1)
+    # the curve runs along x, and so does its first stretch: the trace is the share
+    strain = rates(state, {0: made.script.tools[0]}, 0.5).strain
+    share = strain[:, 0] + strain[:, 2]
+    on = np.abs(middles[:, 1]) < 0.02
+    u = (middles[on, 0] + 1) / 2
+    expected = np.interp((0.5 - 0.4 * u) * (1 + u), [0, 1], [0, 1])
+    assert on.sum() > 10
+    assert share[on] == pytest.approx(expected, rel=0.12)
+    assert not rates(state, {0: made.script.tools[0].model_copy(update={"delay": 0.6})}, 0.5).strain.any()
+
+
+def test_a_surface_that_starts_later_further_out():
+    tool = {
+        "kind": "surface",
+        "where": {"kind": "everywhere"},
+        "later": {"kind": "band", "along": "radius", "low": 0.49, "high": 0.51},
+        "offset": 0.5,
+    }
+    made = engine(tool, shape="disc")
+    state = started(made.state, made.script.tools, 0.05, 0)
+    out = np.linalg.norm(state.x[state.mesh.triangles].mean(axis=1), axis=1)
+    early, late = (np.abs(rates(state, {0: made.script.tools[0]}, t).strain).sum(axis=1) for t in (0.25, 0.75))
+    assert (early[out < 0.4] > 0).all()
+    assert not early[out > 0.6].any()
+    assert (late > 0).all()
+
+
+def test_a_curve_is_made_about_the_apex_where_it_is_then():
+    """The ring follows a hot spot that has moved, at its distance, and rides on the surface afterwards."""
+    spot = {"kind": "spot", "at": (0, 0, 1), "radius": 0.5, "stretch": (4, 4)}
+    ring = {"kind": "curve", "apex": {"tool": 0, "radius": 0.2}, "closed": True, "start": 0.5}
+    made = engine(spot, ring, shape="sphere")
+    while made.state.time < 0.55 - 1e-9:
+        made.advance(1e9, until=made.state.time + 0.05)
+    state = made.state
+    tip = state.spots[0][0].anchor.at(state.x, state.mesh.triangles)[0]
+    points = state.curves[1].at(state.x, state.mesh.triangles)
+    assert tip[2] > 1.1
+    assert np.linalg.norm(points - tip, axis=1) == pytest.approx(np.full(len(points), 0.2), rel=0.25)
+    assert KDTree(state.x).query(points)[0].max() < 0.12
+
+
+def test_an_apex_without_its_spot_is_refused():
+    with pytest.raises(InvalidInput, match="no hot spot"):
+        engine({"kind": "curve", "apex": {"tool": 3}}).advance(1e9, until=0.05)
+
+
+def test_an_l_system_writes_the_spots_it_should():
+    """Lindenmayer's algae, A -> AB, B -> A: Fibonacci's numbers, with letters in their order."""
+    tool = {"kind": "spot", "at": (0, 0, 1), "splits": (0.1, 0.2, 0.3, 0.4), "rules": {"A": ["AfB"], "B": ["A"]}}
+    made = engine(tool, shape="sphere")
+    state = started(made.state, made.script.tools, 0.05, 0)
+    words = []
+    for time in (0.1, 0.2, 0.3, 0.4):
+        state = branched(replace(state, time=time), {0: made.script.tools[0]}, 0)
+        words.append("".join(spot.letter for spot in state.spots[0]))
+    assert words == ["AB", "ABA", "ABAAB", "ABAABABA"]
+
+
+def test_a_fork_turns_by_its_angle():
+    tool = {
+        "kind": "spot",
+        "at": (0, 0, 0),
+        "radius": 0.3,
+        "spread": 1.0,
+        "splits": (0.1,),
+        "turn": 45.0,
+        "shrink": 0.5,
+        "rules": {"A": ["[+f!A][-f!A]"]},
+    }
+    made = engine(tool, shape="disc")
+    state = started(made.state, made.script.tools, 0.05, 0)
+    spots = branched(replace(state, time=0.1), {0: made.script.tools[0]}, 0).spots[0]
+    ends = np.array([spot.anchor.at(state.x, state.mesh.triangles)[0] for spot in spots])
+    r = 0.3 * np.sqrt(0.5)
+    assert ends == pytest.approx(np.array([[r, r, 0], [r, -r, 0]]), abs=1e-6)
+    assert [spot.radius for spot in spots] == [0.15, 0.15]
+
+
+@pytest.mark.parametrize(
+    ("tool", "said"),
+    [
+        ({"kind": "spot", "at": (0, 0, 1), "rules": {"A": ["[A"]}}, "tools.0.spot.rules.*brackets"),
+        ({"kind": "spot", "at": (0, 0, 1), "rules": {"A": ["Ax"]}}, "tools.0.spot.rules.*signs"),
+        ({"kind": "curve"}, "tools.0.curve.*apex"),
+        ({"kind": "curve", "points": [(0, 0, 0), (1, 0, 0)], "paces": [1]}, "tools.0.curve.*paces"),
+        ({"kind": "surface", "where": {"kind": "texture", "values": [[1, 2], [3]]}}, "tools.0.*texture"),
+    ],
+)
+def test_a_wrong_entry_is_named(tool, said):
+    with pytest.raises(InvalidInput, match=said):
+        engine(tool)
+
+
+def test_a_hanging_strip_stretches_by_its_weight():
+    """A strip of weight q per area held above: strain q (L - s) / E, E = 2 (1 + nu) mu; nu = 0 gives elongation."""
+    weight, length = 0.01, 2.0
+    made = Engine(
+        GrowthParams.parse(
+            {
+                "shape": "strip",
+                "aspect": length,
+                "poisson": 0.0,
+                "imperfection": 0,
+                "remesh": 0,
+                "tools": [],
+                "gravity": (weight, 0, 0),
+                "attached": [{"where": {"kind": "band", "along": "x", "low": -0.9, "high": -1.0}}],
+            }
+        ),
+        600,
+        1e-7,
+    )
+    made.advance(1e9, until=0.05)
+    assert made.state.x[:, 0].max() - 1.0 == pytest.approx(weight * (length - 0.05) ** 2 / 4, rel=0.03)
+
+
+def test_normalised_outgrowth_stays_flat():
+    """G19: kept in its plane, what grows out at a disc's rim fits best at lambda = 1."""
+    energies = []
+    for share in (0.0, 1.0, 2.0):
+        turns = 2 * np.pi * np.arange(32) / 32
+        rim = {
+            "kind": "curve",
+            "points": [(np.cos(t), np.sin(t), 0.0) for t in turns],
+            "closed": True,
+            "radius": 0.5,
+            "stretch": (1.0, 2.0),
+            "normalised": share,
+        }
+        held = {"where": {"kind": "everywhere"}, "axes": ["z"]}
+        values = {"shape": "disc", "tools": [rim], "attached": [held]}
+        run = SOLVER.solve(SOLVER.parse(values), Need(stages=(0.5,), quality="preview", fields=("stored_energy",)))
+        energies.append(float(run.stored_energy[0]))
+    print(energies)
+    assert energies[1] < 0.25 * min(energies[0], energies[2])
