@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from .. import shell
-from ..multifrontal import Analysis
-from ..shell.factor import Packed, dissect, factor
+from ..shell.dissection import Fronts
+from ..shell.inverse import Inverse, fronts_of, inverse_of, normals
 from .params import Plane, SolidBall
 from .state import State
 
@@ -26,21 +25,13 @@ _HARDNESS = 30.0
 
 
 class Tangent:
-    """Pattern, order of elimination and last factor of one topology; outlives the growth steps between remeshings."""
+    """Pattern, order of elimination and last inverse of one topology; outlives the growth steps between remeshings."""
 
     def __init__(self, mesh: shell.Topology) -> None:
         self.mesh = mesh
         self.pattern = shell.pattern(mesh)
-        self.analysis: Analysis | None = None
-        self.factor: Packed | None = None
-        self.factors = 0
-
-    def take(self, blocks: Floats, x: Floats) -> None:
-        """Factor `blocks` (nnz, 3, 3)."""
-        if self.analysis is None:
-            self.analysis = dissect(self.mesh, self.pattern, x)
-        self.factor = factor(self.analysis, blocks)
-        self.factors += 1
+        self.fronts: Fronts | None = None
+        self.inverse: Inverse | None = None
 
 
 class StepEnergy:
@@ -75,9 +66,17 @@ class StepEnergy:
         gradient[state.held] = 0.0
         return energy, gradient
 
-    def refactor(self, x: Floats) -> None:
-        """Factor the positive semidefinite tangent at x, shifted."""
-        state, pattern = self.state, self.tangent.pattern
+    @property
+    def ready(self) -> bool:
+        """Whether there is an inverse."""
+        return self.tangent.inverse is not None
+
+    def refactor(self, x: Floats) -> Iterator[None]:
+        """Take the inverse of the positive semidefinite tangent at x, shifted; yields after pieces of the work."""
+        state, tangent, pattern = self.state, self.tangent, self.tangent.pattern
+        if tangent.fronts is None:
+            tangent.fronts = fronts_of(state.mesh, x)
+            yield
         blocks = np.zeros((pattern.blocks, 3, 3))
         shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
         shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
@@ -86,16 +85,16 @@ class StepEnergy:
             depth, normal = _depth(solid, x)
             weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
             blocks[pattern.diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
-        if state.held.any():
-            _hold(blocks, pattern.indptr, pattern.indices, self.free)
-        self.tangent.take(blocks, x)
+        yield
+        n = normals(x, state.mesh.triangles)
+        tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, state.held.all(axis=1))
 
     def precondition(self, v: Floats) -> Floats:
-        """Return the last factor's inverse applied to v (n, 3)."""
-        if self.tangent.factor is None:
-            self.refactor(self.state.x)
-        assert self.tangent.factor is not None
-        return np.where(self.free, self.tangent.factor.solve(np.ascontiguousarray(v)), 0.0)
+        """Return the last inverse applied to v (n, 3)."""
+        assert self.tangent.inverse is not None
+        found = self.tangent.inverse.apply(v)
+        found[self.state.held] = 0.0
+        return found
 
 
 def _area_vectors(x: Floats, triangles: Ints) -> Floats:
@@ -113,15 +112,3 @@ def _depth(solid: Plane | SolidBall, x: Floats) -> tuple[Floats, Floats]:
     way = x - np.array(solid.centre)
     distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]
-
-
-@njit(cache=True)
-def _hold(blocks: Floats, indptr: Ints, indices: Ints, free: NDArray[np.bool_]) -> None:
-    """Make rows and columns of held directions those of the unit matrix."""
-    for row in range(len(free)):
-        for at in range(indptr[row], indptr[row + 1]):
-            column = indices[at]
-            for d in range(3):
-                for h in range(3):
-                    if not (free[row, d] and free[column, h]):
-                        blocks[at, d, h] = 1.0 if row == column and d == h else 0.0
