@@ -141,14 +141,15 @@ class Engine:
         point, spent = Point(state.x, 0.0, np.inf), 0
         energy = StepEnergy(state, self._material, self.params.pressure, self.params.solids, self._tangent)
         goal = self.tolerance * state.length
-        for point in _WAYS[self.params.solver](energy, state.x):
+        for nearer in _WAYS[self.params.solver](energy, _ahead(energy, state, dt)):
+            spent += nearer.x is not point.x
+            point = nearer
             if point.gradient <= goal or point.stuck:
                 break
             if not np.isfinite(point.gradient):
                 raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
-            if spent >= self._most:
+            if spent > self._most:
                 break
-            spent += 1
             yield point.gradient / state.length
         if not point.gradient <= goal:
             raise NotConverged(
@@ -158,7 +159,8 @@ class Engine:
                 residual=point.gradient / state.length,
             )
         forces = point.gradient / state.length
-        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent)
+        drift = (point.x - state.x) / dt if dt else None
+        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
         if self.params.plasticity:
             state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = _branched(state, acting)
@@ -190,6 +192,14 @@ class Engine:
             else:
                 spots[number] = (Spot(place(np.array([tool.at]), *mesh), tool.radius),)
         return replace(state, shares=shares, spots=spots, curves=curves)
+
+
+def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
+    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
+    if state.drift is None:
+        return state.x
+    x = state.x + dt * state.drift
+    return x if energy(x)[0] < energy(state.x)[0] else state.x
 
 
 def _border(mesh: shell.Topology) -> NDArray[np.int64]:

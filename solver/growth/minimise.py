@@ -50,13 +50,26 @@ class Point(NamedTuple):
 def _descend(
     energy: Energy, x: Floats, f: float, d: Floats, slope: float, t: float = 1.0
 ) -> tuple[float, float, Floats]:
-    """Return (step, energy, gradient) of the first of t, t/2, t/4, ... that lowers the energy; step 0 if none does."""
+    """Return (step, energy, gradient) of the first step from t down that lowers the energy; step 0 if none does.
+
+    A step that fails is followed by the least of the cubic through both ends, within a tenth and a half of it.
+    """
     while t > _SHORTEST:
         value, gradient = energy(x + t * d)
         if value <= f + _ARMIJO * t * slope:
             return t, value, gradient
-        t *= 0.5
+        t *= min(max(_least(f, slope * t, value, float(np.vdot(gradient, d)) * t), 0.1), 0.5)
     return 0.0, f, d
+
+
+def _least(f: float, slope: float, value: float, then: float) -> float:
+    """Return where the cubic with values f, value and slopes slope, then at 0 and 1 is least; 0.5 if it has no bend."""
+    bend = slope + then - 3 * (value - f)
+    root = bend * bend - slope * then
+    if not (np.isfinite(root) and root >= 0):
+        return 0.5
+    below = then - slope + 2 * np.sqrt(root)
+    return float(1 - (then + np.sqrt(root) - bend) / below) if below else 0.5
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})

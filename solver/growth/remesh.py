@@ -71,6 +71,7 @@ def split(state: State, longest: float) -> State:
         mesh=new,
         g=g,
         rest=rest,
+        drift=None if state.drift is None else carried(state.drift),
         shares={k: carried(v) for k, v in state.shares.items()},
         held=np.concatenate([state.held, state.held[i] & state.held[j]]),
         spots={k: tuple(moved(spot) for spot in spots) for k, spots in state.spots.items()},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,8 @@ class State:
 
     time: growth time. x: (n, 3). mesh: topology. g: rest metrics (f, 3). rest: rest angles (h,). shares: (n, k) of
     hot surfaces that have started. held: (n, 3) directions that are held, bool. spots, curves: by number of the tool.
-    forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far.
+    forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far. drift: (n, 3) how fast
+    the shape moved in the last step, None at the start.
     """
 
     time: float
@@ -56,8 +58,9 @@ class State:
     curves: dict[int, Anchors]
     forces: float = 0.0
     iterations: int = 0
+    drift: Floats | None = None
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Mean rest edge."""
         g = self.g
