@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ Ints = NDArray[np.int64]
 
 #: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
 _SHIFT = 1e-5
+#: An inverse outlives so many remeshings, and so many times its vertices.
+_LAYERS, _MORE = 12, 1.3
 #: Penalty of solids per area and depth [mu / l^2].
 _HARDNESS = 30.0
 
@@ -27,11 +30,22 @@ _HARDNESS = 30.0
 class Tangent:
     """Pattern, order of elimination and last inverse of one topology; outlives the growth steps between remeshings."""
 
-    def __init__(self, mesh: shell.Topology) -> None:
+    def __init__(self, mesh: shell.Topology, inverse: Inverse | None = None) -> None:
         self.mesh = mesh
-        self.pattern = shell.pattern(mesh)
         self.fronts: Fronts | None = None
-        self.inverse: Inverse | None = None
+        self.inverse = inverse
+
+    @cached_property
+    def pattern(self) -> shell.Pattern:
+        """Where blocks go."""
+        return shell.pattern(self.mesh)
+
+    def remeshed(self, mesh: shell.Topology, pairs: Ints) -> Tangent:
+        """Return the tangent of a mesh whose vertices lie in the middle of `pairs` (n', 2) of this one's."""
+        kept = self.inverse
+        if kept is not None and (len(kept.parents) >= _LAYERS or len(pairs) > _MORE * len(kept.normals)):
+            kept = None
+        return Tangent(mesh, kept.remeshed(pairs) if kept else None)
 
 
 class StepEnergy:
@@ -87,7 +101,7 @@ class StepEnergy:
             blocks[pattern.diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
         yield
         n = normals(x, state.mesh.triangles)
-        tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, state.held.all(axis=1))
+        tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, np.asarray(state.held.all(axis=1)))
 
     def precondition(self, v: Floats) -> Floats:
         """Return the last inverse applied to v (n, 3)."""

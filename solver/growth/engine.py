@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from .. import shell
 from ..contract import Context, NotConverged, Unstable
+from ..shell.inverse import normals
 from .energy import StepEnergy, Tangent
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 from .params import GrowthParams
 from .places import share
 from .rates import grown, rates
-from .remesh import split
+from .remesh import remesh
 from .shapes import Mesh, start
 from .state import Spot, State, place
 from .tools import HotCurve, HotSpot, HotSurface, Tool
@@ -31,6 +32,8 @@ __all__ = ["Engine"]
 Floats = NDArray[np.float64]
 
 _WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
+#: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
+_NUDGE, _WAVES = 0.2, (1, 2, 4)
 #: A mesh does not grow beyond this many times its first vertices.
 _MOST = 20
 
@@ -141,7 +144,8 @@ class Engine:
         point, spent = Point(state.x, 0.0, np.inf), 0
         energy = StepEnergy(state, self._material, self.params.pressure, self.params.solids, self._tangent)
         goal = self.tolerance * state.length
-        for nearer in _WAYS[self.params.solver](energy, _ahead(energy, state, dt)):
+        nudge = None if self.params.imperfection else self.params.seed
+        for nearer in _WAYS[self.params.solver](energy, _ahead(energy, state, dt, nudge)):
             spent += nearer.x is not point.x
             point = nearer
             if point.gradient <= goal or point.stuck:
@@ -165,12 +169,13 @@ class Engine:
             state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = _branched(state, acting)
         if self.params.remesh:
-            while len(state.x) < self._largest:
-                finer = split(state, self._longest)
-                if finer is state:
-                    break
-                state = finer
-                self._tangent = Tangent(state.mesh)
+            finer, changes = remesh(state, self._longest, self._largest)
+            tangent = self._tangent
+            for pairs in changes:
+                tangent = tangent.remeshed(finer.mesh, pairs)
+            if finer.mesh is not state.mesh:
+                self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
+            state = finer
         self._history.append((before, tools))
         self.state = state
         self._steps += 1
@@ -194,12 +199,28 @@ class Engine:
         return replace(state, shares=shares, spots=spots, curves=curves)
 
 
-def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
-    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
-    if state.drift is None:
-        return state.x
-    x = state.x + dt * state.drift
-    return x if energy(x)[0] < energy(state.x)[0] else state.x
+def _ahead(energy: StepEnergy, state: State, dt: float, seed: int | None) -> Floats:
+    """Return the cheapest of: where the shape is, where it comes to if it moves on as before, and small waves.
+
+    seed: of the waves, None for none. A perfect shape sits on its symmetry: only so it finds the way out of it.
+    """
+    x, least = state.x, energy(state.x)[0]
+    if state.drift is not None:
+        moved = x + dt * state.drift
+        value = energy(moved)[0]
+        if value < least:
+            x, least = moved, value
+    if seed is not None:
+        normal, middle = normals(state.x, state.mesh.triangles), state.x
+        for waves in _WAVES:
+            generator = Context.generator(seed)
+            ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(middle, axis=0).max()))
+            height = np.cos(middle @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
+            nudged = state.x + (_NUDGE * energy.material.thickness * height)[:, None] * np.where(energy.free, normal, 0)
+            value = energy(nudged)[0]
+            if value < least:
+                x, least = nudged, value
+    return x
 
 
 def _border(mesh: shell.Topology) -> NDArray[np.int64]:

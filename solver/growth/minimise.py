@@ -17,6 +17,8 @@ __all__ = ["Energy", "Point", "conjugate_gradients", "lbfgs", "quasi_newton"]
 Floats = NDArray[np.float64]
 
 _ARMIJO, _SHORTEST = 1e-4, 1e-9
+#: Least curvature along a step that is learnt, over the model's, and the step below which the model is forgotten.
+_DAMPED, _SHORT = 0.2, 1e-2
 #: Steps with one inverse before it is asked whether it still helps, and the drop of the gradient that says so.
 _BURST, _HELPS = 20, 0.3
 
@@ -165,9 +167,21 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
             if memory.count:
                 memory.clear()
                 continue
+            if preconditioned:
+                # a fresh inverse points nowhere down, by its rounding or at a kink: steepest descent still may
+                yield from _bfgs(energy, x, length, preconditioned=False)
+                return
             yield Point(x, f, size, stuck=True)
             return
-        memory.add(t * d, gradient - g)
+        if preconditioned:
+            # where the energy bends down, what the model has is mixed in (Powell 1978)
+            model, found = -t * t * slope, t * (float(np.vdot(d, gradient)) - slope)
+            share = 1.0 if found >= _DAMPED * model else (1 - _DAMPED) * model / (model - found)
+            memory.add(t * d, share * (gradient - g) - (1 - share) * t * g)
+            if t < _SHORT:
+                memory.clear()
+        else:
+            memory.add(t * d, gradient - g)
         x, f, g = x + t * d, value, gradient
         since, fresh = since + 1, False
 

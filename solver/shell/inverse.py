@@ -10,7 +10,7 @@ the work; as the start of L-BFGS it takes about half as many iterations more (do
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -27,6 +27,12 @@ Ints = NDArray[np.int64]
 
 #: Multiplications of one piece of a factorisation: some milliseconds.
 _PIECE = 20_000_000
+#: Pivots below are taken for 1 [mu].
+_FLOOR = 1e-8
+#: Entries beyond are those of triangles without area [mu].
+_MOST = 1e12
+#: What a new vertex gives alone under a force: about the inverse of a membrane's diagonal [1 / mu].
+_SOFT = 0.2
 
 
 def fronts_of(mesh: Topology, x: Floats) -> Fronts:
@@ -48,19 +54,36 @@ def normals(x: Floats, triangles: Ints) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """Factors L L^T of both matrices; across: normal, within: tangential motions. normals: (n, 3)."""
+    """Factors L L^T of both matrices; across: normal, within: tangential motions. normals: (n, 3).
+
+    parents: after remeshing, for each change the pair (n', 2) of old vertices in the middle of which each new one lies
+    (twice the same for one that stayed): the inverse then acts on what the old vertices can do.
+    """
 
     fronts: Fronts
     normals: Floats
     across: NDArray[np.float32]
     within: NDArray[np.float32]
+    parents: tuple[Ints, ...] = ()
 
     def apply(self, right: Floats) -> Floats:
         """Return the approximate inverse applied to `right` (n, 3)."""
-        found = np.empty_like(right)
+        rights = [right]
+        counts = [len(self.normals), *(len(pairs) for pairs in self.parents)]
+        for pairs, count in zip(reversed(self.parents), reversed(counts[:-1]), strict=True):
+            rights.append(_gathered(rights[-1], pairs, count))
+        found = np.empty((counts[0], 3))
         f = self.fronts
-        _apply(right, self.normals, f.nodes, f.starts, f.own, f.widest, self.across, self.within, found)
+        _apply(rights[-1], self.normals, f.nodes, f.starts, f.own, f.widest, self.across, self.within, found)
+        for pairs, own in zip(self.parents, reversed(rights[:-1]), strict=True):
+            found = 0.5 * (found[pairs[:, 0]] + found[pairs[:, 1]])
+            new = pairs[:, 0] != pairs[:, 1]
+            found[new] += _SOFT * own[new]
         return found
+
+    def remeshed(self, pairs: Ints) -> Inverse:
+        """Return the inverse for a mesh whose vertices lie in the middle of `pairs` (n', 2) of the present ones."""
+        return replace(self, parents=(*self.parents, pairs))
 
 
 def inverse_of(
@@ -69,7 +92,7 @@ def inverse_of(
     """Factor the tangent with `blocks` (nnz, 3, 3), n: normals (n, 3); yields after pieces of bounded work.
 
     held: (n,) vertices that do not move. The generator's value is the Inverse. Raises numpy.linalg.LinAlgError if a
-    matrix is not positive definite.
+    matrix is not finite.
     """
     across, within = np.empty(pattern.blocks), np.empty(pattern.blocks)
     _reduce(blocks, n, pattern.indptr, pattern.indices, held, across, within)
@@ -106,10 +129,16 @@ def _factor(fronts: Fronts, pattern: Pattern, data: Floats) -> Generator[None, N
             values,
         )
         if not good:
-            raise np.linalg.LinAlgError("the tangent is not positive definite")
+            raise np.linalg.LinAlgError("the tangent is not finite")
         at = end
         yield
     return values
+
+
+def _gathered(right: Floats, pairs: Ints, count: int) -> Floats:
+    """Return what the old vertices (count, 3) feel of forces on the new ones: half of those of their children."""
+    both = [np.bincount(pairs.ravel(), np.repeat(0.5 * right[:, d], 2), count) for d in range(3)]
+    return np.stack(both, -1)
 
 
 @njit(cache=True, error_model="numpy")
@@ -150,8 +179,11 @@ def _reduce(
                     both += n[i, d] * k[d, h] * n[j, h]
                     left += n[i, d] * k[d, h] * n[i, h]
                     right += n[j, d] * k[d, h] * n[j, h]
-            across[at] = both
             within[at] = 0.5 * (trace - left - right + cosine * both)
+            across[at] = both
+            # triangles without area bend without bound: they are left to themselves
+            if not (abs(across[at]) < _MOST and abs(within[at]) < _MOST):
+                across[at] = within[at] = _MOST if i == j else 0.0
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
@@ -169,7 +201,7 @@ def _eliminate(
     complements: Floats,
     values: NDArray[np.float32],
 ) -> bool:
-    """Eliminate fronts first to last - 1; returns whether all pivots were positive. place (n,): -1 on entry and exit.
+    """Eliminate fronts first to last - 1; returns whether all pivots were finite. place (n,): -1 on entry and exit.
 
     Fronts are symmetric; row c of w holds column c from the diagonal on.
     """
@@ -204,8 +236,12 @@ def _eliminate(
         for p in range(0, pivots, 4):
             q = min(p + 4, pivots)
             for c in range(p, q):
-                if not w[c, c] > 0:
+                if np.isnan(w[c, c]):
                     return False
+                # the matrices are semidefinite: what is below is rounding, of slivers mostly
+                if w[c, c] < _FLOOR:
+                    w[c, c:] = 0.0
+                    w[c, c] = 1.0
                 column = w[c, c:]
                 column /= np.sqrt(w[c, c])
                 for e in range(c + 1, q):
