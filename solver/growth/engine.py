@@ -144,17 +144,22 @@ class Engine:
         point, spent = Point(state.x, 0.0, np.inf), 0
         energy = StepEnergy(state, self._material, self.params.pressure, self.params.solids, self._tangent)
         goal = self.tolerance * state.length
-        nudge = None if self.params.imperfection else self.params.seed
-        for nearer in _WAYS[self.params.solver](energy, _ahead(energy, state, dt, nudge)):
-            spent += nearer.x is not point.x
-            point = nearer
-            if point.gradient <= goal or point.stuck:
+        begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
+        while True:
+            for nearer in _WAYS[self.params.solver](energy, begin):
+                spent += nearer.x is not point.x
+                point = nearer
+                if point.gradient <= goal or point.stuck:
+                    break
+                if not np.isfinite(point.gradient):
+                    raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
+                if spent > self._most:
+                    break
+                yield point.gradient / state.length
+            begin = _nudged(energy, point.x, point.energy, self.params.seed) if nudges else point.x
+            nudges -= 1
+            if begin is point.x:
                 break
-            if not np.isfinite(point.gradient):
-                raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
-            if spent > self._most:
-                break
-            yield point.gradient / state.length
         if not point.gradient <= goal:
             raise NotConverged(
                 f"no equilibrium at growth time {state.time:g}: residual {point.gradient / state.length:.1e}.",
@@ -199,28 +204,29 @@ class Engine:
         return replace(state, shares=shares, spots=spots, curves=curves)
 
 
-def _ahead(energy: StepEnergy, state: State, dt: float, seed: int | None) -> Floats:
-    """Return the cheapest of: where the shape is, where it comes to if it moves on as before, and small waves.
+def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
+    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
+    if state.drift is None:
+        return state.x
+    x = state.x + dt * state.drift
+    return x if energy(x)[0] < energy(state.x)[0] else state.x
 
-    seed: of the waves, None for none. A perfect shape sits on its symmetry: only so it finds the way out of it.
+
+def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
+    """Return x with small waves if that lowers the energy, else x itself.
+
+    A perfect shape sits on its symmetry, in balance but not at rest: only so it finds the way out.
     """
-    x, least = state.x, energy(state.x)[0]
-    if state.drift is not None:
-        moved = x + dt * state.drift
-        value = energy(moved)[0]
+    found, generator = x, Context.generator(seed)
+    normal = np.where(energy.free, normals(x, energy.state.mesh.triangles), 0.0)
+    for waves in _WAVES:
+        ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(x, axis=0).max()))
+        height = np.cos(x @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
+        trial = x + (_NUDGE * energy.material.thickness * height)[:, None] * normal
+        value = energy(trial)[0]
         if value < least:
-            x, least = moved, value
-    if seed is not None:
-        normal, middle = normals(state.x, state.mesh.triangles), state.x
-        for waves in _WAVES:
-            generator = Context.generator(seed)
-            ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(middle, axis=0).max()))
-            height = np.cos(middle @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
-            nudged = state.x + (_NUDGE * energy.material.thickness * height)[:, None] * np.where(energy.free, normal, 0)
-            value = energy(nudged)[0]
-            if value < least:
-                x, least = nudged, value
-    return x
+            found, least = trial, value
+    return found
 
 
 def _border(mesh: shell.Topology) -> NDArray[np.int64]:
