@@ -23,6 +23,8 @@ Ints = NDArray[np.int64]
 _SHIFT = 1e-5
 #: An inverse outlives so many remeshings, and so many times its vertices.
 _LAYERS, _MORE = 12, 1.3
+#: How far vertices move before contact looks for its pairs again, over the distance.
+_SLACK = 0.5
 #: Penalty of solids per area and depth [mu / l^2].
 _HARDNESS = 30.0
 
@@ -39,6 +41,14 @@ class Tangent:
     def pattern(self) -> shell.Pattern:
         """Where blocks go."""
         return shell.pattern(self.mesh)
+
+    def copy(self) -> Tangent:
+        """Return a tangent that starts from this one's inverse, and may take another."""
+        found = Tangent(self.mesh, self.inverse)
+        found.fronts = self.fronts
+        if "pattern" in self.__dict__:
+            found.__dict__["pattern"] = self.pattern
+        return found
 
     def remeshed(self, mesh: shell.Topology, pairs: Ints) -> Tangent:
         """Return the tangent of a mesh whose vertices lie in the middle of `pairs` (n', 2) of this one's."""
@@ -58,11 +68,14 @@ class StepEnergy:
         pressure: float,
         solids: Sequence[Plane | SolidBall],
         tangent: Tangent,
+        distance: float = 0.0,
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self.load = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
+        self._distance, self._looked = distance, state.x
+        self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
         self.areas = np.bincount(state.mesh.triangles.ravel(), np.repeat(shell.areas(state.g) / 3, 3), len(state.x))
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:
@@ -73,12 +86,26 @@ class StepEnergy:
         if self.load is not None:
             energy -= float(np.vdot(self.load, x - state.x))
             gradient -= self.load
+        if self._distance:
+            if float(np.abs(x - self._looked).max()) > _SLACK * self._distance:
+                self._pairs, self._looked = self._look(x), x
+            hard = _HARDNESS * self.areas / self._distance
+            energy += shell.contact(x, state.mesh.triangles, self._pairs, self._distance, hard, gradient)
         for solid in self.solids:
             depth, normal = _depth(solid, x)
             energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
             gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
         gradient[state.held] = 0.0
         return energy, gradient
+
+    @property
+    def longest(self) -> float:
+        """Longest move of a vertex in one step that contact can follow."""
+        return 0.4 * self._distance if self._distance else np.inf
+
+    def _look(self, x: Floats) -> Ints:
+        # moves of up to the slack by either side, per axis
+        return shell.candidates(x, self.state.mesh, self._distance * (1 + 2 * np.sqrt(3) * _SLACK))
 
     @property
     def ready(self) -> bool:
@@ -99,6 +126,10 @@ class StepEnergy:
             depth, normal = _depth(solid, x)
             weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
             blocks[pattern.diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
+        if self._distance:
+            hard = _HARDNESS * self.areas / self._distance
+            t = state.mesh.triangles
+            shell.contact_diagonal(x, t, self._pairs, self._distance, hard, pattern.diagonal, blocks)
         yield
         n = normals(x, state.mesh.triangles)
         tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, np.asarray(state.held.all(axis=1)))

@@ -32,6 +32,8 @@ __all__ = ["Engine"]
 Floats = NDArray[np.float64]
 
 _WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
+#: Steps that can be undone so that the same way on gives the same bytes; beyond, the same to the residual.
+_EXACT = 30
 #: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
 _NUDGE, _WAVES = 0.2, (1, 2, 4)
 #: A mesh does not grow beyond this many times its first vertices.
@@ -51,7 +53,7 @@ class Engine:
         self.params, self.tolerance, self._most = params, tolerance, most
         self._material = shell.Material(params.thickness, params.poisson)
         self._tools: list[Tool] = list(params.tools)
-        self._history: list[tuple[State, int]] = []
+        self._history: list[tuple[State, int, Tangent]] = []
         self._work: Iterator[float] | None = None
         self.state = _begin(params, start(params.shape, vertices, params.aspect))
         self._longest = params.remesh * self.state.length
@@ -99,15 +101,14 @@ class Engine:
     def undo(self) -> bool:
         """Go back by one step, and drop tools added since; return whether there was one."""
         if self._work is not None:
+            # the step before the one under way is undone, and that one given up
             self._work.close()  # type: ignore[attr-defined]
             self._work = None
         if not self._history:
             return False
-        self.state, tools = self._history.pop()
+        self.state, tools, self._tangent = self._history.pop()
         self._steps -= 1
         del self._tools[tools:]
-        # the same way on from here as the first time needs the same start
-        self._tangent = Tangent(self.state.mesh)
         return True
 
     def reach(self, time: float, context: Context) -> State:
@@ -136,13 +137,16 @@ class Engine:
     def _step(self, dt: float) -> Iterator[float]:
         """Grow by dt and find the equilibrium; yields the residual after every piece of work."""
         before, tools = self.state, len(self._tools)
+        # the way on from here is the same after an undo only with the same inverse
+        kept, self._tangent = self._tangent, self._tangent.copy()
         state = self._started(before)
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         point, spent = Point(state.x, 0.0, np.inf), 0
-        energy = StepEnergy(state, self._material, self.params.pressure, self.params.solids, self._tangent)
+        p = self.params
+        energy = StepEnergy(state, self._material, p.pressure, p.solids, self._tangent, p.contact)
         goal = self.tolerance * state.length
         begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
         while True:
@@ -181,7 +185,9 @@ class Engine:
             if finer.mesh is not state.mesh:
                 self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
             state = finer
-        self._history.append((before, tools))
+        self._history.append((before, tools, kept))
+        if len(self._history) > _EXACT:
+            self._history[-_EXACT - 1][2].inverse = None
         self.state = state
         self._steps += 1
 
@@ -209,6 +215,8 @@ def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
     if state.drift is None:
         return state.x
     x = state.x + dt * state.drift
+    if float(np.abs(x - state.x).max()) > energy.longest:
+        return state.x
     return x if energy(x)[0] < energy(state.x)[0] else state.x
 
 

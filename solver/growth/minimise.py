@@ -29,6 +29,10 @@ class Energy(Protocol):
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient."""
 
+    @property
+    def longest(self) -> float:
+        """Longest move of a point in one step."""
+
     def refactor(self, x: Floats) -> Iterator[None]:
         """Take the inverse at x for `precondition`; yields after pieces of the work."""
 
@@ -56,6 +60,7 @@ def _descend(
 
     A step that fails is followed by the least of the cubic through both ends, within a tenth and a half of it.
     """
+    t = min(t, energy.longest / max(float(np.abs(d).max()), 1e-300))
     while t > _SHORTEST:
         value, gradient = energy(x + t * d)
         if value <= f + _ARMIJO * t * slope:
@@ -178,7 +183,7 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
             model, found = -t * t * slope, t * (float(np.vdot(d, gradient)) - slope)
             share = 1.0 if found >= _DAMPED * model else (1 - _DAMPED) * model / (model - found)
             memory.add(t * d, share * (gradient - g) - (1 - share) * t * g)
-            if t < _SHORT:
+            if t < _SHORT and t * float(np.abs(d).max()) < 0.9 * energy.longest:
                 memory.clear()
         else:
             memory.add(t * d, gradient - g)

@@ -81,6 +81,12 @@ def on_surface(anchors: Anchors, x: Floats, triangles: Ints, new_x: Floats, new_
 def _nearest(point: Floats, x: Floats, triangles: Ints) -> tuple[int, Floats]:
     """Return triangle and barycentric weights of the point of the surface nearest to `point`."""
     p = x[triangles]
+    # a triangle further off than the nearest middle and its own size need not be looked at
+    middles = p.mean(axis=1)
+    sizes = np.linalg.norm(p - middles[:, None], axis=2).max(axis=1)
+    away = np.linalg.norm(middles - point, axis=1)
+    near = np.flatnonzero(away - sizes <= away.min() * (1 + 1e-12))
+    p = p[near]
     a, b, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], point - p[:, 0]
     aa, ab, bb = (a * a).sum(-1), (a * b).sum(-1), (b * b).sum(-1)
     av, bv = (a * v).sum(-1), (b * v).sum(-1)
@@ -97,4 +103,4 @@ def _nearest(point: Floats, x: Floats, triangles: Ints) -> tuple[int, Floats]:
     stacked = np.stack(candidates)
     gaps = np.linalg.norm(np.einsum("cfk,fkd->cfd", stacked, p) - point, axis=-1)
     best, face = np.unravel_index(np.nanargmin(gaps), gaps.shape)
-    return int(face), stacked[best, face]
+    return int(near[face]), stacked[best, face]
