@@ -1,18 +1,22 @@
-"""Seconds to equal residual: quasi-Newton, L-BFGS and conjugate gradients on a growing disc, in one run.
+"""Speed of growth on one thread, kernels compiled beforehand, CPU seconds.
 
-python -m benchmarks.growth [vertices ...]   prints a table; CPU seconds of one thread, kernels compiled beforehand.
+python -m benchmarks.growth [vertices ...]            seconds to equal residual: quasi-Newton, L-BFGS and conjugate
+                                                      gradients on a growing disc and sphere, in one run
+python -m benchmarks.growth --slices [vertices ...]   frames of a scripted painting, 0.3 % growth in each
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from solver.contract import NotConverged
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
+from solver.growth.tools import HotSpot
 
 _CASES = {
     "leaf rim 3 %": (
@@ -29,6 +33,16 @@ _CASES = {
     ),
 }
 _STEPS, _PATIENCE = 4, 3000
+_FRAMES, _STROKE = 150, 15
+_SLICE = 0.01
+#: A painting: shape, and where its strokes of `_STROKE` frames lie.
+_PAINTINGS = {
+    "leaf": ({"shape": "disc", "thickness": 0.02, "curved": False}, lambda a: (0.8 * np.cos(a), 0.8 * np.sin(a), 0.0)),
+    "sphere": (
+        {"shape": "sphere", "thickness": 0.02},
+        lambda a: (np.cos(a) * np.cos(3 * a), np.sin(a) * np.cos(3 * a), np.sin(3 * a)),
+    ),
+}
 
 
 def measure(values: dict, tool: dict, vertices: int, way: str) -> str:
@@ -45,15 +59,52 @@ def measure(values: dict, tool: dict, vertices: int, way: str) -> str:
     return f"{sum(seconds) / _STEPS:.3f} s a step, {engine.state.iterations / _STEPS:.0f} iterations"
 
 
-def main(sizes: list[int]) -> None:
+def paint(name: str, vertices: int, frames: int = _FRAMES) -> str:
+    """Paint with a brush that moves on after some frames; a frame is one growth step to a residual of 1e-3."""
+    values, path = _PAINTINGS[name]
+    engine = Engine(GrowthParams.parse({**values, "tools": [], "step": 1.0, "remesh": 1.3}), vertices, 1e-3)
+    frame: list[float] = []
+    piece: list[float] = []
+    before = len(engine.state.x)
+    for number in range(frames):
+        begun = time.process_time()
+        if number % _STROKE == 0:
+            at = path(2 * np.pi * number / frames)
+            engine.add(HotSpot(at=at, radius=0.4, stretch=(1.003, 1.003), duration=_STROKE))
+        done = False
+        while not done:
+            since = time.process_time()
+            done = engine.advance(_SLICE, until=number + 1.0)
+            piece.append(1e3 * (time.process_time() - since))
+        frame.append(1e3 * (time.process_time() - begun))
+    median, late = np.percentile(frame, [50, 95])
+    return (
+        f"median {median:.0f} ms, p95 {late:.0f} ms, worst {max(frame):.0f} ms, slices of "
+        f"{1e3 * _SLICE:.0f} ms: p95 {np.percentile(piece, 95):.0f} ms, longest {max(piece):.0f} ms, "
+        f"{engine.state.iterations / frames:.1f} iterations a frame, {before} to {len(engine.state.x)} vertices"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("vertices", type=int, nargs="*")
+    parser.add_argument("--slices", action="store_true", help="frames of a scripted painting")
+    parser.add_argument("--ways", nargs="*", default=["quasi_newton", "lbfgs", "cg"], help="ways to equilibrium")
+    given = parser.parse_args()
     with threadpool_limits(1, user_api="blas"):
+        if given.slices:
+            paint("leaf", 200, 20)  # compile
+            for vertices in given.vertices or [5000, 10_000]:
+                for name in _PAINTINGS:
+                    print(f"{vertices:6d} {name:7s} {paint(name, vertices)}", flush=True)
+            return
         for values, tool in _CASES.values():  # compile
             measure(values, tool, 100, "quasi_newton")
-        for vertices in sizes:
+        for vertices in given.vertices or [2600, 10_000]:
             for name, (values, tool) in _CASES.items():
-                for way in ("quasi_newton", "lbfgs", "cg"):
+                for way in given.ways:
                     print(f"{vertices:6d} {name:16s} {way:13s} {measure(values, tool, vertices, way)}", flush=True)
 
 
 if __name__ == "__main__":
-    main([int(v) for v in sys.argv[1:]] or [2600, 10_000])
+    main()

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from .. import shell
-from ..multifrontal import Analysis
-from ..shell.factor import Packed, dissect, factor
+from ..shell.dissection import Fronts
+from ..shell.inverse import Inverse, fronts_of, inverse_of, normals
 from .params import Plane, SolidBall
 from .state import State
 
@@ -21,26 +21,41 @@ Ints = NDArray[np.int64]
 
 #: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
 _SHIFT = 1e-5
+#: An inverse outlives so many remeshings, and so many times its vertices.
+_LAYERS, _MORE = 12, 1.3
+#: How far vertices move before contact looks for its pairs again, over the distance.
+_SLACK = 0.5
 #: Penalty of solids per area and depth [mu / l^2].
 _HARDNESS = 30.0
 
 
 class Tangent:
-    """Pattern, order of elimination and last factor of one topology; outlives the growth steps between remeshings."""
+    """Pattern, order of elimination and last inverse of one topology; outlives the growth steps between remeshings."""
 
-    def __init__(self, mesh: shell.Topology) -> None:
+    def __init__(self, mesh: shell.Topology, inverse: Inverse | None = None) -> None:
         self.mesh = mesh
-        self.pattern = shell.pattern(mesh)
-        self.analysis: Analysis | None = None
-        self.factor: Packed | None = None
-        self.factors = 0
+        self.fronts: Fronts | None = None
+        self.inverse = inverse
 
-    def take(self, blocks: Floats, x: Floats) -> None:
-        """Factor `blocks` (nnz, 3, 3)."""
-        if self.analysis is None:
-            self.analysis = dissect(self.mesh, self.pattern, x)
-        self.factor = factor(self.analysis, blocks)
-        self.factors += 1
+    @cached_property
+    def pattern(self) -> shell.Pattern:
+        """Where blocks go."""
+        return shell.pattern(self.mesh)
+
+    def copy(self) -> Tangent:
+        """Return a tangent that starts from this one's inverse, and may take another."""
+        found = Tangent(self.mesh, self.inverse)
+        found.fronts = self.fronts
+        if "pattern" in self.__dict__:
+            found.__dict__["pattern"] = self.pattern
+        return found
+
+    def remeshed(self, mesh: shell.Topology, pairs: Ints) -> Tangent:
+        """Return the tangent of a mesh whose vertices lie in the middle of `pairs` (n', 2) of this one's."""
+        kept = self.inverse
+        if kept is not None and (len(kept.parents) >= _LAYERS or len(pairs) > _MORE * len(kept.normals)):
+            kept = None
+        return Tangent(mesh, kept.remeshed(pairs) if kept else None)
 
 
 class StepEnergy:
@@ -54,11 +69,14 @@ class StepEnergy:
         solids: Sequence[Plane | SolidBall],
         tangent: Tangent,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        distance: float = 0.0,
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self.load = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
+        self._distance, self._looked = distance, state.x
+        self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
         self.areas = np.bincount(state.mesh.triangles.ravel(), np.repeat(shell.areas(state.g) / 3, 3), len(state.x))
         if any(gravity):
             weight = self.areas[:, None] * np.array(gravity)
@@ -72,6 +90,11 @@ class StepEnergy:
         if self.load is not None:
             energy -= float(np.vdot(self.load, x - state.x))
             gradient -= self.load
+        if self._distance:
+            if float(np.abs(x - self._looked).max()) > _SLACK * self._distance:
+                self._pairs, self._looked = self._look(x), x
+            hard = _HARDNESS * self.areas / self._distance
+            energy += shell.contact(x, state.mesh.triangles, self._pairs, self._distance, hard, gradient)
         for solid in self.solids:
             depth, normal = _depth(solid, x)
             energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
@@ -79,9 +102,26 @@ class StepEnergy:
         gradient[state.held] = 0.0
         return energy, gradient
 
-    def refactor(self, x: Floats) -> None:
-        """Factor the positive semidefinite tangent at x, shifted."""
-        state, pattern = self.state, self.tangent.pattern
+    @property
+    def longest(self) -> float:
+        """Longest move of a vertex in one step that contact can follow."""
+        return 0.4 * self._distance if self._distance else np.inf
+
+    def _look(self, x: Floats) -> Ints:
+        # moves of up to the slack by either side, per axis
+        return shell.candidates(x, self.state.mesh, self._distance * (1 + 2 * np.sqrt(3) * _SLACK))
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is an inverse."""
+        return self.tangent.inverse is not None
+
+    def refactor(self, x: Floats) -> Iterator[None]:
+        """Take the inverse of the positive semidefinite tangent at x, shifted; yields after pieces of the work."""
+        state, tangent, pattern = self.state, self.tangent, self.tangent.pattern
+        if tangent.fronts is None:
+            tangent.fronts = fronts_of(state.mesh, x)
+            yield
         blocks = np.zeros((pattern.blocks, 3, 3))
         shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
         shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
@@ -90,16 +130,20 @@ class StepEnergy:
             depth, normal = _depth(solid, x)
             weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
             blocks[pattern.diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
-        if state.held.any():
-            _hold(blocks, pattern.indptr, pattern.indices, self.free)
-        self.tangent.take(blocks, x)
+        if self._distance:
+            hard = _HARDNESS * self.areas / self._distance
+            t = state.mesh.triangles
+            shell.contact_diagonal(x, t, self._pairs, self._distance, hard, pattern.diagonal, blocks)
+        yield
+        n = normals(x, state.mesh.triangles)
+        tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, np.asarray(state.held.all(axis=1)))
 
     def precondition(self, v: Floats) -> Floats:
-        """Return the last factor's inverse applied to v (n, 3)."""
-        if self.tangent.factor is None:
-            self.refactor(self.state.x)
-        assert self.tangent.factor is not None
-        return np.where(self.free, self.tangent.factor.solve(np.ascontiguousarray(v)), 0.0)
+        """Return the last inverse applied to v (n, 3)."""
+        assert self.tangent.inverse is not None
+        found = self.tangent.inverse.apply(v)
+        found[self.state.held] = 0.0
+        return found
 
 
 def _area_vectors(x: Floats, triangles: Ints) -> Floats:
@@ -117,15 +161,3 @@ def _depth(solid: Plane | SolidBall, x: Floats) -> tuple[Floats, Floats]:
     way = x - np.array(solid.centre)
     distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]
-
-
-@njit(cache=True)
-def _hold(blocks: Floats, indptr: Ints, indices: Ints, free: NDArray[np.bool_]) -> None:
-    """Make rows and columns of held directions those of the unit matrix."""
-    for row in range(len(free)):
-        for at in range(indptr[row], indptr[row + 1]):
-            column = indices[at]
-            for d in range(3):
-                for h in range(3):
-                    if not (free[row, d] and free[column, h]):
-                        blocks[at, d, h] = 1.0 if row == column and d == h else 0.0

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from .. import shell
 from ..contract import Context, NotConverged, Unstable
+from ..shell.inverse import normals
 from .energy import StepEnergy, Tangent
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 from .params import GrowthParams
 from .places import share
 from .placing import border, branched, started
 from .rates import grown, rates
-from .remesh import split
+from .remesh import remesh
 from .shapes import Mesh, start
 from .state import State
 from .tools import Tool
@@ -32,6 +33,10 @@ __all__ = ["Engine"]
 Floats = NDArray[np.float64]
 
 _WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
+#: Steps that can be undone so that the same way on gives the same bytes; beyond, the same to the residual.
+_EXACT = 30
+#: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
+_NUDGE, _WAVES = 0.2, (1, 2, 4)
 #: A mesh does not grow beyond this many times its first vertices.
 _MOST = 20
 
@@ -49,7 +54,7 @@ class Engine:
         self.params, self.tolerance, self._most = params, tolerance, most
         self._material = shell.Material(params.thickness, params.poisson)
         self._tools: list[Tool] = list(params.tools)
-        self._history: list[tuple[State, int]] = []
+        self._history: list[tuple[State, int, Tangent]] = []
         self._work: Iterator[float] | None = None
         self.state = _begin(params, start(params.shape, vertices, params.aspect))
         self._longest = params.remesh * self.state.length
@@ -97,15 +102,14 @@ class Engine:
     def undo(self) -> bool:
         """Go back by one step, and drop tools added since; return whether there was one."""
         if self._work is not None:
+            # the step before the one under way is undone, and that one given up
             self._work.close()  # type: ignore[attr-defined]
             self._work = None
         if not self._history:
             return False
-        self.state, tools = self._history.pop()
+        self.state, tools, self._tangent = self._history.pop()
         self._steps -= 1
         del self._tools[tools:]
-        # the same way on from here as the first time needs the same start
-        self._tangent = Tangent(self.state.mesh)
         return True
 
     def reach(self, time: float, context: Context) -> State:
@@ -134,25 +138,33 @@ class Engine:
     def _step(self, dt: float) -> Iterator[float]:
         """Grow by dt and find the equilibrium; yields the residual after every piece of work."""
         before, tools = self.state, len(self._tools)
+        # the way on from here is the same after an undo only with the same inverse
+        kept, self._tangent = self._tangent, self._tangent.copy()
         state = started(before, self._tools, self.params.step, self.params.seed)
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         point, spent = Point(state.x, 0.0, np.inf), 0
-        energy = StepEnergy(
-            state, self._material, self.params.pressure, self.params.solids, self._tangent, self.params.gravity
-        )
+        p = self.params
+        energy = StepEnergy(state, self._material, p.pressure, p.solids, self._tangent, p.gravity, p.contact)
         goal = self.tolerance * state.length
-        for point in _WAYS[self.params.solver](energy, state.x):
-            if point.gradient <= goal or point.stuck:
+        begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
+        while True:
+            for nearer in _WAYS[self.params.solver](energy, begin):
+                spent += nearer.x is not point.x
+                point = nearer
+                if point.gradient <= goal or point.stuck:
+                    break
+                if not np.isfinite(point.gradient):
+                    raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
+                if spent > self._most:
+                    break
+                yield point.gradient / state.length
+            begin = _nudged(energy, point.x, point.energy, self.params.seed) if nudges else point.x
+            nudges -= 1
+            if begin is point.x:
                 break
-            if not np.isfinite(point.gradient):
-                raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
-            if spent >= self._most:
-                break
-            spent += 1
-            yield point.gradient / state.length
         if not point.gradient <= goal:
             raise NotConverged(
                 f"no equilibrium at growth time {state.time:g}: residual {point.gradient / state.length:.1e}.",
@@ -161,20 +173,51 @@ class Engine:
                 residual=point.gradient / state.length,
             )
         forces = point.gradient / state.length
-        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent)
+        drift = (point.x - state.x) / dt if dt else None
+        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
         if self.params.plasticity:
             state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = branched(state, acting, self.params.seed)
         if self.params.remesh:
-            while len(state.x) < self._largest:
-                finer = split(state, self._longest)
-                if finer is state:
-                    break
-                state = finer
-                self._tangent = Tangent(state.mesh)
-        self._history.append((before, tools))
+            finer, changes = remesh(state, self._longest, self._largest)
+            tangent = self._tangent
+            for pairs in changes:
+                tangent = tangent.remeshed(finer.mesh, pairs)
+            if finer.mesh is not state.mesh:
+                self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
+            state = finer
+        self._history.append((before, tools, kept))
+        if len(self._history) > _EXACT:
+            self._history[-_EXACT - 1][2].inverse = None
         self.state = state
         self._steps += 1
+
+
+def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
+    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
+    if state.drift is None:
+        return state.x
+    x = state.x + dt * state.drift
+    if float(np.abs(x - state.x).max()) > energy.longest:
+        return state.x
+    return x if energy(x)[0] < energy(state.x)[0] else state.x
+
+
+def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
+    """Return x with small waves if that lowers the energy, else x itself.
+
+    A perfect shape sits on its symmetry, in balance but not at rest: only so it finds the way out.
+    """
+    found, generator = x, Context.generator(seed)
+    normal = np.where(energy.free, normals(x, energy.state.mesh.triangles), 0.0)
+    for waves in _WAVES:
+        ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(x, axis=0).max()))
+        height = np.cos(x @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
+        trial = x + (_NUDGE * energy.material.thickness * height)[:, None] * normal
+        value = energy(trial)[0]
+        if value < least:
+            found, least = trial, value
+    return found
 
 
 def _begin(params: GrowthParams, mesh: Mesh) -> State:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 __all__ = ["Energy", "Point", "conjugate_gradients", "lbfgs", "quasi_newton"]
@@ -16,8 +17,10 @@ __all__ = ["Energy", "Point", "conjugate_gradients", "lbfgs", "quasi_newton"]
 Floats = NDArray[np.float64]
 
 _ARMIJO, _SHORTEST = 1e-4, 1e-9
-#: Steps with one factor before it is asked whether it still helps, and the drop of the gradient that says so.
-_BURST, _HELPS = 6, 0.1
+#: Least curvature along a step that is learnt, over the model's, and the step below which the model is forgotten.
+_DAMPED, _SHORT = 0.2, 1e-2
+#: Steps with one inverse before it is asked whether it still helps, and the drop of the gradient that says so.
+_BURST, _HELPS = 20, 0.3
 
 
 class Energy(Protocol):
@@ -26,8 +29,16 @@ class Energy(Protocol):
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient."""
 
-    def refactor(self, x: Floats) -> None:
-        """Take the tangent at x for `precondition`."""
+    @property
+    def longest(self) -> float:
+        """Longest move of a point in one step."""
+
+    def refactor(self, x: Floats) -> Iterator[None]:
+        """Take the inverse at x for `precondition`; yields after pieces of the work."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is an inverse."""
 
     def precondition(self, v: Floats) -> Floats:
         """Return the approximate inverse applied to v."""
@@ -45,58 +56,109 @@ class Point(NamedTuple):
 def _descend(
     energy: Energy, x: Floats, f: float, d: Floats, slope: float, t: float = 1.0
 ) -> tuple[float, float, Floats]:
-    """Return (step, energy, gradient) of the first of t, t/2, t/4, ... that lowers the energy; step 0 if none does."""
+    """Return (step, energy, gradient) of the first step from t down that lowers the energy; step 0 if none does.
+
+    A step that fails is followed by the least of the cubic through both ends, within a tenth and a half of it.
+    """
+    t = min(t, energy.longest / max(float(np.abs(d).max()), 1e-300))
     while t > _SHORTEST:
         value, gradient = energy(x + t * d)
         if value <= f + _ARMIJO * t * slope:
             return t, value, gradient
-        t *= 0.5
+        t *= min(max(_least(f, slope * t, value, float(np.vdot(gradient, d)) * t), 0.1), 0.5)
     return 0.0, f, d
+
+
+def _least(f: float, slope: float, value: float, then: float) -> float:
+    """Return where the cubic with values f, value and slopes slope, then at 0 and 1 is least; 0.5 if it has no bend."""
+    bend = slope + then - 3 * (value - f)
+    root = bend * bend - slope * then
+    if not (np.isfinite(root) and root >= 0):
+        return 0.5
+    below = then - slope + 2 * np.sqrt(root)
+    return float(1 - (then + np.sqrt(root) - bend) / below) if below else 0.5
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _dot(a: Floats, b: Floats) -> float:
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _inward(q: Floats, s: Floats, y: Floats, products: Floats, shares: Floats, last: int, count: int) -> None:
+    """Take the pairs' parts out of q (m,), newest first; s, y (length, m) are rings that end at `last`."""
+    for k in range(count):
+        at = (last - k) % len(s)
+        shares[at] = _dot(s[at], q) / products[at]
+        row = y[at]
+        for i in range(len(q)):
+            q[i] -= shares[at] * row[i]
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _outward(z: Floats, s: Floats, y: Floats, products: Floats, shares: Floats, last: int, count: int) -> None:
+    """Put the pairs' parts into z (m,), oldest first."""
+    for k in range(count - 1, -1, -1):
+        at = (last - k) % len(s)
+        share = shares[at] - _dot(y[at], z) / products[at]
+        row = s[at]
+        for i in range(len(z)):
+            z[i] += share * row[i]
 
 
 class _Memory:
     """The last pairs of step and change of gradient (limited-memory BFGS, Nocedal 1980)."""
 
-    def __init__(self, length: int) -> None:
-        self._length = length
-        self.pairs: list[tuple[Floats, Floats, float]] = []
+    def __init__(self, length: int, size: int) -> None:
+        self._s, self._y = np.empty((length, size)), np.empty((length, size))
+        self._products, self._shares = np.empty(length), np.empty(length)
+        self._last, self.count = -1, 0
+
+    def clear(self) -> None:
+        self.count = 0
 
     def add(self, s: Floats, y: Floats) -> None:
-        product = float(np.vdot(s, y))
-        if product > 1e-12 * np.linalg.norm(s) * np.linalg.norm(y):
-            self.pairs = [*self.pairs, (s, y, 1 / product)][-self._length :]
+        s, y = s.ravel(), y.ravel()
+        product = _dot(s, y)
+        if product > 1e-12 * np.sqrt(_dot(s, s) * _dot(y, y)):
+            self._last = (self._last + 1) % len(self._s)
+            self._s[self._last], self._y[self._last], self._products[self._last] = s, y, product
+            self.count = min(self.count + 1, len(self._s))
 
     def direction(self, gradient: Floats, energy: Energy | None) -> Floats:
         """Return minus the approximate inverse times gradient; around a preconditioner if there is one."""
-        q, shares = gradient.copy(), []
-        for s, y, r in reversed(self.pairs):
-            share = r * np.vdot(s, q)
-            shares.append(share)
-            q -= share * y
+        q = gradient.copy()
+        ring = (self._s, self._y, self._products, self._shares, self._last, self.count)
+        _inward(q.reshape(-1), *ring)
         if energy is not None:
             z = energy.precondition(q)
-        elif self.pairs:
-            s, y, r = self.pairs[-1]
-            z = q / (r * np.vdot(y, y))
+        elif self.count:
+            y = self._y[self._last]
+            z = q * (self._products[self._last] / _dot(y, y))
         else:
             z = q * (1e-3 / max(np.abs(q).max(), 1e-300))
-        for (s, y, r), share in zip(self.pairs, reversed(shares), strict=True):
-            z += s * (share - r * np.vdot(y, z))
+        _outward(z.reshape(-1), *ring)
         return -z
 
 
 def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Iterator[Point]:
     f, g = energy(x)
-    memory = _Memory(length)
+    memory = _Memory(length, x.size)
     since, fresh, mark = 0, False, np.inf
+    anew = preconditioned and not energy.ready
     while True:
         size = float(np.abs(g).max())
         yield Point(x, f, size)
         if preconditioned and since >= _BURST:
-            if size > _HELPS * mark:
-                energy.refactor(x)
-                memory, fresh = _Memory(length), True
-            since, mark = 0, size
+            anew, since, mark = size > _HELPS * mark, 0, size
+        if anew:
+            for _ in energy.refactor(x):
+                yield Point(x, f, size)
+            memory.clear()
+            anew, fresh, since, mark = False, True, 0, size
         mark = size if mark == np.inf else mark
         d = memory.direction(g, energy if preconditioned else None)
         slope = float(np.vdot(g, d))
@@ -105,22 +167,33 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
             t, value, gradient = _descend(energy, x, f, d, slope)
         if t == 0.0:
             if preconditioned and not fresh:
-                energy.refactor(x)
-                memory, fresh, since, mark = _Memory(length), True, 0, size
+                anew = True
                 continue
-            if memory.pairs:
-                memory = _Memory(length)
+            if memory.count:
+                memory.clear()
                 continue
+            if preconditioned:
+                # a fresh inverse points nowhere down, by its rounding or at a kink: steepest descent still may
+                yield from _bfgs(energy, x, length, preconditioned=False)
+                return
             yield Point(x, f, size, stuck=True)
             return
-        memory.add(t * d, gradient - g)
+        if preconditioned:
+            # where the energy bends down, what the model has is mixed in (Powell 1978)
+            model, found = -t * t * slope, t * (float(np.vdot(d, gradient)) - slope)
+            share = 1.0 if found >= _DAMPED * model else (1 - _DAMPED) * model / (model - found)
+            memory.add(t * d, share * (gradient - g) - (1 - share) * t * g)
+            if t < _SHORT and t * float(np.abs(d).max()) < 0.9 * energy.longest:
+                memory.clear()
+        else:
+            memory.add(t * d, gradient - g)
         x, f, g = x + t * d, value, gradient
         since, fresh = since + 1, False
 
 
 def quasi_newton(energy: Energy, x: Floats) -> Iterator[Point]:
-    """L-BFGS around a stale factor of the tangent, taken anew when six steps drop the gradient less than tenfold."""
-    return _bfgs(energy, x, 6, preconditioned=True)
+    """L-BFGS with 12 pairs around a stale inverse, taken anew when 20 steps drop the gradient less than threefold."""
+    return _bfgs(energy, x, 12, preconditioned=True)
 
 
 def lbfgs(energy: Energy, x: Floats) -> Iterator[Point]:

@@ -118,6 +118,13 @@ class GrowthParams(Params):
         (), max_length=20, description="What is held", json_schema_extra=_units("1")
     )
     solids: tuple[Solid, ...] = Field((), max_length=20, description="Static solids", json_schema_extra=_units("1"))
+    contact: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="Distance that parts keep from each other, about an edge of the mesh; 0: they pass through",
+        json_schema_extra=_units("start shape's unit"),
+    )
     step: float = Field(
         0.05, ge=0.001, le=10, description="Growth between two equilibria", json_schema_extra=_units("growth time")
     )

@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import shell
+from .flips import collapse, flip
 from .state import Spot, State, on_surface
 
-__all__ = ["split"]
+__all__ = ["remesh", "split"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+#: Rest edges shorter than this share of the longest allowed are removed: a cut leaves no less than half.
+_SHORT = 0.25
 #: Children by cut edges (bit 1: bc, the longest; 2: ca; 4: ab); corners a b c, middles p of bc, q of ca, s of ab.
 _A, _B, _C, _P, _Q, _S = range(6)
 _WHERE = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
@@ -31,8 +34,34 @@ _CHILDREN = {
 }
 
 
+def remesh(state: State, longest: float, most: int) -> tuple[State, list[Ints]]:
+    """Return the state without rest edges above `longest` or far below it, edges turned over where that helps.
+
+    With it the changes: for each vertex (n', 2) the two before in the middle of which it lies, twice the same where it
+    was there. Beyond `most` vertices nothing is cut.
+    """
+    changes: list[Ints] = []
+    coarser, left = collapse(state, longest * _SHORT)
+    if coarser is not state:
+        state = coarser
+        changes.append(np.stack([left, left], -1))
+    while len(state.x) < most:
+        finer, cut = _split(state, longest)
+        if finer is state:
+            break
+        stayed = np.arange(len(state.x))
+        changes.append(np.concatenate([np.stack([stayed, stayed], -1), cut]))
+        state = finer
+    return flip(state), changes
+
+
 def split(state: State, longest: float) -> State:
     """Return the state with every rest edge above `longest` cut, and what else must be; itself if there is none."""
+    return _split(state, longest)[0]
+
+
+def _split(state: State, longest: float) -> tuple[State, Ints]:
+    """Return the state and the ends (m, 2) of the edges that were cut."""
     mesh = state.mesh
     squares = _squares(state.g)
     total, count = np.zeros(len(mesh.edges)), np.zeros(len(mesh.edges))
@@ -41,7 +70,7 @@ def split(state: State, longest: float) -> State:
     mean = total / count
     marked = mean > longest**2
     if not marked.any():
-        return state
+        return state, mesh.edges[:0]
     # both sides of an edge must agree which edge of theirs is longest: the mean's, with the edge's number for ties
     first = np.argmax(mean[mesh.face_edges] * (1 + 1e-12 * (mesh.face_edges % 7)), axis=1)
     base = mesh.face_edges[np.arange(len(first)), first]
@@ -65,17 +94,19 @@ def split(state: State, longest: float) -> State:
     def moved(spot: Spot) -> Spot:
         return replace(spot, anchor=on_surface(spot.anchor, state.x, mesh.triangles, x, triangles))
 
-    return replace(
+    found = replace(
         state,
         x=x,
         mesh=new,
         g=g,
         rest=rest,
+        drift=None if state.drift is None else carried(state.drift),
         shares={k: carried(v) for k, v in state.shares.items()},
         held=np.concatenate([state.held, state.held[i] & state.held[j]]),
         spots={k: tuple(moved(spot) for spot in spots) for k, spots in state.spots.items()},
         curves={k: on_surface(a, state.x, mesh.triangles, x, triangles) for k, a in state.curves.items()},
     )
+    return found, mesh.edges[marked]
 
 
 def _squares(g: Floats) -> Floats:
@@ -122,14 +153,7 @@ def _rest(state: State, new: shell.Topology, g: Floats, b: Floats, touched: NDAr
     """Return rest angles: the old ones where both triangles stayed, else those of the second forms."""
     rest = shell.added_angles(b, g, new)
     n = new.vertices
-    old = dict(zip(_keys(state.mesh, n), state.rest, strict=True))
-    stayed = ~touched[new.hinge_faces].any(axis=1)
-    keys = _keys(new, n)
-    for hinge in np.flatnonzero(stayed):
-        rest[hinge] = old[keys[hinge]]
+    stayed = np.flatnonzero(~touched[new.hinge_faces].any(axis=1))
+    before, now = (m.edges[m.hinge_edges] @ [n, 1] for m in (state.mesh, new))
+    rest[stayed] = state.rest[np.searchsorted(before, now[stayed])]
     return rest
-
-
-def _keys(mesh: shell.Topology, n: int) -> list[int]:
-    pairs = mesh.edges[mesh.hinge_edges]
-    return (pairs[:, 0] * n + pairs[:, 1]).tolist()

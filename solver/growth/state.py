@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,8 @@ class State:
 
     time: growth time. x: (n, 3). mesh: topology. g: rest metrics (f, 3). rest: rest angles (h,). shares: (n, k) of
     hot surfaces that have started. held: (n, 3) directions that are held, bool. spots, curves: by number of the tool.
-    forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far.
+    forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far. drift: (n, 3) how fast
+    the shape moved in the last step, None at the start.
     """
 
     time: float
@@ -60,8 +62,9 @@ class State:
     curves: dict[int, Anchors]
     forces: float = 0.0
     iterations: int = 0
+    drift: Floats | None = None
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Mean rest edge."""
         g = self.g
@@ -82,6 +85,12 @@ def on_surface(anchors: Anchors, x: Floats, triangles: Ints, new_x: Floats, new_
 def _nearest(point: Floats, x: Floats, triangles: Ints) -> tuple[int, Floats]:
     """Return triangle and barycentric weights of the point of the surface nearest to `point`."""
     p = x[triangles]
+    # a triangle further off than the nearest middle and its own size need not be looked at
+    middles = p.mean(axis=1)
+    sizes = np.linalg.norm(p - middles[:, None], axis=2).max(axis=1)
+    away = np.linalg.norm(middles - point, axis=1)
+    near = np.flatnonzero(away - sizes <= away.min() * (1 + 1e-12))
+    p = p[near]
     a, b, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], point - p[:, 0]
     aa, ab, bb = (a * a).sum(-1), (a * b).sum(-1), (b * b).sum(-1)
     av, bv = (a * v).sum(-1), (b * v).sum(-1)
@@ -98,4 +107,4 @@ def _nearest(point: Floats, x: Floats, triangles: Ints) -> tuple[int, Floats]:
     stacked = np.stack(candidates)
     gaps = np.linalg.norm(np.einsum("cfk,fkd->cfd", stacked, p) - point, axis=-1)
     best, face = np.unravel_index(np.nanargmin(gaps), gaps.shape)
-    return int(face), stacked[best, face]
+    return int(near[face]), stacked[best, face]

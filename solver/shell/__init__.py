@@ -5,6 +5,7 @@ solver's unit of length), forces in mu l. Every kernel takes arrays and returns 
 """
 
 from .bending import angles, bending, bending_tangent, hinge_stiffness
+from .contact import candidates, contact, contact_diagonal
 from .curvature import added_angles, from_angles, to_angles
 from .material import Material
 from .membrane import areas, membrane, membrane_tangent, metric, metric_of_lengths
@@ -20,6 +21,9 @@ __all__ = [
     "areas",
     "bending",
     "bending_tangent",
+    "candidates",
+    "contact",
+    "contact_diagonal",
     "from_angles",
     "hinge_stiffness",
     "membrane",

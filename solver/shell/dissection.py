@@ -1,0 +1,114 @@
+"""Order of elimination of a mesh's vertices: nested dissection of its hinges by place (George 1973).
+
+Hinges are halved again and again along the longer side of where they are; a vertex is eliminated where all hinges that
+touch it first lie in one half. The halves make a binary tree whose nodes are the fronts of a multifrontal factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["Fronts", "dissect"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Hinges in the smallest front: fewer make more fronts, more make them fuller.
+_LEAF = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """Fronts in the order of elimination, children before parents.
+
+    nodes: vertices of all fronts, end to end, those eliminated in each first. starts: (f + 1, 3) offsets into nodes,
+    into the columns of the factor and into the complements that go to parents. own: (f,) eliminated in each.
+    children: (f, 2), -1 where there are none.
+    """
+
+    nodes: Ints
+    starts: Ints
+    own: Ints
+    children: Ints
+
+    @property
+    def count(self) -> int:
+        """Number of fronts."""
+        return len(self.own)
+
+    @property
+    def widest(self) -> int:
+        """Vertices of the largest front."""
+        return int(np.diff(self.starts[:, 0]).max())
+
+
+def dissect(parts: Ints, centres: Floats, vertices: int) -> Fronts:
+    """Return the fronts of the graph whose cliques are `parts` (p, c), which lie at `centres` (p, 3).
+
+    Every vertex must be in a part.
+    """
+    depth = max(0, int(np.ceil(np.log2(max(len(parts), 1) / _LEAF))))
+    leaf = np.empty(len(parts), np.int64)
+    _halve(centres, depth, leaf)
+    leaves = np.repeat(leaf, parts.shape[1])
+    low, high = np.full(vertices, 1 << depth), np.full(vertices, -1)
+    np.minimum.at(low, parts.ravel(), leaves)
+    np.maximum.at(high, parts.ravel(), leaves)
+    # the level at which both ends of a vertex's range of leaves have one parent
+    level_of = depth - np.ceil(np.log2((low ^ high) + 1)).astype(np.int64)
+    keys = np.unique(leaves * vertices + parts.ravel())
+    nodes, own, sizes, children, before = [], [], [], [], 0
+    for level in range(depth, -1, -1):
+        count = 1 << level
+        front, vertex = np.divmod(keys, vertices)
+        done = level_of[vertex] == level
+        nodes.append(vertex[np.argsort(2 * front + ~done, kind="stable")])
+        own.append(np.bincount(front[done], minlength=count))
+        sizes.append(np.bincount(front, minlength=count))
+        leads = before - 2 * count + np.arange(2 * count).reshape(-1, 2)
+        children.append(np.full((count, 2), -1) if level == depth else leads)
+        before += count
+        keys = np.unique((front[~done] >> 1) * vertices + vertex[~done])
+    size, mine = np.concatenate(sizes), np.concatenate(own)
+    columns = mine * size - mine * (mine - 1) // 2
+    lengths = np.stack([size, columns, (size - mine) ** 2], -1)
+    return Fronts(
+        nodes=np.concatenate(nodes),
+        starts=np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(lengths, axis=0)]),
+        own=mine,
+        children=np.concatenate(children),
+    )
+
+
+@njit(cache=True)
+def _halve(centres: Floats, depth: int, leaf: Ints) -> None:
+    """Write the leaf of each part."""
+    count = len(centres)
+    order = np.arange(count)
+    bounds = np.array([0, count])
+    for _ in range(depth):
+        finer = np.empty(2 * len(bounds) - 1, np.int64)
+        for k in range(len(bounds) - 1):
+            first, last = bounds[k], bounds[k + 1]
+            part = order[first:last].copy()
+            best, widest = 0, -1.0
+            for axis in range(3):
+                small, large = np.inf, -np.inf
+                for p in part:
+                    small, large = min(small, centres[p, axis]), max(large, centres[p, axis])
+                if large - small > widest:
+                    best, widest = axis, large - small
+            along = np.empty(len(part))
+            for i in range(len(part)):
+                along[i] = centres[part[i], best]
+            order[first:last] = part[np.argsort(along, kind="mergesort")]
+            finer[2 * k], finer[2 * k + 1] = first, (first + last + 1) // 2
+        finer[-1] = count
+        bounds = finer
+    for k in range(len(bounds) - 1):
+        for i in range(bounds[k], bounds[k + 1]):
+            leaf[order[i]] = k
