@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from ..fruit import Fruit
-from .body.flesh import Flesh, Skin
+from .body.flesh import Flesh, Skin, Swing
 from .colony import MOULDS, SOFT_ROT, Colony
 
 __all__ = ["DecayParams", "Weather", "Wound"]
@@ -140,10 +140,20 @@ class DecayParams(Fruit):
         description="Where rot and mould enter on day 0; by default the stem and the point the fruit rests on",
         json_schema_extra={"units": "1"},
     )
-    body: Literal["none", "quasi-static"] = Field(
+    body: Literal["none", "quasi-static", "paper"] = Field(
         "none",
-        description="How the fruit's body moves: not at all, or from equilibrium to equilibrium",
+        description="How the body moves: not at all, from equilibrium to equilibrium, or as the paper's springs",
         json_schema_extra={"units": "1"},
+    )
+    swing: Swing = Field(
+        Swing(), description="Step and damping of the paper's springs", json_schema_extra={"units": "1"}
+    )
+    march: float | None = Field(
+        None,
+        ge=0.01,
+        le=120,
+        description="Days between the shapes that later ones are settled from; without, each from the fresh fruit",
+        json_schema_extra={"units": "day"},
     )
     firmness: float = Field(
         80.0, ge=0.01, le=1000, description="Firmness of the fresh flesh (Table 2)", json_schema_extra={"units": "1"}

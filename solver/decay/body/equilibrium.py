@@ -55,13 +55,17 @@ class Loads(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """A settled shape: points, out-of-balance force over the forces in it, Newton steps, least J, floor's force."""
+    """A settled shape: points, out-of-balance force over the forces in it, Newton steps, least J, floor's force.
+
+    even: length of a cube as large as the rest shape, over the fresh one.
+    """
 
     points: Array
     residual: float
     steps: int
     least_jacobian: float
     reaction: float
+    even: float = 1.0
 
 
 def rested(points: Array, tets: Index, shrinkage: Array, young: Array, poisson: float) -> Rest:
