@@ -11,20 +11,11 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from ..fruit import Fruit
 from .body.flesh import Flesh, Skin, Swing
 from .colony import MOULDS, SOFT_ROT, Colony
+from .places import Neighbour, Painted, Pressure, PressureMap, Wound
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class Wound(BaseModel):
-    """A place where rot and mould enter on day 0."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    colatitude: float = Field(ge=0, le=180, description="From the pole y > 0 [degree]")
-    azimuth: float = Field(0.0, ge=0, le=360, description="About the y axis, from x towards z [degree]")
-    radius: float = Field(0.12, ge=0.01, le=0.6, description="Radius [r1]")
 
 
 class Weather(BaseModel):
@@ -139,6 +130,28 @@ class DecayParams(Fruit):
         max_length=64,
         description="Where rot and mould enter on day 0; by default the stem and the point the fruit rests on",
         json_schema_extra={"units": "1"},
+    )
+    wound_map: Painted = Field(
+        (),
+        description="Painted wounds: n rows of 2 n values, 1 where rot and mould enter on day 0",
+        json_schema_extra={"units": "1"},
+    )
+    seeds: Literal["wounds", "contacts"] = Field(
+        "wounds",
+        description="Where decay enters: the wounds, or the stem, the floor and the neighbours that are touched",
+        json_schema_extra={"units": "1"},
+    )
+    neighbours: tuple[Neighbour, ...] = Field(
+        (), max_length=64, description="Round fruits beside this one", json_schema_extra={"units": "1"}
+    )
+    pressure: tuple[Pressure, ...] = Field(
+        (),
+        max_length=64,
+        description="Pressure points: where the body's flesh is stiffer or softer, longer or shorter",
+        json_schema_extra={"units": "1"},
+    )
+    pressure_map: PressureMap | None = Field(
+        None, description="Painted pressure map of the body", json_schema_extra={"units": "1"}
     )
     body: Literal["none", "quasi-static", "paper"] = Field(
         "none",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..contract import Cost, Need, Quality
 from .params import DecayParams
+from .seeds import seeds
 
 __all__ = [
     "BODY",
@@ -91,7 +92,7 @@ def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:
 
 def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
     """Return whether rot has to be stepped: it is wanted, or bears on a body that moves."""
-    bears = moved(params, wanted) and params.flesh.heeds_rot and len(params.wounds) > 0
+    bears = moved(params, wanted) and params.flesh.heeds_rot and (bool(params.wound_map) or len(seeds(params)) > 0)
     return bears or not {*ROT, *MOULD, "budget_error"}.isdisjoint(wanted)
 
 

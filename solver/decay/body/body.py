@@ -19,6 +19,7 @@ from ..surface import Surface, geodesic, shares_at
 from .equilibrium import Balance, Loads, rested, settle
 from .flesh import Softened, softened
 from .material import blocks
+from .pressure import pressed
 from .solid import ball, fill
 from .springs import knit, swung
 
@@ -54,7 +55,8 @@ class Body:
         if rot is not None:
             at = _inwards(self._level, self._layers) @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
             inside = at[solid.tets].mean(axis=1)
-        return softened(flesh, self._params.firmness, water, inside, solid.stone)
+        state = softened(flesh, self._params.firmness, water, inside, solid.stone)
+        return pressed(state, self._params, solid)
 
     def settled(
         self, state: Softened, near: Balance | None = None, watch: Callable[[], None] = lambda: None

@@ -57,7 +57,7 @@ def knit(solid: Solid, state: Softened, inertia: float) -> Network:
     length = fresh * np.bincount(back, share * np.tile(state.shrinkage, 6)) / np.bincount(back, share)
     stiffness = np.bincount(back, share * np.tile(state.young, 6)) / fresh**2
     mass = np.bincount(solid.tets.ravel(), np.repeat(solid.volume * state.mass / 4, 4), len(solid.points))
-    return Network(ends, length, stiffness, inertia * mass)
+    return Network(ends, length, stiffness, np.asarray(inertia * mass, dtype=np.float64))
 
 
 def longest_step(x: Array, network: Network, loads: Loads) -> float:
