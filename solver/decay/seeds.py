@@ -10,6 +10,8 @@ __all__ = ["seeds"]
 
 #: Gap at which two fruits touch [r1]: their skins give way by about as much.
 _GAP = 0.05
+#: Colatitude of a neighbour that carries the fruit [degree].
+_ABOVE = 120.0
 #: A fruit that rests on a ring rather than on its pole touches the floor at so many places.
 _RING = 6
 
@@ -18,7 +20,10 @@ def seeds(params: DecayParams) -> tuple[Wound, ...]:
     """Return the wounds of a run: the given ones, or stem, floor and touching neighbours in their place."""
     if params.seeds == "wounds":
         return params.wounds
-    return (Wound(colatitude=0), *_resting(params), *_touching(params))
+    touching = _touching(params)
+    # a fruit that lies on another one does not reach the floor
+    carried = any(wound.colatitude > _ABOVE for wound in touching)
+    return (Wound(colatitude=0), *([] if carried else _resting(params)), *touching)
 
 
 def _resting(params: DecayParams) -> list[Wound]:
