@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from PIL import Image
+from scipy import ndimage
 
 from solver.contract import Need
 from solver.decay import SOLVER, DecayParams
@@ -74,11 +75,11 @@ def heap(runs: list[tuple[DecayParams, xr.Dataset]], view: View) -> bytes:
             if picture is None:
                 picture = shown
                 continue
-            # what a fruit covers is where its colour shows
+            # what a fruit covers is where its colour shows, less the rim that is blended with the paper
             bright, dark = (
                 render(place, pixels=2 * PIXELS, view=view, colour=np.full_like(place, tone)) for tone in (1.0, 0.0)
             )
-            covered = (bright.astype(int) - dark).max(axis=-1, keepdims=True) > 0
+            covered = ndimage.binary_erosion((bright.astype(int) - dark).max(axis=-1) > 0)[..., None]
             picture = np.where(covered, shown, picture)
         assert picture is not None
         strips.append(picture)
