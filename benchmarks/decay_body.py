@@ -7,6 +7,7 @@ Milliseconds are CPU time of one thread, the least of three.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 import time
@@ -21,7 +22,7 @@ from solver.decay.body.body import Body
 from solver.decay.body.flesh import Skin
 from solver.decay.body.wrinkles import Wrinkles
 from solver.decay.environment import water_lost
-from solver.decay.settings import Settings, choose
+from solver.decay.settings import choose
 from solver.decay.stepping import march
 from solver.decay.system import System
 
@@ -46,17 +47,17 @@ def main(preset: str = "apple", day: float = 20.0) -> None:
     def body(layers: int, tolerance: float) -> Body:
         return Body(params, system.surface, _LEVEL, layers, tolerance)
 
-    fine = body(12, 1e-4)
+    fine = body(12, 1e-6)
     there = fine.on_surface(fine.settled(fine.state(water, rot)))
     rows = []
-    for layers, skin in ((6, 4), (8, 5)):
-        ours = body(layers, 1e-3)
+    for quality in ("preview", "default"):
+        settings = dataclasses.replace(choose(params, quality), level=_LEVEL)
+        ours = body(settings.layers, settings.balance)
         state = ours.state(water, rot)
         balance, took = least(lambda ours=ours, state=state: ours.settled(state))  # type: ignore[misc]
         gap = ours.on_surface(balance) - there
-        row = {"layers": layers, "tetrahedra": len(ours.solid.tets), "body_ms": took, "newton": balance.steps}
+        row = {"layers": settings.layers, "tetrahedra": len(ours.solid.tets), "body_ms": took, "newton": balance.steps}
         row["error"] = float(np.sqrt(np.sum(gap**2) / np.sum(there**2)))
-        settings = Settings(_LEVEL, 1e-4, 1.0, layers, 1e-3, skin)
         shell = Wrinkles(params, Skin(), ours, settings)
         found, row["skin_ms"] = least(lambda shell=shell, balance=balance: shell.at(balance), 1)  # type: ignore[misc]
         rows.append(row | {"skin_vertices": len(found[0]), "skin_steps": found[2]})

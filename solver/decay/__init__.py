@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
-from .params import DecayParams, Weather, Wound
+from .params import DecayParams, Weather
+from .places import Wound
 from .presets import PRESETS
 
 if TYPE_CHECKING:

@@ -102,6 +102,11 @@ class Layer:
         bump *= self.rates.cap * np.pi * radius**2 / 3 / whole
         return state._replace(u=state.u + bump, added=state.added + self.surface.mean(bump))
 
+    def painted(self, state: State, share: Array) -> State:
+        """Return the state with colonies of height d2 where share (v), 0 to 1, is 1."""
+        more = self.rates.cap * share
+        return state._replace(u=state.u + more, added=state.added + self.surface.mean(more))
+
     def budget_error(self, state: State) -> float:
         """Return what is missing of theta n + u + v, over what there was and what was added."""
         total = self.surface.mean(self.rates.theta * state.n + state.u + state.v)

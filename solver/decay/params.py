@@ -9,22 +9,13 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from ..fruit import Fruit
-from .body.flesh import Flesh, Skin
+from .body.flesh import Flesh, Skin, Swing
 from .colony import MOULDS, SOFT_ROT, Colony
+from .places import Neighbour, Painted, Pressure, PressureMap, Wound
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class Wound(BaseModel):
-    """A place where rot and mould enter on day 0."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    colatitude: float = Field(ge=0, le=180, description="From the pole y > 0 [degree]")
-    azimuth: float = Field(0.0, ge=0, le=360, description="About the y axis, from x towards z [degree]")
-    radius: float = Field(0.12, ge=0.01, le=0.6, description="Radius [r1]")
 
 
 class Weather(BaseModel):
@@ -140,10 +131,42 @@ class DecayParams(Fruit):
         description="Where rot and mould enter on day 0; by default the stem and the point the fruit rests on",
         json_schema_extra={"units": "1"},
     )
-    body: Literal["none", "quasi-static"] = Field(
-        "none",
-        description="How the fruit's body moves: not at all, or from equilibrium to equilibrium",
+    wound_map: Painted = Field(
+        (),
+        description="Painted wounds: n rows of 2 n values, 1 where rot and mould enter on day 0",
         json_schema_extra={"units": "1"},
+    )
+    seeds: Literal["wounds", "contacts"] = Field(
+        "wounds",
+        description="Where decay enters: the wounds, or the stem, the floor and the neighbours that are touched",
+        json_schema_extra={"units": "1"},
+    )
+    neighbours: tuple[Neighbour, ...] = Field(
+        (), max_length=64, description="Round fruits beside this one", json_schema_extra={"units": "1"}
+    )
+    pressure: tuple[Pressure, ...] = Field(
+        (),
+        max_length=64,
+        description="Pressure points: where the body's flesh is stiffer or softer, longer or shorter",
+        json_schema_extra={"units": "1"},
+    )
+    pressure_map: PressureMap | None = Field(
+        None, description="Painted pressure map of the body", json_schema_extra={"units": "1"}
+    )
+    body: Literal["none", "quasi-static", "paper"] = Field(
+        "none",
+        description="How the body moves: not at all, from equilibrium to equilibrium, or as the paper's springs",
+        json_schema_extra={"units": "1"},
+    )
+    swing: Swing = Field(
+        Swing(), description="Step and damping of the paper's springs", json_schema_extra={"units": "1"}
+    )
+    march: float | None = Field(
+        None,
+        ge=0.01,
+        le=120,
+        description="Days between the shapes that later ones are settled from; without, each from the fresh fruit",
+        json_schema_extra={"units": "day"},
     )
     firmness: float = Field(
         80.0, ge=0.01, le=1000, description="Firmness of the fresh flesh (Table 2)", json_schema_extra={"units": "1"}

@@ -13,7 +13,7 @@ from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
 from .environment import deficit
 from .params import DecayParams
-from .settings import FIELDS, MOULD, VECTORS, choose, stepped
+from .settings import FIELDS, MOULD, VECTORS, choose, nodes, stepped
 from .shape import Shape
 from .stepping import Reached, march
 from .surface import sampler
@@ -41,10 +41,16 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": float(deficit(params))}
     shape = Shape(params, need, settings)
     rows: list[dict[str, Any]] = []
+    followed = set(nodes(params, need))
+    days = tuple(sorted(followed | set(need.stages)))
     try:
         if not stepped(params, wanted):
             attrs["path"] = "closed-form"
-            for day in need.stages:
+            for day in days:
+                if day in followed:
+                    shape.follow(day, None, context)
+                if day not in need.stages:
+                    continue
                 row = _row(day, 0, 0.0, True)
                 _finish(rows, row, shape, None, begun, need, context)
             return _dataset(rows, need, attrs, shape)
@@ -52,7 +58,12 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
         context.report(0.0, f"laying {settings.vertices} points on the fruit")
         system = System(params, settings.level, with_mould)
         attrs["path"] = "rot-and-mould" if with_mould else "rot"
-        for reached in march(system, need.stages, settings.tolerance, settings.longest, context):
+        for reached in march(system, days, settings.tolerance, settings.longest, context):
+            rot = system.rot.share(reached.state.rot)
+            if reached.day in followed:
+                shape.follow(reached.day, rot, context)
+            if reached.day not in need.stages:
+                continue
             errors = [
                 layer.budget_error(state)
                 for layer, state in zip((system.rot, system.mould), reached.state, strict=True)
@@ -63,7 +74,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             if "budget_error" in wanted:
                 row["budget_error"] = max(errors)
             row |= _fields(system, reached, need, settings.level)
-            _finish(rows, row, shape, system.rot.share(reached.state.rot), begun, need, context)
+            _finish(rows, row, shape, rot, begun, need, context)
     except SolverError as error:
         if rows:
             error.partial = _dataset(rows, need, attrs, shape)

@@ -7,8 +7,21 @@ from dataclasses import dataclass
 
 from ..contract import Cost, Need, Quality
 from .params import DecayParams
+from .seeds import seeds
 
-__all__ = ["BODY", "FIELDS", "MOULD", "ROT", "VECTORS", "Settings", "choose", "expected_cost", "moved", "stepped"]
+__all__ = [
+    "BODY",
+    "FIELDS",
+    "MOULD",
+    "ROT",
+    "VECTORS",
+    "Settings",
+    "choose",
+    "expected_cost",
+    "moved",
+    "nodes",
+    "stepped",
+]
 
 #: What has a layer to be stepped for.
 ROT = frozenset({"rot", "substrate", "rotten_share", "mean_rot"})
@@ -23,7 +36,7 @@ VECTORS = ("position", "displacement")
 class Settings:
     """level: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day].
 
-    layers: shells of the body. balance: out-of-balance force of body and skin over the forces in them.
+    layers: shells of the body. balance, smooth: out-of-balance force of body and of skin over the forces in them.
     skin: level of the skin's own mesh.
     """
 
@@ -32,6 +45,7 @@ class Settings:
     longest: float
     layers: int
     balance: float
+    smooth: float
     skin: int
 
     @property
@@ -41,10 +55,10 @@ class Settings:
 
 
 _LEVELS: dict[Quality, tuple[int, float]] = {"preview": (5, 1e-4), "default": (6, 3e-5), "fine": (7, 1e-5)}
-_BODIES: dict[Quality, tuple[int, float, int]] = {
-    "preview": (6, 1e-3, 4),
-    "default": (8, 1e-3, 5),
-    "fine": (16, 1e-4, 5),
+_BODIES: dict[Quality, tuple[int, float, float, int]] = {
+    "preview": (6, 1e-3, 1e-3, 4),
+    "default": (8, 1e-4, 1e-3, 5),
+    "fine": (16, 1e-5, 1e-4, 5),
 }
 #: Longest step, in units of the quicker organism's own time.
 _LONGEST = 4.0
@@ -53,7 +67,7 @@ _SECONDS, _STEP = 4e-7, 0.2
 #: Seconds per settled body and tetrahedron.
 _BODY_SECONDS = 2e-5
 #: Seconds per wrinkled skin and vertex.
-_SKIN_SECONDS = 8e-4
+_SKIN_SECONDS = 4e-4
 #: Working memory per vertex, mesh and states of both organisms.
 _BYTES = 1000
 
@@ -69,9 +83,16 @@ def moved(params: DecayParams, wanted: Collection[str]) -> bool:
     return params.body != "none" and not BODY.isdisjoint(wanted)
 
 
+def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:
+    """Return the days of the march whose shapes later ones are settled from, up to the last stage; none without one."""
+    if params.march is None or not moved(params, need.fields):
+        return ()
+    return tuple(k * params.march for k in range(int(need.stages[-1] / params.march + 1e-9) + 1))
+
+
 def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
     """Return whether rot has to be stepped: it is wanted, or bears on a body that moves."""
-    bears = moved(params, wanted) and params.flesh.heeds_rot and len(params.wounds) > 0
+    bears = moved(params, wanted) and params.flesh.heeds_rot and (bool(params.wound_map) or len(seeds(params)) > 0)
     return bears or not {*ROT, *MOULD, "budget_error"}.isdisjoint(wanted)
 
 
@@ -86,8 +107,9 @@ def expected_cost(params: DecayParams, need: Need) -> Cost:
     values = sum((3 if f in VECTORS else 1) for f in FIELDS if f in wanted) * 2 * need.resolution**2
     seconds = 1e-5 * settings.vertices + steps * settings.vertices * _SECONDS * organisms / 2
     if moved(params, wanted):
-        seconds += len(need.stages) * 20 * settings.layers**3 * _BODY_SECONDS
-        seconds += len(need.stages) * 10 * 4**settings.skin * _SKIN_SECONDS * (params.skin is not None)
+        count = len(need.stages) + len(nodes(params, need))
+        seconds += count * 20 * settings.layers**3 * _BODY_SECONDS
+        seconds += count * 10 * 4**settings.skin * _SKIN_SECONDS * (params.skin is not None)
     return Cost(seconds, len(need.stages) * (values * width + 200) + settings.vertices * _BYTES)
 
 

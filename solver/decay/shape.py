@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,19 @@ from .params import DecayParams
 from .settings import BODY, Settings, moved
 from .surface import Surface, lay
 
+if TYPE_CHECKING:
+    from .body.equilibrium import Balance
+
 __all__ = ["Shape"]
 
 Array = NDArray[np.float64]
+
+
+class _Settled(NamedTuple):
+    """A body and how far its skin stands off (v, 3)."""
+
+    balance: Balance | None
+    folds: Array | None
 
 
 class Shape:
@@ -29,6 +39,7 @@ class Shape:
         meshed = {"water_lost", "volume", "mesh_position", "triangle"} & self._wanted
         self._surface = lay(params, settings.level) if moves or meshed else None
         self._body = self._wrinkles = None
+        self._node: _Settled = _Settled(None, None)
         if moves and self._surface is not None:
             from .body.body import Body
 
@@ -53,17 +64,10 @@ class Shape:
         """
         wanted, need = self._wanted, self._need
         row: dict[str, Any] = {}
-        lost = water_lost(self._params, self._surface, day) if self._surface is not None else 0.0
         if "water_lost" in wanted:
-            row["water_lost"] = lost
-        balance = None
-        if self._body is not None:
-            balance = self._body.settled(self._body.state(lost, rot), context.check_cancelled)
-            row |= {"body_residual": balance.residual, "body_steps": balance.steps}
-        folds = None
-        if self._wrinkles is not None and balance is not None and (wanted & BODY) - {"least_jacobian"}:
-            folds, residual, steps = self._wrinkles.at(balance, context.check_cancelled)
-            row |= {"skin_residual": residual, "skin_steps": steps}
+            row["water_lost"] = self._lost(day)
+        (balance, folds), found = self._settled(day, rot, context)
+        row |= found
         if "least_jacobian" in wanted:
             row["least_jacobian"] = balance.least_jacobian if balance else 1.0
         if wanted & {"position", "displacement"}:
@@ -88,6 +92,30 @@ class Shape:
             if "volume" in wanted:
                 row["volume"] = _volume(points, self._surface)
         return row
+
+    def follow(self, day: float, rot: Array | None, context: Context) -> None:
+        """Settle a day of the march: later days, stages among them, start from its shape.
+
+        Raises:
+            NotConverged: body or skin found no equilibrium.
+
+        """
+        self._node, _ = self._settled(day, rot, context)
+
+    def _settled(self, day: float, rot: Array | None, context: Context) -> tuple[_Settled, dict[str, Any]]:
+        """Return the moved shape of a day, and what is kept of how it was found."""
+        if self._body is None:
+            return _Settled(None, None), {}
+        watch, before = context.check_cancelled, self._node
+        balance = self._body.settled(self._body.state(self._lost(day), rot), before.balance, watch)
+        row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
+        folds = None
+        if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:
+            folds, row["skin_residual"], row["skin_steps"] = self._wrinkles.at(balance, before.folds, watch)
+        return _Settled(balance, folds), row
+
+    def _lost(self, day: float) -> float:
+        return water_lost(self._params, self._surface, day) if self._surface is not None else 0.0
 
 
 def _volume(points: Array, surface: Surface) -> float:

@@ -18,7 +18,9 @@ from .colony import Colony
 from .layer import Layer, State
 from .noise import patches
 from .params import DecayParams
+from .places import painted
 from .rates import Rates, daily
+from .seeds import seeds
 from .spawning import Landing, Spawner
 from .surface import geodesic, lay
 
@@ -74,7 +76,7 @@ class System:
 
     def _wounded(self, params: DecayParams) -> Both:
         rot, mould = self.rot.fresh, self.mould.fresh if self.mould else None
-        for wound in params.wounds:
+        for wound in seeds(params):
             theta, phi = np.radians([wound.colatitude, wound.azimuth])
             centre = params.surface(theta, phi)
             ray = directions(theta, phi)
@@ -83,6 +85,11 @@ class System:
             if self.mould is not None and mould is not None:
                 mould = self.mould.seeded(mould, centre, wound.radius, self.gate(rot))
                 self._mould_spawner.settle(ray, 0.0)
+        if params.wound_map:
+            share = painted(params.wound_map, self._rays)
+            rot = self.rot.painted(rot, share)
+            if self.mould is not None and mould is not None:
+                mould = self.mould.painted(mould, share * self.gate(rot))
         return Both(rot, mould)
 
     @property

@@ -19,7 +19,9 @@ from ..surface import Surface, geodesic, shares_at
 from .equilibrium import Balance, Loads, rested, settle
 from .flesh import Softened, softened
 from .material import blocks
+from .pressure import pressed
 from .solid import ball, fill
+from .springs import knit, swung
 
 __all__ = ["Body"]
 
@@ -43,7 +45,8 @@ class Body:
         self._level, self._layers = level, layers
         self._tolerance = tolerance
         self._pattern = blocks(self.solid.tets, len(self.solid.points))
-        self._pressure = _DENSITY * params.flesh.gravity * reference_radius(params, surface)
+        r1 = reference_radius(params, surface)
+        self._pressure, self._inertia = _DENSITY * params.flesh.gravity * r1, _DENSITY * r1**2
 
     def state(self, water: float, rot: Array | None) -> Softened:
         """Return the flesh after a share of the weight has gone as water; rot: on the surface's vertices (v)."""
@@ -52,20 +55,31 @@ class Body:
         if rot is not None:
             at = _inwards(self._level, self._layers) @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
             inside = at[solid.tets].mean(axis=1)
-        return softened(flesh, self._params.firmness, water, inside, solid.stone)
+        state = softened(flesh, self._params.firmness, water, inside, solid.stone)
+        return pressed(state, self._params, solid)
 
-    def settled(self, state: Softened, watch: Callable[[], None] = lambda: None) -> Balance:
-        """Return the shape that the flesh settles to.
+    def settled(
+        self, state: Softened, near: Balance | None = None, watch: Callable[[], None] = lambda: None
+    ) -> Balance:
+        """Return the shape that the flesh settles to, from a shape `near` it or from the evenly shrunk fresh one.
 
         Raises:
             NotConverged: it does not.
+            Unstable: the paper's springs need shorter steps.
 
         """
         solid, fresh = self.solid, self._params.flesh.unit * self._params.firmness
         rest = rested(solid.points, solid.tets, state.shrinkage, state.young, self._params.flesh.poisson)
         even = float(np.cbrt(np.average(state.shrinkage**3, weights=solid.volume)))
         start = even * solid.points
-        return settle(start, rest, self._loads(state, start, fresh), self._pattern, self._tolerance, watch)
+        loads = self._loads(state, start, fresh)
+        if near is not None:
+            start = near.points * even / near.even
+        if self._params.body == "paper":
+            network = knit(solid, state, self._inertia)
+            return swung(solid, start, network, loads, self._params.swing, watch)._replace(even=even)
+        found = settle(start, rest, loads, self._pattern, self._tolerance, watch)
+        return found._replace(even=even)
 
     def _loads(self, state: Softened, start: Array, fresh: float) -> Loads:
         solid, count = self.solid, len(self.solid.points)

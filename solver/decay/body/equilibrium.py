@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...contract import NotConverged
 from .material import Blocks, energy, forces, hessian, inverse_edges
-from .sparse import solve
+from .sparse import solve, times
 
 __all__ = ["Balance", "Loads", "Rest", "rested", "settle"]
 
@@ -23,6 +23,8 @@ Index = NDArray[np.int64]
 
 #: Newton steps and halvings of a step before giving up; iterations of the linear solver in one step.
 _STEPS, _HALVINGS, _ITERATIONS = 200, 40, 400
+#: Changes of which points touch the floor, in one direction.
+_CONTACTS = 20
 #: Strains below this count as none: a body at rest has no forces to measure its residual by.
 _NOTHING = 1e-6
 #: Round-off of the energy, over the energy of a strain of 1.
@@ -53,13 +55,17 @@ class Loads(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """A settled shape: points, out-of-balance force over the forces in it, Newton steps, least J, floor's force."""
+    """A settled shape: points, out-of-balance force over the forces in it, Newton steps, least J, floor's force.
+
+    even: length of a cube as large as the rest shape, over the fresh one.
+    """
 
     points: Array
     residual: float
     steps: int
     least_jacobian: float
     reaction: float
+    even: float = 1.0
 
 
 def rested(points: Array, tets: Index, shrinkage: Array, young: Array, poisson: float) -> Rest:
@@ -107,7 +113,7 @@ def settle(
             return Balance(x, residual, step, least, reaction)
         # a rough direction is enough far from the end (Eisenstat and Walker)
         asked = min(0.1, max(0.5 * residual / max(before, residual), 0.3 * tolerance / residual, 1e-6))
-        d = _direction(x, g, rest, loads, pattern, asked)
+        d = _direction(x, rest, loads, pattern, asked)
         down = float(np.sum(g * d))
         share = 1.0
         for _ in range(_HALVINGS):
@@ -129,20 +135,56 @@ def settle(
     )
 
 
-def _direction(x: Array, g: Array, rest: Rest, loads: Loads, pattern: Blocks, asked: float) -> Array:
-    """Return Newton's direction (p, 3); that of the cut Hessian where the exact one does not curve upwards."""
+def _direction(x: Array, rest: Rest, loads: Loads, pattern: Blocks, asked: float) -> Array:
+    """Return Newton's direction (p, 3); that of the cut Hessian where the exact one does not curve upwards.
+
+    The floor is no part of the quadratic model but kept as it is: which points it carries is found in each direction
+    by solves that start from the last one. A model of today's contacts alone would take a new one in each step.
+    """
+    g, *_ = _slope(x, rest, loads._replace(contact=np.zeros_like(loads.contact)))
     for cut in (False, True):
         a = np.zeros((len(pattern.near), 3, 3))
         hessian(x, *rest, pattern.slot, a, cut)
         own = a[pattern.own]
         own[:, 0, 0] += loads.tether
         own[:, 2, 2] += loads.tether
-        own[:, 1, 1] += np.where(_below(x, loads) > 0, loads.contact, 0.0)
-        a[pattern.own] = own
-        d, _, upwards = solve(pattern.start, pattern.near, pattern.own, a, -g, asked, _ITERATIONS)
+        d, upwards = _carried(x, g, a, own, loads, pattern, asked)
         if upwards:
             break
     return d
+
+
+def _carried(
+    x: Array, g: Array, a: Array, own: Array, loads: Loads, pattern: Blocks, asked: float
+) -> tuple[Array, bool]:
+    """Return the least of the model g.d + d.a d / 2 and the floor's potential, and whether `a` curved upwards.
+
+    own: the diagonal blocks of `a`, which are written to it with the contacts' stiffness.
+    """
+    d = np.zeros_like(x)
+    touching = _below(x, loads) > 0
+    first = 0.0
+    for _ in range(_CONTACTS):
+        stiff = np.where(touching, loads.contact, 0.0)
+        a[pattern.own] = own
+        a[pattern.own, 1, 1] += stiff
+        right = -g
+        right[:, 1] += stiff * ((0.0 if loads.floor is None else loads.floor) - x[:, 1])
+        right -= times(pattern.start, pattern.near, a, d)
+        size = float(np.linalg.norm(right))
+        first = first or size
+        if size <= asked * first:
+            break
+        more, _, upwards = solve(
+            pattern.start, pattern.near, pattern.own, a, right, min(asked * first / size, 0.3), _ITERATIONS
+        )
+        d += more
+        if not upwards:
+            return d, False
+        before, touching = touching, _below(x + d, loads) > 0
+        if loads.floor is None or not touching.any() or bool((touching == before).all()):
+            break
+    return d, True
 
 
 def _drop(x: Array, loads: Loads) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Flesh", "Skin", "Softened", "softened"]
+__all__ = ["Flesh", "Skin", "Softened", "Swing", "softened"]
 
 Array = NDArray[np.float64]
 
@@ -51,6 +51,16 @@ class Skin(BaseModel):
     stiffness: float = Field(50.0, gt=0, le=10000, description="Young's modulus of the skin, over the flesh's [1]")
     shrinkage: float = Field(0.0, ge=0, le=1, description="Share of the body's even shrinkage that the skin joins [1]")
     depth: float = Field(0.1, ge=0.01, le=1, description="Depth of the flesh that holds the skin [r1]")
+
+
+class Swing(BaseModel):
+    """How the paper's springs are moved: from rest, for a while, in fixed steps."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    step: float = Field(0.006, ge=1e-6, le=1, description="Step of RK4 [s]")
+    seconds: float = Field(1.0, ge=0, le=100, description="How long the springs swing before a stage is shown [s]")
+    damping: float = Field(20.0, ge=0, le=1000, description="Damping of all motion [1/s]")
 
 
 class Softened(NamedTuple):

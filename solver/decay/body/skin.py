@@ -34,7 +34,11 @@ __all__ = ["Shell"]
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_STEPS, _HALVINGS, _ITERATIONS, _MEMORY = 1500, 30, 200, 10
+_STEPS, _HALVINGS, _ITERATIONS, _MEMORY = 1500, 30, 200, 20
+#: Steps that one tangent serves.
+_STALE = 10
+#: Tolerance of the linear solves.
+_LOOSE = 0.1
 #: Random height that a flat skin starts from, over its thickness: without one it would stay flat.
 _UNEVEN = 1e-2
 
@@ -57,14 +61,13 @@ class Shell:
         self,
         carried: Array,
         share: float,
-        normals: Array,
-        generator: np.random.Generator,
+        start: Array,
         tolerance: float,
         watch: Callable[[], None] = lambda: None,
     ) -> tuple[Array, float, int]:
         """Return points (v, 3) of the skin, residual and steps, where the body carries it to `carried` (v, 3).
 
-        share: the skin's lengths over its fresh ones. normals (v, 3): along which it starts uneven.
+        share: the skin's lengths over its fresh ones. start (v, 3): from where it settles; see `uneven`.
 
         Raises:
             NotConverged: there were too many steps.
@@ -72,10 +75,11 @@ class Shell:
         """
         g = self._metric * share**2
         stiffness = hinge_stiffness(g, self._mesh, self._material.flexural)
-        x = carried + _UNEVEN * self._material.thickness * generator.standard_normal((len(carried), 1)) * normals
+        x = start.copy()
         slope, now = self._slope(x, carried, g, stiffness)
         residual = np.inf
         moves: list[tuple[Array, Array]] = []
+        blocks = np.empty(0)
         for step in range(_STEPS):
             watch()
             pull = self._hold[:, None] * (x - carried)
@@ -84,10 +88,8 @@ class Shell:
             residual = float(np.linalg.norm(slope) / scale)
             if residual <= tolerance:
                 return x, residual, step
-            blocks = np.zeros((self._pattern.blocks, 3, 3))
-            membrane_tangent(x, self._faces, g, self._material.lame, self._pattern.of_triangles, blocks)
-            bending_tangent(x, self._mesh.hinges, stiffness, self._pattern.of_hinges, blocks)
-            blocks[self._pattern.diagonal] += self._hold[:, None, None] * np.eye(3)
+            if step % _STALE == 0:
+                blocks = self._tangent(x, g, stiffness)
             d = self._direction(slope, blocks, moves)
             down, part = float(np.sum(slope * d)), 1.0
             for _ in range(_HALVINGS):
@@ -105,6 +107,17 @@ class Shell:
             advice="Make the skin thicker or softer, or let it shrink with the body (skin.shrinkage).",
         )
 
+    def uneven(self, normals: Array, generator: np.random.Generator) -> Array:
+        """Return a small random height (v, 3) along normals (v, 3), without which a flat skin would stay flat."""
+        return _UNEVEN * self._material.thickness * generator.standard_normal((len(normals), 1)) * normals
+
+    def _tangent(self, x: Array, g: Array, stiffness: Array) -> Array:
+        blocks = np.zeros((self._pattern.blocks, 3, 3))
+        membrane_tangent(x, self._faces, g, self._material.lame, self._pattern.of_triangles, blocks)
+        bending_tangent(x, self._mesh.hinges, stiffness, self._pattern.of_hinges, blocks)
+        blocks[self._pattern.diagonal] += self._hold[:, None, None] * np.eye(3)
+        return blocks
+
     def _direction(self, slope: Array, blocks: Array, moves: list[tuple[Array, Array]]) -> Array:
         """Return the direction (v, 3) of L-BFGS that starts from the tangent in place of a multiple of one.
 
@@ -116,7 +129,7 @@ class Shell:
         for s, y, sy in reversed(kept):
             parts.append(float(np.sum(s * q)) / sy)
             q = q - parts[-1] * y
-        d, _, _ = solve(order.indptr, order.indices, order.diagonal, blocks, q, 0.05, _ITERATIONS)
+        d, _, _ = solve(order.indptr, order.indices, order.diagonal, blocks, q, _LOOSE, _ITERATIONS)
         for (s, y, sy), part in zip(kept, reversed(parts), strict=True):
             d = d + (part - float(np.sum(y * d)) / sy) * s
         return d if float(np.sum(slope * d)) < 0 else -slope

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["solve"]
+__all__ = ["solve", "times"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -73,3 +73,10 @@ def solve(
                 r[i, c] -= step * y[i, c]
         before = now
     return x, most, True
+
+
+def times(start: Index, near: Index, a: Array, x: Array) -> Array:
+    """Return a x (p, 3)."""
+    y = np.empty_like(x)
+    _times(start, near, a, x, y)
+    return y

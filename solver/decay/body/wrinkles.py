@@ -26,14 +26,18 @@ class Wrinkles:
 
     def __init__(self, params: DecayParams, skin: Skin, body: Body, settings: Settings) -> None:
         self._body, self._skin, self._seed = body, skin, params.seed
-        self._level, self._fields, self._tolerance = settings.skin, settings.level, settings.balance
+        self._level, self._fields, self._tolerance = settings.skin, settings.level, settings.smooth
         surface = lay(params, settings.skin)
         self._points = surface.points
         self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
         self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness)
 
-    def at(self, balance: Balance, watch: Callable[[], None] = lambda: None) -> tuple[Array, float, int]:
+    def at(
+        self, balance: Balance, folds: Array | None = None, watch: Callable[[], None] = lambda: None
+    ) -> tuple[Array, float, int]:
         """Return how far the skin stands off (v, 3) from the settled body, residual and steps.
+
+        folds (v, 3): how far it stood off in the stage to start from; None starts from a slightly uneven skin.
 
         Raises:
             NotConverged: the skin found no equilibrium.
@@ -42,8 +46,9 @@ class Wrinkles:
         even, rest = self._body.parted(balance)
         carried = (1 + even) * self._points + self._body.onto(self._level) @ rest
         share = 1 + self._skin.shrinkage * even
-        generator = Context.generator(self._seed)
-        found, residual, steps = self._shell.wrinkled(carried, share, self._normals, generator, self._tolerance, watch)
+        if folds is None:
+            folds = self._shell.uneven(self._normals, Context.generator(self._seed))
+        found, residual, steps = self._shell.wrinkled(carried, share, carried + folds, self._tolerance, watch)
         return found - carried, residual, steps
 
     def on_lattice(self, folds: Array, resolution: int) -> Array:

@@ -299,4 +299,4 @@ def test_a_body_can_be_cancelled():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        body.settled(body.state(0.5, None), stop)
+        body.settled(body.state(0.5, None), watch=stop)

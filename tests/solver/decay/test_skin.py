@@ -38,7 +38,7 @@ def heights(sphere, shrinkage):
     shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
     outward = sphere.points / RADIUS
     carried = (1 - shrinkage) * sphere.points
-    found, residual, _ = shell.wrinkled(carried, 1.0, outward, Context.generator(0), 1e-5)
+    found, residual, _ = shell.wrinkled(carried, 1.0, carried + shell.uneven(outward, Context.generator(0)), 1e-5)
     assert residual <= 1e-5
     h = np.einsum("vi,vi->v", found - carried, outward)
     h -= sphere.mean(h)
@@ -58,8 +58,27 @@ def test_a_skin_wrinkles_past_the_critical_shrinkage_with_the_width_of_theory(sp
 def test_a_skin_that_shrinks_with_its_body_stays_on_it(sphere):
     shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
     carried = 0.7 * sphere.points
-    found, _, _ = shell.wrinkled(carried, 0.7, sphere.points / RADIUS, Context.generator(0), 1e-6)
+    found, _, _ = shell.wrinkled(
+        carried, 0.7, carried + shell.uneven(sphere.points / RADIUS, Context.generator(0)), 1e-6
+    )
     assert found == pytest.approx(carried, abs=1e-6)
+
+
+def test_a_march_settles_each_stage_alike_whatever_else_is_asked_for():
+    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "skin": {}, "march": 1.0}
+
+    def at(*days):
+        need = Need(fields=("displacement",), stages=days, quality="preview", resolution=64)
+        return SOLVER.solve(SOLVER.parse(values, "orange"), need)
+
+    alone, among = at(2.5), at(0.7, 1.5, 2.5)
+    assert np.array_equal(alone.displacement[-1], among.displacement[-1])
+    # and from the march's last node it is fewer steps away than from the fresh fruit
+    cold = SOLVER.solve(
+        SOLVER.parse({**values, "march": None}, "orange"),
+        Need(fields=("displacement",), stages=(2.5,), quality="preview", resolution=64),
+    )
+    assert int(alone.body_steps[-1]) < int(cold.body_steps[-1])
 
 
 def test_wrinkles_come_on_top_of_the_body_and_only_with_a_skin():

@@ -1,0 +1,95 @@
+"""Places on a fruit that a user points at: by angles, by a position, or painted as a map."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from scipy import ndimage
+
+__all__ = ["Neighbour", "Painted", "Place", "Pressure", "PressureMap", "Wound", "painted"]
+
+Array = NDArray[np.float64]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+def _square(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    if rows and {len(row) for row in rows} != {2 * len(rows)}:
+        raise ValueError(f"a painted map of {len(rows)} rows has {2 * len(rows)} values in each")
+    return rows
+
+
+#: Rows from the pole y > 0 down, each around the y axis from x towards z: n rows of 2 n values from 0 to 1.
+Painted = Annotated[tuple[tuple[Share, ...], ...], Field(max_length=512), AfterValidator(_square)]
+
+
+class Place(BaseModel):
+    """A disc on the skin; `position` may be given in place of the angles: any point above the place."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    colatitude: float = Field(ge=0, le=180, description="From the pole y > 0 [degree]")
+    azimuth: float = Field(0.0, ge=0, le=360, description="About the y axis, from x towards z [degree]")
+    radius: float = Field(0.12, ge=0.01, le=0.6, description="Radius [r1]")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _pointed_at(cls, value: Any) -> Any:
+        if not isinstance(value, dict) or "position" not in value:
+            return value
+        rest = {k: v for k, v in value.items() if k != "position"}
+        if {"colatitude", "azimuth"} & set(rest):
+            raise ValueError("give a position or angles, not both")
+        point = np.asarray(value["position"], dtype=float)
+        if point.shape != (3,) or not np.isfinite(point).all() or not point.any():
+            raise ValueError("a position is three numbers, and not the fruit's centre")
+        down = np.degrees(np.arccos(np.clip(point[1] / np.linalg.norm(point), -1, 1)))
+        around = np.degrees(np.arctan2(point[2], point[0])) % 360
+        return {**rest, "colatitude": float(down), "azimuth": float(around)}
+
+
+class Wound(Place):
+    """A place where rot and mould enter on day 0."""
+
+
+class Pressure(Place):
+    """A pressure point: how much stiffer and longer the flesh is in a ball about a place of the skin."""
+
+    stiffness: float = Field(1.0, ge=0.01, le=100, description="Stiffness at the place, over what it would be [1]")
+    length: float = Field(1.0, ge=0.5, le=1.5, description="Rest length at the place, over what it would be [1]")
+
+
+class PressureMap(BaseModel):
+    """A painted pressure map: where it is 1, stiffness and rest length are multiplied; it fades out with depth."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    values: Painted
+    stiffness: float = Field(
+        1.0, ge=0.01, le=100, description="Stiffness where the map is 1, over what it would be [1]"
+    )
+    length: float = Field(1.0, ge=0.5, le=1.5, description="Rest length where the map is 1, over what it would be [1]")
+    depth: float = Field(0.5, gt=0, le=3, description="Depth at which the map has faded out [r1]")
+
+
+class Neighbour(BaseModel):
+    """A round fruit beside this one."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    position: tuple[float, float, float] = Field(description="Its centre, from this fruit's [r1]")
+    radius: float = Field(1.0, gt=0, le=100, description="Its radius [r1]")
+
+
+def painted(rows: tuple[tuple[float, ...], ...], rays: Array) -> Array:
+    """Return a painted map at unit rays (v, 3), bilinear; beyond a pole the rows go on on the other side."""
+    values = np.array(rows, dtype=float)
+    n, m = values.shape
+    padded = np.concatenate([np.roll(values[:1], n, axis=1), values, np.roll(values[-1:], n, axis=1)])
+    down = np.arccos(np.clip(rays[:, 1], -1, 1)) * n / np.pi + 0.5
+    along = np.arctan2(rays[:, 2], rays[:, 0]) % (2 * np.pi) * m / (2 * np.pi)
+    padded = np.concatenate([padded, padded[:, :1]], axis=1)
+    found: Array = ndimage.map_coordinates(padded, [down, along], order=1, mode="nearest")
+    return found
