@@ -26,11 +26,11 @@ from .stepping import Reached, State, balanced, begin, broken, copied, floor, ki
 __all__ = ["implicit"]
 
 #: Solves before a stale factor is given up, and factors before a step is.
-_SOLVES, _FACTORS = 200, 4
+_SOLVES, _FACTORS = 200, 2
 #: A factor is renewed when it has cost this many solves more than a fresh one would have: about what a new one costs.
 _EXCESS = 60
 #: The least residual that is asked for: this share of the tolerance, of the load that the bundle bears.
-_LEAST = 1e-5
+_LEAST = 1e-4
 _HALVINGS = 12
 #: Times that breaking and solving alternate in one step.
 _PASSES = 40
@@ -107,7 +107,7 @@ class _Solver:
         x = guesses[int(np.nanargmin(norms))]
         scale = max(norms[0], _LEAST * strength(wood, p))
         wanted = self.tolerance * scale
-        longest = float(wood.rods.rest[wood.rods.k > 0].mean())
+        longest = 0.2 * float(wood.rods.rest[wood.rods.k > 0].mean())
         root = np.arange(len(m.x))
         norm = min(norms)
         for attempt in range(_FACTORS):

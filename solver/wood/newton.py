@@ -15,9 +15,9 @@ import numpy as np
 __all__ = ["Found", "descend"]
 
 #: Pairs that are remembered.
-_MEMORY = 12
+_MEMORY = 20
 #: A step is accepted when the slope along it is below this part of the slope at its start.
-_ENOUGH = 0.8
+_ENOUGH = 0.3
 _TRIALS = 8
 
 

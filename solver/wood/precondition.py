@@ -209,13 +209,20 @@ def preconditioner(
     known: the pattern, where it still holds. Returns the factor and the pattern.
     """
     pattern = known or Stiffness(rods, bonds, free)
-    blocks = np.zeros((len(pattern.indices), 3, 3))
-    _gauss(x, rods, bonds, pattern.place, blocks)
-    for c in range(3):
-        blocks[pattern.diagonal, c, c] += inertia[free]
-    if contacts is not None:
-        blocks[pattern.diagonal] += contacts[free]
     analysis = dissected(x[free], pattern.indptr, pattern.indices)
+    for full in (True, False):
+        if full:
+            blocks = pattern.blocks(x, rods, bonds)
+        else:
+            blocks = np.zeros((len(pattern.indices), 3, 3))
+            _gauss(x, rods, bonds, pattern.place, blocks)
+        for c in range(3):
+            blocks[pattern.diagonal, c, c] += inertia[free]
+        if contacts is not None:
+            blocks[pattern.diagonal] += contacts[free]
+        factor = factorise(analysis, blocks)
+        if all(b.signs is None for b in factor.blocks):
+            break
     local = np.zeros((len(x), 3, 3))
     local[free] = np.linalg.inv(blocks[pattern.diagonal])
-    return Preconditioner(free, *_flat(factorise(analysis, blocks)), local), pattern
+    return Preconditioner(free, *_flat(factor), local), pattern
