@@ -32,6 +32,7 @@ _NUMBERS = (
     "elastic_energy",
     "lost_energy",
     "work",
+    "dissipated_energy",
     "broken_rods",
     "broken_bonds",
     "impulse",

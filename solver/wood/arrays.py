@@ -63,3 +63,4 @@ class Bodies(NamedTuple):
     times: np.ndarray  # (r, w) [s], rising
     points: np.ndarray  # (r, w, 3) centre at these times [m]
     k: np.ndarray  # (r,) contact stiffness of a vertex [N/m]
+    ease: np.ndarray  # (r,) depth over which it grows to this [m]

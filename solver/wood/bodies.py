@@ -1,7 +1,8 @@
 """Contact of vertices with rigid bodies on given paths: a penalty with Coulomb friction, impulse and work accounted.
 
 The thesis (3.2.5) reflects vertices as in elastic collisions. A penalty E = k g^2 / 2 in the depth g has an energy of
-its own, so that what a body puts in can be balanced, and the same force serves the implicit scheme.
+its own, so that what a body puts in can be balanced, and the same force serves the implicit scheme. Its stiffness
+grows from nothing over the first part of the depth, so that Newton's method does not meet a kink at every vertex.
 """
 
 from __future__ import annotations
@@ -49,14 +50,18 @@ def press(
     rubbing: float,
     push: np.ndarray,
     power: np.ndarray,
+    normals: np.ndarray,
+    lagged: np.ndarray,
 ) -> float:
     """Add contact forces to f (v, 3) [N]; return the energy of the contacts [J].
 
     push (r, 3) [N] gets the force on each body; power[0] the power of the bodies, power[1] the power lost by friction
-    [W]. With `rubbing` above 0 friction has its full size beyond this slip [m/s] and grows evenly below (the implicit
-    scheme needs that); with 0 it is limited to what stops a vertex in half a step `dt` [s].
+    [W]; normals (r, v) [N] the normal forces. With `rubbing` 0 friction is limited to what stops a vertex in half a
+    step `dt` [s]. Above 0, for the implicit scheme, it follows the normal forces `lagged` (r, v) [N] and has its full
+    size beyond this slip [m/s]: then it is the slope of a potential (Li et al. 2020, sec. 5.4).
     """
     energy = 0.0
+    normals[:] = 0.0
     for r in range(len(bodies.kind)):
         reach = bodies.half[r]
         axis = bodies.axis[r]
@@ -107,8 +112,13 @@ def press(
                     n0 = side if axis == 0 else 0.0
                     n1 = side if axis == 1 else 0.0
                     n2 = side if axis == 2 else 0.0
-            normal = bodies.k[r] * gap
-            energy += 0.5 * normal * gap
+            if gap < bodies.ease[r]:
+                normal = 0.5 * bodies.k[r] * gap * gap / bodies.ease[r]
+                energy += normal * gap / 3.0
+            else:
+                normal = bodies.k[r] * (gap - 0.5 * bodies.ease[r])
+                energy += bodies.k[r] * (0.5 * gap * (gap - bodies.ease[r]) + bodies.ease[r] ** 2 / 6.0)
+            normals[r, i] = normal
             s0 = v[i, 0] - speed[r, 0]
             s1 = v[i, 1] - speed[r, 1]
             s2 = v[i, 2] - speed[r, 2]
@@ -120,7 +130,8 @@ def press(
             drag = 0.0
             if bodies.friction[r] > 0.0 and slip > 0.0:
                 if rubbing > 0.0:
-                    drag = bodies.friction[r] * normal * min(slip / rubbing, 1.0) / slip
+                    soft = min(slip / rubbing, 1.0)
+                    drag = bodies.friction[r] * lagged[r, i] * soft * (2.0 - soft) / slip
                 else:
                     drag = min(bodies.friction[r] * normal, 0.5 * mass[i] * slip / dt) / slip
             p0 = normal * n0 - drag * s0

@@ -20,6 +20,8 @@ __all__ = ["SAMPLES", "Wood", "lay", "scratch_for"]
 SAMPLES = np.linspace(0.0, 1.0, 9)
 #: Share of an edge's stiffness that a contact has.
 _CONTACT = 0.1
+#: Depth over which a contact gains its stiffness, over a rod's radius.
+_EASE = 0.1
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
 _NET = 3.0
@@ -65,6 +67,8 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((r, 3)),
         np.zeros((r, 3)),
         np.zeros(2),
+        np.zeros((r, v)),
+        np.zeros((r, v)),
     )
 
 
@@ -120,7 +124,7 @@ def _strength(points: np.ndarray, field: Field, params: WoodParams) -> np.ndarra
     return strength
 
 
-def _bodies(params: WoodParams, k: float) -> Bodies:
+def _bodies(params: WoodParams, k: float, ease: float) -> Bodies:
     found, width = params.bodies, max((len(b.path) for b in params.bodies), default=1)
     times = np.zeros((len(found), width))
     points = np.zeros((len(found), width, 3))
@@ -143,6 +147,7 @@ def _bodies(params: WoodParams, k: float) -> Bodies:
         times,
         points,
         np.full(len(found), k),
+        np.full(len(found), ease),
     )
 
 
@@ -254,7 +259,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         rods_,
         bonds,
         turns,
-        _bodies(params, k),
+        _bodies(params, k, _EASE * float(np.median(rods_.radius))),
         turning,
         strength,
         rod,

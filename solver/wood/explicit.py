@@ -39,7 +39,7 @@ class Motion(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3)."""
+    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3), contacts (r, v)."""
 
     f: np.ndarray
     t: np.ndarray
@@ -50,6 +50,8 @@ class Scratch(NamedTuple):
     speed: np.ndarray
     push: np.ndarray
     power: np.ndarray
+    normals: np.ndarray
+    lagged: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
@@ -106,6 +108,8 @@ def forces(
             rubbing,
             scratch.push,
             scratch.power,
+            scratch.normals,
+            scratch.lagged,
         )
 
 

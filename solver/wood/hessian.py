@@ -12,7 +12,7 @@ from numba import njit
 
 from .arrays import Bonds, Rods
 
-__all__ = ["Stiffness"]
+__all__ = ["Stiffness", "spread"]
 
 #: Difference over the edge's length.
 _STEP = 1e-6
@@ -51,23 +51,29 @@ def _bond(u: np.ndarray, k: float, rest: float, s: float, cosine: float, g: np.n
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(h: np.ndarray, weights: np.ndarray, out: np.ndarray) -> None:
-    """Write the blocks (9, 9) of three vertices from h (6, 6) of two vectors with weights (2, 3)."""
+def spread(h: np.ndarray, weights: np.ndarray, place: np.ndarray, out: np.ndarray) -> None:
+    """Add h (6, 6) of two vectors, which three vertices make up with weights (2, 3), to the blocks out at `place`.
+
+    place (3, 3): the block of two vertices in out (nnz, 3, 3); -1 if one is held.
+    """
     for k in range(3):
         for m in range(3):
-            for r in range(3):
-                for c in range(3):
-                    total = 0.0
-                    for p in range(2):
-                        for q in range(2):
-                            total += weights[p, k] * weights[q, m] * h[3 * p + r, 3 * q + c]
-                    out[3 * k + r, 3 * m + c] = total
+            n = place[k, m]
+            if n < 0:
+                continue
+            for p in range(2):
+                for q in range(2):
+                    w = weights[p, k] * weights[q, m]
+                    if w == 0.0:
+                        continue
+                    for r in range(3):
+                        for c in range(3):
+                            out[n, r, c] += w * h[3 * p + r, 3 * q + c]
 
 
 @njit(cache=True, error_model="numpy")
-def _fill(x: np.ndarray, rods: Rods, bonds: Bonds, out: np.ndarray) -> None:
-    """Write the element matrices (e + h + b, 9, 9): edges, hinges, bonds; zero where broken."""
-    out[:] = 0.0
+def _fill(x: np.ndarray, rods: Rods, bonds: Bonds, place: np.ndarray, out: np.ndarray) -> None:
+    """Add the second derivatives of edges, hinges and bonds to the blocks out (nnz, 3, 3)."""
     for e in range(len(rods.a)):
         if rods.alive[e] == 0 or rods.k[e] == 0.0:
             continue
@@ -75,13 +81,16 @@ def _fill(x: np.ndarray, rods: Rods, bonds: Bonds, out: np.ndarray) -> None:
         length = np.sqrt((d * d).sum())
         d /= length
         force = rods.k[e] * (length / rods.rest[e] - 1.0) / length
-        for r in range(3):
-            for c in range(3):
-                value = (rods.k[e] / rods.rest[e] - force) * d[r] * d[c] + (force if r == c else 0.0)
-                out[e, r, c] = value
-                out[e, 3 + r, 3 + c] = value
-                out[e, r, 3 + c] = -value
-                out[e, 3 + r, c] = -value
+        for k in range(2):
+            for m in range(2):
+                n = place[e, k, m]
+                if n < 0:
+                    continue
+                sign = 1.0 if k == m else -1.0
+                for r in range(3):
+                    for c in range(3):
+                        value = (rods.k[e] / rods.rest[e] - force) * d[r] * d[c] + (force if r == c else 0.0)
+                        out[n, r, c] += sign * value
     u = np.zeros(6)
     up = np.zeros(6)
     down = np.zeros(6)
@@ -110,7 +119,7 @@ def _fill(x: np.ndarray, rods: Rods, bonds: Bonds, out: np.ndarray) -> None:
         weights[0, 1] = 1.0
         weights[1, 1] = -1.0
         weights[1, 2] = 1.0
-        _spread(0.5 * (h + h.T), weights, out[base + n])
+        spread(0.5 * (h + h.T), weights, place[base + n], out)
     base += len(rods.before)
     for n in range(len(bonds.i)):
         if bonds.on[n] == 0:
@@ -135,57 +144,44 @@ def _fill(x: np.ndarray, rods: Rods, bonds: Bonds, out: np.ndarray) -> None:
         weights[1, 0] = 0.0
         weights[1, 1] = -1.0
         weights[1, 2] = 1.0
-        _spread(0.5 * (h + h.T), weights, out[base + n])
+        spread(0.5 * (h + h.T), weights, place[base + n], out)
 
 
 class Stiffness:
-    """Assembles K over the free degrees of freedom; bonds that were handed over need a new one."""
+    """K over the free vertices, in blocks; bonds that were handed over need a new one."""
 
     def __init__(self, rods: Rods, bonds: Bonds, free: np.ndarray) -> None:
         """Fix the pattern for free (v,) bool: vertices that are not held."""
         p, q = rods.before, rods.after
-        edge = np.column_stack([rods.a, rods.b, rods.b])
+        edge = np.column_stack([rods.a, rods.b, np.full(len(rods.a), -1)])
         hinge = np.column_stack([rods.a[p], rods.b[p], rods.b[q]])
         bond = np.column_stack([bonds.i, rods.a[bonds.j], rods.b[bonds.j]])
-        self._count = (len(edge) + len(hinge) + len(bond), 9, 9)
-        number = np.full(3 * len(free), -1)
-        self.free = np.repeat(free, 3)
-        number[self.free] = np.arange(int(self.free.sum()))
-        self.size = int(self.free.sum())
-        dof = (3 * np.concatenate([edge, hinge, bond])[:, :, None] + np.arange(3)).reshape(-1, 9)
-        dof = number[dof]
-        rows = np.broadcast_to(dof[:, :, None], self._count)
-        columns = np.broadcast_to(dof[:, None, :], self._count)
-        self._inside = (rows >= 0) & (columns >= 0)
-        # the third vertex of an edge is none
-        self._inside[: len(edge), 6:] = False
-        self._inside[: len(edge), :, 6:] = False
-        code = columns[self._inside].astype(np.int64) * self.size + rows[self._inside]
-        diagonal = np.arange(self.size, dtype=np.int64) * (self.size + 1)
-        three = np.arange(3)
-        first = np.flatnonzero(free)
-        corner = number[3 * first[:, None] + three]
-        blocks = (corner[:, None, :] * self.size + corner[:, :, None]).reshape(-1)
-        unique, place = np.unique(np.concatenate([code, blocks]), return_inverse=True)
-        self._place, self._block = place[: len(code)], place[len(code) :].reshape(-1, 3, 3)
-        self._diagonal = np.searchsorted(unique, diagonal)
-        self._nnz = len(unique)
-        self._indices = (unique % self.size).astype(np.int32)
-        self._pointer = np.searchsorted(unique, np.arange(self.size + 1, dtype=np.int64) * self.size).astype(np.int32)
-        self._elements = np.zeros(self._count)
+        self.size = int(free.sum())
+        # the last entry stands for the missing third vertex of an edge
+        number = np.full(len(free) + 1, -1, np.int64)
+        number[:-1][free] = np.arange(self.size)
+        of = number[np.concatenate([edge, hinge, bond])]
+        rows = np.broadcast_to(of[:, :, None], (len(of), 3, 3))
+        columns = np.broadcast_to(of[:, None, :], (len(of), 3, 3))
+        inside = (rows >= 0) & (columns >= 0)
+        alone = np.arange(self.size, dtype=np.int64) * (self.size + 1)
+        codes = np.concatenate([rows[inside] * self.size + columns[inside], alone])
+        unique, at = np.unique(codes, return_inverse=True)
+        self.place = np.full(inside.shape, -1, np.int64)
+        self.place[inside] = at[: len(at) - self.size]
+        self.diagonal = at[len(at) - self.size :]
+        self.indices = unique % max(self.size, 1)
+        self.indptr = np.searchsorted(unique, np.arange(self.size + 1, dtype=np.int64) * self.size)
 
-    def matrix(
-        self,
-        x: np.ndarray,
-        rods: Rods,
-        bonds: Bonds,
-        diagonal: np.ndarray | float = 0.0,
-        blocks: np.ndarray | None = None,
-    ) -> sp.csc_matrix:
-        """Return K [N/m] with `diagonal` (free dof,) and `blocks` (free vertices, 3, 3) added."""
-        _fill(x, rods, bonds, self._elements)
-        data = np.bincount(self._place, self._elements[self._inside], self._nnz)
-        data[self._diagonal] = data[self._diagonal] + diagonal
-        if blocks is not None:
-            np.add.at(data, self._block, blocks)
-        return sp.csc_matrix((data, self._indices, self._pointer), shape=(self.size, self.size))
+    def blocks(self, x: np.ndarray, rods: Rods, bonds: Bonds, diagonal: float = 0.0) -> np.ndarray:
+        """Return the blocks (nnz, 3, 3) of K [N/m] with `diagonal` added, on the pattern indptr, indices."""
+        out = np.zeros((len(self.indices), 3, 3))
+        _fill(x, rods, bonds, self.place, out)
+        for c in range(3):
+            out[self.diagonal, c, c] += diagonal
+        return out
+
+    def matrix(self, x: np.ndarray, rods: Rods, bonds: Bonds, diagonal: float = 0.0) -> sp.bsr_matrix:
+        """Return K [N/m] with `diagonal` added, over the free degrees of freedom."""
+        data = self.blocks(x, rods, bonds, diagonal)
+        return sp.bsr_matrix((data, self.indices, self.indptr), shape=(3 * self.size, 3 * self.size))

@@ -51,14 +51,15 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         dt = min(settings.courant * longest, params.step or np.inf)
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context)
-    else:
-        from .implicit import implicit, static
+    elif params.mode == "implicit":
+        from .implicit import implicit
 
-        if params.mode == "implicit":
-            attrs["step"] = settings.step
-            marching = implicit(wood, params, need.stages, settings.step, context)
-        else:
-            marching = static(wood, params, need.stages, context)
+        attrs["step"] = settings.step
+        marching = implicit(wood, params, need.stages, settings, balance, context)
+    else:
+        from .static import static
+
+        marching = static(wood, params, need.stages, context)
     rows: list[dict[str, Any]] = []
     try:
         for reached in marching:
@@ -76,7 +77,7 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
     """Return what is wanted of a stage."""
     state = reached.state
     wood = state.wood
-    moving, elastic, lost, work, _ = reached.energy
+    moving, elastic, lost, work, dissipated, _ = reached.energy
     ends = wood.grid[:, -1]
     weight = wood.rods.radius[np.searchsorted(wood.rod, np.arange(len(wood.grid)))] ** 2
     found: dict[str, Any] = {
@@ -84,6 +85,7 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
         "elastic_energy": elastic,
         "lost_energy": lost,
         "work": work,
+        "dissipated_energy": dissipated,
         "broken_rods": state.rods,
         "broken_bonds": state.bonds,
         "impulse": state.impulse.sum(0),

@@ -12,17 +12,21 @@ __all__ = ["Settings", "choose", "expected_cost"]
 
 @dataclass(frozen=True)
 class Settings:
-    """vertices: of a rod. courant: explicit step over the longest stable one. step: implicit [s]."""
+    """vertices: of a rod. courant: explicit step over the longest stable one. step: implicit [s].
+
+    tolerance: residual that an implicit step leaves, over that of standing still.
+    """
 
     vertices: int
     courant: float
     step: float
+    tolerance: float
 
 
-_QUALITIES: dict[Quality, tuple[float, float, float]] = {
-    "preview": (0.5, 0.8, 1 / 120),
-    "default": (1.0, 0.4, 1 / 480),
-    "fine": (2.0, 0.2, 1 / 1920),
+_QUALITIES: dict[Quality, tuple[float, float, float, float]] = {
+    "preview": (0.5, 0.8, 1 / 120, 1e-2),
+    "default": (1.0, 0.4, 1 / 480, 1e-3),
+    "fine": (2.0, 0.2, 1 / 1920, 1e-4),
 }
 #: Measured on one busy core: seconds per vertex and explicit step, and per vertex and implicit step.
 _EXPLICIT, _IMPLICIT = 1.5e-7, 4e-5
@@ -33,9 +37,9 @@ _FEWEST = 3
 
 def choose(params: WoodParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
-    share, courant, step = _QUALITIES[quality]
+    share, courant, step, tolerance = _QUALITIES[quality]
     edges = max(round(share * (params.vertices - 1)), _FEWEST - 1)
-    return Settings(edges + 1, courant, params.step or step)
+    return Settings(edges + 1, courant, params.step or step, tolerance)
 
 
 def expected_cost(params: WoodParams, need: Need) -> Cost:

@@ -13,7 +13,19 @@ from .explicit import BENDING, BONDS, CONTACT, LOST, STRETCH, WORK, Scratch, for
 from .fracture import break_worst, overstress
 from .params import WoodParams
 
-__all__ = ["Reached", "State", "balanced", "begin", "broken", "copied", "explicit", "floor", "kinetic"]
+__all__ = [
+    "Reached",
+    "State",
+    "balanced",
+    "begin",
+    "broken",
+    "copied",
+    "explicit",
+    "floor",
+    "kinetic",
+    "reached",
+    "strength",
+]
 
 #: Steps between looks for breaks, so many that they cost little and a wave passes few edges meanwhile.
 _LOOK, _FEWEST, _MOST = 6000, 4, 32
@@ -21,8 +33,15 @@ _LOOK, _FEWEST, _MOST = 6000, 4, 32
 _BATCH = 500_000
 
 
+#: Kinetic, elastic, lost, work, dissipated and at the start [J].
+Energy = tuple[float, float, float, float, float, float]
+
+
 class State(NamedTuple):
-    """A moment of a run. books (6,) [J] as `explicit` numbers them; impulse (r, 3) [N s]; steps taken."""
+    """A moment of a run. books (6,) [J] as `explicit` numbers them; impulse (r, 3) [N s]; steps taken.
+
+    dissipated [J]: what an implicit scheme takes on its own account.
+    """
 
     wood: Wood
     scratch: Scratch
@@ -31,14 +50,15 @@ class State(NamedTuple):
     rods: int
     bonds: int
     steps: int
+    dissipated: float = 0.0
 
 
 class Reached(NamedTuple):
-    """What is reported of a stage. energy: (kinetic, elastic, lost, work, start) [J]; error: of their balance."""
+    """What is reported of a stage. energy: (kinetic, elastic, lost, work, dissipated, start) [J]; error: of what ended it."""
 
     time: float
     state: State
-    energy: tuple[float, float, float, float, float]
+    energy: Energy
     error: float
     sound: bool
 
@@ -54,6 +74,17 @@ def kinetic(wood: Wood) -> float:
 def floor(wood: Wood, params: WoodParams) -> float:
     """Return a small energy [J] below which nothing counts: a billionth of what the rods bear before they break."""
     return 0.5e-9 * float(wood.rods.k @ wood.rods.rest) * params.strain_limit**2
+
+
+def strength(wood: Wood, params: WoodParams) -> float:
+    """Return the load [N] that the bundle bears by its mean section and strain limit."""
+    return float(wood.rods.k @ wood.rods.rest) * params.strain_limit / params.length
+
+
+def reached(time: float, state: State, start: float, error: float, sound: bool) -> Reached:
+    """Return what is reported of a stage that was solved rather than marched to."""
+    elastic, lost, work = float(state.books[: CONTACT + 1].sum()), float(state.books[LOST]), float(state.books[WORK])
+    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, 0.0, start), error, sound)
 
 
 def begin(wood: Wood) -> State:
@@ -176,9 +207,9 @@ def explicit(
         yield balanced(shown, wanted, start, scale, tolerance)
 
 
-def _scale(energy: tuple[float, float, float, float, float], scale: float) -> float:
-    kinetic_, elastic, lost, work, start = energy
-    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost))
+def _scale(energy: Energy, scale: float) -> float:
+    kinetic_, elastic, lost, work, dissipated, start = energy
+    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost) + abs(dissipated))
 
 
 def balanced(state: State, time: float, start: float, scale: float, tolerance: float) -> Reached:
@@ -190,8 +221,8 @@ def balanced(state: State, time: float, start: float, scale: float, tolerance: f
     """
     elastic = float(state.books[: CONTACT + 1].sum())
     moving = kinetic(state.wood)
-    energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), start)
-    error = abs(moving + elastic + energy[2] - energy[3] - start) / _scale(energy, scale)
+    energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), state.dissipated, start)
+    error = abs(moving + elastic + energy[2] + energy[4] - energy[3] - start) / _scale(energy, scale)
     if error > 0.5:
         raise Unstable(
             f"at t = {time:.4g} s the energy balance is off by {100 * error:.0f} percent.",

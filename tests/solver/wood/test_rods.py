@@ -11,7 +11,7 @@ from solver.wood import SOLVER
 from solver.wood.bundle import Wood, lay, scratch_for
 from solver.wood.explicit import forces
 from solver.wood.hessian import Stiffness
-from solver.wood.implicit import equilibrium
+from solver.wood.static import equilibrium
 from solver.wood.stepping import begin, kinetic
 from solver.wood.stepping import explicit as march
 

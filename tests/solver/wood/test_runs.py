@@ -124,6 +124,7 @@ def test_friction_is_coulomb_s():
             one[:, :1],
             one[:, None],
             np.array([1e3]),
+            np.zeros(1),
         )
         f, push, power = np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(2)
         x, v = np.array([[0.0, 0.1, 0.99]]), np.array([[2.0, 0.0, 0.0]])
@@ -137,6 +138,8 @@ def test_friction_is_coulomb_s():
             0.0,
             push,
             power,
+            np.zeros((1, 1)),
+            np.zeros((1, 1)),
         )
         energy = press(x, v, f, *args)
         assert f[0] == pytest.approx([-4.0, 0, 10.0])
