@@ -16,7 +16,20 @@ from solver import __version__
 from . import cli_onset, cli_queue, cli_refine, cli_tables
 from .console import Root, emit, grid, note
 from .errors import InvalidOption
-from .options import As_json, Out, Preset, Quality, Seed, Set, Stages, StorePath, assignments, numbers
+from .options import (
+    As_json,
+    Out,
+    Params,
+    Preset,
+    Quality,
+    Seed,
+    Set,
+    Stages,
+    StorePath,
+    assignments,
+    numbers,
+    parameters,
+)
 
 __all__ = ["app"]
 
@@ -87,6 +100,7 @@ def presets(as_json: As_json = False) -> None:
 def solve(
     solver: Annotated[str, typer.Argument(help="Name of a solver (`wizen presets`).")],
     preset: Preset = None,
+    params_file: Params = None,
     set_: Set = None,
     stages: Stages = None,
     quality: Quality = None,
@@ -108,6 +122,8 @@ def solve(
     wizen solve dehydration --preset plum1 --quality preview --stages 0.3 --out plum.png --json
 
     wizen solve decay --preset orange --stages 0,4,8 --out inside.png --cut 35
+
+    wizen solve growth --params examples/growth/pumpkin.toml --out pumpkin.png
     """
     from solver import registry
     from solver.contract import Context, Need
@@ -125,14 +141,16 @@ def solve(
         if out is None or out.suffix != ".png":
             raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
     chosen = registry.get(solver)
-    values = assignments(set_)
+    values = parameters(params_file) | assignments(set_)
     if seed is not None:
         values["seed"] = seed
     params = chosen.parse(values, preset)
     need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})))
     if out is not None:
         outputs.check_suffix(out, True, len(need.stages))
-        need = chosen.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True))}))
+        need = chosen.settle(
+            need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen.fields))})
+        )
     spec = job(chosen, params, need)
     start = time.perf_counter()
     with progress.one_run(solver) as observe, progress.stopping() as stop:
@@ -153,7 +171,7 @@ def solve(
     if out is not None:
         axes = {name: params.axis(name) for name in params.axes}
         shapes = [outputs.of_result(result, axes, i) for i in range(len(need.stages))] if "position" in result else []
-        title = f"{chosen.title}: {preset or solver}"
+        title = f"{chosen.title}: {preset or (params_file.stem if params_file else solver)}"
         symbol, units = chosen.stages.symbol, units_of(solver)
         made = Made(
             shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key, cut=cut

@@ -16,6 +16,7 @@ from .errors import InvalidOption
 __all__ = [
     "As_json",
     "Out",
+    "Params",
     "Preset",
     "Quality",
     "Seed",
@@ -26,12 +27,19 @@ __all__ = [
     "TableName",
     "assignments",
     "numbers",
+    "parameters",
 ]
 
 Preset = Annotated[str | None, typer.Option("--preset", help="Named parameters to start from (`wizen presets`).")]
 Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter, e.g. te=0.04 or stone=0.4,0.3. Repeatable."),
+]
+Params = Annotated[
+    Path | None,
+    typer.Option(
+        "--params", metavar="FILE", help="Parameters as TOML or JSON; they go over --preset, --set over them."
+    ),
 ]
 Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]
 Quality = Annotated[str | None, typer.Option("--quality", help="preview, default or fine.")]
@@ -66,6 +74,27 @@ def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
         if name in values:
             raise InvalidOption(f"--set {name} is given twice.", "Keep one of them.")
         values[name] = _value(text)
+    return values
+
+
+def parameters(path: Path | None) -> dict[str, Any]:
+    """Return the parameters in a file of TOML or JSON; none for None.
+
+    Raises:
+        InvalidOption: no such file, or it cannot be read as its suffix says.
+
+    """
+    if path is None:
+        return {}
+    try:
+        text = path.read_text(encoding="utf-8")
+        values = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+    except OSError as error:
+        raise InvalidOption(f"--params {path}: {error.strerror}.", "Name a TOML or JSON file.") from None
+    except ValueError as error:  # both libraries' errors, and what is no text
+        raise InvalidOption(f"--params {path}: {error}.", "Write TOML, or JSON in a .json file.") from None
+    if not isinstance(values, dict):
+        raise InvalidOption(f"--params {path} holds no names and values.", 'Write for example {"thickness": 0.02}.')
     return values
 
 

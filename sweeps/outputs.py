@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -20,7 +20,10 @@ from store.lookup import Shape
 from .errors import InvalidOption
 from .formats import Encoder, Made, added
 
-__all__ = ["check_suffix", "fields_for", "of_result", "save", "suffixes"]
+if TYPE_CHECKING:
+    from .picture import Panel
+
+__all__ = ["check_suffix", "fields_for", "of_result", "save", "suffixes", "triangles"]
 
 
 def _npz(made: Made) -> bytes:
@@ -49,6 +52,10 @@ def _png(made: Made) -> bytes:
     from . import colours
     from .picture import Panel, sheet
 
+    if made.run is not None and "mesh_position" in made.run and "position" not in made.run:
+        panels = triangles(made.run)
+        labels = [f"{made.stage_symbol} = {float(stage):g}" for stage in made.run["stage"]]
+        return sheet([panels], title=made.title, column_labels=labels, pixels=360)
     panels = [
         Panel(shape.position, shape.poles, colour=None if made.run is None else colours.of_run(made.run, i))
         for i, shape in enumerate(made.shapes)
@@ -56,6 +63,19 @@ def _png(made: Made) -> bytes:
     ]
     labels = [f"{made.stage_symbol} = {shape.stage:g}" for shape in made.shapes]
     return sheet([panels], title=made.title, column_labels=labels, pixels=360)
+
+
+def triangles(run: xr.Dataset) -> list[Panel]:
+    """Return the meshes of a run's stages as panels, moved so that all together stand in the middle."""
+    from solver import meshes
+
+    from .picture import Panel
+
+    frames = [meshes.frame(run, i) for i in range(run.sizes["stage"])]
+    points = np.concatenate([frame.vertices for frame in frames])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    up = str(run.attrs.get("up", "y"))
+    return [Panel(frame.vertices - middle, triangles=frame.triangles, up=up) for frame in frames]
 
 
 def _json(made: Made) -> bytes:
@@ -99,10 +119,24 @@ def check_suffix(path: Path, run: bool, stages: int) -> None:
         raise InvalidOption(f"--out {path}: there is no directory {path.parent}.", "Create it first.")
 
 
-def fields_for(path: Path | None, run: bool) -> tuple[str, ...]:
-    """Return the fields that writing `path` needs; none if nothing is written."""
+def fields_for(path: Path | None, run: bool, known: Collection[str] = ("position",)) -> tuple[str, ...]:
+    """Return the fields that writing `path` needs, of a solver that has those `known`; none if nothing is written.
+
+    Raises:
+        InvalidOption: the format holds the fruit's lattice only, and the solver has none.
+
+    """
     encoder = suffixes(run).get(path.suffix) if path is not None else None
-    return encoder.fields if encoder is not None else ()
+    if encoder is None:
+        return ()
+    if "position" in known or "position" not in encoder.fields:
+        return encoder.fields
+    if encoder.single:
+        raise InvalidOption(
+            f"--out {path}: a solver with meshes of its own is not written as {path.suffix if path else ''} at once.",
+            "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
+        )
+    return tuple("mesh_position" if name == "position" else name for name in encoder.fields)
 
 
 def save(path: Path, made: Made) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .render import BACKGROUND, View, render
+from .render import BACKGROUND, View, render, render_triangles
 
 __all__ = ["Panel", "sheet"]
 
@@ -21,12 +21,23 @@ _INK = "#3a2a24"
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], a note to write below it, and colours (n, 2n, 3)."""
+    """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], a note to write below it, and colours (n, 2n, 3).
+
+    With triangles (f, 3), positions and colours are those of vertices (v, 3), and `up` is the axis that points up.
+    """
 
     position: NDArray[Any]
     poles: NDArray[Any] | None = None
     note: str = ""
     colour: NDArray[Any] | None = None
+    triangles: NDArray[Any] | None = None
+    up: str = "y"
+
+    def image(self, pixels: int, view: View) -> NDArray[Any]:
+        """Return the picture (pixels, pixels, 3)."""
+        if self.triangles is None:
+            return render(self.position, self.poles, pixels, view, self.colour)
+        return render_triangles(self.position, self.triangles, pixels, view, self.colour, self.up)
 
 
 def sheet(
@@ -75,7 +86,7 @@ def sheet(
                 continue
             box = (x / width, 1 - (y + pixels) / height, pixels / width, pixels / height)
             axes = figure.add_axes(box)
-            image = render(panel.position, panel.poles, pixels, view, panel.colour)
+            image = panel.image(pixels, view)
             axes.imshow(image, interpolation="nearest")
             axes.set_axis_off()
             if panel.note:

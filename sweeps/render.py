@@ -1,6 +1,6 @@
-"""A small software renderer for surfaces on the fruit lattice: no window, no GPU, only numpy.
+"""A small software renderer for surfaces of triangles: no window, no GPU, only numpy.
 
-The lattice is resampled through its spectrum so that no triangle covers more than a few pixels. Then every
+Lattices are resampled through their spectrum, other triangles are cut in four until they cover few pixels. Then every
 triangle tests the few pixels of its bounding box, all triangles at a time, and the nearest fragment wins.
 """
 
@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from store import spectra
 
-__all__ = ["BACKGROUND", "View", "mesh", "render"]
+__all__ = ["BACKGROUND", "View", "mesh", "render", "render_triangles"]
 
 Array = NDArray[Any]
 
@@ -37,6 +37,9 @@ _AMBIENT = np.array([0.20, 0.19, 0.19])
 _SUPERSAMPLES = 2
 #: Resolution at which surfaces are drawn: one lattice cell of it covers about a pixel of a large picture.
 _FINEST = 256
+#: Longest side of a triangle's box when it is drawn [sub-pixels]; and the colour of surfaces that have none.
+_COARSEST = 16
+_CLAY = np.array([0.42, 0.50, 0.20])
 
 
 @dataclass(frozen=True)
@@ -88,22 +91,70 @@ def render(
     side = pixels * _SUPERSAMPLES
     resolution = int(np.clip(side // 3, len(position), max(_FINEST, len(position))))
     vertices, faces = mesh(position, poles, resolution)
-    normals = _normals(vertices, faces)
+    paint = None if colour is None else _paint(colour, resolution)
+    return _draw(vertices, faces, paint, pixels, view, _frame(view), open_=False)
+
+
+def render_triangles(
+    vertices: Array,
+    triangles: Array,
+    pixels: int = 320,
+    view: View | None = None,
+    colour: Array | None = None,
+    up: str = "y",
+) -> Array:
+    """Return a picture (pixels, pixels, 3), uint8, of vertices (v, 3) and triangles (f, 3), seen from both sides.
+
+    The view's middle is the origin. colour: (v, 3), linear light; up: the axis that points up, y or z.
+    """
+    view = view or View()
     frame = _frame(view)
-    seen, turned = vertices @ frame.T, normals @ frame.T
+    if up == "z":
+        frame = frame[:, [2, 0, 1]]
+    paint = np.broadcast_to(_CLAY, np.shape(vertices)) if colour is None else colour
+    return _draw(np.asarray(vertices, float), np.asarray(triangles, np.int64), paint, pixels, view, frame, open_=True)
+
+
+def _draw(
+    vertices: Array, faces: Array, paint: Array | None, pixels: int, view: View, frame: Array, open_: bool
+) -> Array:
+    side = pixels * _SUPERSAMPLES
     scale = side / 2 / view.extent
+    normals = _normals(vertices, faces)
+    if open_:
+        values = np.concatenate([vertices, normals, np.asarray(paint, float)], axis=1)
+        values, faces = _finer(values, faces, _COARSEST / scale)
+        vertices, normals, paint = values[:, :3], values[:, 3:6], values[:, 6:]
+    seen, turned = vertices @ frame.T, normals @ frame.T
     points = np.stack([side / 2 + scale * seen[:, 0], side / 2 - scale * seen[:, 1]], axis=-1)
-    index, face, weights = _rasterise(points, seen[:, 2], faces, side)
+    index, face, weights, back = _rasterise(points, seen[:, 2], faces, side, open_)
     corners = faces[face]
     depth = np.full(side * side, -np.inf)
     depth[index] = np.einsum("fk,fk->f", weights, seen[corners, 2])
     normal = np.einsum("fk,fkc->fc", weights, turned[corners])
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    normal[back] *= -1
     image = _floor_shadow(side, view, seen, scale)
-    paint = None if colour is None else np.einsum("fk,fkc->fc", weights, _paint(colour, resolution)[corners])
-    image.reshape(-1, 3)[index] = _shade(normal, _relief(depth.reshape(side, side)).ravel()[index], paint)
+    skin = None if paint is None else np.einsum("fk,fkc->fc", weights, paint[corners])
+    image.reshape(-1, 3)[index] = _shade(normal, _relief(depth.reshape(side, side)).ravel()[index], skin)
     small = image.reshape(pixels, _SUPERSAMPLES, pixels, _SUPERSAMPLES, 3).mean(axis=(1, 3))
     return (255 * np.clip(small, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
+
+
+def _finer(values: Array, faces: Array, longest: float) -> tuple[Array, Array]:
+    """Cut triangles with an edge above `longest` in four, until there are none; values (v, k) begin with places."""
+    done = []
+    while True:
+        p = values[faces, :3]
+        long = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1) > longest
+        done.append(faces[~long])
+        if not long.any() or len(values) > 4_000_000:
+            return values, np.concatenate([*done, faces[long]])
+        a, b, c = faces[long].T
+        middles = [0.5 * (values[i] + values[j]) for i, j in ((a, b), (b, c), (c, a))]
+        ab, bc, ca = (len(values) + k * len(a) + np.arange(len(a)) for k in range(3))
+        values = np.concatenate([values, *middles])
+        faces = np.concatenate([np.stack(t, -1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
 
 
 def _frame(view: View) -> Array:
@@ -124,12 +175,19 @@ def _normals(vertices: Array, faces: Array) -> Array:
     return total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-300)
 
 
-def _rasterise(points: Array, depth: Array, faces: Array, side: int) -> tuple[Array, Array, Array]:
-    """Return (pixel index, face, barycentric weights) of what is nearest to the eye in each covered pixel."""
+def _rasterise(
+    points: Array, depth: Array, faces: Array, side: int, both: bool
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Return (pixel index, face, barycentric weights, seen from behind) of what is nearest to the eye in each pixel.
+
+    both: triangles that turn away from the eye are drawn too.
+    """
     corners = points[faces]
     edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = edge1[:, 0] * edge2[:, 1] - edge1[:, 1] * edge2[:, 0]
-    front = np.flatnonzero(area < -1e-12)  # the picture's second axis points down
+    # the picture's second axis points down
+    front = np.flatnonzero(np.abs(area) > 1e-12) if both else np.flatnonzero(area < -1e-12)
+    behind = area > 0
     corners, edge1, edge2, area = corners[front], edge1[front], edge2[front], area[front]
     low = np.floor(corners.min(axis=1)).astype(int)
     span = np.ceil(corners.max(axis=1)).astype(int) - low
@@ -151,7 +209,7 @@ def _rasterise(points: Array, depth: Array, faces: Array, side: int) -> tuple[Ar
     winner = np.full(side * side, -1)
     winner[index[near_last]] = near_last
     kept = winner[winner >= 0]
-    return index[kept], face[kept], weights[kept]
+    return index[kept], face[kept], weights[kept], behind[face[kept]]
 
 
 def _relief(depth: Array) -> Array:

@@ -102,4 +102,4 @@ def _dataset(rows: list[dict[str, Any]], frames: list[Frame], need: Need, params
     if frames:
         data |= changing(frames[: len(rows)], need.dtype)
         coords["component"] = ["x", "y", "z"]
-    return xr.Dataset(data, coords, {"path": params.solver})
+    return xr.Dataset(data, coords, {"path": params.solver, "up": "z"})
