@@ -47,6 +47,9 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         "vertices": settings.vertices,
         "bonds": len(wood.bonds.i),
         "metres_per_unit": 1.0,
+        "up": "z",
+        # what a picture should show, middle and radius: fragments fly far
+        "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
     }
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
     frames: list[Frame] = []
