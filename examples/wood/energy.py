@@ -33,11 +33,12 @@ def main(out: Path) -> None:
     ):
         above.plot(1000 * run.stage, values, color=colour, label=label, linewidth=1.3)
     above.set_ylabel("energy [J]")
-    above.legend(frameon=False, loc="center right")
+    above.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 0.99))
     above.set_title("A bent bundle let go (Fig. 4.1)", loc="left")
     below.semilogy(1000 * run.stage[1:], np.maximum(drift[1:], 1e-9), color="#222222", linewidth=1)
     below.axhline(1e-3, color="#b03030", linewidth=0.8, linestyle=":")
-    below.set_ylabel("error of the sum")
+    below.set_ylim(1e-5, 2e-3)
+    below.set_ylabel("error")
     below.set_xlabel("time [ms]")
     FigureCanvasAgg(figure).print_png(out)
 
