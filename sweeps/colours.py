@@ -15,18 +15,23 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LAYERS", "Skin", "by_field", "encoded", "layered", "of_run"]
+__all__ = ["LAYERS", "MESH_LAYERS", "Skin", "by_field", "encoded", "layered", "of_run"]
 
 Array = NDArray[Any]
 
 #: Fields that make layers.
 LAYERS = ("rot", "mould", "mould_active")
+#: Fields of meshes that give them colours.
+MESH_LAYERS = ("inside",)
 
 #: Rotten flesh under the skin, and the rim of mould that still grows; linear light.
 _ROT = np.array([0.16, 0.075, 0.03])
 _RIM = np.array([0.86, 0.86, 0.82])
+#: Bark and fresh wood.
+_BARK = np.array([0.105, 0.062, 0.036])
+_WOOD = np.array([0.63, 0.43, 0.235])
 #: Roughness of waxy skin, of wet rot and of felt: chosen by eye, measured by nobody.
-_WAX, _WET, _FELT = 0.35, 0.6, 1.0
+_WAX, _WET, _FELT, _DRY = 0.35, 0.6, 1.0, 0.85
 
 
 class Skin(NamedTuple):
@@ -37,7 +42,10 @@ class Skin(NamedTuple):
 
 
 def layered(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | None:
-    """Return the look of a surface with fields of rot or mould (...), or None if it has neither or no skin's colour."""
+    """Return the look of a surface with fields of rot or mould (...), or of wood `inside`; None if it has neither."""
+    if "inside" in fields:
+        share = np.asarray(fields["inside"], float)
+        return Skin(_over(np.broadcast_to(_BARK, (*share.shape, 3)), _WOOD, share), np.full(share.shape, _DRY))
     known = [np.asarray(fields[name], float) for name in ("rot", "mould") if name in fields]
     if not known or not {"skin_colour", "mould_colour"} <= set(params):
         return None

@@ -17,6 +17,7 @@ import xarray as xr
 from store import seal, shards, spectra
 from store.lookup import Shape
 
+from .colours import MESH_LAYERS
 from .errors import InvalidOption
 from .formats import Encoder, Made, added
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from .picture import Panel
 
 __all__ = ["check_suffix", "fields_for", "of_result", "save", "suffixes", "triangles"]
+
+#: Pictures of meshes leave out what is farther from the middle than this, over the radius that they show.
+_BEYOND = 1.6
 
 
 def _npz(made: Made) -> bytes:
@@ -66,16 +70,32 @@ def _png(made: Made) -> bytes:
 
 
 def triangles(run: xr.Dataset) -> list[Panel]:
-    """Return the meshes of a run's stages as panels, moved so that all together stand in the middle."""
+    """Return the meshes of a run's stages as panels, moved and scaled alike so that all together fill the picture.
+
+    A run whose attribute `view` names a middle and a radius shows that part of space instead.
+    """
     from solver import meshes
 
+    from . import colours
     from .picture import Panel
 
     frames = [meshes.frame(run, i) for i in range(run.sizes["stage"])]
     points = np.concatenate([frame.vertices for frame in frames])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    up = str(run.attrs.get("up", "y"))
-    return [Panel(frame.vertices - middle, triangles=frame.triangles, up=up) for frame in frames]
+    size = float(np.linalg.norm(points - middle, axis=1).max()) or 1.0
+    if "view" in run.attrs:
+        *middle, size = np.asarray(run.attrs["view"], float)
+    up, params = str(run.attrs.get("up", "y")), json.loads(run.attrs.get("params", "{}"))
+    found = []
+    for frame in frames:
+        skin = colours.layered(frame.fields, params)
+        paint = None if skin is None else skin.colour
+        place = (frame.vertices - np.asarray(middle)) / size
+        away = np.linalg.norm(place, axis=1, keepdims=True)
+        # what is far outside would only stretch the shadow
+        seen = frame.triangles[(away[frame.triangles, 0] < _BEYOND).all(axis=1)]
+        found.append(Panel(place * np.minimum(1, _BEYOND / np.maximum(away, 1e-12)), None, "", paint, seen, up))
+    return found
 
 
 def _json(made: Made) -> bytes:
@@ -136,7 +156,9 @@ def fields_for(path: Path | None, run: bool, known: Collection[str] = ("position
             f"--out {path}: a solver with meshes of its own is not written as {path.suffix if path else ''} at once.",
             "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
         )
-    return tuple("mesh_position" if name == "position" else name for name in encoder.fields)
+    # what gives the mesh its colours comes along
+    coloured = tuple(name for name in MESH_LAYERS if name in known)
+    return (*("mesh_position" if name == "position" else name for name in encoder.fields), *coloured)
 
 
 def save(path: Path, made: Made) -> None:

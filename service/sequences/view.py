@@ -2,8 +2,8 @@
 
 A result holds either the fruit's lattice (`position` or `displacement` on colatitude x azimuth; topology and texture
 coordinates of `service.formats.mesh`) or meshes (`solver.meshes`).
-Fields without a shape are shown on the fresh fruit. Lengths are in the result's own unit, y is up for
-fruits; nothing is turned or scaled here but by `Sequence.scaled`.
+Fields without a shape are shown on the fresh fruit. Lengths are in the result's own unit; y is up, and a result whose
+attribute `up` is z is turned about x. Nothing else is turned, or scaled but by `Sequence.scale`.
 """
 
 from __future__ import annotations
@@ -184,6 +184,8 @@ class Sequence:
             found = meshes.frame(self.run, index)
             fields = {n: np.asarray(v, "f4") for n, v in found.fields.items() if np.ndim(v) == 1}
             vertices, triangles = np.asarray(found.vertices, "f4"), np.asarray(found.triangles, "u4")
+            if self.run.attrs.get("up") == "z":
+                vertices = vertices[:, [0, 2, 1]] * np.array([1, 1, -1], "f4")
             return Surface(stage, vertices, triangles, fields)
         position = _positions(self.run, index)
         vertices = mesh.vertices(position, spectra.poles(spectra.spectrum(position)))

@@ -179,7 +179,8 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     rest = _curved(straight, params.curvature)
     number = np.arange(rods * count, dtype=np.int32).reshape(rods, count)
     grid = number[:, int(ghosts[0]) : count - int(ghosts[1])]
-    a, b = number[:, :-1].ravel(), number[:, 1:].ravel()
+    # copies: of a single rod, ravel would give both the same memory, and a split would move both
+    a, b = number[:, :-1].flatten(), number[:, 1:].flatten()
     edge = np.arange(len(a), dtype=np.int32).reshape(rods, count - 1)
     real = np.ones((rods, count - 1), bool)
     if ghosts[0]:

@@ -10,8 +10,10 @@ import numpy as np
 import xarray as xr
 
 from ..contract import Context, InvalidInput, Need, SolverError
+from ..meshes import Frame, changing
 from .bundle import Wood, lay
 from .params import WoodParams
+from .render import Skin
 from .settings import choose
 from .stability import longest_step
 from .stepping import Reached, explicit
@@ -20,6 +22,7 @@ __all__ = ["run"]
 
 #: Energy that may be missing from the balance of a sound stage, over the largest energy of the run.
 _BALANCE = {"preview": 0.05, "default": 0.01, "fine": 0.003}
+_MESH = frozenset({"mesh_position", "inside"})
 
 
 def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
@@ -43,7 +46,13 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         "rods": len(wood.grid),
         "vertices": settings.vertices,
         "bonds": len(wood.bonds.i),
+        "metres_per_unit": 1.0,
+        "up": "z",
+        # what a picture should show, middle and radius: fragments fly far
+        "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
     }
+    skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
+    frames: list[Frame] = []
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]
     if params.mode == "explicit":
@@ -63,14 +72,16 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     rows: list[dict[str, Any]] = []
     try:
         for reached in marching:
+            if skin is not None:
+                frames.append(skin.frame(reached.state.wood))
             rows.append(_row(reached, wood, need, time.perf_counter() - begun))
             context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
-            error.partial = _dataset(rows, wood, need, attrs)
+            error.partial = _dataset(rows, frames, wood, need, attrs)
             error.last_stage = rows[-1]["stage"]
         raise
-    return _dataset(rows, wood, need, attrs)
+    return _dataset(rows, frames, wood, need, attrs)
 
 
 def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, Any]:
@@ -107,7 +118,9 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
     }
 
 
-def _dataset(rows: list[dict[str, Any]], wood: Wood, need: Need, attrs: dict[str, Any]) -> xr.Dataset:
+def _dataset(
+    rows: list[dict[str, Any]], frames: list[Frame], wood: Wood, need: Need, attrs: dict[str, Any]
+) -> xr.Dataset:
     dims = {
         "impulse": ("stage", "component"),
         "tip_position": ("stage", "component"),
@@ -119,6 +132,9 @@ def _dataset(rows: list[dict[str, Any]], wood: Wood, need: Need, attrs: dict[str
         values = np.array([row[name] for row in rows])
         if name != "stage":
             data[name] = (dims.get(name, ("stage",)), values.astype(np.int8) if name == "converged" else values)
+    if frames:
+        bare = [f if "inside" in need.fields else f._replace(fields={}) for f in frames[: len(rows)]]
+        data |= changing(bare, need.dtype)
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
     if any("component" in entry[0] for entry in data.values()):
         coords["component"] = ["x", "y", "z"]

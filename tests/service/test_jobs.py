@@ -182,6 +182,31 @@ def test_results_by_accept(store: Store, queue_only: httpx.Client, tmp_path: Pat
     assert queue_only.get(result).status_code == 200
 
 
+def test_breaking_wood_comes_back_as_meshes(store: Store, queue_only: httpx.Client, tmp_path: Path) -> None:
+    params = {"rods": 8, "vertices": 8, "length": 0.05, "radius": 0.003, "clamp": "both", "pull": [20.0, 0.0, 0.0]}
+    need = {"stages": [0.0, 6e-5], "fields": ["mesh_position", "inside", "broken_rods"]}
+    asked = queue_only.post("/v1/jobs", json={"solver": "wood", "params": params, "need": need})
+    assert asked.status_code == 202
+    assert drain(store) == 1
+    result = f"{asked.json()['links']['self']}/result"
+    (tmp_path / "run.h5").write_bytes(queue_only.get(result).content)
+    with xr.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as run:
+        assert run["broken_rods"].values[1] > 0
+        assert run["face_count"].values[1] > run["face_count"].values[0]
+    (tmp_path / "one.glb").write_bytes(queue_only.get(result, params={"format": "glb", "stage": 0.0}).content)
+    whole: Any = trimesh.load(tmp_path / "one.glb", force="mesh")
+    assert whole.is_watertight
+    assert whole.volume == pytest.approx(np.pi * 0.003**2 * 0.05, rel=1e-4)
+    # bark is dark, ends are light
+    colour = np.asarray(whole.visual.vertex_colors, float)
+    assert np.ptp(colour[:, 0]) > 50
+    moving = queue_only.get(result, params={"format": "animation"})
+    assert moving.headers["content-type"] == "model/gltf-binary"
+    (tmp_path / "all.glb").write_bytes(moving.content)
+    scene: Any = trimesh.load(tmp_path / "all.glb")
+    assert len(scene.geometry) == 2
+
+
 @pytest.mark.parametrize(
     ("change", "status", "code"),
     [

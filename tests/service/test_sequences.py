@@ -64,6 +64,14 @@ def vertices(run: xr.Dataset) -> list[np.ndarray]:
     return [surface.vertices for surface in of_run(run)]
 
 
+def test_what_is_z_up_is_turned_and_not_mirrored() -> None:
+    run = splitting()
+    lying, standing = vertices(run), vertices(run.assign_attrs(up="z"))
+    for one, other in zip(lying, standing, strict=True):
+        np.testing.assert_array_equal(other[:, 1], one[:, 2])  # what was up is y
+        np.testing.assert_array_equal(np.cross(other[0], other[1])[1], np.cross(one[0], one[1])[2])
+
+
 # --- vertex caches: numpy's own records, from the layouts in the formats' documents -------------------------------
 
 
