@@ -1,7 +1,8 @@
-"""Shapes computed in the event loop take turns: one for each pass of the loop, in the order in which they were asked.
+"""Shapes computed in the event loop take turns, in the order in which they were asked.
 
-Between two of them the loop sends what the sockets take and reads what has come. Without turns, all requests that are
-read in one pass would be computed in a row, and whoever waits for the second half of his answer waits for all of them.
+Between two of them the loop makes a few passes: it takes new connections (uvloop one in each pass), reads requests and
+sends what the sockets take. Without turns, all that is read in one pass would be computed in a row, and a newcomer
+would wait for several such rows.
 """
 
 from __future__ import annotations
@@ -12,6 +13,10 @@ from types import TracebackType
 from .errors import Overloaded
 
 __all__ = ["Turns"]
+
+
+#: Passes of the loop between two turns while others wait.
+_PASSES = 1
 
 
 class Turns:
@@ -48,5 +53,11 @@ class Turns:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Let the next one have his turn, in the loop's next pass."""
-        self._lock.release()
+        """Let the next one have his turn after a few passes of the loop."""
+        self._leave(_PASSES)
+
+    def _leave(self, passes: int) -> None:
+        if self._waiting and passes:
+            asyncio.get_running_loop().call_soon(self._leave, passes - 1)
+        else:
+            self._lock.release()
