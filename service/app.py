@@ -22,6 +22,7 @@ from .openapi import Documented
 from .security import requires
 from .settings import Settings
 from .telemetry import Metrics, Telemetry
+from .turns import Turns
 
 __all__ = ["create_app"]
 
@@ -63,6 +64,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.settings = settings
     app.state.tables = LiveTables(settings.store, settings.reload_interval)
     app.state.answers = Answers(settings.cache_bytes)
+    app.state.turns = Turns(app.state.settings.max_waiting)
     app.state.tokens = Tokens(settings.store)
     # looking at jobs has threads of its own, so that listeners do not wait for shapes, nor shapes for them
     app.state.listeners, app.state.listening = 0, anyio.CapacityLimiter(2)

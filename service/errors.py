@@ -16,6 +16,7 @@ __all__ = [
     "NotAcceptable",
     "NotDone",
     "OutsideRanges",
+    "Overloaded",
     "QueryTooLong",
     "ServiceError",
     "TimedOut",
@@ -172,6 +173,12 @@ class JobEnded(ServiceError):
     """A job that cannot be cancelled any more."""
 
     code = "job-ended"
+
+
+class Overloaded(ServiceError):
+    """Too many shapes wait to be computed."""
+
+    code = "overloaded"
 
 
 class TooManyListeners(ServiceError):

@@ -36,6 +36,7 @@ class Settings(BaseSettings):
     max_query: int = Field(4096, ge=64, description="Longest query string [bytes]")
     max_body: int = Field(1 << 20, ge=0, description="Largest request body [bytes]")
     timeout: float = Field(30.0, gt=0, description="Longest wait for an answer to begin [s]")
+    max_waiting: int = Field(256, ge=1, description="Most small shapes that wait to be computed, in each process")
     threads: int = Field(8, ge=1, le=256, description="Shapes computed at the same time; each holds its arrays")
     reload_interval: float = Field(0.5, ge=0, description="How often a table's manifest is looked at, at most [s]")
     cache_age: int = Field(60, ge=0, description="How long a client may reuse a shape without asking again [s]")

@@ -65,7 +65,8 @@ async def shape(
         return await run_in_threadpool(_shape, request, solver)  # opening a large table takes seconds
     asked = _ask(request, solver)
     if asked.is_quick:
-        return _settle(request, asked)
+        async with request.app.state.turns:
+            return _settle(request, asked)
     return await run_in_threadpool(_settle, request, asked)
 
 

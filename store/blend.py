@@ -20,6 +20,9 @@ __all__ = ["Blend", "Blender", "complex_view", "powers"]
 
 Array = NDArray[Any]
 
+#: What the harmonics of order 0, which alone reach the poles, are there: sqrt(2 l + 1), and (-1)^l times that.
+_AT_POLES = np.array([[np.sqrt(2 * d + 1), (-1) ** d * np.sqrt(2 * d + 1)] for d in range(harmonics.LOWEST)])
+
 
 class Blend(NamedTuple):
     """Waves (3, m, k) of the displacement; with a `ratio`, of its wrinkles alone, which are to be multiplied by it on
@@ -43,10 +46,7 @@ class Blend(NamedTuple):
         ends = spectra.poles(np.moveaxis(self.waves, 0, -1))
         if self.ratio is None or self.low is None:
             return ends
-        # the harmonics of order 0 alone reach a pole, with sqrt(2 l + 1) (-1)^l
-        at_north = np.sqrt(2 * np.arange(harmonics.LOWEST) + 1)
-        at_south = at_north * (1 - 2 * (np.arange(harmonics.LOWEST) % 2))
-        shape = self.low[:, 0].real @ np.stack([at_north, at_south], axis=-1)
+        shape = self.low[:, 0].real @ _AT_POLES
         return ends * spectra.poles(self.ratio)[:, None] + shape.T
 
 
@@ -87,8 +87,8 @@ class Blender:
         if "LL" in method.corrections:
             mean = _form(parts, cell.power)
             gains = targets.gains(known.scale(query), samples, weights, dict(stages), mean)
-            added = waves * (bands.multiplier(gains, targets.bands, waves.shape[-1] - 1) - 1)
-            waves += poles.keep_off(added, targets.highest)
+            factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
+            poles.multiply(waves, factor, targets.highest)
             total = float((gains**2 * mean).sum())
         if "env" not in method.corrections:
             return Blend(waves)

@@ -47,7 +47,8 @@ def add_fresh(fruit: Fruit, displacement: Array, patch: Patch | None = None) -> 
 
 def fresh_poles(fruit: Fruit) -> Array:
     """Return the fresh surface's two poles (2, 3)."""
-    return fruit.surface(np.array([0.0, np.pi]), np.zeros(2))
+    inner, distance = _ends(fruit.radii)
+    return inner * (1 + fruit.exocarp_thickness / distance)
 
 
 @lru_cache(maxsize=64)
@@ -55,6 +56,14 @@ def _generatrix(radii: tuple[float, ...], n: int) -> tuple[Array, Array]:
     # the fruit that these radii come from has been validated
     fruit: Any = Fruit.model_construct
     return fruit(radii=radii).generatrix(colatitudes(n))
+
+
+@lru_cache(maxsize=64)
+def _ends(radii: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return the sarcocarp's poles (2, 3) and their distances (2, 1) from the centre."""
+    fruit: Any = Fruit.model_construct
+    inner = fruit(radii=radii).sarcocarp(np.array([0.0, np.pi]), np.zeros(2))
+    return inner, np.linalg.norm(inner, axis=-1, keepdims=True)
 
 
 @lru_cache(maxsize=16)

@@ -89,12 +89,12 @@ class Targets:
     def _powers(self, point: Array, samples: Array, weights: Array, stages: list[int]) -> Array:
         """Return the powers (stages, bands) wanted at stored stages."""
         step = point - weights @ self._points[samples]
-        at = np.ix_(samples, np.array(stages))
+        at = samples[:, None], np.array(stages)
         total = np.exp(weights @ self._total[at] + self._total_slope[stages] @ step)
-        moved = np.einsum("t,tsq->sq", weights, self._quantiles[at])
+        moved = _weigh(weights, self._quantiles[at])
         moved += (self._centroid_slope[stages] @ step)[:, None]
         shares = np.array([self._shares(row) for row in moved])
-        shares *= np.einsum("t,tsb->sb", weights, self._mended[at])
+        shares *= _weigh(weights, self._mended[at])
         return np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
 
     def _shares(self, quantiles: Array) -> Array:
@@ -103,11 +103,16 @@ class Targets:
         knots = np.concatenate([[quantiles[0] - width[0]], quantiles, [quantiles[-1] + width[1]]])
         below = np.interp(self.bands.edges, knots, _KNOTS, left=0, right=1)
         below[0], below[-1] = 0, 1
-        shares = np.diff(below) + 1e-4
+        shares = below[1:] - below[:-1] + 1e-4
         return shares / shares.sum()
 
 
 _KNOTS = np.concatenate([[0.0], _QUANTILES, [1.0]])
+
+
+def _weigh(weights: Array, rows: Array) -> Array:
+    """Return the weighted sum (s, q) of (t, s, q)."""
+    return (weights @ rows.reshape(len(rows), -1)).reshape(rows.shape[1:])
 
 
 def _slopes(points: Array, values: Array, fitted: bool) -> Array:
@@ -125,7 +130,7 @@ def multiplier(gains: Array, bands: Bands, band: int) -> Array:
     more than all else. A harmonic has modes below its degree too, so that gains leak into the bands above: what leaks
     is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
     """
-    sharp = np.clip(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST, _MOST)
+    sharp = np.minimum(np.maximum(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST), _MOST)
     return _spread(sharp, bands, band).astype(np.float32)
 
 

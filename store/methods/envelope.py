@@ -41,7 +41,13 @@ def factor(mean: Array, wanted: Array, total: float | None = None) -> Array:
         mean, wanted = (field * (total / (area @ field + _NOTHING)) for field in (mean, wanted))
     least = _FAINT * (area @ wanted) + _NOTHING
     ratio = np.sqrt((wanted + least) / (mean + least))
-    return (np.clip(ratio, 1 / _MOST, _MOST) @ _analysis()).view(complex).reshape(COARSE + 1, COARSE + 1)
+    along, cosines, sines = _analysis()
+    lines = (np.minimum(np.maximum(ratio, 1 / _MOST), _MOST).reshape(COARSE, -1) @ along).reshape(COARSE, -1, 2)
+    found = np.empty((COARSE + 1, 2, COARSE + 1))
+    for first, down in ((0, cosines), (1, sines)):
+        rows = lines[:, first::2].reshape(COARSE, -1)
+        found[first::2] = (rows.T @ down).reshape(-1, 2, COARSE + 1)
+    return found[:, 0] + 1j * found[:, 1]
 
 
 def take_low(waves: Array, low: Array) -> None:
@@ -54,17 +60,28 @@ def apply(planes: Array, ratio: Array, low: Array, patch: Patch) -> None:
     """Multiply wrinkles (c, height, width) on a patch by the factor with spectrum `ratio`, and add `low` (3, m, l) of
     the patch's components: all in place.
     """
-    with window.planes(ratio[None].astype(np.result_type(planes, np.complex64)), patch._replace(components=(0,))) as by:
-        planes *= by
+    planes *= _on_lattice(ratio, patch, planes.dtype)
     shapes = legendre(harmonics.LOWEST - 1, patch.n)[..., patch.rows]
     lines = np.ascontiguousarray(np.einsum("cml,mlt->ctm", low[list(patch.components)], shapes))
     sides = lines.view(float).astype(planes.dtype)
     planes += sides @ window.around(patch.n, harmonics.LOWEST, patch.left, patch.width, planes.dtype.str)
 
 
+def _on_lattice(ratio: Array, patch: Patch, kind: np.dtype[Any]) -> Array:
+    """Sum a spectrum (m, k) on a patch (height, width): so few waves are cheaper by matrices than by transforms."""
+    held = min(len(ratio), patch.n + 1)
+    parts = ratio[:held, :held].T.copy().view(float).reshape(held, held, 2).astype(kind)
+    lines = np.empty((patch.height, held, 2), kind)
+    for first, matrix in enumerate(window.down(patch.n, held, patch.top, patch.height, kind.str)):
+        lines[:, first::2] = (matrix.T @ parts[:, first::2].reshape(held, -1)).reshape(patch.height, -1, 2)
+    return lines.reshape(patch.height, -1) @ window.around(patch.n, held, patch.left, patch.width, kind.str)
+
+
 @lru_cache(maxsize=1)
-def _analysis() -> Array:
-    """Return the matrix (places, parts) from fields on the coarse lattice to spectra: cheaper than small transforms."""
+def _analysis() -> tuple[Array, Array, Array]:
+    """Return the matrices from the coarse lattice to spectra, cheaper than small transforms: from azimuths to parts of
+    waves m (24, 2 m), and from colatitudes to amplitudes (12, k) of even and of odd m.
+    """
     # `spectra.spectrum` as sums: these few lines are no reason to import scipy.fft
     n, waves = COARSE, np.arange(COARSE + 1)
     angles = np.outer(colatitudes(n), waves)
@@ -72,8 +89,6 @@ def _analysis() -> Array:
     cosines[:, 0] /= 2
     cosines[:, n] = 0  # the lattice does not hold it
     sines[:, n] /= 2
-    down = np.where((waves % 2 == 0)[:, None, None], cosines, sines) * (2 / n)
     along = np.exp(-1j * np.outer(azimuths(n), waves)) / (2 * n)
     along[:, n] /= 2
-    found = np.einsum("pm,mtk->tpmk", along, down)
-    return found.reshape(2 * n * n, -1).view(float)
+    return along.view(float), cosines * (2 / n), sines * (2 / n)

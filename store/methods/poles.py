@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["highest_degree", "keep_off"]
+__all__ = ["highest_degree", "keep_off", "multiply"]
 
 Array = NDArray[np.generic]
 
@@ -31,16 +31,31 @@ def highest_degree(power: NDArray[np.floating]) -> int:
 
 def keep_off(waves: Array, degree: int) -> Array:
     """Return waves (c, m, k) of fields with nothing at latitudes where waves m of degrees up to `degree` cannot be."""
+    kept = np.zeros_like(waves)
+    _add(kept, waves, np.ones(waves.shape[1:], waves.real.dtype), degree)
+    return kept
+
+
+def multiply(waves: Array, factor: Array, degree: int) -> None:
+    """Multiply waves (c, m, k) by a factor (m, k), in place, and keep what that adds off the poles."""
+    _add(waves, waves, factor - factor.dtype.type(1), degree)
+
+
+def _add(target: Array, waves: Array, factor: Array, degree: int) -> None:
+    """Add to `target` the waves times a factor (m, k), kept off the poles; both (c, m, k) may be the same."""
     count, band = len(waves), waves.shape[1] - 1
     real = waves.real.dtype
     parts = waves.view(real).reshape(count, band + 1, band + 1, 2)
-    kept = np.zeros_like(parts)
     # a window is the same on both hemispheres, so even and odd k do not mix: half the products
     for first, windows in enumerate(_windows(band, degree, real.str)):
-        rows = np.ascontiguousarray(parts[:, : len(windows), first::2].transpose(1, 0, 3, 2))
-        lines = rows.reshape(len(windows), 2 * count, -1) @ windows
-        kept[:, : len(windows), first::2] = lines.reshape(rows.shape).transpose(1, 0, 3, 2)
-    return kept.view(waves.dtype)[..., 0]
+        kept = len(windows)
+        rows = np.empty((kept, count, 2, windows.shape[-1]), real)
+        by = factor[:kept, None, None, first::2]
+        np.multiply(parts[:, :kept, first::2].transpose(1, 0, 3, 2), by, out=rows)
+        lines = (rows.reshape(kept, 2 * count, -1) @ windows).reshape(rows.shape)
+        # part by part: numpy's innermost loop is otherwise two numbers long
+        for i, sums in enumerate((target.real, target.imag)):
+            sums[:, :kept, first::2] += lines[:, :, i].transpose(1, 0, 2)
 
 
 @lru_cache(maxsize=16)

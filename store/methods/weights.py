@@ -7,7 +7,9 @@ the set of the nearest changes, and so does `nearest`. `linear` and `scattered` 
 
 from __future__ import annotations
 
+import bisect
 import itertools
+import math
 from functools import cached_property
 from typing import Any
 
@@ -121,7 +123,7 @@ class _Grid:
     """Samples (count, axes) that are all nodes of a grid; `numbers` (axes...) says which sample is which node."""
 
     def __init__(self, ticks: list[Array], numbers: Array) -> None:
-        self._ticks, self._numbers = ticks, numbers
+        self._ticks, self._numbers = [tick.tolist() for tick in ticks], numbers
         self._nodes = {int(number): node for node, number in np.ndenumerate(numbers)}
 
     @classmethod
@@ -141,9 +143,9 @@ class _Grid:
 
     def weigh(self, point: Array) -> Weighted:
         sides = []
-        for tick, x in zip(self._ticks, point, strict=True):
-            j = int(np.clip(np.searchsorted(tick, x, side="right") - 1, 0, max(len(tick) - 2, 0)))
-            part = 0.0 if len(tick) == 1 else float(np.clip((x - tick[j]) / (tick[j + 1] - tick[j]), 0, 1))
+        for tick, x in zip(self._ticks, point.tolist(), strict=True):
+            j = min(max(bisect.bisect_right(tick, x) - 1, 0), max(len(tick) - 2, 0))
+            part = 0.0 if len(tick) == 1 else min(max((x - tick[j]) / (tick[j + 1] - tick[j]), 0.0), 1.0)
             part = round(part) if abs(part - round(part)) < SAME else part
             sides.append([(k, w) for k, w in ((j, 1 - part), (j + 1, part)) if w > 0])
         return self._product(sides)
@@ -167,6 +169,6 @@ class _Grid:
 
     def _product(self, sides: list[list[tuple[int, float]]]) -> Weighted:
         corners = list(itertools.product(*sides))
-        samples = np.array([self._numbers[tuple(k for k, _ in corner)] for corner in corners])
-        weights = np.array([np.prod([w for _, w in corner]) for corner in corners])
+        samples = np.array([self._numbers.item(*(k for k, _ in corner)) for corner in corners])
+        weights = np.array([math.prod(w for _, w in corner) for corner in corners])
         return Weighted(samples, weights, float("nan"))
