@@ -73,13 +73,14 @@ class StepEnergy:
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
-        self.load = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
+        self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
         self._distance, self._looked = distance, state.x
         self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
-        self.areas = np.bincount(state.mesh.triangles.ravel(), np.repeat(shell.areas(state.g) / 3, 3), len(state.x))
+        thirds = np.repeat(shell.areas(state.g) / 3, 3)
+        self.areas = np.bincount(state.mesh.triangles.ravel(), thirds, len(state.x)).astype(np.float64)
         if any(gravity):
-            weight = self.areas[:, None] * np.array(gravity)
+            weight = (self.areas[:, None] * np.array(gravity)).astype(np.float64)
             self.load = weight if self.load is None else self.load + weight
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:

@@ -8,6 +8,7 @@ from forces and velocities alone and is booked as dissipated, so that the balanc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -120,7 +121,7 @@ class _Solver:
             while (root >= old).any():
                 root = np.where(root >= old, wood.parent[root], root)
             factor = self._factor
-            found = descend(residual, x, lambda r: factor.solve(r, root), wanted, _SOLVES, longest)
+            found = descend(residual, x, partial(factor.solve, root=root), wanted, _SOLVES, longest)
             self.solves += found.solves
             x, norm = found.x, found.norm
             if not self._fresh:

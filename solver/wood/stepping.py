@@ -54,7 +54,10 @@ class State(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """What is reported of a stage. energy: (kinetic, elastic, lost, work, dissipated, start) [J]; error: of what ended it."""
+    """What is reported of a stage.
+
+    energy: (kinetic, elastic, lost, work, dissipated, start) [J]; error: of what ended it.
+    """
 
     time: float
     state: State

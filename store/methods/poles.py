@@ -38,7 +38,7 @@ def keep_off(waves: Array, degree: int) -> Array:
 
 def multiply(waves: Array, factor: Array, degree: int) -> None:
     """Multiply waves (c, m, k) by a factor (m, k), in place, and keep what that adds off the poles."""
-    _add(waves, waves, factor - factor.dtype.type(1), degree)
+    _add(waves, waves, (factor - 1).astype(factor.dtype), degree)
 
 
 def _add(target: Array, waves: Array, factor: Array, degree: int) -> None:

@@ -98,7 +98,7 @@ def test_energy_never_rises_in_contact():
         rest=np.zeros(len(mesh.hinges)),
         held=np.zeros(x.shape, bool),
     )
-    energy = StepEnergy(state, shell.Material(0.05), 0.0, (), Tangent(mesh), DISTANCE)
+    energy = StepEnergy(state, shell.Material(0.05), 0.0, (), Tangent(mesh), distance=DISTANCE)
     values = []
     for point in quasi_newton(energy, x):
         values.append(point.energy)
