@@ -76,7 +76,7 @@ def _spheres(at: Axes, rows: Sequence[Row], theta: float) -> None:
 def _buckled(at: Axes, rows: Sequence[Row]) -> None:
     """Draw means over seeds as deviations from the reference's, with half the range of seeds as bars."""
     te, gamma, mirrors = kind(rows[0])
-    part = {"": "sphere", "xyz": "eighth of a sphere"}.get(mirrors, "part of a sphere")
+    part = {"": "whole", "xyz": "eighth"}.get(mirrors, "part")
     for quality, (colour, marker) in QUALITIES.items():
         chosen = [row for row in rows if row["quality"] == quality]
         if not chosen:
@@ -100,7 +100,7 @@ def _buckled(at: Axes, rows: Sequence[Row]) -> None:
     at.margins(x=0.09, y=0.08)
     _dress(
         at,
-        f"{part.capitalize()} after buckling, te {te:g}, gamma {gamma:g}; numbers: s",
+        f"Buckled, {part}, te {te:g}, gamma {gamma:g} (numbers: s)",
         f"mean over seeds against {reference} [%]",
     )
     shown = [
