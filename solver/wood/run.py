@@ -134,7 +134,8 @@ def _dataset(
             data[name] = (dims.get(name, ("stage",)), values.astype(np.int8) if name == "converged" else values)
     if frames:
         bare = [f if "inside" in need.fields else f._replace(fields={}) for f in frames[: len(rows)]]
-        data |= changing(bare, need.dtype)
+        meshes = changing(bare, need.dtype)
+        data |= {name: value for name, value in meshes.items() if name not in _MESH or name in need.fields}
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
     if any("component" in entry[0] for entry in data.values()):
         coords["component"] = ["x", "y", "z"]

@@ -52,6 +52,7 @@ EXPECTED: dict[type[Exception], int] = {
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,
     errors.TimedOut: 503,
+    errors.Overloaded: 503,
     errors.Unauthorized: 401,
     errors.Forbidden: 403,
     errors.TooCostly: 422,
