@@ -123,7 +123,7 @@ def solve(
 
     wizen solve decay --preset orange --stages 0,4,8 --out inside.png --cut 35
 
-    wizen solve growth --params examples/growth/pumpkin.toml --out pumpkin.png
+    wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
     """
     from solver import registry
     from solver.contract import Context, Need
@@ -177,7 +177,7 @@ def solve(
             shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key, cut=cut
         )
         outputs.save(out, made)
-    emit(document, as_json, lambda console: show_run(console, document))
+    emit(document, as_json, lambda console: show_run(console, document, chosen.stages.symbol))
 
 
 @app.command()

@@ -15,10 +15,17 @@ __all__ = ["per_stage", "readers", "report_document", "short", "show_report", "s
 
 
 def short(value: Any) -> str:
-    """Return a number, a list of numbers or a group of them in a few characters."""
+    """Return a value of a parameter in a few characters: numbers as they are, groups by their size."""
     if isinstance(value, Mapping):
         return f"{{{len(value)} values}}"
-    return "[" + ",".join(f"{v:g}" for v in value) + "]" if isinstance(value, list | tuple) else f"{value:g}"
+    if isinstance(value, list | tuple):
+        plain = all(isinstance(v, int | float) for v in value)
+        return (
+            "[" + ",".join(map(short, value)) + "]"
+            if plain
+            else f"[{len(value)} entr{'y' if len(value) == 1 else 'ies'}]"
+        )
+    return f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
 
 
 def per_stage(result: Any) -> dict[str, Any]:
@@ -34,9 +41,9 @@ def per_stage(result: Any) -> dict[str, Any]:
     }
 
 
-def show_run(console: Any, document: Mapping[str, Any]) -> None:
+def show_run(console: Any, document: Mapping[str, Any], symbol: str) -> None:
     """Print a run's numbers, one column per stage."""
-    head = ["", *(f"s = {stage:g}" for stage in document["stages"])]
+    head = ["", *(f"{symbol} = {stage:g}" for stage in document["stages"])]
     rows = [
         [f"{name} [{d['units']}]" if d["units"] not in ("", "1") else name, *(_cell(v) for v in d["values"])]
         for name, d in document["descriptors"].items()

@@ -21,6 +21,7 @@ from conftest import Solves, write
 from typer.testing import CliRunner, Result
 
 from service.cli import app
+from solver import registry
 from store import seal
 from store.store import Store
 from sweeps.options import assignments
@@ -95,7 +96,9 @@ def test_version() -> None:
 
 def test_presets() -> None:
     assert document(wizen("presets", "--json"))["dehydration"]["presets"]["plum1"]["stone"] == [0.6, 0.5]
-    assert "jujube1" in wizen("presets").stdout
+    listed = wizen("presets")
+    assert listed.exit_code == 0
+    assert all(preset in listed.stdout for name in registry.names() for preset in registry.get(name).presets)
 
 
 @pytest.mark.parametrize(
