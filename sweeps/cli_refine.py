@@ -71,7 +71,7 @@ def refine(
         with progress.stopping() as stop, progress.sweep(refining.name_of(read), readers(read)) as observe:
             for found in rounds(read, opened, name, pool, count, measure, held_out, observe, stop):
                 done.append(found)
-                held = "" if found.held_out is None else f", held out {found.held_out:.4g}"
+                held = "" if found.held_out is None else f", held out {found.held_out:.4g} ({found.held_runs} runs)"
                 note(f"{found.added} added: {measure} left out {found.left_out:.4g}{held}")
     failed = sum(one.failed for one in done)
     document = {
@@ -83,12 +83,12 @@ def refine(
     }
 
     def show(console: Any) -> None:
-        head = ["added", "at", f"{measure} left out"] + ["held out"] * (held_out is not None)
+        head = ["added", "at", f"{measure} left out"] + ["held out", "runs"] * (held_out is not None)
         rows = []
         for one in done:
             at = "; ".join(_place(point) for point in one.points) or "-"
-            errors = [one.left_out] + ([one.held_out] if one.held_out is not None else [])
-            rows.append([str(one.added), at, *(f"{error:.4g}" for error in errors)])
+            held = [] if one.held_out is None else [f"{one.held_out:.4g}", str(one.held_runs)]
+            rows.append([str(one.added), at, f"{one.left_out:.4g}", *held])
         grid(console, head, rows)
         if stop.is_set():
             console.print("stopped: the same command goes on from here", markup=False)

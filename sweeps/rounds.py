@@ -39,8 +39,8 @@ Propose = Callable[[Plan, State, Sequence[Mapping[str, float]]], Iterator[Propos
 class Round(NamedTuple):
     """After a round: runs added in all, the points of this round, how many of its runs failed, and the errors.
 
-    `left_out` is the mean error of the samples, each predicted from the others; `held_out` that of runs which the
-    table has not seen, if there are any.
+    `left_out` is the mean error of the samples, each predicted from the others; `held_out` that of the `held_runs` runs
+    which the table has not seen and which lie inside it, if there are any. A table that grows takes more of them in.
     """
 
     added: int
@@ -48,6 +48,7 @@ class Round(NamedTuple):
     failed: int
     left_out: float
     held_out: float | None
+    held_runs: int
     digest: str
 
 
@@ -81,9 +82,9 @@ def rounds(
 
     def measured(points: tuple[dict[str, float], ...], failed: int) -> Round:
         state = refine.read(store, name, measure)
-        error = None if held is None else held_out_error(store, name, held, measure)
+        error, runs = (None, 0) if held is None else held_out_error(store, name, held, measure)
         added = len(_asked(store, plan).keys() & set(state.table.keys))
-        return Round(added, points, failed, state.mean, error, state.table.digest)
+        return Round(added, points, failed, state.mean, error, runs, state.table.digest)
 
     failed = run([job for job in _asked(store, plan).values() if job.state in ("wanted", "running")])
     _add(store, name, _asked(store, plan))
@@ -140,8 +141,8 @@ def _would_end_grid(store: Store, table: TableInfo, more: Collection[Job]) -> bo
     return Samples(values).is_grid and not Samples(np.vstack([values, added])).is_grid
 
 
-def held_out_error(store: Store, name: str, held: Path, measure: str) -> float:
-    """Return the mean error of the default method over held-out runs and stages, by a measure of `store.measures`.
+def held_out_error(store: Store, name: str, held: Path, measure: str) -> tuple[float, int]:
+    """Return the default method's mean error over held-out runs and stages, by a measure of `store.measures`; how many.
 
     Raises:
         InvalidOption: no run of `held` lies between the table's samples.
@@ -156,4 +157,4 @@ def held_out_error(store: Store, name: str, held: Path, measure: str) -> float:
         for case in found
         for s in table.stages
     ]
-    return float(np.mean(errors))
+    return float(np.mean(errors)), len(found)

@@ -73,7 +73,7 @@ def test_the_error_falls_and_faster_than_at_random(site: None, tmp_path: Path) -
     for seed in range(4):
         other = Store.open(shutil.copytree(base, tmp_path / f"random{seed}"))
         at_random(other, plan, 8, seed)
-        blind.append(held_out_error(other, "default", held, "L2nr"))
+        blind.append(held_out_error(other, "default", held, "L2nr")[0])
     print("refined", [f"{error:.3f}" for error in errors], "at random", [f"{error:.3f}" for error in blind])
     assert errors[-1] < 0.75 * errors[0]
     assert errors[-1] < np.mean(blind)
