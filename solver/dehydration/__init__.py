@@ -68,8 +68,9 @@ SOLVER = Solver(
         (0.1, 0.15, 0.2, 0.25, 0.3),
     ),
     default_resolution={"preview": 64, "default": 96, "fine": 128},
-    # largest error of the roughness against a fine run, te = 0.04, gamma = 10 (docs/dehydration.md); fine has no finer
-    tolerances={"preview": 0.19, "default": 0.11},
+    # largest error of the roughness against fine runs, scatter of seeds included, over the fruits of docs/dehydration.md:
+    # gamma = 30 at te = 0.04 is the worst of them; fine has no finer
+    tolerances={"preview": 0.34, "default": 0.16},
     presets=PRESETS,
     run=_run,
     cost=_cost,
