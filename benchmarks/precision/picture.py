@@ -38,17 +38,20 @@ def draw(parts: Mapping[str, Any], path: Path) -> None:
     thetas = sorted({row["theta"] for row in parts.get("spheres", [])}, reverse=True)
     kinds = sorted({kind(row) for row in after}, key=lambda k: (-k[0], *k[1:]))
     kinds = [one for one in kinds if len({row["quality"] for row in after if kind(row) == one}) > 1]
-    panels, rows = max(len(thetas), len(kinds)), bool(thetas) + bool(kinds)
-    figure, axes = plt.subplots(rows, panels, figsize=(5.0 * panels, 4.6 * rows), layout="constrained", squeeze=False)
-    for at, theta in zip(axes[0], thetas, strict=False):
+    count = len(thetas) + len(kinds)
+    panels = min(count, 3)
+    rows = -(-count // panels)
+    figure, grid = plt.subplots(rows, panels, figsize=(5.0 * panels, 4.6 * rows), layout="constrained", squeeze=False)
+    axes = grid.ravel()
+    for at, theta in zip(axes, thetas, strict=False):
         _spheres(at, [row for row in parts["spheres"] if row["theta"] == theta and "failed" not in row], theta)
-    for at in axes[0, 1 : len(thetas)]:
-        at.sharey(axes[0, 0])
-    for at, one in zip(axes[-1], kinds, strict=False):
+    for at in axes[1 : len(thetas)]:
+        at.sharey(axes[0])
+    for at, one in zip(axes[len(thetas) :], kinds, strict=False):
         _buckled(at, [row for row in after if kind(row) == one])
     for at in axes.flat:
         at.set_visible(at.has_data())
-    handles, labels = axes[0, 0].get_legend_handles_labels()
+    handles, labels = axes[0].get_legend_handles_labels()
     columns = min(len(labels) + 1, 3 * panels - 1)
     ring = Line2D([], [], ls="", marker="o", mfc="none", mec=INK, ms=11, label="shipped setting")
     figure.legend(
