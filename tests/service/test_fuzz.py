@@ -32,6 +32,7 @@ CHECKS = (
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_every_answer_is_as_the_page_says(tmp_path: Path) -> None:
     store = Store.open(tmp_path / "store", create=True)
     fill(store, **AXES)
