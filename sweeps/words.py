@@ -15,10 +15,12 @@ __all__ = ["per_stage", "readers", "report_document", "short", "show_report", "s
 
 
 def short(value: Any) -> str:
-    """Return a number, a list of numbers or a group of them in a few characters."""
+    """Return a number, a word, a list or a group of them in a few characters."""
     if isinstance(value, Mapping):
         return f"{{{len(value)} values}}"
-    return "[" + ",".join(f"{v:g}" for v in value) + "]" if isinstance(value, list | tuple) else f"{value:g}"
+    if isinstance(value, list | tuple):
+        return f"[{','.join(map(short, value))}]"
+    return f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
 
 
 def per_stage(result: Any) -> dict[str, Any]:
