@@ -31,7 +31,7 @@ CHECKS = (
 )
 
 
-def fuzz(store: Store, folder: Path, *options: str, examples: str = "100") -> None:
+def fuzz(store: Store, folder: Path, *options: str, examples: str = "60") -> None:
     """Send what the page of a service over a store allows and forbids."""
     secret = Tokens(store.root).create("fuzz", ["run"])[1]
     many = {"max_jobs": 10**6, "max_jobs_per_token": 10**6}
