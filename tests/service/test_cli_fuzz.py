@@ -95,7 +95,7 @@ def clean(folder: Path) -> None:
     max_examples=int(os.environ.get("WIZEN_FUZZ_EXAMPLES", "50")),
     deadline=None,
     derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(line=COMMANDS)
 def test_no_line_ends_in_a_traceback(place: Path, line: list[str]) -> None:
