@@ -21,6 +21,7 @@ from .live import LiveTables
 from .openapi import Documented
 from .security import requires
 from .settings import Settings
+from .shortcut import Shortcut
 from .telemetry import Metrics, Telemetry
 from .turns import Turns
 
@@ -87,6 +88,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
     # the last one added is the outermost
+    if settings.public_read:
+        app.add_middleware(Shortcut, state=app.state)
     app.add_middleware(Limits, settings=settings)
     if settings.public_read and settings.cache_bytes:
         app.add_middleware(Repeats, state=app.state)

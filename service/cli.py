@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import socket
 from collections.abc import Mapping
 from functools import partial
@@ -42,14 +43,24 @@ def serve(
     ] = None,
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on; 0.0.0.0 is all of them.")] = None,
     port: Annotated[int | None, typer.Option("--port", min=0, max=65535, help="0 takes any free one.")] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, max=256, help="Processes that answer, over one table in memory.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler whose workers run the jobs."),
+    ] = None,
 ) -> None:
-    """Serve the tables of a store over HTTP. What is not given comes from WIZEN_STORE, WIZEN_HOST, WIZEN_PORT.
+    """Serve the tables of a store over HTTP. What is not given comes from WIZEN_STORE, WIZEN_HOST, WIZEN_PORT,
+    WIZEN_WORKERS and WIZEN_SCHEDULER.
 
     [bold]Examples[/bold]
 
     wizen serve --store demo
 
-    wizen serve --store demo --host 0.0.0.0 --port 9000
+    wizen serve --store demo --host 0.0.0.0 --port 9000 --workers 4
+
+    wizen serve --store /shared/fruits --scheduler tcp://10.0.0.1:8786
     """
     import uvicorn
     from pydantic import ValidationError
@@ -58,7 +69,7 @@ def serve(
     from .hints import hints
     from .settings import Settings
 
-    given: dict[str, Any] = {"store": store, "host": host, "port": port}
+    given: dict[str, Any] = {"store": store, "host": host, "port": port, "workers": workers, "scheduler": scheduler}
     try:
         settings = Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
@@ -71,10 +82,19 @@ def serve(
     note(f"serving {settings.store} at {address}")
     for line in hints(settings.store, address):
         note(line)
-    with listener:
-        uvicorn.Server(
-            uvicorn.Config(create_app(settings), log_level="warning", timeout_graceful_shutdown=_PATIENCE)
-        ).run(sockets=[listener])
+    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": _PATIENCE}
+    if settings.workers == 1:
+        with listener:
+            uvicorn.Server(uvicorn.Config(create_app(settings), **options)).run(sockets=[listener])
+        return
+    # several processes, one that dies being replaced: they bind the address that was found to be free, and read their
+    # settings from the environment
+    port = listener.getsockname()[1]
+    listener.close()
+    for name in ("store", "scheduler"):
+        if getattr(settings, name) is not None:
+            os.environ[f"WIZEN_{name.upper()}"] = str(getattr(settings, name))
+    uvicorn.run("service.app:app", host=settings.host, port=port, workers=settings.workers, **options)
 
 
 def main() -> None:

@@ -148,8 +148,9 @@ def _cells(given: Mapping[str, str], wrong: list[Wrong]) -> int | None:
     if wrong or pixels is None or distance is None or fov is None:
         return None
     height = 2 * distance * math.tan(math.radians(fov) / 2) if distance else 2.0  # of what the picture shows [r1]
-    cells = math.pi * pixels / height / PIXELS_PER_CELL
-    return max(_FEWEST, math.ceil(min(cells, 1e6) / 8) * 8)  # multiples of 8: fast transforms, and few lattices to keep
+    shown = math.pi * pixels / PIXELS_PER_CELL
+    cells = min(shown / height, 1e6) if height > shown * 1e-6 else 1e6  # as near as one may come
+    return max(_FEWEST, math.ceil(cells / 8) * 8)  # multiples of 8: fast transforms, and few lattices to keep
 
 
 def _region(text: str | None, wrong: list[Wrong]) -> tuple[tuple[float, float], tuple[float, float]] | None:

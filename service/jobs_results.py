@@ -17,7 +17,7 @@ from store.errors import CorruptShard, UnknownJob
 from store.jobs import Job
 from store.store import Store
 
-from . import problems, vocabulary
+from . import jobs_fields, problems, vocabulary
 from .errors import InvalidQuery, JobFailed, NotAcceptable, NotDone, Wrong
 from .formats import FORMATS, About, Format
 from .jobs import JobId, stored_job
@@ -82,6 +82,15 @@ def result(
         str | None,
         Query(description="Representation; goes before the Accept header", json_schema_extra={"enum": list(_NAMES)}),
     ] = None,
+    fields: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=1000,
+            description="With format=json: fields by name, commas between them, with their numbers. Without it, "
+            "results that are no surface on the lattice send those of one number per stage",
+        ),
+    ] = None,
 ) -> Response:
     """Fetch what a job computed: the whole run as netCDF-4/HDF5, as a scene, a vertex cache or maps, or one stage.
 
@@ -95,7 +104,8 @@ def result(
     name = chosen.name if chosen else "netcdf"
     settings = request.app.state.settings
     asked = options.model_dump(exclude_defaults=True)
-    word = "".join(f"-{key}={value!r}" for key, value in sorted({"stage": stage, **asked}.items()) if value is not None)
+    said = {"stage": stage, "fields": fields, **asked}
+    word = "".join(f"-{key}={value!r}" for key, value in sorted(said.items()) if value is not None)
     tag = f'"{job.digest}-{name}{"" if chosen is None else quote(word, safe="=-")}"'
     headers = {
         "ETag": tag,
@@ -107,7 +117,9 @@ def result(
     if chosen is None:
         return _shard(store, job, headers)
     run = store.get(job.key)
-    if isinstance(chosen, Export) or (chosen.name in STILLS and _is_scene(run, asked)):
+    if chosen.name == "json" and (fields is not None or not _is_surface(run, job)):
+        body = jobs_fields.encode(run, fields, stage, settings.max_export_samples)
+    elif isinstance(chosen, Export) or (chosen.name in STILLS and _is_scene(run, asked)):
         body = _scene(run, stage, chosen, options, settings)
     else:
         body = _shape(run, job, stage, chosen)
@@ -119,6 +131,12 @@ def result(
 def _is_scene(run: xr.Dataset, asked: dict[str, Any]) -> bool:
     """Return whether a stage as glb or obj is more than the bare lattice: a mesh, colours, another scale."""
     return bool(asked) or "mesh_position" in run or bool({"rot", "mould"} & set(run.data_vars))
+
+
+def _is_surface(run: xr.Dataset, job: Job) -> bool:
+    """Return whether a result holds the whole surface on the lattice."""
+    whole = job.need.get("region") is None and {"colatitude", "azimuth"} <= set(run.dims)
+    return whole and ("position" in run or "displacement" in run)
 
 
 def _scene(
@@ -223,13 +241,12 @@ def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
     if abs(stages[near] - wanted) > 1e-9 * max(1.0, abs(wanted)):
         advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
         raise InvalidQuery.of([Wrong("stage", f"the result has no stage {wanted:g}", advice)])
-    whole = job.need.get("region") is None and {"colatitude", "azimuth"} <= set(run.dims)
-    if whole and "position" not in run and "displacement" in run and hasattr(params, "surface"):
+    if _is_surface(run, job) and "position" not in run and hasattr(params, "surface"):
         from solver.fruit import lattice
 
         fresh = params.surface(*lattice(run.sizes["colatitude"]))
         run["position"] = run["displacement"] + fresh.astype(run["displacement"].dtype)
-    if not whole or "position" not in run:
+    if not _is_surface(run, job) or "position" not in run:
         advice = f"Ask for {NETCDF}; a job whose need has the field 'position' and no region is a shape."
         raise NotAcceptable("this result is not a whole surface.", advice=advice)
     axes = vocabulary.axes(job.solver)

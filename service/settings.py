@@ -26,6 +26,7 @@ class Settings(BaseSettings):
     )
     host: str = Field("127.0.0.1", description="Address to listen on")
     port: int = Field(8765, ge=0, le=65535, description="Port to listen on")
+    workers: int = Field(1, ge=1, le=256, description="Processes of `wizen serve` that answer")
     max_resolution: int = Field(512, ge=8, le=2048, description="Most colatitude samples of one shape")
     max_batch: int = Field(4096, ge=1, description="Most shapes of one batch")
     max_batch_samples: int = Field(1 << 25, ge=128, description="Most lattice points of one batch, over all its shapes")

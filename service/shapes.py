@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 from urllib.parse import urlencode
+from weakref import WeakKeyDictionary
 
 from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
@@ -27,7 +28,7 @@ from .live import LiveTables
 from .query import ShapeQuery, Words, parse
 from .settings import Settings
 
-__all__ = ["router", "words_of"]
+__all__ = ["at_once", "router", "words_of"]
 
 router = APIRouter(tags=["shapes"])
 
@@ -35,6 +36,9 @@ router = APIRouter(tags=["shapes"])
 #: for the interpreter there.
 _QUICK = ("points", "npz", "json")
 _SMALL = 128
+
+#: The words of the tables in use, which one application serves with one limit.
+_kept_words: WeakKeyDictionary[ShapeTable, Words] = WeakKeyDictionary()
 
 _BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
 _CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()}
@@ -60,14 +64,24 @@ async def shape(
     says what error to expect (`expected_error`, by measure) and whether it lies between the runs (`inside`);
     `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table.
     """
-    given = request.query_params
-    if not request.app.state.tables.is_ready(solver, given.get("table")):
-        return await run_in_threadpool(_shape, request, solver)  # opening a large table takes seconds
+    found = await at_once(request, solver)
+    return await run_in_threadpool(_shape, request, solver) if found is None else found
+
+
+async def at_once(request: Request, solver: str) -> Response | None:
+    """Return a shape that is computed in the event loop, in its turn; None for what is better done in a thread.
+
+    Raises:
+        ServiceError, StoreError, SolverError: as `_ask` and `_settle`, or too many wait already.
+
+    """
+    if not request.app.state.tables.is_ready(solver, request.query_params.get("table")):
+        return None  # opening a large table takes seconds
     asked = _ask(request, solver)
-    if asked.is_quick:
-        async with request.app.state.turns:
-            return _settle(request, asked)
-    return await run_in_threadpool(_settle, request, asked)
+    if not asked.is_quick:
+        return None
+    async with request.app.state.turns:
+        return _settle(request, asked)
 
 
 class _Asked(NamedTuple):
@@ -106,7 +120,9 @@ def _ask(request: Request, solver: str) -> _Asked:
     chosen = negotiate(request.headers.get("accept"), given.get("format"))
     name = tables.choose(solver, given.get("table"))
     table = tables.get(name)
-    words = words_of(known, table, settings.max_resolution)
+    words = _kept_words.get(table)
+    if words is None:
+        words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
     detail = level.read(given)
     query = parse(given.multi_items(), words, detail.refused(chosen))
     resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)

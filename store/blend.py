@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import harmonics, spectra, window
+from . import harmonics, window
 from .methods import Method, bands, envelope, poles
 from .methods.cells import Cells
 from .methods.weights import Samples
@@ -25,8 +26,8 @@ _AT_POLES = np.array([[np.sqrt(2 * d + 1), (-1) ** d * np.sqrt(2 * d + 1)] for d
 
 
 class Blend(NamedTuple):
-    """Waves (3, m, k) of the displacement; with a `ratio`, of its wrinkles alone, which are to be multiplied by it on
-    the lattice before the shape `low` of the fruit is added.
+    """Waves (3, m, k) of the displacement; with a `ratio` (`methods.envelope`), of its wrinkles alone, which are to be
+    multiplied by it on the lattice before the shape `low` of the fruit is added.
     """
 
     waves: Array
@@ -43,11 +44,12 @@ class Blend(NamedTuple):
 
     def poles(self) -> Array:
         """Return the displacement (2, 3) of the two poles."""
-        ends = spectra.poles(np.moveaxis(self.waves, 0, -1))
+        # only waves m = 0 reach them
+        ends = (self.waves[:, 0].real @ _signs(self.waves.shape[-1], self.waves.real.dtype.str)).T
         if self.ratio is None or self.low is None:
             return ends
         shape = self.low[:, 0].real @ _AT_POLES
-        return ends * spectra.poles(self.ratio)[:, None] + shape.T
+        return ends * envelope.at_poles(self.ratio)[:, None] + shape.T
 
 
 class Blender:
@@ -74,15 +76,14 @@ class Blender:
 
         `query` is the point that the corrections aim at. Waves beyond `band` are left out.
         """
-        cut = slice(None if band is None else band + 1)
-        waves = self._mean(samples, weights, stages, cut)
-        terms = len(samples) * len(stages)
-        if terms <= 1 or not method.corrections or query is None:
+        chosen, places = tuple(samples.tolist()), tuple(stages)
+        parts = np.multiply.outer(weights, list(stages.values())).ravel()
+        waves = self._mean(chosen, places, parts, band)
+        if len(parts) <= 1 or not method.corrections or query is None:
             # one sample at one stage, or on its way there from the fresh shape: nothing was lost
             return Blend(waves)
         targets, cells, known = self._tools
-        cell = cells.of(tuple(samples.tolist()), tuple(stages))
-        parts = np.outer(weights, list(stages.values())).ravel()
+        cell = cells.of(chosen, places)
         total = None
         if "LL" in method.corrections:
             mean = _form(parts, cell.power)
@@ -93,7 +94,7 @@ class Blender:
         if "env" not in method.corrections:
             return Blend(waves)
         ratio = envelope.factor(_form(parts, cell.local), parts @ cell.amplitude, total)
-        low = np.tensordot(parts, cell.low, 1)
+        low = (parts @ cell.low.view(float).reshape(len(parts), -1)).view(complex).reshape(cell.low.shape[1:])
         envelope.take_low(waves, low)
         return Blend(waves, ratio, low)
 
@@ -108,14 +109,28 @@ class Blender:
         targets = bands.Targets(self.power, self._samples)
         return targets, Cells(self._stored, targets.bands), self._samples
 
-    def _mean(self, samples: Array, weights: Array, stages: Mapping[int, float], cut: slice) -> Array:
-        first = self._stored[0, 0][:, cut, cut]
+    def _mean(self, samples: tuple[int, ...], stages: tuple[int, ...], parts: Array, band: int | None) -> Array:
+        cut = slice(None if band is None else band + 1)
+        kind = self._stored.dtype.type
         # not by BLAS: its threads would wait for each other in a busy server, for a sum of a tenth of a millisecond
-        total, scaled = np.zeros_like(first), np.empty_like(first)
-        for i, w in zip(samples, weights, strict=True):
-            for j, t in stages.items():
-                total += np.multiply(self._stored[i, j][:, cut, cut], first.dtype.type(w * t), out=scaled)
+        terms = [
+            (self._stored[i, j][:, cut, cut], kind(w))
+            for (i, j), w in zip(itertools.product(samples, stages), parts.tolist(), strict=True)
+        ]
+        if not terms:  # the fresh shape alone
+            return complex_view(np.zeros_like(self._stored[0, 0][:, cut, cut]))
+        total = np.multiply(*terms[0], order="C")
+        scaled = np.empty_like(total)
+        for waves, w in terms[1:]:
+            np.add(total, np.multiply(waves, w, out=scaled), out=total)
         return complex_view(total)
+
+
+@lru_cache(maxsize=16)
+def _signs(waves: int, dtype: str) -> Array:
+    """Return what cosines k < `waves` are at the two poles, (k, 2)."""
+    k = np.arange(waves)
+    return np.stack([np.ones(waves), (-1.0) ** k], axis=1).astype(dtype)
 
 
 def complex_view(parts: Array) -> Array:

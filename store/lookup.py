@@ -129,6 +129,9 @@ class ShapeTable:
         stored = {stage: j for j, stage in enumerate(table.stages)}
         self._knots = np.array(sorted({0.0, *stored}))
         self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
+        named: list[str] = [name for name in ("radii", "stone", "exocarp_thickness") if name in table.template]
+        self._fruit_template = {name: table.template[name] for name in named}
+        self._fruit_places = {name: place for name, place in table.places.items() if place[0] in named}
 
     @classmethod
     def open(cls, path_or_store: Path | str | Store, name: str = "default", verify: bool = True) -> Self:
@@ -241,8 +244,8 @@ class ShapeTable:
                 poles = (surface.fresh_poles(fruit) + blend.poles()).astype(blend.waves.real.dtype)
                 poles = poles[:, list(patch.components)]
         return Shape(
-            colatitude=colatitudes(n)[patch.rows],
-            azimuth=azimuths(n)[patch.columns],
+            colatitude=_angles(n)[0][patch.rows],
+            azimuth=_angles(n)[1][patch.columns],
             position=position,
             displacement=displacement,
             poles=poles,
@@ -353,7 +356,8 @@ class ShapeTable:
             InvalidGeometry: no fruit has these parameters.
 
         """
-        params = self.at_parameters(values)
+        places = self._fruit_places
+        params = insert(self._fruit_template, places, {name: values[name] for name in places if name in values})
         try:
             radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
         except KeyError:
@@ -362,6 +366,15 @@ class ShapeTable:
             ) from None
         _check_fruit(radii, stone)
         return Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te)
+
+
+@lru_cache(maxsize=16)
+def _angles(n: int) -> tuple[Array, Array]:
+    """Return the colatitudes and azimuths of a lattice, read-only."""
+    found = colatitudes(n), azimuths(n)
+    for angles in found:
+        angles.flags.writeable = False
+    return found
 
 
 @lru_cache(maxsize=256)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -40,7 +41,12 @@ class Neighbours:
 
     def distance(self, query: Array) -> float:
         """Return the scaled distance to the nearest sample; 0 where it is hit."""
-        found = float(self._nearest((query - self._low) / self._span, 1)[0][0])
+        scaled = (query - self._low) / self._span
+        if self._count > _FEW:
+            found = float(self._nearest(scaled, 1)[0][0])
+        else:
+            offsets = self._scaled - scaled
+            found = math.sqrt(float(np.einsum("ij,ij->i", offsets, offsets).min()))
         return found if found >= SAME else 0.0
 
     @cached_property

@@ -84,14 +84,18 @@ class Trust:
 
     def __init__(self, found: Array, method: str, samples: Samples) -> None:
         self.method = method
-        self._errors = np.array([[list(errors(Measures(*row)).values()) for row in rows] for rows in found])
-        self._spacing = samples.spacing
+        own = np.array([[list(errors(Measures(*row)).values()) for row in rows] for rows in found])
+        # side by side: the errors by stage, and the spacing
+        self._rows = np.column_stack([own.reshape(len(own), -1), samples.spacing])
 
     def expect(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
         """Return the error to expect of each measure: nothing at a sample, a sample's own a whole spacing away."""
-        whole = np.array(sum(t * (near.weights @ self._errors[near.samples, j]) for j, t in stages.items()))
-        share = min(near.nearest / float(near.weights @ self._spacing[near.samples]), 1.0)
-        return dict(zip(Measures._fields, (share * whole).tolist(), strict=True))
+        *own, spacing = (near.weights @ self._rows[near.samples]).tolist()
+        share, count = min(near.nearest / spacing, 1.0), len(Measures._fields)
+        return {
+            name: share * sum(t * own[count * j + k] for j, t in stages.items())
+            for k, name in enumerate(Measures._fields)
+        }
 
 
 def refuse(

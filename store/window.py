@@ -67,6 +67,7 @@ class Window:
     azimuth: tuple[float, float] = (0.0, 2 * math.pi)
     components: tuple[int, ...] = (0, 1, 2)
 
+    @lru_cache(maxsize=64)  # noqa: B019 - windows are small and equal ones are the same key
     def on(self, n: int) -> Patch:
         """Return the lattice points within; the nearest row or column where none is."""
         north, south = (angle * n / math.pi - 0.5 for angle in self.colatitude)

@@ -15,16 +15,11 @@ __all__ = ["per_stage", "readers", "report_document", "short", "show_report", "s
 
 
 def short(value: Any) -> str:
-    """Return a value of a parameter in a few characters: numbers as they are, groups by their size."""
+    """Return a number, a word, a list or a group of them in a few characters."""
     if isinstance(value, Mapping):
         return f"{{{len(value)} values}}"
     if isinstance(value, list | tuple):
-        plain = all(isinstance(v, int | float) for v in value)
-        return (
-            "[" + ",".join(map(short, value)) + "]"
-            if plain
-            else f"[{len(value)} entr{'y' if len(value) == 1 else 'ies'}]"
-        )
+        return f"[{','.join(map(short, value))}]"
     return f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
 
 

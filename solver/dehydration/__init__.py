@@ -68,8 +68,8 @@ SOLVER = Solver(
         (0.1, 0.15, 0.2, 0.25, 0.3),
     ),
     default_resolution={"preview": 64, "default": 96, "fine": 128},
-    # largest error of the roughness against fine runs, scatter of seeds included, over the fruits of docs/dehydration.md:
-    # gamma = 30 at te = 0.04 is the worst of them; fine has no finer
+    # largest error of the roughness against fine runs, scatter of seeds included, over docs/dehydration.md's fruits
+    # (gamma = 30 at te = 0.04 is the worst); fine has no finer
     tolerances={"preview": 0.34, "default": 0.16},
     presets=PRESETS,
     run=_run,

@@ -9,8 +9,10 @@ linearly, as displacements do, and below the onset there is no power to divide b
 
 from __future__ import annotations
 
+import itertools
 from functools import lru_cache
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +73,7 @@ class Targets:
         self._mended = true / back.reshape(true.shape)
         self._quantiles = quantiles.reshape(*true.shape[:-1], -1)
         self._points = samples.points
+        self._known = lru_cache(maxsize=64)(self._known_of)
         fitted = len(self._points) >= self._points.shape[1] + 2
         self._total_slope = _slopes(self._points, self._total, fitted)
         self._centroid_slope = _slopes(self._points, self._quantiles.mean(axis=-1), fitted)
@@ -80,39 +83,55 @@ class Targets:
 
         `point` (axes,) is the query among `Samples.points`.
         """
-        places = list(stages)
-        amplitudes = np.sqrt(self._powers(point, samples, weights, places))
+        amplitudes = np.sqrt(self._powers(point, tuple(samples.tolist()), weights, tuple(stages)))
         wanted = (np.array(list(stages.values())) @ amplitudes) ** 2
-        least = _FAINT * mean.mean() + _NOTHING
-        return np.minimum(np.maximum(np.sqrt((wanted + least) / (mean + least)), 1 / _MOST), _MOST)
+        least = _FAINT * (float(mean.sum()) / len(mean)) + _NOTHING
+        found: Array = np.minimum(np.maximum(np.sqrt((wanted + least) / (mean + least)), 1 / _MOST), _MOST)
+        return found
 
-    def _powers(self, point: Array, samples: Array, weights: Array, stages: list[int]) -> Array:
+    def _powers(self, point: Array, samples: tuple[int, ...], weights: Array, stages: tuple[int, ...]) -> Array:
         """Return the powers (stages, bands) wanted at stored stages."""
-        step = point - weights @ self._points[samples]
-        at = samples[:, None], np.array(stages)
-        total = np.exp(weights @ self._total[at] + self._total_slope[stages] @ step)
-        moved = _weigh(weights, self._quantiles[at])
-        moved += (self._centroid_slope[stages] @ step)[:, None]
+        known = self._known(samples, stages)
+        mean = weights @ known.rows
+        points, totals, moved, mended = (mean[part] for part in known.parts)
+        step = known.slopes @ (point - points)
+        total = np.exp(totals + step[: len(stages)])
+        moved = moved.reshape(len(stages), -1) + step[len(stages) :, None]
         shares = np.array([self._shares(row) for row in moved])
-        shares *= _weigh(weights, self._mended[at])
+        shares *= mended.reshape(shares.shape)
         return np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
+
+    def _known_of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> _Known:
+        at = np.array(samples)[:, None], np.array(stages)
+        columns = [self._points[at[0][:, 0]], self._total[at], self._quantiles[at], self._mended[at]]
+        rows = [part.reshape(len(samples), -1) for part in columns]
+        ends = np.cumsum([0, *(row.shape[1] for row in rows)]).tolist()
+        slopes = np.concatenate([self._total_slope[at[1]], self._centroid_slope[at[1]]])
+        return _Known(np.concatenate(rows, axis=1), tuple(itertools.starmap(slice, pairwise(ends))), slopes)
 
     def _shares(self, quantiles: Array) -> Array:
         """Return the shares (bands,) of a distribution given by its quantiles; no band is quite empty."""
-        width = quantiles[1] - quantiles[0], quantiles[-1] - quantiles[-2]
-        knots = np.concatenate([[quantiles[0] - width[0]], quantiles, [quantiles[-1] + width[1]]])
+        knots = np.empty(len(quantiles) + 2)
+        knots[1:-1] = quantiles
+        knots[0], knots[-1] = 2 * quantiles[0] - quantiles[1], 2 * quantiles[-1] - quantiles[-2]
         below = np.interp(self.bands.edges, knots, _KNOTS, left=0, right=1)
         below[0], below[-1] = 0, 1
         shares = below[1:] - below[:-1] + 1e-4
-        return shares / shares.sum()
+        shares /= shares.sum()
+        return shares
+
+
+class _Known(NamedTuple):
+    """What is known at some samples: `rows` (samples, ...) of which `parts` are their points, and at some stages their
+    totals, quantiles and mended shares; and the `slopes` (2 * stages, axes) of totals and centroids.
+    """
+
+    rows: Array
+    parts: tuple[slice, ...]
+    slopes: Array
 
 
 _KNOTS = np.concatenate([[0.0], _QUANTILES, [1.0]])
-
-
-def _weigh(weights: Array, rows: Array) -> Array:
-    """Return the weighted sum (s, q) of (t, s, q)."""
-    return (weights @ rows.reshape(len(rows), -1)).reshape(rows.shape[1:])
 
 
 def _slopes(points: Array, values: Array, fitted: bool) -> Array:
@@ -131,29 +150,41 @@ def multiplier(gains: Array, bands: Bands, band: int) -> Array:
     is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
     """
     sharp = np.minimum(np.maximum(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST), _MOST)
-    return _spread(sharp, bands, band).astype(np.float32)
+    excess = _kept_spreading(band, tuple(bands.centres.tolist())) @ (sharp - 1).astype(np.float32)
+    excess += np.float32(1)
+    found: Array = excess.reshape(band + 1, band + 1)
+    return found
 
 
-def _spread(gains: Array, bands: Bands, band: int) -> Array:
-    """Return gains (bands,) as a factor (m, k) that is linear in ln hypot(m, k) between the bands' centres."""
-    ends = np.concatenate([[1.0], gains, [gains[-1]]])
-    upper, part = _places(band, tuple(bands.centres.tolist()))
-    return ends[upper - 1] * (1 - part) + ends[upper] * part
+@lru_cache(maxsize=16)
+def _kept_spreading(band: int, centres: tuple[float, ...]) -> Array:
+    return _spreading(band, centres).astype(np.float32)
+
+
+def _spreading(band: int, centres: tuple[float, ...]) -> Array:
+    """Return the matrix (m k, bands) from gains to the factor (m, k), both less 1, which is linear in ln hypot(m, k)
+    between the bands' centres.
+    """
+    upper, part = (values.ravel() for values in _places(band, centres))
+    # the ends: the shape of the fruit, whose factor is 1, and beyond the last band as in it
+    ends = np.concatenate([np.zeros((1, len(centres))), np.eye(len(centres)), np.eye(len(centres))[-1:]])
+    spread: Array = ends[upper - 1] * (1 - part)[:, None] + ends[upper] * part[:, None]
+    return spread
 
 
 @lru_cache(maxsize=8)
 def _unleak(highest: int) -> Array:
     """Return the matrix (bands, bands) from gains by degree to gains by hypot(m, k), both less 1."""
     bands, shares = Bands(highest), harmonics.shares(highest)
+    spread = _spreading(highest, tuple(bands.centres.tolist()))
     size = np.diff([*bands.first, highest + 1])
     leak = np.empty((len(size), len(size)))
     for i, gains in enumerate(np.eye(len(size))):
-        passed = (shares * (_spread(1 + gains, bands, highest) - 1)).sum(axis=(1, 2))
+        passed = (shares * (spread @ gains).reshape(highest + 1, -1)).sum(axis=(1, 2))
         leak[:, i] = np.add.reduceat(passed, bands.first) / size
     return np.linalg.inv(leak)
 
 
-@lru_cache(maxsize=16)
 def _places(band: int, centres: tuple[float, ...]) -> tuple[Array, Array]:
     """Return for every mode the band above it among [shape of the fruit, bands..., end], and how near that one is."""
     waves = np.arange(band + 1.0)

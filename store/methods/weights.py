@@ -8,7 +8,6 @@ the set of the nearest changes, and so does `nearest`. `linear` and `scattered` 
 from __future__ import annotations
 
 import bisect
-import itertools
 import math
 from functools import cached_property
 from typing import Any
@@ -34,6 +33,7 @@ class Samples:
         logs = self._log(values)
         self._low, span = logs.min(axis=0), np.ptp(logs, axis=0)
         self._span = np.where(span > 0, span, 1)
+        self._scales = list(zip(self._logarithmic.tolist(), self._low.tolist(), self._span.tolist(), strict=True))
         self.points = (logs - self._low) / self._span
         self._near = Neighbours(self.points) if (span > 0).all() else self._idw
         self._grid = _Grid.find(self.points)
@@ -45,7 +45,9 @@ class Samples:
 
     def scale(self, query: Array) -> Array:
         """Return a point's place (axes,) among `points`: logarithms scaled to 0..1."""
-        return (self._log(query) - self._low) / self._span
+        # one by one: so few numbers take longer as arrays
+        scales = zip(query.tolist(), self._scales, strict=True)
+        return np.array([((math.log(x) if is_log else x) - low) / span for x, (is_log, low, span) in scales])
 
     def unscale(self, point: Array) -> Array:
         """Return the place (axes,) of which `scale` makes `point`."""
@@ -74,8 +76,7 @@ class Samples:
     def contains(self, query: Array) -> bool:
         """Return whether a point lies in the convex hull of the samples in the scaled axes."""
         if self._grid is not None:
-            point = self.scale(query)
-            return bool(((point >= -SAME) & (point <= 1 + SAME)).all())
+            return all(-SAME <= x <= 1 + SAME for x in self.scale(query).tolist())
         from scipy.optimize import nnls  # not for grids: it takes long to import
 
         system, right = self._hull, np.append(self.scale(query), 1.0)
@@ -124,6 +125,7 @@ class _Grid:
 
     def __init__(self, ticks: list[Array], numbers: Array) -> None:
         self._ticks, self._numbers = [tick.tolist() for tick in ticks], numbers
+        self._flat = numbers.ravel().tolist()
         self._nodes = {int(number): node for node, number in np.ndenumerate(numbers)}
 
     @classmethod
@@ -168,7 +170,8 @@ class _Grid:
         return pairs
 
     def _product(self, sides: list[list[tuple[int, float]]]) -> Weighted:
-        corners = list(itertools.product(*sides))
-        samples = np.array([self._numbers.item(*(k for k, _ in corner)) for corner in corners])
-        weights = np.array([math.prod(w for _, w in corner) for corner in corners])
-        return Weighted(samples, weights, float("nan"))
+        corners = [(0, 1.0)]
+        for count, side in zip(self._numbers.shape, sides, strict=True):
+            corners = [(place * count + k, weight * w) for place, weight in corners for k, w in side]
+        samples = np.array([self._flat[place] for place, _ in corners])
+        return Weighted(samples, np.array([weight for _, weight in corners]), float("nan"))

@@ -204,6 +204,8 @@ def test_detail_for_a_screen(client: httpx.Client) -> None:
     far = client.get(SHAPE, params={**point, "screen_px": 1000, "distance": 20, "fov": 30}).json()
     assert far["lattice"]["colatitude"] == 80
     near = client.get(SHAPE, params={**point, "screen_px": 4000, "distance": 0.1}).json()
+    nearest = client.get(SHAPE, params={**point, "screen_px": 4000, "distance": 5e-324, "fov": 5e-324}).json()
+    assert nearest["detail"]["resolution"] == near["detail"]["resolution"]
     assert near["lattice"]["colatitude"] == 512
     assert near["detail"]["wanted"] > 512
     plain = client.get(SHAPE, params=point).json()

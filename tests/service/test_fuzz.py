@@ -31,11 +31,8 @@ CHECKS = (
 )
 
 
-@pytest.mark.slow
-def test_every_answer_is_as_the_page_says(tmp_path: Path) -> None:
-    store = Store.open(tmp_path / "store", create=True)
-    fill(store, **AXES)
-    build(store)
+def fuzz(store: Store, folder: Path, *options: str, examples: str = "60") -> None:
+    """Send what the page of a service over a store allows and forbids."""
     secret = Tokens(store.root).create("fuzz", ["run"])[1]
     many = {"max_jobs": 10**6, "max_jobs_per_token": 10**6}
     # its jobs stay in the queue
@@ -43,8 +40,31 @@ def test_every_answer_is_as_the_page_says(tmp_path: Path) -> None:
     with served(app) as client:
         command = [sys.executable, "-m", "schemathesis.cli", "run", f"{client.base_url}/openapi.json"]
         command += ["--header", f"Authorization: Bearer {secret}", "--checks", ",".join(CHECKS)]
-        command += ["--max-examples", os.environ.get("WIZEN_FUZZ_EXAMPLES", "200"), "--phases", "coverage,fuzzing"]
-        command += ["--continue-on-failure", "--seed", "1", "--no-color"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        command += ["--max-examples", os.environ.get("WIZEN_FUZZ_EXAMPLES", examples), "--phases", "coverage,fuzzing"]
+        command += ["--continue-on-failure", "--seed", "1", "--no-color", *options]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     print(done.stdout)
     assert done.returncode == 0, done.stdout[-20000:] + done.stderr
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    store = Store.open(tmp_path / "store", create=True)
+    fill(store, **AXES)
+    build(store)
+    return store
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_every_answer_is_as_the_page_says(store: Store, tmp_path: Path) -> None:
+    fuzz(store, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_so_are_results_in_every_format(store: Store, tmp_path: Path) -> None:
+    """The id of a job that is done, which nobody would guess."""
+    key = store.ledger.jobs("done")[0].key
+    (tmp_path / "schemathesis.toml").write_text(f'[parameters]\n"path.id" = "{key}"\n')
+    fuzz(store, tmp_path, "--include-path-regex", "jobs/.*id", examples="200")

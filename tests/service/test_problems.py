@@ -59,6 +59,7 @@ EXPECTED: dict[type[Exception], int] = {
     errors.NotDone: 409,
     errors.JobFailed: 409,
     errors.JobEnded: 409,
+    errors.Overloaded: 503,
     errors.TooManyListeners: 429,
     errors.UncertainBatch: 422,
     errors.UnfitFormat: 422,

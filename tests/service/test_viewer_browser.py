@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from service.page import BUILT
 from solver import __version__
 from store.store import Store
+from store.tokens import Tokens
 
 from ..store.conftest import fill
 from .conftest import AXES, SHAPE, build
@@ -256,6 +257,58 @@ def test_a_service_that_allows_little_detail_is_asked_for_no_more(browser: Brows
         assert visit.shown("shown.n >= 100")["n"] == 100
         assert all("resolution=192" not in url for url in visit.asked)
         assert visit.complaints == []
+        visit.page.close()
+
+
+@pytest.fixture
+def shrinking(tmp_path: Path) -> tuple[Store, str]:
+    """A store with a table of the solver `shrinking`, whose runs take no time, and Python's path to it."""
+    info = tmp_path / "site" / "shrinking-1.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: shrinking\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[wizen.solvers]\nshrinking = shrinking:SOLVER\n")
+    path = os.pathsep.join(map(str, (ROOT, ROOT / "tests" / "sweeps", info.parent)))
+    plan, store = tmp_path / "plan.toml", tmp_path / "store"
+    plan.write_text(
+        'solver = "shrinking"\n[set]\npause = 0.5\n[axes]\nte = [0.02, 0.04]\ngamma = [10, 30]\n'
+        '[need]\nstages = [0.2]\nquality = "preview"\n'
+    )
+    for command in (["sweep", plan, "--store", store], ["table", "build", "--store", store, "--solver", "shrinking"]):
+        words = [sys.executable, "-m", "service.cli", *map(str, command)]
+        subprocess.run(words, env={**os.environ, "PYTHONPATH": path}, check=True, capture_output=True)
+    return Store.open(store), path
+
+
+def test_what_the_table_only_guesses_is_run_exactly(
+    browser: Browser, tmp_path: Path, shrinking: tuple[Store, str]
+) -> None:
+    store, path = shrinking
+    secret = Tokens(store.root).create("visitor", ["run"])[1]
+    with serving(tmp_path, "--store", str(store.root), PYTHONPATH=path) as address:
+        visit = Visit(browser)
+        visit.page.goto(f"{address}/#s=0.13&te=0.03&gamma=17&method=idw")
+        visit.shown("shown.s == 0.13")
+        run = visit.page.get_by_role("button", name="Run exactly")
+        run.click()
+        dialog = visit.page.get_by_role("dialog")
+        dialog.get_by_label("Token").fill("nonsense")
+        dialog.get_by_role("button", name="Run", exact=True).click()
+        visit.page.get_by_text("the token is not known here").wait_for()
+        assert visit.complaints == ["Failed to load resource: the server responded with a status of 401 (Unauthorized)"]
+        run.click()  # asks again
+        dialog.get_by_label("Token").fill(secret)
+        dialog.get_by_role("button", name="Run", exact=True).click()
+        visit.page.get_by_text("Computed for this very point.").wait_for(timeout=120_000)
+        assert "a stored run" in visit.page.locator(".badge").inner_text()
+        assert any(url.endswith("/events") for url in visit.asked)
+        (job,) = [job for job in store.ledger.jobs("done") if job.need["stages"] == [0.13]]
+        assert (job.params["exocarp_thickness"], job.params["modulus_ratio"]) == (0.03, 17.0)
+        assert visit.page.locator("#view").get_attribute("data-exact") == "true"
+        # the run goes with its point; the token stays where it is
+        visit.page.get_by_role("button", name="Nearest run").click()
+        visit.page.wait_for_function("() => document.getElementById('view').dataset.exact === 'false'")
+        assert visit.page.evaluate("JSON.stringify([localStorage, sessionStorage])") == "[{},{}]"
+        assert len(visit.complaints) == 1
         visit.page.close()
 
 

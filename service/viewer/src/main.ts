@@ -5,6 +5,7 @@ import { Problem, shape, solver as askSolver, tables as askTables, type Answer, 
 import { Choice, Slider } from "./controls";
 import { Detail } from "./detail";
 import { button, byId, el } from "./dom";
+import { Exact } from "./exact";
 import { Fruit } from "./fruit";
 import { Latest } from "./live";
 import { lookOf } from "./looks";
@@ -40,6 +41,7 @@ async function start(): Promise<void> {
     throw new Problem(
       all[0]?.complaint ?? "There is no table yet.",
       "Run a sweep and `wizen table build`; this page shows it as soon as it is there.",
+      "",
     );
   }
   const wanted = fromHash();
@@ -68,23 +70,40 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
   const actions = new Actions(byId("actions"), () => ({ table, point, resolution: detail.finest, method }));
   let resting = 0;
 
+  const display = (answer: Answer, at: Point, moving: boolean): void => {
+    problem.hidden = true;
+    fruit.wear(look.skins[skin], shareOf(stage, at[stage.name]));
+    fruit.show(answer.points, answer.n, moving);
+    studio.reshaped();
+    const speed = `${answer.milliseconds.toFixed(0)} ms, ${(answer.bytes / 1024).toFixed(0)} kB`;
+    showTrust(byId("trust"), answer.about, speed);
+    showFacts(byId("facts").querySelector("div") as HTMLElement, answer.about);
+    canvas.dataset.shown = JSON.stringify({ n: answer.n, ...at });
+    canvas.dataset.method = answer.about.method;
+    canvas.dataset.exact = String(answer.about.exact);
+  };
+  const exact = new Exact(
+    byId("exact"),
+    () => ({ table, point: { ...point }, resolution: detail.finest, method }),
+    (answer, asked) => {
+      // whoever has gone on meanwhile is not thrown back
+      if (JSON.stringify(asked.point) !== JSON.stringify(point)) return false;
+      display(answer, asked.point, false);
+      return true;
+    },
+  );
+
   const questions = new Latest<Question, Answer>(
     (q) => shape(q),
     (answer, q, last) => {
-      problem.hidden = true;
       if (q.moving) detail.learn(q.resolution, answer.milliseconds);
-      fruit.wear(look.skins[skin], shareOf(stage, q.point[stage.name]));
-      fruit.show(answer.points, answer.n, q.moving);
-      studio.reshaped();
-      const speed = `${answer.milliseconds.toFixed(0)} ms, ${(answer.bytes / 1024).toFixed(0)} kB`;
-      showTrust(byId("trust"), answer.about, speed);
-      showFacts(byId("facts").querySelector("div") as HTMLElement, answer.about);
-      canvas.dataset.shown = JSON.stringify({ n: answer.n, ...q.point });
-      canvas.dataset.method = answer.about.method;
+      display(answer, q.point, q.moving);
+      if (!q.moving) exact.judge(answer.about);
       if (last && q.moving) rest();
     },
     (error) => {
       complain(error);
+      exact.refused(error);
       setTimeout(rest, AGAIN);
     },
   );

@@ -1,0 +1,71 @@
+"""The look-up against its own formulas written out plainly: a mean in double precision, fields on lattices, no kept
+products, no matrices in place of transforms.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.fruit import lattice
+from store import harmonics, methods, spectra
+from store.blend import complex_view
+from store.lookup import ShapeTable
+from store.methods import bands, cells, envelope, poles
+
+from .test_lookup_methods import rough  # noqa: F401 - a fixture
+
+QUERY, STAGE = {"te": 0.033, "gamma": 14.0}, 0.17
+TERMS = 8  # four corners at two stages
+
+
+def plain(table: ShapeTable, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions (n, 2n, 3) and poles (2, 3) of the default method."""
+    samples, stored, blender = table._samples, table._spectra, table._blender
+    assert samples is not None
+    near = samples.weigh("linear", np.array(list(QUERY.values())), 6, 2.0)
+    stages = table._bracket(STAGE)
+    terms = [(i, j, w * t) for i, w in zip(near.samples, near.weights, strict=True) for j, t in stages.items()]
+    assert len(terms) == TERMS
+    full = sum(w * complex_view(stored[i, j]).astype(complex) for i, j, w in terms)
+    assert isinstance(full, np.ndarray)
+    targets = bands.Targets(blender.power, samples)
+    mean = bands.add_up(harmonics.power(harmonics.degrees(full)).sum(axis=0), targets.bands)
+    point = samples.scale(np.array(list(QUERY.values())))
+    gains = targets.gains(point, near.samples, near.weights, stages, mean)
+
+    cut = slice(min(n, table.resolution) + 1)
+    waves = full[:, cut, cut].copy()
+    sharp = np.clip(1 + bands._unleak(targets.bands.highest) @ (gains - 1), 0.25, 4)
+    modes = np.arange(waves.shape[-1])
+    degree = np.log(np.maximum(np.hypot(modes[:, None], modes), 1))
+    knots = [np.log(2.9), *targets.bands.centres, np.log(3.0 * modes[-1] + 3)]
+    poles.multiply(waves, np.interp(degree, knots, [1, *sharp, sharp[-1]]), targets.highest)
+
+    local = cells._local(full[None])[0, 0]
+    own = [np.sqrt(cells._local(complex_view(stored[i, j]).astype(complex)[None])[0, 0]) for i, j, _ in terms]
+    wanted = sum(w * amplitude for (_, _, w), amplitude in zip(terms, own, strict=True))
+    ratio = envelope.factor(local, np.asarray(wanted), float((gains**2 * mean).sum()))
+    wave = spectra.spectrum(ratio)
+    low = harmonics.degrees(full)[..., :3, :3]
+    envelope.take_low(waves, low)
+    shape = np.zeros_like(waves)
+    envelope.take_low(shape, -low)
+
+    u = spectra.synthesize(waves, n) * spectra.synthesize(wave, n) + spectra.synthesize(shape, n)
+    fruit = table.fruit(QUERY)
+    ends = spectra.poles(waves) * spectra.poles(wave) + spectra.poles(shape)
+    fresh = fruit.surface(np.array([0.0, np.pi]), np.zeros(2))
+    return fruit.surface(*lattice(n)) + np.moveaxis(u, 0, -1), fresh + ends.T
+
+
+@pytest.mark.parametrize("n", [8, 12, 32, 64, 90])
+def test_the_default_is_what_it_is_said_to_be(rough: ShapeTable, n: int) -> None:  # noqa: F811
+    shape = rough.at(QUERY, STAGE, resolution=n)
+    position, ends = plain(rough, n)
+    assert shape.method == methods.DEFAULT
+    assert shape.position is not None
+    assert shape.poles is not None
+    assert np.ptp(np.linalg.norm(position, axis=-1)) > 0.01
+    np.testing.assert_allclose(shape.position, position, atol=1e-6)
+    np.testing.assert_allclose(shape.poles, ends, atol=1e-6)
