@@ -23,6 +23,8 @@ Ints = NDArray[np.int64]
 _SHIFT = 1e-5
 #: An inverse outlives so many remeshings, and so many times its vertices.
 _LAYERS, _MORE = 12, 1.3
+#: Stiffness of a membrane's vertex [mu]: about the diagonal of six equilateral triangles.
+_STIFFEST = 10.0
 #: How far vertices move before contact looks for its pairs again, over the distance.
 _SLACK = 0.5
 #: Penalty of solids per area and depth [mu / l^2].
@@ -102,6 +104,21 @@ class StepEnergy:
             gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
         gradient[state.held] = 0.0
         return energy, gradient
+
+    def rounding(self, x: Floats) -> float:
+        """Return the largest gradient component that is rounding: what it changes by where x moves by last digits.
+
+        And what no step can take away, because the energy changes by less than its own rounding: (2 stiffness x
+        rounding of the energy)^(1/2), with the stiffness of a membrane's vertex and the energy's terms in magnitude.
+        """
+        signs = np.where(np.arange(x.size).reshape(x.shape) * 2654435761 % 2**32 < 2**31, 1.0, -1.0)
+        energy, gradient = self(x)
+        moved = self(x + signs * np.spacing(np.abs(x).max()))[1]
+        terms = abs(energy)
+        if self.load is not None:
+            terms += float(np.abs(self.load * (x - self.state.x)).sum())
+        digits = np.finfo(float).eps
+        return float(np.abs(moved - gradient).max() + np.sqrt(2 * _STIFFEST * digits * terms))
 
     @property
     def longest(self) -> float:

@@ -45,6 +45,22 @@ def test_uniform_growth_is_scaling_without_energy(shape, step):
     assert float(row.stored_energy[0]) < 1e-5 * float(row.rest_area[0])
 
 
+@pytest.mark.parametrize(("pressure", "least"), [(0.0, 1e-13), (0.02, 1e-7)])
+def test_a_goal_below_rounding_is_met_at_rounding(pressure, least):
+    """Without energy what is left is the forces' last digits; with energy, what no step can see."""
+    tools = [surface(stretch=(3.0, 3.0))]
+    engine = grow(300, 0.5, 1e-30, pressure=pressure, step=0.5, remesh=0, imperfection=0, tools=tools)
+    assert 0 < engine.residual < least
+    assert engine.state.iterations < 200
+
+
+def test_a_goal_below_rounding_is_not_met_before():
+    tools = [surface(where={"kind": "band", "along": "radius", "low": 0.6, "high": 1.0}, stretch=(2.0, 1.0))]
+    engine = Engine(GrowthParams.parse({"shape": "disc", "step": 0.5, "tools": tools}), 150, 1e-30, most=60)
+    with pytest.raises(NotConverged):
+        engine.advance(1e9, until=0.5)
+
+
 def test_a_curled_sheet_is_a_cylinder():
     """Rest curvature kappa about one axis and none along the other: no energy on a cylinder of radius 1 / kappa."""
     engine = grow(
