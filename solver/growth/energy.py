@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from .. import shell
 from ..shell.dissection import Fronts
 from ..shell.inverse import Inverse, fronts_of, inverse_of, normals
-from .params import Plane, SolidBall
+from .params import Bending, Plane, SolidBall
 from .state import State
 
-__all__ = ["StepEnergy", "Tangent"]
+__all__ = ["StepEnergy", "Tangent", "elastic"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,6 +60,11 @@ class Tangent:
         return Tangent(mesh, kept.remeshed(pairs) if kept else None)
 
 
+def elastic(state: State, material: shell.Material, bending: Bending) -> float:
+    """Return the energy of stretching and bending of a state, in mu l^2."""
+    return StepEnergy(state, material, 0.0, (), Tangent(state.mesh), bending=bending)(state.x)[0]
+
+
 class StepEnergy:
     """Energy of positions (n, 3) against a state's rest metrics and angles, in mu l^2."""
 
@@ -72,9 +77,11 @@ class StepEnergy:
         tangent: Tangent,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         distance: float = 0.0,
+        bending: Bending = "hinges",
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
+        self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
         self._distance, self._looked = distance, state.x
@@ -89,7 +96,10 @@ class StepEnergy:
         """Return energy and gradient; the gradient of held directions is 0."""
         state, gradient = self.state, np.zeros_like(x)
         energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient)
-        energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
+        if self._mean is None:
+            energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
+        else:
+            energy += shell.mean_bending(x, state.mesh.hinges, state.rest, *self._mean, gradient)
         if self.load is not None:
             energy -= float(np.vdot(self.load, x - state.x))
             gradient -= self.load

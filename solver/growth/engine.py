@@ -147,7 +147,8 @@ class Engine:
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         point, spent = Point(state.x, 0.0, np.inf), 0
         p = self.params
-        energy = StepEnergy(state, self._material, p.pressure, p.solids, self._tangent, p.gravity, p.contact)
+        tangent = self._tangent
+        energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
         while True:

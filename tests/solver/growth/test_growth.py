@@ -45,6 +45,19 @@ def test_uniform_growth_is_scaling_without_energy(shape, step):
     assert float(row.stored_energy[0]) < 1e-5 * float(row.rest_area[0])
 
 
+@pytest.mark.parametrize("shape", ["sphere", "disc"])
+def test_uniform_growth_costs_no_mean_curvature_either(shape):
+    tools = [surface(stretch=(3.0, 3.0))]
+    engine = grow(
+        300, 1.0, 1e-10, shape=shape, step=0.05, remesh=0, imperfection=0, bending="mean_curvature", tools=tools
+    )
+    x = Engine(engine.params, 300).state.x
+    i, j = engine.state.mesh.edges.T
+    y = engine.state.x
+    grown = np.linalg.norm(y[i] - y[j], axis=1) / np.linalg.norm(x[i] - x[j], axis=1)
+    assert grown == pytest.approx(3.0, rel=1e-8)
+
+
 @pytest.mark.parametrize(("pressure", "least"), [(0.0, 1e-13), (0.02, 1e-7)])
 def test_a_goal_below_rounding_is_met_at_rounding(pressure, least):
     """Without energy what is left is the forces' last digits; with energy, what no step can see."""
