@@ -146,9 +146,12 @@ class StepEnergy:
 
     def refactor(self, x: Floats) -> Iterator[None]:
         """Take the inverse of the positive semidefinite tangent at x, shifted; yields after pieces of the work."""
-        state, tangent, pattern = self.state, self.tangent, self.tangent.pattern
+        state, tangent = self.state, self.tangent
         if tangent.fronts is None:
             tangent.fronts = fronts_of(state.mesh, x)
+            yield
+        new, pattern = "pattern" not in tangent.__dict__, tangent.pattern
+        if new:
             yield
         blocks = np.zeros((pattern.blocks, 3, 3))
         shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)

@@ -8,7 +8,7 @@ between slices starts with the next step, and `script` gives the parameters whos
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -55,7 +55,7 @@ class Engine:
         self._material = shell.Material(params.thickness, params.poisson)
         self._tools: list[Tool] = list(params.tools)
         self._history: list[tuple[State, int, Tangent]] = []
-        self._work: Iterator[float] | None = None
+        self._work: Generator[None, None, None] | None = None
         self.state = _begin(params, start(params.shape, vertices, params.aspect))
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
@@ -103,7 +103,7 @@ class Engine:
         """Go back by one step, and drop tools added since; return whether there was one."""
         if self._work is not None:
             # the step before the one under way is undone, and that one given up
-            self._work.close()  # type: ignore[attr-defined]
+            self._work.close()
             self._work = None
         if not self._history:
             return False
@@ -135,8 +135,8 @@ class Engine:
         finally:
             self.state, self._history, self._tangent, self._steps = kept
 
-    def _step(self, dt: float) -> Iterator[float]:
-        """Grow by dt and find the equilibrium; yields the residual after every piece of work."""
+    def _step(self, dt: float) -> Generator[None, None, None]:
+        """Grow by dt and find the equilibrium; yields after every piece of work."""
         before, tools = self.state, len(self._tools)
         # the way on from here is the same after an undo only with the same inverse
         kept, self._tangent = self._tangent, self._tangent.copy()
@@ -144,12 +144,14 @@ class Engine:
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
+        yield
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         point, spent = Point(state.x, 0.0, np.inf), 0
         p = self.params
         tangent = self._tangent
         energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
+        yield
         begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
         while True:
             for nearer in _WAYS[self.params.solver](energy, begin):
@@ -161,7 +163,7 @@ class Engine:
                     raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
                 if spent > self._most:
                     break
-                yield point.gradient / state.length
+                yield
             begin = _nudged(energy, point.x, point.energy, self.params.seed) if nudges else point.x
             nudges -= 1
             if begin is point.x:
@@ -180,8 +182,9 @@ class Engine:
         if self.params.plasticity:
             state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = branched(state, acting, self.params.seed)
+        yield
         if self.params.remesh:
-            finer, changes = remesh(state, self._longest, self._largest)
+            finer, changes = yield from remesh(state, self._longest, self._largest)
             tangent = self._tangent
             for pairs in changes:
                 tangent = tangent.remeshed(finer.mesh, pairs)

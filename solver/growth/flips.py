@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import shell
-from .state import Anchors, State, on_surface
+from .state import Anchors, State, corners_of, on_surface
 
 __all__ = ["collapse", "flip"]
 
@@ -40,14 +40,17 @@ def flip(state: State) -> State:
         return state
     taken, chosen = np.zeros(len(mesh.triangles), bool), []
     # a flip changes the neighbours' angles: flips of one round share no triangle and no vertex pair
-    edges = {(int(i), int(j)) for i, j in mesh.edges}
+    n, keys, new = mesh.vertices, mesh.edges @ [mesh.vertices, 1], set()
     for hinge in wanted[np.argsort(-excess[wanted], kind="stable")]:
         around = mesh.hinge_faces[hinge]
         k, m = sorted(int(v) for v in mesh.hinges[hinge, 2:])
-        if taken[around].any() or (k, m) in edges:
+        key = k * n + m
+        # keys of edges are sorted
+        at = np.searchsorted(keys, key)
+        if taken[around].any() or key in new or (at < len(keys) and keys[at] == key):
             continue
         taken[around] = True
-        edges.add((k, m))
+        new.add(key)
         chosen.append(hinge)
     if not chosen:
         return state
@@ -232,9 +235,10 @@ def _rebuilt(state: State, triangles: Ints, g: Floats, left: Ints) -> State:
     _, old, same = np.intersect1d(before, now, return_indices=True)
     rest[same] = state.rest[old]
     x = state.x[left]
+    corners = corners_of(x, triangles)
 
     def moved(anchors: Anchors) -> Anchors:
-        return on_surface(anchors, state.x, mesh.triangles, x, triangles)
+        return on_surface(anchors, state.x, mesh.triangles, corners)
 
     return replace(
         state,
