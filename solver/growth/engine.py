@@ -80,13 +80,16 @@ class Engine:
     def advance(self, budget: float, until: float = np.inf) -> bool:
         """Work for about `budget` seconds; return whether a step was completed. Goes no further than `until`.
 
+        Whatever the budget, one piece of the work is done, of some milliseconds.
+
         Raises:
             NotConverged: an equilibrium was not found; the state before the step stands.
             Unstable: the shape left the finite.
 
         """
-        end, completed = clock.perf_counter() + budget, False
-        while clock.perf_counter() < end and (self._steps + 1) * self.params.step <= until + 1e-9:
+        end, completed, first = clock.perf_counter() + budget, False, True
+        while (first or clock.perf_counter() < end) and (self._steps + 1) * self.params.step <= until + 1e-9:
+            first = False
             if self._work is None:
                 self._work = self._step(self.params.step)
             try:
