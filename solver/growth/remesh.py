@@ -69,10 +69,8 @@ def _split(state: State, longest: float) -> tuple[State, Ints]:
     """Return the state and the ends (m, 2) of the edges that were cut."""
     mesh = state.mesh
     squares = _squares(state.g)
-    total, count = np.zeros(len(mesh.edges)), np.zeros(len(mesh.edges))
-    np.add.at(total, mesh.face_edges, squares)
-    np.add.at(count, mesh.face_edges, 1)
-    mean = total / count
+    around = mesh.face_edges.ravel()
+    mean = np.bincount(around, squares.ravel(), len(mesh.edges)) / np.bincount(around, minlength=len(mesh.edges))
     marked = mean > longest**2
     if not marked.any():
         return state, mesh.edges[:0]
