@@ -24,6 +24,7 @@ class Panel:
     """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], a note to write below it, and colours (n, 2n, 3).
 
     With triangles (f, 3), positions and colours are those of vertices (v, 3), and `up` is the axis that points up.
+    view: where it is seen from in place of the sheet's direction.
     """
 
     position: NDArray[Any]
@@ -32,6 +33,7 @@ class Panel:
     colour: NDArray[Any] | None = None
     triangles: NDArray[Any] | None = None
     up: str = "y"
+    view: View | None = None
 
     def image(self, pixels: int, view: View) -> NDArray[Any]:
         """Return the picture (pixels, pixels, 3)."""
@@ -86,7 +88,8 @@ def sheet(
                 continue
             box = (x / width, 1 - (y + pixels) / height, pixels / width, pixels / height)
             axes = figure.add_axes(box)
-            image = panel.image(pixels, view)
+            own = panel.view and View(panel.view.azimuth, panel.view.elevation, view.extent)
+            image = panel.image(pixels, own or view)
             axes.imshow(image, interpolation="nearest")
             axes.set_axis_off()
             if panel.note:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from .. import shell
 from ..shell.dissection import Fronts
 from ..shell.inverse import Inverse, fronts_of, inverse_of, normals
-from .params import Plane, SolidBall
+from .params import Bending, Plane, SolidBall
 from .state import State
 
-__all__ = ["StepEnergy", "Tangent"]
+__all__ = ["StepEnergy", "Tangent", "elastic"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -23,6 +23,8 @@ Ints = NDArray[np.int64]
 _SHIFT = 1e-5
 #: An inverse outlives so many remeshings, and so many times its vertices.
 _LAYERS, _MORE = 12, 1.3
+#: Stiffness of a membrane's vertex [mu]: about the diagonal of six equilateral triangles.
+_STIFFEST = 10.0
 #: How far vertices move before contact looks for its pairs again, over the distance.
 _SLACK = 0.5
 #: Penalty of solids per area and depth [mu / l^2].
@@ -58,6 +60,11 @@ class Tangent:
         return Tangent(mesh, kept.remeshed(pairs) if kept else None)
 
 
+def elastic(state: State, material: shell.Material, bending: Bending) -> float:
+    """Return the energy of stretching and bending of a state, in mu l^2."""
+    return StepEnergy(state, material, 0.0, (), Tangent(state.mesh), bending=bending)(state.x)[0]
+
+
 class StepEnergy:
     """Energy of positions (n, 3) against a state's rest metrics and angles, in mu l^2."""
 
@@ -70,9 +77,11 @@ class StepEnergy:
         tangent: Tangent,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         distance: float = 0.0,
+        bending: Bending = "hinges",
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
+        self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
         self._distance, self._looked = distance, state.x
@@ -87,7 +96,10 @@ class StepEnergy:
         """Return energy and gradient; the gradient of held directions is 0."""
         state, gradient = self.state, np.zeros_like(x)
         energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient)
-        energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
+        if self._mean is None:
+            energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
+        else:
+            energy += shell.mean_bending(x, state.mesh.hinges, state.rest, *self._mean, gradient)
         if self.load is not None:
             energy -= float(np.vdot(self.load, x - state.x))
             gradient -= self.load
@@ -102,6 +114,21 @@ class StepEnergy:
             gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
         gradient[state.held] = 0.0
         return energy, gradient
+
+    def rounding(self, x: Floats) -> float:
+        """Return the largest gradient component that is rounding: what it changes by where x moves by last digits.
+
+        And what no step can take away, because the energy changes by less than its own rounding: (2 stiffness x
+        rounding of the energy)^(1/2), with the stiffness of a membrane's vertex and the energy's terms in magnitude.
+        """
+        signs = np.where(np.arange(x.size).reshape(x.shape) * 2654435761 % 2**32 < 2**31, 1.0, -1.0)
+        energy, gradient = self(x)
+        moved = self(x + signs * np.spacing(np.abs(x).max()))[1]
+        terms = abs(energy)
+        if self.load is not None:
+            terms += float(np.abs(self.load * (x - self.state.x)).sum())
+        digits = np.finfo(float).eps
+        return float(np.abs(moved - gradient).max() + np.sqrt(2 * _STIFFEST * digits * terms))
 
     @property
     def longest(self) -> float:
@@ -119,9 +146,12 @@ class StepEnergy:
 
     def refactor(self, x: Floats) -> Iterator[None]:
         """Take the inverse of the positive semidefinite tangent at x, shifted; yields after pieces of the work."""
-        state, tangent, pattern = self.state, self.tangent, self.tangent.pattern
+        state, tangent = self.state, self.tangent
         if tangent.fronts is None:
             tangent.fronts = fronts_of(state.mesh, x)
+            yield
+        new, pattern = "pattern" not in tangent.__dict__, tangent.pattern
+        if new:
             yield
         blocks = np.zeros((pattern.blocks, 3, 3))
         shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)

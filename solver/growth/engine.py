@@ -8,7 +8,7 @@ between slices starts with the next step, and `script` gives the parameters whos
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -55,7 +55,7 @@ class Engine:
         self._material = shell.Material(params.thickness, params.poisson)
         self._tools: list[Tool] = list(params.tools)
         self._history: list[tuple[State, int, Tangent]] = []
-        self._work: Iterator[float] | None = None
+        self._work: Generator[None, None, None] | None = None
         self.state = _begin(params, start(params.shape, vertices, params.aspect))
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
@@ -80,13 +80,16 @@ class Engine:
     def advance(self, budget: float, until: float = np.inf) -> bool:
         """Work for about `budget` seconds; return whether a step was completed. Goes no further than `until`.
 
+        Whatever the budget, one piece of the work is done, of some milliseconds.
+
         Raises:
             NotConverged: an equilibrium was not found; the state before the step stands.
             Unstable: the shape left the finite.
 
         """
-        end, completed = clock.perf_counter() + budget, False
-        while clock.perf_counter() < end and (self._steps + 1) * self.params.step <= until + 1e-9:
+        end, completed, first = clock.perf_counter() + budget, False, True
+        while (first or clock.perf_counter() < end) and (self._steps + 1) * self.params.step <= until + 1e-9:
+            first = False
             if self._work is None:
                 self._work = self._step(self.params.step)
             try:
@@ -103,7 +106,7 @@ class Engine:
         """Go back by one step, and drop tools added since; return whether there was one."""
         if self._work is not None:
             # the step before the one under way is undone, and that one given up
-            self._work.close()  # type: ignore[attr-defined]
+            self._work.close()
             self._work = None
         if not self._history:
             return False
@@ -135,8 +138,8 @@ class Engine:
         finally:
             self.state, self._history, self._tangent, self._steps = kept
 
-    def _step(self, dt: float) -> Iterator[float]:
-        """Grow by dt and find the equilibrium; yields the residual after every piece of work."""
+    def _step(self, dt: float) -> Generator[None, None, None]:
+        """Grow by dt and find the equilibrium; yields after every piece of work."""
         before, tools = self.state, len(self._tools)
         # the way on from here is the same after an undo only with the same inverse
         kept, self._tangent = self._tangent, self._tangent.copy()
@@ -144,11 +147,14 @@ class Engine:
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
+        yield
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         point, spent = Point(state.x, 0.0, np.inf), 0
         p = self.params
-        energy = StepEnergy(state, self._material, p.pressure, p.solids, self._tangent, p.gravity, p.contact)
+        tangent = self._tangent
+        energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
+        yield
         begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
         while True:
             for nearer in _WAYS[self.params.solver](energy, begin):
@@ -160,12 +166,13 @@ class Engine:
                     raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
                 if spent > self._most:
                     break
-                yield point.gradient / state.length
+                yield
             begin = _nudged(energy, point.x, point.energy, self.params.seed) if nudges else point.x
             nudges -= 1
             if begin is point.x:
                 break
-        if not point.gradient <= goal:
+        # a goal below what the digits hold is met where rounding is
+        if not (point.gradient <= goal or point.gradient <= energy.rounding(point.x)):
             raise NotConverged(
                 f"no equilibrium at growth time {state.time:g}: residual {point.gradient / state.length:.1e}.",
                 advice="Take a shorter step or a thicker sheet.",
@@ -178,8 +185,9 @@ class Engine:
         if self.params.plasticity:
             state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = branched(state, acting, self.params.seed)
+        yield
         if self.params.remesh:
-            finer, changes = remesh(state, self._longest, self._largest)
+            finer, changes = yield from remesh(state, self._longest, self._largest)
             tangent = self._tangent
             for pairs in changes:
                 tangent = tangent.remeshed(finer.mesh, pairs)

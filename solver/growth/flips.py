@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import shell
-from .state import Anchors, State, on_surface
+from .state import Anchors, State, corners_of, on_surface
 
 __all__ = ["collapse", "flip"]
 
@@ -23,40 +23,47 @@ Ints = NDArray[np.int64]
 
 #: How much the angles opposite to an edge must exceed pi together, and the fold beyond which an edge stays [radian].
 _MARGIN, _FOLD = 0.1, 0.5
+#: How far from pi an angle sum of the triangles alone may be, for that of the hinge to be looked at [radian].
+_NEAR = 0.3
 
 
 def flip(state: State) -> State:
     """Return the state with edges flipped where the rest metric is not Delaunay; itself if there are none."""
     mesh = state.mesh
-    corners = _unfolded(state)
+    some = _flat(state)
+    corners = _unfolded(state, some)
     angle = [_angle(corners[:, k], corners[:, 0], corners[:, 1]) for k in (2, 3)]
     excess = angle[0] + angle[1] - np.pi
     # both new triangles must be right side up: the quadrangle is convex at the ends of the edge
     p, q, r, s = (corners[:, k] for k in range(4))
     convex = (_cross(q - s, r - s) > 0) & (_cross(r - s, p - s) > 0)
-    now = np.abs(shell.angles(state.x, mesh.hinges))
-    wanted = np.flatnonzero((excess > _MARGIN) & convex & (now < _FOLD) & (np.abs(state.rest) < _FOLD))
+    now = np.abs(shell.angles(state.x, mesh.hinges[some]))
+    wanted = np.flatnonzero((excess > _MARGIN) & convex & (now < _FOLD) & (np.abs(state.rest[some]) < _FOLD))
     if not len(wanted):
         return state
     taken, chosen = np.zeros(len(mesh.triangles), bool), []
     # a flip changes the neighbours' angles: flips of one round share no triangle and no vertex pair
-    edges = {(int(i), int(j)) for i, j in mesh.edges}
-    for hinge in wanted[np.argsort(-excess[wanted], kind="stable")]:
+    n, keys, new = mesh.vertices, mesh.edges @ [mesh.vertices, 1], set()
+    for at in wanted[np.argsort(-excess[wanted], kind="stable")]:
+        hinge = some[at]
         around = mesh.hinge_faces[hinge]
         k, m = sorted(int(v) for v in mesh.hinges[hinge, 2:])
-        if taken[around].any() or (k, m) in edges:
+        key = k * n + m
+        # keys of edges are sorted
+        near = np.searchsorted(keys, key)
+        if taken[around].any() or key in new or (near < len(keys) and keys[near] == key):
             continue
         taken[around] = True
-        edges.add((k, m))
-        chosen.append(hinge)
+        new.add(key)
+        chosen.append(at)
     if not chosen:
         return state
-    hinges = np.array(chosen)
+    hinges = some[chosen]
     a, b = mesh.hinge_faces[hinges].T
     i, j, k, m = mesh.hinges[hinges].T
     triangles, g = mesh.triangles.copy(), state.g.copy()
     triangles[a], triangles[b] = np.stack([k, m, j], -1), np.stack([m, k, i], -1)
-    p, q, r, s = (corners[hinges, c] for c in range(4))
+    p, q, r, s = (corners[chosen, c] for c in range(4))
     g[a], g[b] = _metric(r, s, q), _metric(s, r, p)
     return _rebuilt(state, triangles, g, np.arange(len(state.x)))
 
@@ -70,7 +77,7 @@ def collapse(state: State, shortest: float) -> tuple[State, Ints]:
     squares = np.zeros(len(mesh.edges))
     faces = np.stack([state.g[:, 0] + state.g[:, 2] - 2 * state.g[:, 1], state.g[:, 2], state.g[:, 0]], -1)
     count = np.bincount(mesh.face_edges.ravel(), minlength=len(squares))
-    np.add.at(squares, mesh.face_edges, faces)
+    squares += np.bincount(mesh.face_edges.ravel(), faces.ravel(), len(squares))
     short = np.flatnonzero(squares / count < shortest**2)
     everything = np.arange(len(state.x))
     if not len(short):
@@ -165,14 +172,25 @@ def _turned(g: Floats, at: int) -> tuple[float, float, float]:
     return c, c - b, a + c - 2 * b
 
 
-def _unfolded(state: State) -> Floats:
-    """Return the corners of hinges in the plane of their rest metrics (h, 4, 2); the edge is a mean."""
+def _flat(state: State) -> Ints:
+    """Return the hinges whose opposite rest angles come near pi together, or exceed it."""
+    g, mesh = state.g, state.mesh
+    squares = np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
+    dots = np.stack([g[:, 1], g[:, 0] - g[:, 1], g[:, 2] - g[:, 1]], -1)
+    sizes = np.sqrt(np.stack([squares[:, (k + 1) % 3] * squares[:, (k + 2) % 3] for k in range(3)], -1))
+    cosines, sines = dots / sizes, 2 * shell.areas(g)[:, None] / sizes
+    first, second = ((mesh.hinge_faces[:, side], mesh.hinge_corners[:, side]) for side in range(2))
+    return np.flatnonzero(sines[first] * cosines[second] + cosines[first] * sines[second] < np.sin(_NEAR))
+
+
+def _unfolded(state: State, some: Ints) -> Floats:
+    """Return the corners of some hinges (m,) in the plane of their rest metrics (m, 4, 2); the edge is a mean."""
     mesh, g = state.mesh, state.g
-    seen = np.empty((2, len(mesh.hinges), 3))
+    seen = np.empty((2, len(some), 3))
     for side in range(2):
         # from the start of the edge as each triangle turns, which is the corner after the opposite one
-        at = (mesh.hinge_corners[:, side] + 1) % 3
-        a, b, c = g[mesh.hinge_faces[:, side]].T
+        at = (mesh.hinge_corners[some, side] + 1) % 3
+        a, b, c = g[mesh.hinge_faces[some, side]].T
         seen[side] = np.where(
             (at == 0)[:, None],
             np.stack([a, b, c], -1),
@@ -181,7 +199,7 @@ def _unfolded(state: State) -> Floats:
             ),
         )
     length = np.sqrt(0.5 * (seen[0, :, 0] + seen[1, :, 0]))
-    corners = np.zeros((len(mesh.hinges), 4, 2))
+    corners = np.zeros((len(some), 4, 2))
     corners[:, 1, 0] = length
     for side in range(2):
         own = np.sqrt(seen[side, :, 0])
@@ -232,9 +250,10 @@ def _rebuilt(state: State, triangles: Ints, g: Floats, left: Ints) -> State:
     _, old, same = np.intersect1d(before, now, return_indices=True)
     rest[same] = state.rest[old]
     x = state.x[left]
+    corners = corners_of(x, triangles)
 
     def moved(anchors: Anchors) -> Anchors:
-        return on_surface(anchors, state.x, mesh.triangles, x, triangles)
+        return on_surface(anchors, state.x, mesh.triangles, corners)
 
     return replace(
         state,

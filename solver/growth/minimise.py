@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 _ARMIJO, _SHORTEST = 1e-4, 1e-9
 #: Least curvature along a step that is learnt, over the model's, and the step below which the model is forgotten.
 _DAMPED, _SHORT = 0.2, 1e-2
+#: Steps in a row that change no digit of the energy, after which none will.
+_IDLE = 10
 #: Steps with one inverse before it is asked whether it still helps, and the drop of the gradient that says so.
 _BURST, _HELPS = 20, 0.3
 
@@ -147,7 +149,7 @@ class _Memory:
 def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Iterator[Point]:
     f, g = energy(x)
     memory = _Memory(length, x.size)
-    since, fresh, mark = 0, False, np.inf
+    since, fresh, mark, idle = 0, False, np.inf, 0
     anew = preconditioned and not energy.ready
     while True:
         size = float(np.abs(g).max())
@@ -187,7 +189,11 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
                 memory.clear()
         else:
             memory.add(t * d, gradient - g)
+        idle = idle + 1 if value == f else 0
         x, f, g = x + t * d, value, gradient
+        if idle == _IDLE:
+            yield Point(x, f, float(np.abs(g).max()), stuck=True)
+            return
         since, fresh = since + 1, False
 
 
@@ -204,6 +210,7 @@ def lbfgs(energy: Energy, x: Floats) -> Iterator[Point]:
 def conjugate_gradients(energy: Energy, x: Floats) -> Iterator[Point]:
     """Nonlinear conjugate gradients (Polak-Ribiere+), as the paper has them; the first trial step is a secant's."""
     f, g = energy(x)
+    idle = 0
     d, trial = -g, 1e-2 / max(float(np.abs(g).max()), 1e-300) * 1e-1
     while True:
         size = float(np.abs(g).max())
@@ -225,6 +232,10 @@ def conjugate_gradients(energy: Energy, x: Floats) -> Iterator[Point]:
                 return
             d = -g
             continue
+        idle = idle + 1 if value == f else 0
         trial, x, f = t, x + t * d, value
+        if idle == _IDLE:
+            yield Point(x, f, float(np.abs(gradient).max()), stuck=True)
+            return
         d = -gradient + max(0.0, float(np.vdot(gradient, gradient - g) / np.vdot(g, g))) * d
         g = gradient

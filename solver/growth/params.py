@@ -12,7 +12,7 @@ from .places import Place
 from .shapes import Shape
 from .tools import HotSurface, Tool
 
-__all__ = ["Attachment", "GrowthParams", "Plane", "Solid", "SolidBall"]
+__all__ = ["Attachment", "Bending", "GrowthParams", "Plane", "Solid", "SolidBall"]
 
 
 class _Model(BaseModel):
@@ -43,6 +43,8 @@ class SolidBall(_Model):
 
 
 Solid = Annotated[Plane | SolidBall, Field(discriminator="kind")]
+
+Bending = Literal["hinges", "mean_curvature"]
 
 
 def _units(units: str) -> dict[str, JsonValue]:
@@ -80,6 +82,11 @@ class GrowthParams(Params):
         json_schema_extra=_units("start shape's unit"),
     )
     poisson: float = Field(0.3, ge=0, le=0.49, description="Poisson's ratio", json_schema_extra=_units("1"))
+    bending: Bending = Field(
+        "hinges",
+        description="What resists bending: angles between triangles, or the mean curvature of vertices, as the paper's",
+        json_schema_extra=_units("1"),
+    )
     curved: bool = Field(
         True,
         description="Whether the start shape's curvature is its rest curvature (else it wants to be flat)",

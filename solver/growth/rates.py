@@ -50,10 +50,12 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
         else:
             share, along = _spots(state, tool, number, time)
         first, second = np.log(_stretches(state, tool, number))
-        v = _in_rest_frame(state, along)
-        strain += _tensor(strength * share * first, strength * share * second, v)
+        some = np.flatnonzero(share)
+        share = strength * share[some]
+        v = _in_rest_frame(state, along[some], some)
+        strain[some] += _tensor(share * first, share * second, v)
         if isinstance(tool, HotSurface) and any(tool.curl):
-            curving += _tensor(strength * share * tool.curl[0], strength * share * tool.curl[1], v)
+            curving[some] += _tensor(share * tool.curl[0], share * tool.curl[1], v)
     return Rates(strain, curving)
 
 
@@ -99,14 +101,14 @@ def _frames(g: Floats) -> tuple[Floats, Floats, Floats]:
     return l11, l12, np.sqrt(g[:, 2] - l12 * l12)
 
 
-def _in_rest_frame(state: State, along: Floats) -> Floats:
-    """Return unit vectors (f, 2) of directions in space (f, 3), carried back to the rest frames by the shape."""
-    p = state.x[state.mesh.triangles]
+def _in_rest_frame(state: State, along: Floats, some: NDArray[np.int64]) -> Floats:
+    """Return unit vectors (m, 2) of directions in space (m, 3), carried back to some rest frames by the shape."""
+    p = state.x[state.mesh.triangles[some]]
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     aa, ab, bb = (a * a).sum(-1), (a * b).sum(-1), (b * b).sum(-1)
     va, vb = (along * a).sum(-1), (along * b).sum(-1)
     s, t = bb * va - ab * vb, aa * vb - ab * va
-    l11, l12, l22 = _frames(state.g)
+    l11, l12, l22 = _frames(state.g[some])
     v = np.stack([l11 * s + l12 * t, l22 * t], -1)
     size = np.linalg.norm(v, axis=1, keepdims=True)
     # a direction along the normal has no projection: any frame is as good

@@ -7,6 +7,7 @@ the tensor of the parent, so that a coarse sphere's children bend like the spher
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from .. import shell
 from .flips import collapse, flip
-from .state import Spot, State, on_surface
+from .state import Spot, State, corners_of, on_surface
 
 __all__ = ["remesh", "split"]
 
@@ -34,17 +35,19 @@ _CHILDREN = {
 }
 
 
-def remesh(state: State, longest: float, most: int) -> tuple[State, list[Ints]]:
-    """Return the state without rest edges above `longest` or far below it, edges turned over where that helps.
+def remesh(state: State, longest: float, most: int) -> Generator[None, None, tuple[State, list[Ints]]]:
+    """Find the state without rest edges above `longest` or far below it, edges turned over where that helps.
 
-    With it the changes: for each vertex (n', 2) the two before in the middle of which it lies, twice the same where it
-    was there. Beyond `most` vertices nothing is cut.
+    Yields after pieces of the work; the generator's value is the state and, with it, the changes: for each vertex
+    (n', 2) the two before in the middle of which it lies, twice the same where it was there. Beyond `most` vertices
+    nothing is cut.
     """
     changes: list[Ints] = []
     coarser, left = collapse(state, longest * _SHORT)
     if coarser is not state:
         state = coarser
         changes.append(np.stack([left, left], -1))
+    yield
     while len(state.x) < most:
         finer, cut = _split(state, longest)
         if finer is state:
@@ -52,6 +55,8 @@ def remesh(state: State, longest: float, most: int) -> tuple[State, list[Ints]]:
         stayed = np.arange(len(state.x))
         changes.append(np.concatenate([np.stack([stayed, stayed], -1), cut]))
         state = finer
+        yield
+    yield
     return flip(state), changes
 
 
@@ -64,10 +69,8 @@ def _split(state: State, longest: float) -> tuple[State, Ints]:
     """Return the state and the ends (m, 2) of the edges that were cut."""
     mesh = state.mesh
     squares = _squares(state.g)
-    total, count = np.zeros(len(mesh.edges)), np.zeros(len(mesh.edges))
-    np.add.at(total, mesh.face_edges, squares)
-    np.add.at(count, mesh.face_edges, 1)
-    mean = total / count
+    around = mesh.face_edges.ravel()
+    mean = np.bincount(around, squares.ravel(), len(mesh.edges)) / np.bincount(around, minlength=len(mesh.edges))
     marked = mean > longest**2
     if not marked.any():
         return state, mesh.edges[:0]
@@ -91,8 +94,10 @@ def _split(state: State, longest: float) -> tuple[State, Ints]:
     new = shell.topology(triangles, len(x))
     rest = _rest(state, new, g, b, touched)
 
+    corners = corners_of(x, triangles)
+
     def moved(spot: Spot) -> Spot:
-        return replace(spot, anchor=on_surface(spot.anchor, state.x, mesh.triangles, x, triangles))
+        return replace(spot, anchor=on_surface(spot.anchor, state.x, mesh.triangles, corners))
 
     found = replace(
         state,
@@ -104,7 +109,7 @@ def _split(state: State, longest: float) -> tuple[State, Ints]:
         shares={k: carried(v) for k, v in state.shares.items()},
         held=np.concatenate([state.held, state.held[i] & state.held[j]]),
         spots={k: tuple(moved(spot) for spot in spots) for k, spots in state.spots.items()},
-        curves={k: on_surface(a, state.x, mesh.triangles, x, triangles) for k, a in state.curves.items()},
+        curves={k: on_surface(a, state.x, mesh.triangles, corners) for k, a in state.curves.items()},
     )
     return found, mesh.edges[marked]
 

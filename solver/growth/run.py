@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from .. import shell
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
+from .energy import elastic
 from .engine import Engine
 from .params import GrowthParams
 from .settings import choose
@@ -76,11 +77,7 @@ def _row(
     if "mesh_area" in need.fields:
         row["mesh_area"] = float(shell.areas(shell.metric(state.x, state.mesh.triangles)).sum())
     if "stored_energy" in need.fields:
-        spare = np.zeros_like(state.x)
-        stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
-        row["stored_energy"] = shell.membrane(
-            state.x, state.mesh.triangles, state.g, material.lame, spare
-        ) + shell.bending(state.x, state.mesh.hinges, state.rest, stiffness, spare)
+        row["stored_energy"] = elastic(state, material, params.bending)
     return row
 
 

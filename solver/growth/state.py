@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import shell
 
-__all__ = ["Anchors", "Spot", "State", "on_surface", "place"]
+__all__ = ["Anchors", "Corners", "Spot", "State", "corners_of", "on_surface", "place"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -71,26 +72,42 @@ class State:
         return float(np.sqrt(np.concatenate([g[:, 0], g[:, 2], g[:, 0] + g[:, 2] - 2 * g[:, 1]])).mean())
 
 
+class Corners(NamedTuple):
+    """Triangles to look for points in: corners (f, 3, 3), middles (f, 3), how far corners are from there (f,)."""
+
+    at: Floats
+    middles: Floats
+    sizes: Floats
+
+
+def corners_of(x: Floats, triangles: Ints) -> Corners:
+    """Return the triangles of a surface."""
+    at = x[triangles]
+    middles = at.mean(axis=1)
+    return Corners(at, middles, np.linalg.norm(at - middles[:, None], axis=2).max(axis=1))
+
+
 def place(points: Floats, x: Floats, triangles: Ints) -> Anchors:
     """Return the nearest points of a surface to `points` (m, 3)."""
-    faces, weights = zip(*(_nearest(point, x, triangles) for point in np.atleast_2d(points)), strict=True)
+    return _placed(points, corners_of(x, triangles))
+
+
+def on_surface(anchors: Anchors, x: Floats, triangles: Ints, corners: Corners) -> Anchors:
+    """Return the anchors of the same places on the triangles `corners` that took the place of others."""
+    return _placed(anchors.at(x, triangles), corners)
+
+
+def _placed(points: Floats, corners: Corners) -> Anchors:
+    faces, weights = zip(*(_nearest(point, corners) for point in np.atleast_2d(points)), strict=True)
     return Anchors(np.array(faces, np.int64), np.array(weights))
 
 
-def on_surface(anchors: Anchors, x: Floats, triangles: Ints, new_x: Floats, new_triangles: Ints) -> Anchors:
-    """Return the anchors of the same places on a mesh that took the place of another."""
-    return place(anchors.at(x, triangles), new_x, new_triangles)
-
-
-def _nearest(point: Floats, x: Floats, triangles: Ints) -> tuple[int, Floats]:
+def _nearest(point: Floats, corners: Corners) -> tuple[int, Floats]:
     """Return triangle and barycentric weights of the point of the surface nearest to `point`."""
-    p = x[triangles]
     # a triangle further off than the nearest middle and its own size need not be looked at
-    middles = p.mean(axis=1)
-    sizes = np.linalg.norm(p - middles[:, None], axis=2).max(axis=1)
-    away = np.linalg.norm(middles - point, axis=1)
-    near = np.flatnonzero(away - sizes <= away.min() * (1 + 1e-12))
-    p = p[near]
+    away = np.linalg.norm(corners.middles - point, axis=1)
+    near = np.flatnonzero(away - corners.sizes <= away.min() * (1 + 1e-12))
+    p = corners.at[near]
     a, b, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], point - p[:, 0]
     aa, ab, bb = (a * a).sum(-1), (a * b).sum(-1), (b * b).sum(-1)
     av, bv = (a * v).sum(-1), (b * v).sum(-1)

@@ -8,6 +8,7 @@ from .bending import angles, bending, bending_tangent, hinge_stiffness
 from .contact import candidates, contact, contact_diagonal
 from .curvature import added_angles, from_angles, to_angles
 from .material import Material
+from .mean import mean_bending, mean_stiffness
 from .membrane import areas, membrane, membrane_tangent, metric, metric_of_lengths
 from .pattern import Pattern, pattern
 from .topology import Topology, topology
@@ -26,6 +27,8 @@ __all__ = [
     "contact_diagonal",
     "from_angles",
     "hinge_stiffness",
+    "mean_bending",
+    "mean_stiffness",
     "membrane",
     "membrane_tangent",
     "metric",

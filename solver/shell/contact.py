@@ -38,7 +38,8 @@ def candidates(x: Floats, mesh: Topology, distance: float, rings: int = 2) -> In
     corners = csr_matrix((np.ones(t.size, np.int32), (t.ravel(), np.repeat(np.arange(len(t)), 3))), (n, len(t)))
     own = (around @ corners).tocoo()
     count = len(t)
-    keys = np.setdiff1d(near.row.astype(np.int64) * count + near.col, own.row.astype(np.int64) * count + own.col)
+    pairs = np.sort(near.row.astype(np.int64) * count + near.col)
+    keys = np.setdiff1d(pairs, own.row.astype(np.int64) * count + own.col, assume_unique=True)
     return np.stack([keys // count, keys % count], -1)
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .topology import distinct
+
 __all__ = ["Fronts", "dissect"]
 
 Floats = NDArray[np.float64]
@@ -60,7 +62,7 @@ def dissect(parts: Ints, centres: Floats, vertices: int) -> Fronts:
     np.maximum.at(high, parts.ravel(), leaves)
     # the level at which both ends of a vertex's range of leaves have one parent
     level_of = depth - np.ceil(np.log2((low ^ high) + 1)).astype(np.int64)
-    keys = np.unique(leaves * vertices + parts.ravel())
+    keys = distinct(leaves * vertices + parts.ravel())
     nodes, own, sizes, children, before = [], [], [], [], 0
     for level in range(depth, -1, -1):
         count = 1 << level
@@ -72,7 +74,7 @@ def dissect(parts: Ints, centres: Floats, vertices: int) -> Fronts:
         leads = before - 2 * count + np.arange(2 * count).reshape(-1, 2)
         children.append(np.full((count, 2), -1) if level == depth else leads)
         before += count
-        keys = np.unique((front[~done] >> 1) * vertices + vertex[~done])
+        keys = distinct((front[~done] >> 1) * vertices + vertex[~done])
     size, mine = np.concatenate(sizes), np.concatenate(own)
     columns = mine * size - mine * (mine - 1) // 2
     lengths = np.stack([size, columns, (size - mine) ** 2], -1)

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Multiplications of one piece of a factorisation: some milliseconds.
-_PIECE = 20_000_000
+_PIECE = 5_000_000
 #: Pivots below are taken for 1 [mu].
 _FLOOR = 1e-8
 #: Entries beyond are those of triangles without area [mu].

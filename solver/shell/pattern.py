@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from .topology import Topology
+from .topology import Topology, distinct
 
 __all__ = ["Pattern", "pattern"]
 
@@ -33,18 +34,31 @@ class Pattern:
 def pattern(mesh: Topology) -> Pattern:
     """Return the pattern of a mesh's tangent; vertices of no triangle have their diagonal block."""
     n = mesh.vertices
-
-    def pairs(corners: Ints) -> Ints:
-        return (corners[:, :, None] * n + corners[:, None, :]).reshape(len(corners), -1)
-
-    triangles, hinges, own = pairs(mesh.triangles), pairs(mesh.hinges), np.arange(n) * (n + 1)
-    keys, inverse = np.unique(np.concatenate([triangles.ravel(), hinges.ravel(), own]), return_inverse=True)
-    inverse = inverse.ravel()
-    a, b = triangles.size, triangles.size + hinges.size
+    # corners share a triangle where there is an edge; those of a hinge else are the opposite ones
+    both = np.concatenate([mesh.edges, mesh.hinges[:, 2:]])
+    keys = distinct(np.concatenate([both @ [n, 1], both @ [1, n], np.arange(n) * (n + 1)]))
+    indptr, indices = np.searchsorted(keys // n, np.arange(n + 1)), keys % n
+    own = np.arange(n)[:, None]
     return Pattern(
-        indptr=np.searchsorted(keys // n, np.arange(n + 1)),
-        indices=keys % n,
-        of_triangles=inverse[:a].reshape(triangles.shape),
-        of_hinges=inverse[a:b].reshape(hinges.shape),
-        diagonal=inverse[b:],
+        indptr=indptr,
+        indices=indices,
+        of_triangles=_places(mesh.triangles, indptr, indices),
+        of_hinges=_places(mesh.hinges, indptr, indices),
+        diagonal=_places(own, indptr, indices)[:, 0],
     )
+
+
+@njit(cache=True)
+def _places(corners: Ints, indptr: Ints, indices: Ints) -> Ints:
+    """Return where the blocks of all pairs of corners (m, c) lie (m, c^2); -1 of pairs that have none."""
+    width = corners.shape[1]
+    found = np.full((len(corners), width * width), -1)
+    for t in range(len(corners)):
+        for a in range(width):
+            i = corners[t, a]
+            for b in range(width):
+                for at in range(indptr[i], indptr[i + 1]):
+                    if indices[at] == corners[t, b]:
+                        found[t, width * a + b] = at
+                        break
+    return found

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..contract import InvalidGeometry
 
-__all__ = ["Topology", "topology"]
+__all__ = ["Topology", "distinct", "topology"]
 
 Ints = NDArray[np.int64]
 
@@ -78,3 +78,9 @@ def topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
         border=np.flatnonzero(counts == 1),
         vertices=vertices,
     )
+
+
+def distinct(keys: Ints) -> Ints:
+    """Return the different keys, sorted: by sorting, which is many times faster than the hashing of numpy.unique."""
+    found = np.sort(keys, axis=None)
+    return found[np.concatenate([[True], found[1:] != found[:-1]])] if len(found) else found

@@ -1,5 +1,7 @@
 """Growth against closed forms, conservation and its own promises."""
 
+from time import process_time
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,35 @@ def test_uniform_growth_is_scaling_without_energy(shape, step):
         engine.params, Need(stages=(1.0,), quality="preview", fields=("stored_energy", "rest_area"))
     )
     assert float(row.stored_energy[0]) < 1e-5 * float(row.rest_area[0])
+
+
+@pytest.mark.parametrize("shape", ["sphere", "disc"])
+def test_uniform_growth_costs_no_mean_curvature_either(shape):
+    tools = [surface(stretch=(3.0, 3.0))]
+    engine = grow(
+        300, 1.0, 1e-10, shape=shape, step=0.05, remesh=0, imperfection=0, bending="mean_curvature", tools=tools
+    )
+    x = Engine(engine.params, 300).state.x
+    i, j = engine.state.mesh.edges.T
+    y = engine.state.x
+    grown = np.linalg.norm(y[i] - y[j], axis=1) / np.linalg.norm(x[i] - x[j], axis=1)
+    assert grown == pytest.approx(3.0, rel=1e-8)
+
+
+@pytest.mark.parametrize(("pressure", "least"), [(0.0, 1e-13), (0.02, 1e-7)])
+def test_a_goal_below_rounding_is_met_at_rounding(pressure, least):
+    """Without energy what is left is the forces' last digits; with energy, what no step can see."""
+    tools = [surface(stretch=(3.0, 3.0))]
+    engine = grow(300, 0.5, 1e-30, pressure=pressure, step=0.5, remesh=0, imperfection=0, tools=tools)
+    assert 0 < engine.residual < least
+    assert engine.state.iterations < 200
+
+
+def test_a_goal_below_rounding_is_not_met_before():
+    tools = [surface(where={"kind": "band", "along": "radius", "low": 0.6, "high": 1.0}, stretch=(2.0, 1.0))]
+    engine = Engine(GrowthParams.parse({"shape": "disc", "step": 0.5, "tools": tools}), 150, 1e-30, most=60)
+    with pytest.raises(NotConverged):
+        engine.advance(1e9, until=0.5)
 
 
 def test_a_curled_sheet_is_a_cylinder():
@@ -145,6 +176,22 @@ def test_slices_and_tools_between_them_replay_as_a_batch():
     batch = grow(200, 0.5, **live.script.model_dump())
     assert np.array_equal(live.state.x, batch.state.x)
     assert live.script.tools[1].start == pytest.approx(0.2)
+
+
+def test_no_piece_of_a_step_is_as_long_as_a_factorisation():
+    """Pieces of a first step, which takes an inverse of its own, on 3000 vertices: none is a half of it."""
+    tool = surface(where={"kind": "band", "along": "radius", "low": 0.6, "high": 1.0}, stretch=(1.3, 1.0))
+    params = GrowthParams.parse({"shape": "disc", "step": 0.1, "tools": [tool]})
+    shares = []
+    for _ in range(2):  # the first compiles
+        engine, pieces, done = Engine(params, 3000), [], False
+        while not done:
+            begun = process_time()
+            done = engine.advance(0.0, until=0.1)
+            pieces.append(process_time() - begun)
+        assert len(pieces) > 20
+        shares.append(max(pieces) / sum(pieces))
+    assert min(shares) < 0.5
 
 
 def test_undo_goes_back_one_step_and_forgets_later_tools():

@@ -52,6 +52,58 @@ def test_gradient_is_the_difference_of_energies(crumpled):
         assert (ahead - behind) / (2 * step) == pytest.approx(slope, rel=1e-6)
 
 
+def test_mean_curvature_bending_equals_its_twin_and_its_gradient_is_the_difference_of_energies(crumpled):
+    x, mesh, g, generator = crumpled
+    rest = generator.normal(0, 0.3, len(mesh.hinges))
+    lengths, stiffness = shell.mean_stiffness(g, mesh, 0.05)
+
+    def energy(y):
+        return shell.mean_bending(y, mesh.hinges, rest, lengths, stiffness, np.zeros_like(y))
+
+    area, total = shell.areas(g), 0.0
+    for v in range(len(x)):
+        own = (mesh.triangles == v).any(axis=1)
+        mean = 0.0
+        for hinge, angle, faces, corners in zip(mesh.hinges, rest, mesh.hinge_faces, mesh.hinge_corners, strict=True):
+            if v in hinge[:2]:
+                edges = [
+                    (g[f, 0] + g[f, 2] - 2 * g[f, 1], g[f, 2], g[f, 0])[c] for f, c in zip(faces, corners, strict=True)
+                ]
+                mean += np.sqrt(np.mean(edges)) * (angle_twin(x, hinge) - angle) / 4
+        total += 2 * 0.05 * mean**2 / (area[own].sum() / 3)
+    assert energy(x) == pytest.approx(total, rel=1e-6)
+    gradient = np.zeros_like(x)
+    shell.mean_bending(x, mesh.hinges, rest, lengths, stiffness, gradient)
+    for way in generator.normal(size=(5, *x.shape)):
+        slope = np.vdot(gradient, way)
+        assert (energy(x + 1e-6 * way) - energy(x - 1e-6 * way)) / 2e-6 == pytest.approx(slope, rel=1e-6)
+
+
+def test_mean_curvature_bends_cylinders_and_spheres_like_a_plate_without_gaussian_curvature():
+    """Energy per area D (2 H)^2 / 2: D kappa^2 / 2 on a cylinder, four times that on a sphere of the same curvature."""
+    points, faces = sheet(40, 40, 0.02)
+    kappa = 1.5
+    inner = (np.abs(points[:, 0] - 0.4) < 0.3) & (np.abs(points[:, 1] - 0.34) < 0.25)
+    x = np.stack([np.sin(kappa * points[:, 0]) / kappa, points[:, 1], np.cos(kappa * points[:, 0]) / kappa], -1)
+    mesh = shell.topology(faces, len(x))
+    g = shell.metric(points, faces)
+    lengths, stiffness = shell.mean_stiffness(g, mesh, 0.05)
+    # other vertices out of the sum
+    energy = shell.mean_bending(x, mesh.hinges, np.zeros(len(mesh.hinges)), lengths, inner * stiffness, 0 * x)
+    area = np.bincount(faces.ravel(), np.repeat(shell.areas(g) / 3, 3), len(x))
+    assert energy == pytest.approx(0.05 * kappa**2 / 2 * area[inner].sum(), rel=2e-3)
+    points, faces = ball(1500)
+    mesh, g = shell.topology(faces, len(points)), shell.metric(points, faces)
+    lengths, stiffness = shell.mean_stiffness(g, mesh, 0.05)
+    flat = np.zeros(len(mesh.hinges))
+    energy = shell.mean_bending(points, mesh.hinges, flat, lengths, stiffness, 0 * points)
+    assert energy == pytest.approx(0.05 * 4 / 2 * 4 * np.pi, rel=0.02)
+    # grown evenly, with the same rest angles, it is the same sphere: rest mean curvature went down by 1 / s
+    lengths, stiffness = shell.mean_stiffness(9 * g, mesh, 0.05)
+    rest = shell.angles(points, mesh.hinges)
+    assert shell.mean_bending(3 * points, mesh.hinges, rest, lengths, stiffness, 0 * points) < 1e-24
+
+
 def dense(pattern, blocks, n):
     full = np.zeros((3 * n, 3 * n))
     rows = np.repeat(np.arange(n), np.diff(pattern.indptr))
