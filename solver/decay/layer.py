@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .diffusion import listed_around, rkl2, stages_for
+from .diffusion import Links, linked, listed_around, rkl2, stages_for
 from .rates import Rates
 from .reaction import react
 from .surface import Surface
@@ -43,6 +43,7 @@ class Layer:
         self.surface, self.rates = surface, rates
         self._coarse = coarse
         self._all = np.arange(len(fresh))
+        self._everywhere = self._linked(np.ones_like(fresh), self._all)
         zero = np.zeros_like(fresh)
         self.fresh = State(zero, zero, fresh, 0.0)
         self._store = rates.theta * surface.mean(fresh)
@@ -63,8 +64,7 @@ class Layer:
         self._half(u, v, n, listed, dt / 2, gate, rates)
         if rates.feed > 0:
             stages = stages_for(dt, rates.feed * s.stiffest)
-            ones = np.ones_like(n)
-            rkl2(n, ones, rates.feed, 0.0, dt, stages, self._all, s.start, s.near, s.weight, s.area)
+            rkl2(n, self._everywhere, rates.feed, 0.0, dt, stages, self._all, s.area)
         self._half(u, v, n, listed, dt / 2, gate, rates)
         return State(u, v, n, state.added)
 
@@ -83,9 +83,14 @@ class Layer:
             return
         react(u, v, n, listed, dt / 2, rates)
         c = self._coarse * n if gate is None else self._coarse * n * gate
-        stages = stages_for(dt, rates.fastest * s.stiffest * float(c[listed].max()))
-        rkl2(u, c, rates.mobility, rates.cap, dt, stages, listed, s.start, s.near, s.weight, s.area)
+        # two stages would be stable but less accurate
+        stages = max(3, stages_for(dt, rates.fastest * s.stiffest * float(c[listed].max())))
+        rkl2(u, self._linked(c, listed), rates.mobility, rates.cap, dt, stages, listed, s.area)
         react(u, v, n, listed, dt / 2, rates)
+
+    def _linked(self, c: Array, listed: NDArray[np.int64]) -> Links:
+        s = self.surface
+        return linked(c, listed, s.start, s.near, s.weight, s.area)
 
     def seeded(self, state: State, centre: Array, radius: float, gate: Array | None = None) -> State:
         """Return the state with a new colony: a smooth bump of height d2 about a point (3), times the gate.

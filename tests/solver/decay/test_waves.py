@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.contract import InvalidGeometry
-from solver.decay.diffusion import listed_around, rkl2, stages_for
+from solver.decay.diffusion import linked, listed_around, rkl2, stages_for
 from solver.decay.layer import Layer
 from solver.decay.rates import Rates
 from solver.decay.reaction import react
@@ -31,7 +31,9 @@ def line(count: int, length: float) -> Surface:
 
 def spread(s: Surface, y: np.ndarray, c: np.ndarray, scale: float, cap: float, dt: float, stages: int) -> np.ndarray:
     out = y.copy()
-    rkl2(out, c, scale, cap, dt, stages, np.arange(len(y)), s.start, s.near, s.weight, s.area)
+    everywhere = np.arange(len(y))
+    links = linked(c, everywhere, s.start, s.near, s.weight, s.area)
+    rkl2(out, links, scale, cap, dt, stages, everywhere, s.area)
     return out
 
 
@@ -236,7 +238,8 @@ def test_only_what_is_infected_is_listed_and_the_rest_would_not_matter(layer):
     assert 0 < len(listed) < len(state.u) / 3
     few, all_ = state.u.copy(), state.u.copy()
     for u, which in ((few, listed), (all_, np.arange(len(few)))):
-        rkl2(u, state.n, 36.0, 0.01, 0.02, 5, which, s.start, s.near, s.weight, s.area)
+        links = linked(state.n, which, s.start, s.near, s.weight, s.area)
+        rkl2(u, links, 36.0, 0.01, 0.02, 5, which, s.area)
     assert np.abs(few - all_).max() < 1e-10 * few.max()
 
 
