@@ -3,8 +3,8 @@
     du/dt = div(c grad Phi(u)),   Phi(u) = integral of max(D, 0),   D = m u (1 - u/d2)   (Eq. 4 with its parentheses)
 
 Above d2 the printed D is negative: anti-diffusion, which blows up. Phi stays flat there. The coefficient c = n times
-noise times gate sits on edges as the harmonic mean of their ends, so nothing enters where it is 0 (the paper: no fungus
-where no rot is). Symmetric weights conserve the total to round-off. RKL2 (Meyer, Balsara and Aslam 2014): second order,
+noise sits on edges as the harmonic mean of their ends, times the gate at their middle, and nothing enters an end where
+the gate is 0 (the paper: no fungus where no rot is). Symmetric weights conserve the total to round-off. RKL2 (Meyer, Balsara and Aslam 2014): second order,
 stable for dt <= (s^2 + s - 2)/2 over the spectral radius, with s stages.
 """
 
@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from .gate import gate
 
 __all__ = ["Links", "linked", "listed_around", "rkl2", "stages_for"]
 
@@ -72,12 +74,16 @@ def listed_around(u: Array, cut: float, rings: int, start: Index, near: Index) -
 
 
 @njit(cache=True)
-def linked(c: Array, listed: Index, start: Index, near: Index, weight: Array, area: Array) -> Links:
-    """Return the edges among the listed vertices that have a coefficient c > 0 at both ends: its harmonic mean."""
+def linked(c: Array, rot: Array, listed: Index, start: Index, near: Index, weight: Array, area: Array) -> Links:
+    """Return the edges among the listed vertices that have a coefficient c > 0 at both ends: its harmonic mean.
+
+    rot (v): map that opens the gate, at both ends and in the middle; without one (empty) there is no gate.
+    """
+    gated = len(rot) > 0
     place = np.full(len(c), -1, np.int32)
     most = 0
     for here, i in enumerate(listed):
-        if c[i] > 0:
+        if c[i] > 0 and not (gated and gate(rot[i]) == 0):
             place[i] = here
             most += start[i + 1] - start[i]
     first, to, share = np.empty(len(listed) + 1, np.int64), np.empty(most, np.int32), np.empty(most)
@@ -92,6 +98,8 @@ def linked(c: Array, listed: Index, start: Index, near: Index, weight: Array, ar
             if place[j] >= 0:
                 to[count] = place[j]
                 share[count] = whole * weight[k] * c[j] / (c[i] + c[j])
+                if gated:
+                    share[count] *= gate(0.5 * (rot[i] + rot[j]))
                 count += 1
     first[len(listed)] = count
     return Links(first, to, share)

@@ -1,7 +1,7 @@
 """Rot and mould together on one fruit: initial fields, the gate between them, wounds and spawning.
 
 The soft rot lives on the flesh and eats what is in it, the mould lives on the skin and eats what is there; both start
-as random fields of one kind (D15). The mould spreads only where rot is (D14): the gate is 0 below 0.002 of rot.
+as random fields of one kind (D15). The mould spreads only where rot is (D14).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 from ..contract import Context
 from ..fruit import directions
 from .colony import Colony
+from .gate import SHUT, gates
 from .layer import Layer, State
 from .noise import patches
 from .params import DecayParams
@@ -28,9 +29,6 @@ __all__ = ["Both", "System"]
 
 Array = NDArray[np.float64]
 
-#: Rot map where the gate starts to open and where it is open; below the first the mould does not enter. Ten times more
-#: makes young colonies hang on how thin their rot is, and errors of the mesh four times larger.
-_SHUT, _OPEN = 0.002, 0.02
 #: Radius of a spawned colony [r1], and the share of the map above which a place is taken already.
 _SPORE = 0.06
 _TAKEN = 0.05
@@ -99,17 +97,16 @@ class System:
 
     def gate(self, rot: State) -> Array:
         """Return where the mould may spread, 0 to 1 (v)."""
-        x = np.clip((self.rot.share(rot) - _SHUT) / (_OPEN - _SHUT), 0, 1)
-        return x * x * (3 - 2 * x)
+        return gates(self.rot.share(rot))
 
     def advance(self, state: Both, day: float, dt: float) -> Both:
-        """Return the state dt [day] after a day, without new colonies; gate and air are those of the step's middle."""
+        """Return the state dt [day] after a day, without new colonies; rot and air are those of the step's middle."""
         rot = self.rot.advance(state.rot, dt, rates=self._rates(self._params.rot, day + dt / 2))
         if self.mould is None or state.mould is None:
             return Both(rot, None)
-        gate = (self.gate(state.rot) + self.gate(rot)) / 2
+        ground = (self.rot.share(state.rot) + self.rot.share(rot)) / 2
         rates = self._rates(self._params.mould, day + dt / 2)
-        return Both(rot, self.mould.advance(state.mould, dt, gate, rates))
+        return Both(rot, self.mould.advance(state.mould, dt, ground, rates))
 
     def _rates(self, colony: Colony, day: float) -> Rates | None:
         return daily(colony, self._params, day) if self._params.weather else None
@@ -165,4 +162,4 @@ class System:
         assert self.mould is not None
         assert state.mould is not None
         chance = rotten if landing.stray else 1.0
-        return rotten > _SHUT and landing.mark < chance and float(self.mould.share(state.mould)[site]) < _TAKEN
+        return rotten > SHUT and landing.mark < chance and float(self.mould.share(state.mould)[site]) < _TAKEN

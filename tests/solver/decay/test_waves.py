@@ -5,6 +5,7 @@ import pytest
 
 from solver.contract import InvalidGeometry
 from solver.decay.diffusion import linked, listed_around, rkl2, stages_for
+from solver.decay.gate import gates
 from solver.decay.layer import Layer
 from solver.decay.rates import Rates
 from solver.decay.reaction import react
@@ -14,6 +15,8 @@ from solver.fruit import directions, lattice
 RATES = Rates(
     mobility=36.0, cap=0.01, consume=50.0, half=1.0, wither=50.0, a1=1 / 2400, a2=1 / 120, theta=0.05, feed=4e-4
 )
+
+NO_ROT = np.empty(0)
 
 
 def line(count: int, length: float) -> Surface:
@@ -32,7 +35,7 @@ def line(count: int, length: float) -> Surface:
 def spread(s: Surface, y: np.ndarray, c: np.ndarray, scale: float, cap: float, dt: float, stages: int) -> np.ndarray:
     out = y.copy()
     everywhere = np.arange(len(y))
-    links = linked(c, everywhere, s.start, s.near, s.weight, s.area)
+    links = linked(c, NO_ROT, everywhere, s.start, s.near, s.weight, s.area)
     rkl2(out, links, scale, cap, dt, stages, everywhere, s.area)
     return out
 
@@ -238,16 +241,17 @@ def test_only_what_is_infected_is_listed_and_the_rest_would_not_matter(layer):
     assert 0 < len(listed) < len(state.u) / 3
     few, all_ = state.u.copy(), state.u.copy()
     for u, which in ((few, listed), (all_, np.arange(len(few)))):
-        links = linked(state.n, which, s.start, s.near, s.weight, s.area)
+        links = linked(state.n, NO_ROT, which, s.start, s.near, s.weight, s.area)
         rkl2(u, links, 36.0, 0.01, 0.02, 5, which, s.area)
     assert np.abs(few - all_).max() < 1e-10 * few.max()
 
 
 def test_nothing_enters_where_the_gate_is_shut(layer):
-    gate = (layer.surface.points[:, 1] > 0.7).astype(float)
+    rot = np.where(layer.surface.points[:, 1] > 0.7, 1.0, 0.001)
+    gate = gates(rot)
     state = layer.seeded(layer.fresh, np.array([0.0, 1.0, 0.0]), 0.4, gate)
     for _ in range(40):
-        state = layer.advance(state, 0.05, gate)
+        state = layer.advance(state, 0.05, rot)
     assert (state.u + state.v)[gate == 0].max() == 0
     assert state.u[gate > 0].min() > 0
 
