@@ -25,8 +25,8 @@ def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: in
     params = SOLVER.parse({"body": "quasi-static", "te": 0.03, "skin": {}}, preset)
     assert isinstance(params, DecayParams)
     settings = choose(params, "default")
-    system = System(params, settings.level, True)
-    body = Body(params, system.surface, settings.level, settings.layers, settings.balance)
+    system = System(params, settings.cells, True)
+    body = Body(params, system.surface, settings.cells, settings.layers, settings.balance)
     skin = Wrinkles(params, Skin(), body, settings)
     # the first two frames compile and find the shape to start from
     days = tuple(day + k / rate for k in range(count + 2))

@@ -217,7 +217,7 @@ def main(path: Path, python: str | None) -> None:
     for where in ("plane", "sphere"):
         round_ = where == "sphere"
         exact = reference(rates, round_)
-        meshes = ((4, 12), (5, 24), (6, 48), (7, 96)) if round_ else ((33, 12), (65, 24), (129, 48), (257, 96))
+        meshes = ((16, 12), (32, 24), (64, 48), (128, 96)) if round_ else ((33, 12), (65, 24), (129, 48), (257, 96))
         found = [ours(rates, n, steps, round_, exact) for n, steps in meshes]
         found += [euler(rates, n, round_, exact) for n in (32, 64, 128, 256)]
         if python and not round_:

@@ -21,7 +21,7 @@ from solver.decay.settings import choose
 from solver.decay.stepping import march
 from solver.decay.system import System
 
-_LEVEL = 4
+_CELLS = 16
 #: Spores fall often, so that seeds differ by more than their patches of nutrient.
 _SETTING = {"growth_rate": 50.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
 
@@ -31,7 +31,7 @@ def ends(seeds: range, rate: int, days: float) -> NDArray[np.float64]:
     found = []
     for seed in seeds:
         params = DecayParams.model_validate(_SETTING | {"seed": seed})
-        system = System(params, _LEVEL, True)
+        system = System(params, _CELLS, True)
         frames = tuple(np.arange(1, round(rate * days) + 1) / rate)
         *_, end = march(system, frames, 1e-3, choose(params, "preview").longest, Context())
         assert system.mould is not None

@@ -4,8 +4,8 @@
 
 Above d2 the printed D is negative: anti-diffusion, which blows up. Phi stays flat there. The coefficient c = n times
 noise sits on edges as the harmonic mean of their ends, times the gate at their middle, and nothing enters an end where
-the gate is 0 (the paper: no fungus where no rot is). Symmetric weights conserve the total to round-off. RKL2 (Meyer, Balsara and Aslam 2014): second order,
-stable for dt <= (s^2 + s - 2)/2 over the spectral radius, with s stages.
+the gate is 0 (the paper: no fungus where no rot is). Symmetric weights conserve the total to round-off. RKL2 (Meyer,
+Balsara and Aslam 2014): second order, stable for dt <= (s^2 + s - 2)/2 over the spectral radius, with s stages.
 """
 
 from __future__ import annotations
@@ -115,9 +115,7 @@ def _potential(y: float, cap: float) -> float:
 
 
 @njit(cache=True)
-def rkl2(
-    y: Array, links: Links, scale: float, cap: float, dt: float, stages: int, listed: Index, area: Array
-) -> None:
+def rkl2(y: Array, links: Links, scale: float, cap: float, dt: float, stages: int, listed: Index, area: Array) -> None:
     """Advance y by dt in place on the listed vertices; others neither change nor take part.
 
     Phi(y) = scale y^2 (1/2 - y / (3 cap)) up to cap, or scale y if cap <= 0. What undershoots zero is taken from the

@@ -56,7 +56,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             return _dataset(rows, need, attrs, shape)
         with_mould = bool(wanted & MOULD)
         context.report(0.0, f"laying {settings.vertices} points on the fruit")
-        system = System(params, settings.level, with_mould)
+        system = System(params, settings.cells, with_mould)
         attrs["path"] = "rot-and-mould" if with_mould else "rot"
         for reached in march(system, days, settings.tolerance, settings.longest, context):
             rot = system.rot.share(reached.state.rot)
@@ -73,7 +73,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             row = _row(reached.day, reached.steps, reached.error * settings.tolerance, sound)
             if "budget_error" in wanted:
                 row["budget_error"] = max(errors)
-            row |= _fields(system, reached, need, settings.level)
+            row |= _fields(system, reached, need, settings.cells)
             _finish(rows, row, shape, rot, begun, need, context)
     except SolverError as error:
         if rows:
@@ -103,7 +103,7 @@ def _row(day: float, steps: int, residual: float, converged: bool) -> dict[str, 
     return {"stage": day, "residual": residual, "converged": converged, "iterations": steps}
 
 
-def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[str, Any]:
+def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[str, Any]:
     """Return maps on the lattice and shares of the area, those that were asked for."""
     surface, wanted = system.surface, set(need.fields)
     rot = system.rot.share(reached.state.rot)
@@ -126,7 +126,7 @@ def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[st
     if wanted & set(maps):
         assert need.resolution is not None  # settled
         inside = window(need.resolution, need.region)
-        sample = sampler(level, need.resolution)
+        sample = sampler(cells, need.resolution)
         for name in sorted(wanted & set(maps)):
             field = (sample @ maps[name]).reshape(need.resolution, -1)
             row[name] = field[inside].astype(need.dtype)

@@ -37,13 +37,13 @@ class Shape:
         self._wanted = set(need.fields)
         moves = moved(params, self._wanted)
         meshed = {"water_lost", "volume", "mesh_position", "triangle"} & self._wanted
-        self._surface = lay(params, settings.level) if moves or meshed else None
+        self._surface = lay(params, settings.cells) if moves or meshed else None
         self._body = self._wrinkles = None
         self._node: _Settled = _Settled(None, None)
         if moves and self._surface is not None:
             from .body.body import Body
 
-            self._body = Body(params, self._surface, settings.level, settings.layers, settings.balance)
+            self._body = Body(params, self._surface, settings.cells, settings.layers, settings.balance)
             if params.skin is not None:
                 from .body.wrinkles import Wrinkles
 

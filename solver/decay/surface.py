@@ -71,14 +71,15 @@ class Surface:
 
 
 @lru_cache(maxsize=4)
-def geodesic(level: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return unit directions (10 * 4^level + 2, 3) and faces (20 * 4^level, 3), wound outwards, of a geodesic sphere.
+def geodesic(cells: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return unit directions (10 cells^2 + 2, 3) and faces (20 cells^2, 3), wound outwards, of a geodesic sphere.
 
-    Vertices are numbered so that neighbours lie close in memory.
+    cells: edges along one of the icosahedron's. Its triangles are cut evenly by the odd part of the number, then
+    halved: a sphere of twice the cells has all points of this one. Neighbours lie close in memory.
     """
-    points = GOLDEN_POINTS
-    faces = np.array(GOLDEN_ICOSAHEDRON).reshape(20, 3)
-    for _ in range(level):
+    halvings = (cells & -cells).bit_length() - 1
+    points, faces = _cut(cells >> halvings)
+    for _ in range(halvings):
         edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
         unique, back = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_inverse=True)
         middle = points[unique // len(points)] + points[unique % len(points)]
@@ -95,6 +96,29 @@ def geodesic(level: int) -> tuple[Array, NDArray[np.int64]]:
     points, faces = points[order], place[faces]
     points.flags.writeable = faces.flags.writeable = False
     return points, faces
+
+
+def _cut(cells: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return the icosahedron, each triangle cut evenly into cells^2 and its points put on the sphere."""
+    faces = np.array(GOLDEN_ICOSAHEDRON).reshape(20, 3)
+    if cells == 1:
+        return GOLDEN_POINTS, faces
+    number: dict[tuple[tuple[int, int], ...], int] = {}
+    cut = []
+    for corners in faces.tolist():
+
+        def at(i: int, j: int, corners: list[int] = corners) -> int:
+            # neighbours name a point of their common edge alike: by its corners and their shares
+            shares = zip(corners, (cells - i - j, i, j), strict=True)
+            return number.setdefault(tuple(sorted((c, s) for c, s in shares if s)), len(number))
+
+        for i in range(cells):
+            for j in range(cells - i):
+                cut.append((at(i, j), at(i + 1, j), at(i, j + 1)))
+                if i + j < cells - 1:
+                    cut.append((at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)))
+    points = np.array([sum(GOLDEN_POINTS[c] * s for c, s in shares) for shares in number])
+    return points / np.linalg.norm(points, axis=1, keepdims=True), np.array(cut)
 
 
 def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
@@ -130,16 +154,16 @@ def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
     )
 
 
-def lay(fruit: Fruit, level: int) -> Surface:
-    """Return the fruit's fresh outer surface as a geodesic sphere of `level` laid on it."""
-    rays, faces = geodesic(level)
+def lay(fruit: Fruit, cells: int) -> Surface:
+    """Return the fruit's fresh outer surface as a geodesic sphere of so many `cells` laid on it."""
+    rays, faces = geodesic(cells)
     return triangulated(fruit.surface(np.arccos(np.clip(rays[:, 1], -1, 1)), np.arctan2(rays[:, 2], rays[:, 0])), faces)
 
 
 @lru_cache(maxsize=4)
-def sampler(level: int, resolution: int) -> sparse.csr_array:
-    """Return the matrix that takes a field on `geodesic(level)` to the common lattice (n * 2n rows), linearly."""
-    return shares_at(*geodesic(level), directions(*lattice(resolution)).reshape(-1, 3))
+def sampler(cells: int, resolution: int) -> sparse.csr_array:
+    """Return the matrix that takes a field on `geodesic(cells)` to the common lattice (n * 2n rows), linearly."""
+    return shares_at(*geodesic(cells), directions(*lattice(resolution)).reshape(-1, 3))
 
 
 def shares_at(rays: Array, faces: NDArray[np.int64], wanted: Array) -> sparse.csr_array:

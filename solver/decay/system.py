@@ -51,10 +51,10 @@ class _Due(NamedTuple):
 class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it."""
 
-    def __init__(self, params: DecayParams, level: int, with_mould: bool) -> None:
+    def __init__(self, params: DecayParams, cells: int, with_mould: bool) -> None:
         self._params = params
-        self.surface = lay(params, level)
-        self._rays, _ = geodesic(level)
+        self.surface = lay(params, cells)
+        self._rays, _ = geodesic(cells)
         self._tree = KDTree(self._rays)
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
         chance = params.spawning / (10 - params.propagation_rate)

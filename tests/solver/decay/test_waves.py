@@ -59,8 +59,8 @@ def slope(errors: list[float], ratio: float = 2.0) -> float:
 )
 def test_eigenvalues_of_the_sphere_come_with_order_two(degree, harmonic):
     errors = []
-    for level in (3, 4):
-        sphere = triangulated(*geodesic(level))
+    for cells in (8, 16):
+        sphere = triangulated(*geodesic(cells))
         y = harmonic(*sphere.points.T)
         value = -np.sum(sphere.area * y * laplacian(sphere, y)) / np.sum(sphere.area * y * y)
         errors.append(abs(value / (degree * (degree + 1)) - 1))
@@ -70,7 +70,7 @@ def test_eigenvalues_of_the_sphere_come_with_order_two(degree, harmonic):
 
 def test_a_harmonic_decays_at_its_rate():
     """exp(-l (l + 1) D t); the steps are long enough to need many stages, short enough not to show."""
-    sphere = triangulated(*geodesic(4))
+    sphere = triangulated(*geodesic(16))
     y = 2 + sphere.points[:, 0] * sphere.points[:, 1]
     now, dt = y, 0.004
     stages = stages_for(dt, sphere.stiffest)
@@ -124,7 +124,7 @@ def numpy_twin(
 
 
 def test_the_kernel_is_its_numpy_twin():
-    sphere = triangulated(*geodesic(2))
+    sphere = triangulated(*geodesic(4))
     draw = np.random.default_rng(3)
     y, c = draw.uniform(0.002, 0.02, 162), draw.uniform(0.5, 1.5, 162)
     ours = spread(sphere, y, c, 36.0, 0.01, 0.05, 7)
@@ -207,7 +207,7 @@ def test_reaction_is_of_second_order():
 
 @pytest.fixture(scope="module")
 def layer() -> Layer:
-    sphere = triangulated(*geodesic(3))
+    sphere = triangulated(*geodesic(8))
     x, y, z = sphere.points.T
     return Layer(sphere, RATES, 0.8 + 0.2 * x * y, 1 + 0.3 * z)
 
@@ -256,6 +256,20 @@ def test_nothing_enters_where_the_gate_is_shut(layer):
     assert state.u[gate > 0].min() > 0
 
 
+@pytest.mark.parametrize("cells", [1, 3, 5, 6])
+def test_a_geodesic_sphere_is_closed_even_and_holds_its_halves(cells):
+    points, faces = geodesic(cells)
+    assert points.shape == (10 * cells**2 + 2, 3)
+    assert faces.shape == (20 * cells**2, 3)
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    volumes = np.einsum("ti,ti->t", np.cross(a, b), c)
+    assert volumes.min() > volumes.max() / 2.5
+    twice, _ = geodesic(2 * cells)
+    assert np.abs(points[:, None] - twice).sum(axis=-1).min(axis=1).max() < 1e-12
+
+
 def test_obtuse_triangles_get_no_negative_weight():
     points = np.array([[x, y, 0.0] for y in np.linspace(0, 1, 6) for x in np.linspace(0, 12, 6)])
     points[:, 0] += 2.9 * points[:, 1]
@@ -273,8 +287,8 @@ def test_a_surface_without_triangles_is_refused():
 
 def test_the_lattice_sees_what_the_mesh_holds():
     errors = []
-    for level in (2, 3):
-        rays, _ = geodesic(level)
+    for cells in (4, 8):
+        rays, _ = geodesic(cells)
         wanted = directions(*lattice(24)).reshape(-1, 3)
-        errors.append(float(np.abs(sampler(level, 24) @ rays - wanted).max()))
+        errors.append(float(np.abs(sampler(cells, 24) @ rays - wanted).max()))
     assert slope(errors) == pytest.approx(2, abs=0.2)
