@@ -24,6 +24,7 @@ from solver.decay.body.wrinkles import Wrinkles
 from solver.decay.environment import water_lost
 from solver.decay.settings import choose
 from solver.decay.stepping import march
+from solver.decay.surface import extent
 from solver.decay.system import System
 
 _CELLS = 32
@@ -42,7 +43,7 @@ def main(preset: str = "apple", day: float = 20.0) -> None:
     params = SOLVER.parse({"body": "quasi-static", "te": 0.03}, preset)
     system = System(params, _CELLS, False)
     (reached,) = march(system, (day,), 1e-4, choose(params, "preview").longest, Context())
-    rot, water = system.rot.share(reached.state.rot), water_lost(params, system.surface, day)
+    rot, water = system.rot.share(reached.state.rot), water_lost(params, extent(params), day)
 
     def body(layers: int, tolerance: float) -> Body:
         return Body(params, system.surface, _CELLS, layers, tolerance)

@@ -18,6 +18,7 @@ from solver.decay.body.wrinkles import Wrinkles
 from solver.decay.environment import water_lost
 from solver.decay.settings import choose
 from solver.decay.stepping import march
+from solver.decay.surface import extent
 from solver.decay.system import System
 
 
@@ -37,7 +38,7 @@ def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: in
         fields = time.process_time() - begun
         rot = system.rot.share(reached.state.rot)
         begun = time.process_time()
-        balance = body.settled(body.state(water_lost(params, system.surface, reached.day), rot), balance)
+        balance = body.settled(body.state(water_lost(params, extent(params), reached.day), rot), balance)
         moved = time.process_time() - begun
         begun = time.process_time()
         folds, _, _ = skin.at(balance, folds)

@@ -153,9 +153,10 @@ class DecayParams(Fruit):
     pressure_map: PressureMap | None = Field(
         None, description="Painted pressure map of the body", json_schema_extra={"units": "1"}
     )
-    body: Literal["none", "quasi-static", "paper"] = Field(
+    body: Literal["none", "quasi-static", "paper", "table"] = Field(
         "none",
-        description="How the body moves: not at all, from equilibrium to equilibrium, or as the paper's springs",
+        description="How the body moves: not at all, from equilibrium to equilibrium, as the paper's springs, or as "
+        "the dehydration table says of a fruit that shrank so far (rot and weight do not bear on it)",
         json_schema_extra={"units": "1"},
     )
     swing: Swing = Field(

@@ -30,6 +30,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     """Return maps and shares of the wanted days; see `solver.quantities` for units.
 
     Raises:
+        InvalidInput: the shape is to come from a table that does not hold it.
         Unstable: no step was short enough; carries the stages before.
         NotConverged: the body found no equilibrium; carries the stages before.
         Cancelled: the observer asked to stop.
@@ -40,6 +41,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     wanted = set(need.fields)
     attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": float(deficit(params))}
     shape = Shape(params, need, settings)
+    shape.check(context)
     rows: list[dict[str, Any]] = []
     followed = set(nodes(params, need))
     days = tuple(sorted(followed | set(need.stages)))
@@ -56,7 +58,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             return _dataset(rows, need, attrs, shape)
         with_mould = bool(wanted & MOULD)
         context.report(0.0, f"laying {settings.vertices} points on the fruit")
-        system = System(params, settings.cells, with_mould)
+        system = System(params, settings.cells, with_mould, shape.surface)
         attrs["path"] = "rot-and-mould" if with_mould else "rot"
         for reached in march(system, days, settings.tolerance, settings.longest, context):
             rot = system.rot.share(reached.state.rot)

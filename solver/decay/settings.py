@@ -80,7 +80,7 @@ def choose(params: DecayParams, quality: Quality) -> Settings:
 
 def moved(params: DecayParams, wanted: Collection[str]) -> bool:
     """Return whether the wanted fields ask for a body that moves."""
-    return params.body != "none" and not BODY.isdisjoint(wanted)
+    return params.body in ("quasi-static", "paper") and not BODY.isdisjoint(wanted)
 
 
 def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:

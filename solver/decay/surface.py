@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import robust_laplacian
@@ -23,7 +23,9 @@ from ..fruit import Fruit, directions, lattice
 __all__ = [
     "GOLDEN_ICOSAHEDRON",
     "GOLDEN_POINTS",
+    "Extent",
     "Surface",
+    "extent",
     "geodesic",
     "lay",
     "sampler",
@@ -42,6 +44,13 @@ GOLDEN_ICOSAHEDRON = (
 _RECTANGLE = np.array([[-1, _GOLDEN, 0], [1, _GOLDEN, 0], [-1, -_GOLDEN, 0], [1, -_GOLDEN, 0]])
 #: Its corners (12, 3), of length 1.
 GOLDEN_POINTS: Array = np.concatenate([np.roll(_RECTANGLE, k, axis=1) for k in range(3)]) / np.hypot(1, _GOLDEN)
+
+
+class Extent(NamedTuple):
+    """Area [r1^2] and volume [r1^3] of a fruit."""
+
+    area: float
+    volume: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +139,12 @@ def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
     """
     if len(points) == 0 or len(faces) == 0:
         raise InvalidGeometry("the surface has no triangles.", advice="Give a mesh with at least one triangle.")
-    laplacian, mass = robust_laplacian.mesh_laplacian(np.asarray(points, float), np.asarray(faces, np.int64))
-    area = mass.diagonal()
+    laplacian, area = _cotangents(points, faces) or _robust(points, faces)
     if not np.isfinite(area).all() or area.min() <= 0:
         raise InvalidGeometry(
             "the surface has points that no triangle of positive area touches.", advice="Remove unused points."
         )
-    links: Any = sparse.coo_array(laplacian)
+    links = laplacian.tocoo()
     kept = links.row != links.col
     rows = sparse.csr_array(
         (np.maximum(-links.data[kept], 0), (links.row[kept], links.col[kept])), shape=laplacian.shape
@@ -154,10 +162,56 @@ def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
     )
 
 
+def _cotangents(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array] | None:
+    """Return Laplacian and lumped areas (v) of a mesh whose own triangles are Delaunay; None of any other."""
+    count = len(points)
+    rows, columns, values = [], [], []
+    doubled = np.linalg.norm(
+        np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]), axis=1
+    )
+    if not doubled.min() > 0:
+        return None
+    for k in range(3):
+        o, i, j = (faces[:, (k + m) % 3] for m in range(3))
+        rows.append(np.minimum(i, j))
+        columns.append(np.maximum(i, j))
+        # the angle across from the edge
+        values.append(np.einsum("fk,fk->f", points[i] - points[o], points[j] - points[o]) / (2 * doubled))
+    edge = np.concatenate(rows) * count + np.concatenate(columns)
+    edges, back, uses = np.unique(edge, return_inverse=True, return_counts=True)
+    weight = np.bincount(back, np.concatenate(values))
+    if weight.min() < 0 or uses.max() > 2:
+        return None
+    i, j = edges // count, edges % count
+    both = (np.concatenate([i, j]), np.concatenate([j, i]))
+    laplacian = sparse.coo_array((-np.concatenate([weight, weight]), both), shape=(count, count))
+    return laplacian, np.bincount(faces.ravel(), np.repeat(doubled / 6, 3), count)
+
+
+def _robust(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array]:
+    laplacian, mass = robust_laplacian.mesh_laplacian(np.asarray(points, float), np.asarray(faces, np.int64))
+    return laplacian, mass.diagonal()
+
+
 def lay(fruit: Fruit, cells: int) -> Surface:
     """Return the fruit's fresh outer surface as a geodesic sphere of so many `cells` laid on it."""
-    rays, faces = geodesic(cells)
-    return triangulated(fruit.surface(np.arccos(np.clip(rays[:, 1], -1, 1)), np.arctan2(rays[:, 2], rays[:, 0])), faces)
+    return triangulated(_laid(fruit, cells), geodesic(cells)[1])
+
+
+def _laid(fruit: Fruit, cells: int) -> Array:
+    rays, _ = geodesic(cells)
+    return fruit.surface(np.arccos(np.clip(rays[:, 1], -1, 1)), np.arctan2(rays[:, 2], rays[:, 0]))
+
+
+def extent(fruit: Fruit) -> Extent:
+    """Return area and volume of the fresh fruit, from two coarse spheres: the error of order two cancels."""
+    coarse, fine = (_facets(_laid(fruit, cells), geodesic(cells)[1]) for cells in (16, 32))
+    return Extent(*((4 * fine - coarse) / 3).tolist())
+
+
+def _facets(points: Array, faces: NDArray[np.int64]) -> Array:
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return np.array([np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2, np.sum(a * np.cross(b, c)) / 6])
 
 
 @lru_cache(maxsize=4)

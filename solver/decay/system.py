@@ -23,7 +23,7 @@ from .places import painted
 from .rates import Rates, daily
 from .seeds import seeds
 from .spawning import Landing, Spawner
-from .surface import geodesic, lay
+from .surface import Surface, geodesic, lay
 
 __all__ = ["Both", "System"]
 
@@ -49,11 +49,14 @@ class _Due(NamedTuple):
 
 
 class System:
-    """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it."""
+    """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it.
 
-    def __init__(self, params: DecayParams, cells: int, with_mould: bool) -> None:
+    surface: the fruit's own of so many cells, where it has been laid already.
+    """
+
+    def __init__(self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None) -> None:
         self._params = params
-        self.surface = lay(params, cells)
+        self.surface = surface or lay(params, cells)
         self._rays, _ = geodesic(cells)
         self._tree = KDTree(self._rays)
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)

@@ -15,7 +15,7 @@ from scipy import sparse
 from ...fruit import directions, lattice
 from ..environment import reference_radius
 from ..params import DecayParams
-from ..surface import Surface, geodesic, shares_at
+from ..surface import Surface, extent, geodesic, shares_at
 from .equilibrium import Balance, Loads, rested, settle
 from .flesh import Softened, softened
 from .material import blocks
@@ -45,7 +45,7 @@ class Body:
         self._cells, self._layers = cells, layers
         self._tolerance = tolerance
         self._pattern = blocks(self.solid.tets, len(self.solid.points))
-        r1 = reference_radius(params, surface)
+        r1 = reference_radius(params, extent(params))
         self._pressure, self._inertia = _DENSITY * params.flesh.gravity * r1, _DENSITY * r1**2
 
     def state(self, water: float, rot: Array | None) -> Softened:

@@ -12,7 +12,7 @@ from solver.decay.presets import ENVIRONMENTS
 from solver.decay.settings import choose
 from solver.decay.spawning import Spawner
 from solver.decay.stepping import march
-from solver.decay.surface import lay
+from solver.decay.surface import extent
 from solver.decay.system import System
 
 FAST = {"growth_rate": 100.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
@@ -50,14 +50,14 @@ def test_the_room_of_the_paper():
 )
 def test_daily_losses_of_table_1(fruit, daily):
     params = SOLVER.parse({"radii": (1.0,) * 8}, fruit)
-    fresh = lay(params, 8)
+    fresh = extent(params)
     assert water_lost(params, fresh, 1.0) == pytest.approx(daily, rel=0.1)
     assert water_lost(params, fresh, 1e6) == params.water_content / 100
 
 
 def test_water_lost_in_changing_air_is_the_integral():
     """Humidity falls evenly at a steady temperature: the mean of both ends, exactly."""
-    fresh = lay(DecayParams(), 4)
+    fresh = extent(DecayParams())
     falling = [{"day": 0, "temperature": 22.2, "humidity": 80}, {"day": 10, "temperature": 22.2, "humidity": 40}]
     lost = water_lost(DecayParams(weather=falling), fresh, 10.0)
     ends = [water_lost(DecayParams(humidity=h), fresh, 10.0) for h in (80, 40)]
