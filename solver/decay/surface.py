@@ -185,7 +185,7 @@ def _cotangents(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array] | 
     i, j = edges // count, edges % count
     both = (np.concatenate([i, j]), np.concatenate([j, i]))
     laplacian = sparse.coo_array((-np.concatenate([weight, weight]), both), shape=(count, count))
-    return laplacian, np.bincount(faces.ravel(), np.repeat(doubled / 6, 3), count)
+    return laplacian, np.bincount(faces.ravel(), np.repeat(doubled / 6, 3), count).astype(float)
 
 
 def _robust(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array]:
