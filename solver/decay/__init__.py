@@ -32,7 +32,7 @@ _SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutri
 
 SOLVER = Solver(
     name="decay",
-    version="1",
+    version="2",
     title="Decay of fruits: rot and mould",
     params=DecayParams,
     fields=(
