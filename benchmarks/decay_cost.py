@@ -1,6 +1,6 @@
 """What a step of rot and mould costs, by points and by infected area: python -m benchmarks.decay_cost.
 
-A colony that covers a share of the sphere, both organisms; CPU milliseconds of a step, the least of five, and the slopes
+A colony that covers a share of the sphere, both organisms; CPU milliseconds of a step, the least of five, and slopes
 of log cost over log points and of cost over listed points.
 """
 

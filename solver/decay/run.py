@@ -126,6 +126,8 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
         }
     row: dict[str, Any] = {name: value for name, value in found.items() if name in wanted}
     if wanted & set(maps):
+        if system.imported:
+            return row | {name: maps[name].astype(need.dtype) for name in sorted(wanted & set(maps))}
         assert need.resolution is not None  # settled
         inside = window(need.resolution, need.region)
         sample = sampler(cells, need.resolution)
@@ -144,12 +146,14 @@ def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shap
             data[name] = (("stage", "vertex", "component"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
+        elif name in FIELDS and values.ndim == 2:
+            data[name] = (("stage", "vertex"), values)
         elif name in FIELDS:
             data[name] = (("stage", "colatitude", "azimuth"), values)
         elif name != "stage":
             data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
-    if any(name in FIELDS for name in data):
+    if any(name in FIELDS and data[name][1].ndim > 2 for name in data):
         down, along = window(need.resolution, need.region)
         coords["colatitude"] = colatitudes(need.resolution)[down]
         coords["azimuth"] = azimuths(need.resolution)[along]

@@ -37,7 +37,7 @@ class Settings:
     """cells: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day].
 
     layers: shells of the body. balance, smooth: out-of-balance force of body and of skin over the forces in them.
-    skin: cells of the skin's own mesh.
+    skin: cells of the skin's own mesh. imported: points of a mesh of the user's own, which stands for the sphere.
     """
 
     cells: int
@@ -47,11 +47,12 @@ class Settings:
     balance: float
     smooth: float
     skin: int
+    imported: int = 0
 
     @property
     def vertices(self) -> int:
         """Number of points on the surface."""
-        return 10 * self.cells**2 + 2
+        return self.imported or 10 * self.cells**2 + 2
 
 
 _MESHES: dict[Quality, tuple[int, float]] = {"preview": (32, 1e-4), "default": (96, 3e-5), "fine": (192, 1e-5)}
@@ -75,7 +76,13 @@ _BYTES = 1000
 def choose(params: DecayParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
     cells, tolerance = _MESHES[quality]
-    return Settings(cells, tolerance, _LONGEST / max(_clock(params), 0.1), *_BODIES[quality])
+    return Settings(
+        cells,
+        tolerance,
+        _LONGEST / max(_clock(params), 0.1),
+        *_BODIES[quality],
+        len(params.mesh.points) if params.mesh else 0,
+    )
 
 
 def moved(params: DecayParams, wanted: Collection[str]) -> bool:

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contract import Context, Need
+from ..contract import Context, InvalidInput, Need
 from ..fruit import lattice, window
 from . import dried
 from .environment import water_lost
+from .imported import extent_of
 from .params import DecayParams
 from .settings import BODY, Settings, moved
-from .surface import Surface, extent, geodesic, lay
+from .surface import Surface, extent, geodesic
+from .system import laid
 
 if TYPE_CHECKING:
     from .body.equilibrium import Balance
@@ -43,8 +45,11 @@ class Shape:
         meshed = not {"volume", "mesh_position", "triangle"}.isdisjoint(self._wanted)
         self._dries = params.body == "table" and not BODY.isdisjoint(self._wanted)
         self._rays = geodesic(settings.cells)[0] if self._dries and meshed else None
-        self.surface = lay(params, settings.cells) if moves or meshed else None
-        self._extent = extent(params)
+        own = params.mesh is not None
+        self.surface = laid(params, settings.cells) if moves or meshed or own else None
+        # an open patch does not say how much it closes: water is lost by the fruit of the parameters
+        self._closed = extent_of(self.surface) if own and self.surface is not None else extent(params)
+        self._extent = self._closed or extent(params)
         self._body = self._wrinkles = None
         self._node: _Settled = _Settled(None, None)
         if moves and self.surface is not None:
@@ -60,9 +65,18 @@ class Shape:
         """Refuse, before any step, what no table can answer.
 
         Raises:
-            InvalidInput: the need names the flesh, or the fruit on the last day lies outside the table.
+            InvalidInput: the need names the flesh, or the fruit on the last day lies outside the table; or it asks an
+                imported mesh for what only the fruit has.
 
         """
+        if self._params.mesh is not None:
+            lattice = {"position", "displacement"} & self._wanted
+            if lattice or self._need.region is not None:
+                raise InvalidInput(
+                    "an imported mesh has no lattice of colatitudes.", advice="Ask for mesh_position, without a region."
+                )
+            if "volume" in self._wanted and self._closed is None:
+                raise InvalidInput("an open mesh has no volume.", advice="Close it, or leave the volume out.")
         if self._dries:
             dried.check(self._params, self._need)
             dried.displaced(self._params, self._lost(self._need.stages[-1]), 4, context)
@@ -113,7 +127,9 @@ class Shape:
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
             if "volume" in wanted:
-                row["volume"] = _volume(points, self.surface)
+                # an imported mesh may be wound either way
+                own = self._closed if self._params.mesh is not None else None
+                row["volume"] = own.volume if own else _volume(points, self.surface)
         return row
 
     def follow(self, day: float, rot: Array | None, context: Context) -> None:

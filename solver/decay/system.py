@@ -16,6 +16,7 @@ from ..contract import Context
 from ..fruit import directions
 from .colony import Colony
 from .gate import SHUT, gates
+from .imported import rays_from
 from .layer import Layer, State
 from .noise import patches
 from .params import DecayParams
@@ -23,9 +24,9 @@ from .places import painted
 from .rates import Rates, daily
 from .seeds import seeds
 from .spawning import Landing, Spawner
-from .surface import Surface, geodesic, lay
+from .surface import Surface, geodesic, lay, triangulated
 
-__all__ = ["Both", "System"]
+__all__ = ["Both", "System", "laid"]
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,18 @@ class _Due(NamedTuple):
     rots: bool
 
 
+def laid(params: DecayParams, cells: int) -> Surface:
+    """Return what everything grows on: the imported mesh, or the fruit's own surface of so many cells.
+
+    Raises:
+        InvalidGeometry: the mesh has points that no triangle of positive area touches.
+
+    """
+    if params.mesh is None:
+        return lay(params, cells)
+    return triangulated(np.array(params.mesh.points, float), np.array(params.mesh.faces, np.int64))
+
+
 class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it.
 
@@ -56,8 +69,8 @@ class System:
 
     def __init__(self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None) -> None:
         self._params = params
-        self.surface = surface or lay(params, cells)
-        self._rays, _ = geodesic(cells)
+        self.surface = surface or laid(params, cells)
+        self._rays = geodesic(cells)[0] if params.mesh is None else rays_from(self.surface.points)
         self._tree = KDTree(self._rays)
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
         chance = params.spawning / (10 - params.propagation_rate)
@@ -78,9 +91,10 @@ class System:
     def _wounded(self, params: DecayParams) -> Both:
         rot, mould = self.rot.fresh, self.mould.fresh if self.mould else None
         for wound in seeds(params):
-            theta, phi = np.radians([wound.colatitude, wound.azimuth])
-            centre = params.surface(theta, phi)
-            ray = directions(theta, phi)
+            ray = directions(*np.radians([wound.colatitude, wound.azimuth]))
+            if wound.vertex is not None:
+                ray = self._rays[wound.vertex]
+            centre = self._place(ray) if wound.vertex is None else self.surface.points[wound.vertex]
             rot = self.rot.seeded(rot, centre, wound.radius)
             self._rot_spawner.settle(ray, 0.0)
             if self.mould is not None and mould is not None:
@@ -92,6 +106,11 @@ class System:
             if self.mould is not None and mould is not None:
                 mould = self.mould.painted(mould, share * self.gate(rot))
         return Both(rot, mould)
+
+    @property
+    def imported(self) -> bool:
+        """Whether the surface is a mesh of the user's own, whose vertices have the fields."""
+        return self._params.mesh is not None
 
     @property
     def steady(self) -> bool:
@@ -148,8 +167,7 @@ class System:
         assert self._due is not None
         landing, rots = self._due
         self._due = None
-        x, y, z = landing.direction
-        place = self._params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
+        place = self._place(landing.direction)
         if rots:
             self._rot_spawner.settle(landing.direction, landing.day)
             return state._replace(rot=self.rot.seeded(state.rot, place, _SPORE))
@@ -157,6 +175,13 @@ class System:
         assert state.mould is not None
         self._mould_spawner.settle(landing.direction, landing.day)
         return state._replace(mould=self.mould.seeded(state.mould, place, _SPORE, self.gate(state.rot)))
+
+    def _place(self, ray: Array) -> Array:
+        """Return the point (3) of the skin in a unit direction; of an imported mesh the vertex nearest to it."""
+        if self._params.mesh is not None:
+            return np.asarray(self.surface.points[int(self._tree.query(ray)[1])])
+        x, y, z = ray
+        return self._params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
 
     def _roots(self, state: Both, landing: Landing, site: int, rots: bool) -> bool:
         rotten = float(self.rot.share(state.rot)[site])
