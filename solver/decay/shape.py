@@ -70,10 +70,10 @@ class Shape:
 
         """
         if self._params.mesh is not None:
-            lattice = {"position", "displacement"} & self._wanted
-            if lattice or self._need.region is not None:
+            if "displacement" in self._wanted or self._need.region is not None:
                 raise InvalidInput(
-                    "an imported mesh has no lattice of colatitudes.", advice="Ask for mesh_position, without a region."
+                    "an imported mesh has no lattice of colatitudes.",
+                    advice="Ask for fields without a region, and no displacement.",
                 )
             if "volume" in self._wanted and self._closed is None:
                 raise InvalidInput("an open mesh has no volume.", advice="Close it, or leave the volume out.")

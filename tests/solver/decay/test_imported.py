@@ -41,6 +41,14 @@ def test_the_fruit_s_own_mesh_rots_as_the_fruit():
     assert np.array_equal(own.triangle.values, fresh.faces)
 
 
+def test_a_position_is_that_of_the_mesh():
+    points, faces = patch()
+    run = grown(mesh(points, faces), ("position", "rot"))
+    assert set(run.data_vars) >= {"mesh_position", "triangle", "rot"}
+    assert "position" not in run
+    assert run.mesh_position[0].values == pytest.approx(points, abs=1e-6)
+
+
 def test_an_open_patch_rots_from_a_vertex_and_keeps_the_budget():
     points, faces = patch()
     run = grown(mesh(points, faces), wounds=[{"vertex": 7}])
@@ -95,7 +103,7 @@ def test_what_does_not_fit_a_mesh_is_refused(values, said):
 def test_what_a_mesh_does_not_have_is_refused():
     points, faces = patch()
     with pytest.raises(InvalidInput, match="no lattice"):
-        grown(mesh(points, faces), ("position",))
+        grown(mesh(points, faces), ("displacement",))
     with pytest.raises(InvalidInput, match="open mesh has no volume"):
         grown(mesh(points, faces), ("volume",))
     with pytest.raises(InvalidGeometry, match="no triangle of positive area"):
