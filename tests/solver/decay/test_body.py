@@ -11,7 +11,7 @@ from solver.decay.body.equilibrium import Loads, rested, settle
 from solver.decay.body.flesh import Flesh, softened
 from solver.decay.body.material import blocks, energy, forces, hessian
 from solver.decay.body.solid import fill, volumes
-from solver.decay.surface import geodesic, lay
+from solver.decay.surface import extent, geodesic, lay
 from solver.fruit import PRESETS, Fruit
 
 
@@ -203,7 +203,8 @@ def test_the_floor_carries_the_weight_of_what_is_left(firmness):
     body = Body(params, surface, 16, 6, 1e-3)
     balance = body.settled(body.state(0.3, None))
     rigid = body.state(0.3, None).mass
-    r1 = (params.weight * 1e-6 / surface_volume(surface)) ** (1 / 3)
+    assert extent(params).volume == pytest.approx(surface_volume(lay(params, 64)), rel=1e-3)
+    r1 = (params.weight * 1e-6 / extent(params).volume) ** (1 / 3)
     newtons = 9.81 * 1000 * np.sum(rigid * body.solid.volume) * r1**3
     assert balance.reaction * r1**2 == pytest.approx(newtons, rel=1e-6)
     assert balance.residual <= 1e-3
