@@ -10,7 +10,10 @@ from solver.decay.surface import geodesic
 from solver.fruit import directions, lattice
 from store import starter
 from store.lookup import ShapeTable
+from store.store import Store
 from sweeps.dried import dried
+from sweeps.plan import job
+from sweeps.work import Task, work
 
 FRUIT = {"body": "table", "transpiration": 14.1, "weight": 87.0, "water_content": 88.0, "wounds": []}
 
@@ -72,3 +75,15 @@ def test_what_the_table_does_not_hold_is_refused_before_any_step(values, need, s
 def test_without_a_table_it_says_so():
     with pytest.raises(InvalidInput, match="there is none here"):
         solve(context=Context())
+
+
+def test_a_job_finds_the_table_too(tmp_path):
+    store = Store.open(tmp_path / "store", create=True)
+    params = SOLVER.parse(FRUIT)
+    need = SOLVER.settle(Need(fields=("position",), stages=(1.0,), resolution=16))
+    spec = job(SOLVER, params, need)
+    store.ledger.want([spec], "test")
+    assert store.ledger.claim("tester", 60) is not None
+    assert work(Task(store.root, spec, "tester", 60.0)).state == "done"
+    theirs = solve(fields=("position",), stages=(1.0,), resolution=16).position.values
+    assert np.array_equal(store.get(spec.key)["position"].values, theirs)
