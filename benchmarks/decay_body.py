@@ -24,9 +24,10 @@ from solver.decay.body.wrinkles import Wrinkles
 from solver.decay.environment import water_lost
 from solver.decay.settings import choose
 from solver.decay.stepping import march
+from solver.decay.surface import extent
 from solver.decay.system import System
 
-_LEVEL = 5
+_CELLS = 32
 
 
 def least(work: Callable[[], Any], times: int = 3) -> tuple[Any, float]:
@@ -40,18 +41,18 @@ def least(work: Callable[[], Any], times: int = 3) -> tuple[Any, float]:
 
 def main(preset: str = "apple", day: float = 20.0) -> None:
     params = SOLVER.parse({"body": "quasi-static", "te": 0.03}, preset)
-    system = System(params, _LEVEL, False)
+    system = System(params, _CELLS, False)
     (reached,) = march(system, (day,), 1e-4, choose(params, "preview").longest, Context())
-    rot, water = system.rot.share(reached.state.rot), water_lost(params, system.surface, day)
+    rot, water = system.rot.share(reached.state.rot), water_lost(params, extent(params), day)
 
     def body(layers: int, tolerance: float) -> Body:
-        return Body(params, system.surface, _LEVEL, layers, tolerance)
+        return Body(params, system.surface, _CELLS, layers, tolerance)
 
     fine = body(12, 1e-6)
     there = fine.on_surface(fine.settled(fine.state(water, rot)))
     rows = []
     for quality in ("preview", "default"):
-        settings = dataclasses.replace(choose(params, quality), level=_LEVEL)
+        settings = dataclasses.replace(choose(params, quality), cells=_CELLS)
         ours = body(settings.layers, settings.balance)
         state = ours.state(water, rot)
         balance, took = least(lambda ours=ours, state=state: ours.settled(state))  # type: ignore[misc]

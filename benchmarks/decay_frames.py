@@ -18,6 +18,7 @@ from solver.decay.body.wrinkles import Wrinkles
 from solver.decay.environment import water_lost
 from solver.decay.settings import choose
 from solver.decay.stepping import march
+from solver.decay.surface import extent
 from solver.decay.system import System
 
 
@@ -25,8 +26,8 @@ def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: in
     params = SOLVER.parse({"body": "quasi-static", "te": 0.03, "skin": {}}, preset)
     assert isinstance(params, DecayParams)
     settings = choose(params, "default")
-    system = System(params, settings.level, True)
-    body = Body(params, system.surface, settings.level, settings.layers, settings.balance)
+    system = System(params, settings.cells, True)
+    body = Body(params, system.surface, settings.cells, settings.layers, settings.balance)
     skin = Wrinkles(params, Skin(), body, settings)
     # the first two frames compile and find the shape to start from
     days = tuple(day + k / rate for k in range(count + 2))
@@ -37,7 +38,7 @@ def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: in
         fields = time.process_time() - begun
         rot = system.rot.share(reached.state.rot)
         begun = time.process_time()
-        balance = body.settled(body.state(water_lost(params, system.surface, reached.day), rot), balance)
+        balance = body.settled(body.state(water_lost(params, extent(params), reached.day), rot), balance)
         moved = time.process_time() - begun
         begun = time.process_time()
         folds, _, _ = skin.at(balance, folds)

@@ -40,7 +40,7 @@ def _grown(values: dict[str, Any], preset: str | None = None) -> str:
     """Run rot and mould on a small sphere; return what they covered."""
     params = SOLVER.parse({"growth_rate": 50.0, **values}, preset)
     assert isinstance(params, DecayParams)
-    system = System(params, 4, True)
+    system = System(params, 16, True)
     worst = 0.0
     for reached in march(system, (0.5, 3.0), 1e-3, choose(params, "preview").longest, Context()):
         for layer, state in zip((system.rot, system.mould), reached.state, strict=True):
@@ -73,7 +73,7 @@ def _frames() -> str:
         params, ends = DecayParams(growth_rate=50.0, seed=seed), []
         for rate in (24, 96):
             days = tuple(np.arange(1, rate + 1) / rate * 2.0)
-            *_, end = march(System(params, 3, True), days, 1e-3, 0.5, Context())
+            *_, end = march(System(params, 8, True), days, 1e-3, 0.5, Context())
             ends.append(end.state)
         same = all(np.array_equal(a, b) for x, y in zip(*ends, strict=True) for a, b in zip(x[:3], y[:3], strict=True))
         _demand(same, "the number of frames changed the rot")
@@ -91,7 +91,7 @@ def _dry() -> str:
 
 
 def _obtuse() -> str:
-    points, faces = geodesic(4)
+    points, faces = geodesic(16)
     flat = points * [1.0, 0.02, 1.0]
     said, surface, _ = _spread(flat, faces)
     _demand(surface.weight.min() >= 0, "a negative weight")
@@ -99,14 +99,14 @@ def _obtuse() -> str:
 
 
 def _hole() -> str:
-    points, faces = geodesic(4)
+    points, faces = geodesic(16)
     kept = faces[points[faces].mean(axis=1)[:, 0] < 0.5]
     used, faces = np.unique(kept, return_inverse=True)
     return _spread(points[used], faces.reshape(-1, 3))[0]
 
 
 def _inverted() -> str:
-    points, faces = geodesic(4)
+    points, faces = geodesic(16)
     said, _, there = _spread(points, faces)
     _, _, here = _spread(points, faces[:, ::-1].copy())
     _demand(float(np.abs(here - there).max()) < 1e-9, "inside out is not the same")

@@ -289,10 +289,12 @@ class Context:
         observe: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
         library: Callable[[str], xr.Dataset | None] | None = None,
+        dried: Callable[[Mapping[str, float], float, int], np.ndarray] | None = None,
     ) -> None:
         self._observe = observe
         self._cancelled = cancelled
         self._library = library
+        self._dried = dried
         self._fraction = 0.0
 
     def report(self, fraction: float, message: str = "") -> None:
@@ -310,6 +312,22 @@ class Context:
         """
         if self._cancelled is not None and self._cancelled():
             raise Cancelled("the run was cancelled.")
+
+    def dried(self, fruit: Mapping[str, float], shrinkage: float, resolution: int) -> np.ndarray:
+        """Return the displacement (n, 2 n, 3) [r1] of a dried fruit, for runs that want its shape and no more.
+
+        fruit: by the names of the dehydration solver's axes. shrinkage: its s, the share of each length that is lost.
+
+        Raises:
+            InvalidInput: nobody here knows dried shapes, or none of this fruit.
+
+        """
+        if self._dried is None:
+            raise InvalidInput(
+                "the shape comes from a table of dried fruits, and there is none here.",
+                advice="Run it by `wizen solve`, by a sweep or as a job, or give Context(dried=sweeps.dried.dried).",
+            )
+        return self._dried(fruit, shrinkage, resolution)
 
     def result(self, key: str) -> xr.Dataset:
         """Return an earlier result by its key, for runs that start from one.

@@ -130,6 +130,7 @@ def solve(
     from store import shards
 
     from . import outputs, progress
+    from .dried import dried
     from .formats import Made
     from .plan import job, units_of
     from .words import per_stage, show_run
@@ -154,7 +155,7 @@ def solve(
     spec = job(chosen, params, need)
     start = time.perf_counter()
     with progress.one_run(solver) as observe, progress.stopping() as stop:
-        result = chosen.solve(params, need, Context(observe, stop.is_set))
+        result = chosen.solve(params, need, Context(observe, stop.is_set, dried=dried))
     seconds = time.perf_counter() - start
     document = {
         "key": spec.key,

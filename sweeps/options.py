@@ -60,10 +60,12 @@ TableName = Annotated[str, typer.Option("--name", help="Name of the table.")]
 
 
 def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
-    """Return the values of `--set NAME=VALUE` options; VALUE is TOML or JSON, a list without brackets, or plain text.
+    """Return the values of `--set NAME=VALUE` options.
+
+    VALUE is TOML or JSON, a list without brackets, @ and a mesh file, or plain text.
 
     Raises:
-        InvalidOption: no NAME=, or a name given twice.
+        InvalidOption: no NAME=, a name given twice, or a mesh file that cannot be read.
 
     """
     values: dict[str, Any] = {}
@@ -99,6 +101,10 @@ def parameters(path: Path | None) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
+    if text.startswith("@"):
+        from . import meshfile
+
+        return meshfile.read(Path(text[1:]))
     readers = [lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)]
     if "," in text:
         readers.append(lambda: tomllib.loads(f"value = [{text}]")["value"])

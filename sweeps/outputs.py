@@ -166,9 +166,15 @@ def save(path: Path, made: Made) -> None:
 
     Raises:
         StorageFull: the disk is full; nothing half-written stays.
+        InvalidOption: the format holds the fruit's lattice only, and the run has a mesh of its own.
 
     """
     encoder = suffixes(made.run is not None)[path.suffix]
+    if encoder is not None and encoder.single and "position" in encoder.fields and not made.shapes:
+        raise InvalidOption(
+            f"--out {path}: a run on a mesh of its own is not written as {path.suffix} at once.",
+            "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
+        )
     if encoder is None:
         assert made.run is not None
         shards.write(path, made.run, made.key)

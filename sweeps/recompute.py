@@ -14,6 +14,8 @@ from store.audit import Finding
 from store.store import Store
 from store.tables import TableInfo
 
+from .dried import dried
+
 __all__ = ["Spot", "recompute"]
 
 
@@ -62,7 +64,7 @@ def _spot(store: Store, key: str, tolerance: float, cancelled: Callable[[], bool
     job = store.ledger.get(key)
     solver, stored = registry.get(job.solver), store.get(key)
     try:
-        context = Context(cancelled=cancelled, library=store.find)
+        context = Context(cancelled=cancelled, library=store.find, dried=dried)
         again = solver.solve(solver.parse(job.params), Need.parse(job.need), context)
     except SolverError as error:
         if error.code == "cancelled":

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .params import DecayParams
-from .surface import Surface
+from .surface import Extent
 
 __all__ = ["air", "damping", "deficit", "reference_radius", "saturation", "water_lost"]
 
@@ -56,21 +56,19 @@ def deficit(params: DecayParams, day: float | Array = 0.0) -> Any:
     return np.maximum(saturation(celsius) * (_ACTIVITY - humidity / 100), 0.0)
 
 
-def water_lost(params: DecayParams, surface: Surface, days: float) -> float:
+def water_lost(params: DecayParams, extent: Extent, days: float) -> float:
     """Return the water lost after some days, over the fresh weight: Eq. 10 until no water is left.
 
     The fruit's size follows from its weight, its shape and a density of 1 g/cm^3.
     """
-    r1 = reference_radius(params, surface)
-    grams = params.transpiration * surface.total(1.0) * r1**2 * _dryness(params, days) * 1e-6 * _SECONDS
+    r1 = reference_radius(params, extent)
+    grams = params.transpiration * extent.area * r1**2 * _dryness(params, days) * 1e-6 * _SECONDS
     return float(min(grams / params.weight, params.water_content / 100))
 
 
-def reference_radius(params: DecayParams, surface: Surface) -> float:
+def reference_radius(params: DecayParams, extent: Extent) -> float:
     """Return r1 [m] of a fruit of this shape and weight, at a density of 1 g/cm^3."""
-    a, b, c = (surface.points[surface.faces[:, k]] for k in range(3))
-    volume = float(np.sum(a * np.cross(b, c))) / 6
-    return float((params.weight / (_DENSITY * volume)) ** (1 / 3))
+    return float((params.weight / (_DENSITY * extent.volume)) ** (1 / 3))
 
 
 def _dryness(params: DecayParams, days: float) -> float:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .diffusion import listed_around, rkl2, stages_for
+from .diffusion import Links, linked, listed_around, rkl2, stages_for
 from .rates import Rates
 from .reaction import react
 from .surface import Surface
@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _RINGS = 3
 #: Density below which nothing lives, over d2.
 _CUT = 1e-8
+_NO_ROT: Array = np.empty(0)
 
 
 class State(NamedTuple):
@@ -43,6 +44,7 @@ class Layer:
         self.surface, self.rates = surface, rates
         self._coarse = coarse
         self._all = np.arange(len(fresh))
+        self._everywhere = self._linked(np.ones_like(fresh), _NO_ROT, self._all)
         zero = np.zeros_like(fresh)
         self.fresh = State(zero, zero, fresh, 0.0)
         self._store = rates.theta * surface.mean(fresh)
@@ -51,8 +53,8 @@ class Layer:
         """Return u + v over what the nutrient n = 1 can feed: the organism's map, 0 to 1."""
         return np.minimum((state.u + state.v) / self.rates.theta, 1.0)
 
-    def advance(self, state: State, dt: float, gate: Array | None = None, rates: Rates | None = None) -> State:
-        """Return the state dt [day] later; `gate` (v), 0 to 1, says where the organism may spread.
+    def advance(self, state: State, dt: float, rot: Array = _NO_ROT, rates: Rates | None = None) -> State:
+        """Return the state dt [day] later. rot (v): the map whose gate says where the organism may spread.
 
         rates: those of this step, where the weather changes them.
         """
@@ -60,12 +62,11 @@ class Layer:
         u, v, n = state.u.copy(), state.v.copy(), state.n.copy()
         s = self.surface
         listed = listed_around(u, _CUT * self.rates.cap, _RINGS, s.start, s.near)
-        self._half(u, v, n, listed, dt / 2, gate, rates)
+        self._half(u, v, n, listed, dt / 2, rot, rates)
         if rates.feed > 0:
             stages = stages_for(dt, rates.feed * s.stiffest)
-            ones = np.ones_like(n)
-            rkl2(n, ones, rates.feed, 0.0, dt, stages, self._all, s.start, s.near, s.weight, s.area)
-        self._half(u, v, n, listed, dt / 2, gate, rates)
+            rkl2(n, self._everywhere, rates.feed, 0.0, dt, stages, self._all, s.area)
+        self._half(u, v, n, listed, dt / 2, rot, rates)
         return State(u, v, n, state.added)
 
     def _half(
@@ -75,17 +76,22 @@ class Layer:
         n: Array,
         listed: NDArray[np.int64],
         dt: float,
-        gate: Array | None,
+        rot: Array,
         rates: Rates,
     ) -> None:
         s = self.surface
         if not len(listed):
             return
         react(u, v, n, listed, dt / 2, rates)
-        c = self._coarse * n if gate is None else self._coarse * n * gate
-        stages = stages_for(dt, rates.fastest * s.stiffest * float(c[listed].max()))
-        rkl2(u, c, rates.mobility, rates.cap, dt, stages, listed, s.start, s.near, s.weight, s.area)
+        c = self._coarse * n
+        # two stages would be stable but less accurate
+        stages = max(3, stages_for(dt, rates.fastest * s.stiffest * float(c[listed].max())))
+        rkl2(u, self._linked(c, rot, listed), rates.mobility, rates.cap, dt, stages, listed, s.area)
         react(u, v, n, listed, dt / 2, rates)
+
+    def _linked(self, c: Array, rot: Array, listed: NDArray[np.int64]) -> Links:
+        s = self.surface
+        return linked(c, rot, listed, s.start, s.near, s.weight, s.area)
 
     def seeded(self, state: State, centre: Array, radius: float, gate: Array | None = None) -> State:
         """Return the state with a new colony: a smooth bump of height d2 about a point (3), times the gate.

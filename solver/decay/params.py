@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ..fruit import Fruit
 from .body.flesh import Flesh, Skin, Swing
 from .colony import MOULDS, SOFT_ROT, Colony
+from .imported import Mesh
 from .places import Neighbour, Painted, Pressure, PressureMap, Wound
 
 __all__ = ["DecayParams", "Weather", "Wound"]
@@ -144,6 +145,11 @@ class DecayParams(Fruit):
     neighbours: tuple[Neighbour, ...] = Field(
         (), max_length=64, description="Round fruits beside this one", json_schema_extra={"units": "1"}
     )
+    mesh: Mesh | None = Field(
+        None,
+        description="A triangle mesh in place of the fruit's surface, closed or open; fields are those of its vertices",
+        json_schema_extra={"units": "r1"},
+    )
     pressure: tuple[Pressure, ...] = Field(
         (),
         max_length=64,
@@ -153,9 +159,10 @@ class DecayParams(Fruit):
     pressure_map: PressureMap | None = Field(
         None, description="Painted pressure map of the body", json_schema_extra={"units": "1"}
     )
-    body: Literal["none", "quasi-static", "paper"] = Field(
+    body: Literal["none", "quasi-static", "paper", "table"] = Field(
         "none",
-        description="How the body moves: not at all, from equilibrium to equilibrium, or as the paper's springs",
+        description="How the body moves: not at all, from equilibrium to equilibrium, as the paper's springs, or as "
+        "the dehydration table says of a fruit that shrank so far (rot and weight do not bear on it)",
         json_schema_extra={"units": "1"},
     )
     swing: Swing = Field(
@@ -185,6 +192,23 @@ class DecayParams(Fruit):
         description="Mould that is no longer active, linear red, green, blue; its active rim is white",
         json_schema_extra={"units": "1"},
     )
+
+    @model_validator(mode="after")
+    def _fits_the_mesh(self) -> Self:
+        count = len(self.mesh.points) if self.mesh else 0
+        for wound in self.wounds:
+            if wound.vertex is not None and wound.vertex >= count:
+                where = (
+                    f"the mesh has vertices 0 to {count - 1}"
+                    if count
+                    else "only an imported mesh has numbered vertices"
+                )
+                raise ValueError(f"a wound names vertex {wound.vertex}: {where}")
+        if self.mesh is not None and self.body != "none":
+            raise ValueError(f"an imported mesh has no flesh under it: take body=none, not {self.body}")
+        if self.mesh is not None and self.seeds == "contacts":
+            raise ValueError("an imported mesh has neither stem nor floor: take seeds=wounds")
+        return self
 
     @field_validator("weather")
     @classmethod

@@ -51,7 +51,18 @@ class Place(BaseModel):
 
 
 class Wound(Place):
-    """A place where rot and mould enter on day 0."""
+    """A place where rot and mould enter on day 0; on an imported mesh `vertex` may be given in place of the angles."""
+
+    vertex: int | None = Field(None, ge=0, description="Number of a vertex of the imported mesh")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbered(cls, value: Any) -> Any:
+        if not isinstance(value, dict) or value.get("vertex") is None:
+            return value
+        if "position" in value:
+            raise ValueError("give a position or a vertex, not both")
+        return {"colatitude": 0.0, **value}
 
 
 class Pressure(Place):

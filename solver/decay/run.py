@@ -30,16 +30,20 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     """Return maps and shares of the wanted days; see `solver.quantities` for units.
 
     Raises:
+        InvalidInput: the shape is to come from a table that does not hold it.
         Unstable: no step was short enough; carries the stages before.
         NotConverged: the body found no equilibrium; carries the stages before.
         Cancelled: the observer asked to stop.
 
     """
+    if params.mesh is not None:
+        need = need.model_copy(update={"fields": _on_mesh(need.fields)})
     settings = choose(params, need.quality)
     begun = time.perf_counter()
     wanted = set(need.fields)
     attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": float(deficit(params))}
     shape = Shape(params, need, settings)
+    shape.check(context)
     rows: list[dict[str, Any]] = []
     followed = set(nodes(params, need))
     days = tuple(sorted(followed | set(need.stages)))
@@ -56,7 +60,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             return _dataset(rows, need, attrs, shape)
         with_mould = bool(wanted & MOULD)
         context.report(0.0, f"laying {settings.vertices} points on the fruit")
-        system = System(params, settings.level, with_mould)
+        system = System(params, settings.cells, with_mould, shape.surface)
         attrs["path"] = "rot-and-mould" if with_mould else "rot"
         for reached in march(system, days, settings.tolerance, settings.longest, context):
             rot = system.rot.share(reached.state.rot)
@@ -73,7 +77,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             row = _row(reached.day, reached.steps, reached.error * settings.tolerance, sound)
             if "budget_error" in wanted:
                 row["budget_error"] = max(errors)
-            row |= _fields(system, reached, need, settings.level)
+            row |= _fields(system, reached, need, settings.cells)
             _finish(rows, row, shape, rot, begun, need, context)
     except SolverError as error:
         if rows:
@@ -81,6 +85,13 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             error.last_stage = rows[-1]["stage"]
         raise
     return _dataset(rows, need, attrs, shape)
+
+
+def _on_mesh(fields: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the fields of a run on an imported mesh: those of vertices come with the mesh, and so does a position."""
+    if not {*FIELDS} & set(fields):
+        return fields
+    return tuple(sorted({*fields, "mesh_position", "triangle"} - {"position"}))
 
 
 def _finish(
@@ -103,7 +114,7 @@ def _row(day: float, steps: int, residual: float, converged: bool) -> dict[str, 
     return {"stage": day, "residual": residual, "converged": converged, "iterations": steps}
 
 
-def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[str, Any]:
+def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[str, Any]:
     """Return maps on the lattice and shares of the area, those that were asked for."""
     surface, wanted = system.surface, set(need.fields)
     rot = system.rot.share(reached.state.rot)
@@ -124,9 +135,11 @@ def _fields(system: System, reached: Reached, need: Need, level: int) -> dict[st
         }
     row: dict[str, Any] = {name: value for name, value in found.items() if name in wanted}
     if wanted & set(maps):
+        if system.imported:
+            return row | {name: maps[name].astype(need.dtype) for name in sorted(wanted & set(maps))}
         assert need.resolution is not None  # settled
         inside = window(need.resolution, need.region)
-        sample = sampler(level, need.resolution)
+        sample = sampler(cells, need.resolution)
         for name in sorted(wanted & set(maps)):
             field = (sample @ maps[name]).reshape(need.resolution, -1)
             row[name] = field[inside].astype(need.dtype)
@@ -142,12 +155,14 @@ def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shap
             data[name] = (("stage", "vertex", "component"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
+        elif name in FIELDS and values.ndim == 2:
+            data[name] = (("stage", "vertex"), values)
         elif name in FIELDS:
             data[name] = (("stage", "colatitude", "azimuth"), values)
         elif name != "stage":
             data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
-    if any(name in FIELDS for name in data):
+    if any(name in FIELDS and data[name][1].ndim > 2 for name in data):
         down, along = window(need.resolution, need.region)
         coords["colatitude"] = colatitudes(need.resolution)[down]
         coords["azimuth"] = azimuths(need.resolution)[along]

@@ -34,31 +34,32 @@ VECTORS = ("position", "displacement")
 
 @dataclass(frozen=True)
 class Settings:
-    """level: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day].
+    """cells: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day].
 
     layers: shells of the body. balance, smooth: out-of-balance force of body and of skin over the forces in them.
-    skin: level of the skin's own mesh.
+    skin: cells of the skin's own mesh. imported: points of a mesh of the user's own, which stands for the sphere.
     """
 
-    level: int
+    cells: int
     tolerance: float
     longest: float
     layers: int
     balance: float
     smooth: float
     skin: int
+    imported: int = 0
 
     @property
     def vertices(self) -> int:
         """Number of points on the surface."""
-        return 10 * 4**self.level + 2
+        return self.imported or 10 * self.cells**2 + 2
 
 
-_LEVELS: dict[Quality, tuple[int, float]] = {"preview": (5, 1e-4), "default": (6, 3e-5), "fine": (7, 1e-5)}
+_MESHES: dict[Quality, tuple[int, float]] = {"preview": (32, 1e-4), "default": (96, 3e-5), "fine": (192, 1e-5)}
 _BODIES: dict[Quality, tuple[int, float, float, int]] = {
-    "preview": (6, 1e-3, 1e-3, 4),
-    "default": (8, 1e-4, 1e-3, 5),
-    "fine": (16, 1e-5, 1e-4, 5),
+    "preview": (6, 1e-3, 1e-3, 16),
+    "default": (8, 1e-4, 1e-3, 32),
+    "fine": (16, 1e-5, 1e-4, 32),
 }
 #: Longest step, in units of the quicker organism's own time.
 _LONGEST = 4.0
@@ -74,13 +75,19 @@ _BYTES = 1000
 
 def choose(params: DecayParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
-    level, tolerance = _LEVELS[quality]
-    return Settings(level, tolerance, _LONGEST / max(_clock(params), 0.1), *_BODIES[quality])
+    cells, tolerance = _MESHES[quality]
+    return Settings(
+        cells,
+        tolerance,
+        _LONGEST / max(_clock(params), 0.1),
+        *_BODIES[quality],
+        len(params.mesh.points) if params.mesh else 0,
+    )
 
 
 def moved(params: DecayParams, wanted: Collection[str]) -> bool:
     """Return whether the wanted fields ask for a body that moves."""
-    return params.body != "none" and not BODY.isdisjoint(wanted)
+    return params.body in ("quasi-static", "paper") and not BODY.isdisjoint(wanted)
 
 
 def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:
@@ -109,7 +116,7 @@ def expected_cost(params: DecayParams, need: Need) -> Cost:
     if moved(params, wanted):
         count = len(need.stages) + len(nodes(params, need))
         seconds += count * 20 * settings.layers**3 * _BODY_SECONDS
-        seconds += count * 10 * 4**settings.skin * _SKIN_SECONDS * (params.skin is not None)
+        seconds += count * 10 * settings.skin**2 * _SKIN_SECONDS * (params.skin is not None)
     return Cost(seconds, len(need.stages) * (values * width + 200) + settings.vertices * _BYTES)
 
 

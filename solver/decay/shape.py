@@ -1,4 +1,4 @@
-"""Where the surface is in a stage: on the fresh fruit, or moved with a body that lost water and rotted."""
+"""Where the surface is in a stage: as fresh, moved with a body that lost water and rotted, or as a table says."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contract import Context, Need
+from ..contract import Context, InvalidInput, Need
 from ..fruit import lattice, window
+from . import dried
 from .environment import water_lost
+from .imported import extent_of
 from .params import DecayParams
 from .settings import BODY, Settings, moved
-from .surface import Surface, lay
+from .surface import Surface, extent, geodesic
+from .system import laid
 
 if TYPE_CHECKING:
     from .body.equilibrium import Balance
@@ -30,36 +33,66 @@ class _Settled(NamedTuple):
 
 
 class Shape:
-    """What the need asks of the fruit's shape, water lost included; nothing else is laid, filled or settled."""
+    """What the need asks of the fruit's shape, water lost included; nothing else is laid, filled or settled.
+
+    surface: the mesh that was laid, if one had to be.
+    """
 
     def __init__(self, params: DecayParams, need: Need, settings: Settings) -> None:
         self._params, self._need = params, need
         self._wanted = set(need.fields)
         moves = moved(params, self._wanted)
-        meshed = {"water_lost", "volume", "mesh_position", "triangle"} & self._wanted
-        self._surface = lay(params, settings.level) if moves or meshed else None
+        meshed = not {"volume", "mesh_position", "triangle"}.isdisjoint(self._wanted)
+        self._dries = params.body == "table" and not BODY.isdisjoint(self._wanted)
+        self._rays = geodesic(settings.cells)[0] if self._dries and meshed else None
+        own = params.mesh is not None
+        self.surface = laid(params, settings.cells) if moves or meshed or own else None
+        # an open patch does not say how much it closes: water is lost by the fruit of the parameters
+        self._closed = extent_of(self.surface) if own and self.surface is not None else extent(params)
+        self._extent = self._closed or extent(params)
         self._body = self._wrinkles = None
         self._node: _Settled = _Settled(None, None)
-        if moves and self._surface is not None:
+        if moves and self.surface is not None:
             from .body.body import Body
 
-            self._body = Body(params, self._surface, settings.level, settings.layers, settings.balance)
+            self._body = Body(params, self.surface, settings.cells, settings.layers, settings.balance)
             if params.skin is not None:
                 from .body.wrinkles import Wrinkles
 
                 self._wrinkles = Wrinkles(params, params.skin, self._body, settings)
 
+    def check(self, context: Context) -> None:
+        """Refuse, before any step, what no table can answer.
+
+        Raises:
+            InvalidInput: the need names the flesh, or the fruit on the last day lies outside the table; or it asks an
+                imported mesh for what only the fruit has.
+
+        """
+        if self._params.mesh is not None:
+            if "displacement" in self._wanted or self._need.region is not None:
+                raise InvalidInput(
+                    "an imported mesh has no lattice of colatitudes.",
+                    advice="Ask for fields without a region, and no displacement.",
+                )
+            if "volume" in self._wanted and self._closed is None:
+                raise InvalidInput("an open mesh has no volume.", advice="Close it, or leave the volume out.")
+        if self._dries:
+            dried.check(self._params, self._need)
+            dried.displaced(self._params, self._lost(self._need.stages[-1]), 4, context)
+
     @property
     def triangles(self) -> NDArray[np.int32]:
         """Faces (f, 3) of the surface whose vertices are `mesh_position`."""
-        assert self._surface is not None
-        return self._surface.faces.astype(np.int32)
+        assert self.surface is not None
+        return self.surface.faces.astype(np.int32)
 
     def at(self, day: float, rot: Array | None, context: Context) -> dict[str, Any]:
         """Return the wanted shape of a day, with rot (v) on the surface's vertices.
 
         Raises:
             NotConverged: body or skin found no equilibrium.
+            InvalidInput: the table of dried fruits does not reach there.
 
         """
         wanted, need = self._wanted, self._need
@@ -75,22 +108,28 @@ class Shape:
             inside = window(need.resolution, need.region)
             fresh = self._params.surface(*lattice(need.resolution))
             gone = self._body.on_lattice(balance, need.resolution) if self._body and balance else np.zeros_like(fresh)
+            if self._dries:
+                gone = self._dried(day, need.resolution, context)
             if self._wrinkles and folds is not None:
                 gone = gone + self._wrinkles.on_lattice(folds, need.resolution)
             for name, values in (("position", fresh + gone), ("displacement", gone)):
                 if name in wanted:
                     row[name] = values[inside].astype(need.dtype)
         if wanted & {"mesh_position", "volume"}:
-            assert self._surface is not None
-            points = self._surface.points
+            assert self.surface is not None
+            points = self.surface.points
             if self._body and balance:
                 points = points + self._body.on_surface(balance)
             if self._wrinkles and folds is not None:
                 points = points + self._wrinkles.on_surface(folds)
+            if self._rays is not None:
+                points = points + dried.at_rays(self._dried(day, dried.ROWS, context), self._rays)
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
             if "volume" in wanted:
-                row["volume"] = _volume(points, self._surface)
+                # an imported mesh may be wound either way
+                own = self._closed if self._params.mesh is not None else None
+                row["volume"] = own.volume if own else _volume(points, self.surface)
         return row
 
     def follow(self, day: float, rot: Array | None, context: Context) -> None:
@@ -114,8 +153,11 @@ class Shape:
             folds, row["skin_residual"], row["skin_steps"] = self._wrinkles.at(balance, before.folds, watch)
         return _Settled(balance, folds), row
 
+    def _dried(self, day: float, resolution: int, context: Context) -> Array:
+        return dried.displaced(self._params, self._lost(day), resolution, context)
+
     def _lost(self, day: float) -> float:
-        return water_lost(self._params, self._surface, day) if self._surface is not None else 0.0
+        return water_lost(self._params, self._extent, day)
 
 
 def _volume(points: Array, surface: Surface) -> float:

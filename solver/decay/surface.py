@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import robust_laplacian
@@ -23,7 +23,9 @@ from ..fruit import Fruit, directions, lattice
 __all__ = [
     "GOLDEN_ICOSAHEDRON",
     "GOLDEN_POINTS",
+    "Extent",
     "Surface",
+    "extent",
     "geodesic",
     "lay",
     "sampler",
@@ -42,6 +44,13 @@ GOLDEN_ICOSAHEDRON = (
 _RECTANGLE = np.array([[-1, _GOLDEN, 0], [1, _GOLDEN, 0], [-1, -_GOLDEN, 0], [1, -_GOLDEN, 0]])
 #: Its corners (12, 3), of length 1.
 GOLDEN_POINTS: Array = np.concatenate([np.roll(_RECTANGLE, k, axis=1) for k in range(3)]) / np.hypot(1, _GOLDEN)
+
+
+class Extent(NamedTuple):
+    """Area [r1^2] and volume [r1^3] of a fruit."""
+
+    area: float
+    volume: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +80,15 @@ class Surface:
 
 
 @lru_cache(maxsize=4)
-def geodesic(level: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return unit directions (10 * 4^level + 2, 3) and faces (20 * 4^level, 3), wound outwards, of a geodesic sphere.
+def geodesic(cells: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return unit directions (10 cells^2 + 2, 3) and faces (20 cells^2, 3), wound outwards, of a geodesic sphere.
 
-    Vertices are numbered so that neighbours lie close in memory.
+    cells: edges along one of the icosahedron's. Its triangles are cut evenly by the odd part of the number, then
+    halved: a sphere of twice the cells has all points of this one. Neighbours lie close in memory.
     """
-    points = GOLDEN_POINTS
-    faces = np.array(GOLDEN_ICOSAHEDRON).reshape(20, 3)
-    for _ in range(level):
+    halvings = (cells & -cells).bit_length() - 1
+    points, faces = _cut(cells >> halvings)
+    for _ in range(halvings):
         edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
         unique, back = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_inverse=True)
         middle = points[unique // len(points)] + points[unique % len(points)]
@@ -97,6 +107,29 @@ def geodesic(level: int) -> tuple[Array, NDArray[np.int64]]:
     return points, faces
 
 
+def _cut(cells: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return the icosahedron, each triangle cut evenly into cells^2 and its points put on the sphere."""
+    faces = np.array(GOLDEN_ICOSAHEDRON).reshape(20, 3)
+    if cells == 1:
+        return GOLDEN_POINTS, faces
+    number: dict[tuple[tuple[int, int], ...], int] = {}
+    cut = []
+    for corners in faces.tolist():
+
+        def at(i: int, j: int, corners: list[int] = corners) -> int:
+            # neighbours name a point of their common edge alike: by its corners and their shares
+            shares = zip(corners, (cells - i - j, i, j), strict=True)
+            return number.setdefault(tuple(sorted((c, s) for c, s in shares if s)), len(number))
+
+        for i in range(cells):
+            for j in range(cells - i):
+                cut.append((at(i, j), at(i + 1, j), at(i, j + 1)))
+                if i + j < cells - 1:
+                    cut.append((at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)))
+    points = np.array([sum(GOLDEN_POINTS[c] * s for c, s in shares) for shares in number])
+    return points / np.linalg.norm(points, axis=1, keepdims=True), np.array(cut)
+
+
 def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
     """Return the surface of a triangle mesh, closed or open: nothing flows over an open border.
 
@@ -106,13 +139,12 @@ def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
     """
     if len(points) == 0 or len(faces) == 0:
         raise InvalidGeometry("the surface has no triangles.", advice="Give a mesh with at least one triangle.")
-    laplacian, mass = robust_laplacian.mesh_laplacian(np.asarray(points, float), np.asarray(faces, np.int64))
-    area = mass.diagonal()
+    laplacian, area = _cotangents(points, faces) or _robust(points, faces)
     if not np.isfinite(area).all() or area.min() <= 0:
         raise InvalidGeometry(
             "the surface has points that no triangle of positive area touches.", advice="Remove unused points."
         )
-    links: Any = sparse.coo_array(laplacian)
+    links = laplacian.tocoo()
     kept = links.row != links.col
     rows = sparse.csr_array(
         (np.maximum(-links.data[kept], 0), (links.row[kept], links.col[kept])), shape=laplacian.shape
@@ -130,16 +162,62 @@ def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
     )
 
 
-def lay(fruit: Fruit, level: int) -> Surface:
-    """Return the fruit's fresh outer surface as a geodesic sphere of `level` laid on it."""
-    rays, faces = geodesic(level)
-    return triangulated(fruit.surface(np.arccos(np.clip(rays[:, 1], -1, 1)), np.arctan2(rays[:, 2], rays[:, 0])), faces)
+def _cotangents(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array] | None:
+    """Return Laplacian and lumped areas (v) of a mesh whose own triangles are Delaunay; None of any other."""
+    count = len(points)
+    rows, columns, values = [], [], []
+    doubled = np.linalg.norm(
+        np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]), axis=1
+    )
+    if not doubled.min() > 0:
+        return None
+    for k in range(3):
+        o, i, j = (faces[:, (k + m) % 3] for m in range(3))
+        rows.append(np.minimum(i, j))
+        columns.append(np.maximum(i, j))
+        # the angle across from the edge
+        values.append(np.einsum("fk,fk->f", points[i] - points[o], points[j] - points[o]) / (2 * doubled))
+    edge = np.concatenate(rows) * count + np.concatenate(columns)
+    edges, back, uses = np.unique(edge, return_inverse=True, return_counts=True)
+    weight = np.bincount(back, np.concatenate(values))
+    if weight.min() < 0 or uses.max() > 2:
+        return None
+    i, j = edges // count, edges % count
+    both = (np.concatenate([i, j]), np.concatenate([j, i]))
+    laplacian = sparse.coo_array((-np.concatenate([weight, weight]), both), shape=(count, count))
+    return laplacian, np.bincount(faces.ravel(), np.repeat(doubled / 6, 3), count).astype(float)
+
+
+def _robust(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array]:
+    laplacian, mass = robust_laplacian.mesh_laplacian(np.asarray(points, float), np.asarray(faces, np.int64))
+    return laplacian, mass.diagonal()
+
+
+def lay(fruit: Fruit, cells: int) -> Surface:
+    """Return the fruit's fresh outer surface as a geodesic sphere of so many `cells` laid on it."""
+    return triangulated(_laid(fruit, cells), geodesic(cells)[1])
+
+
+def _laid(fruit: Fruit, cells: int) -> Array:
+    rays, _ = geodesic(cells)
+    return fruit.surface(np.arccos(np.clip(rays[:, 1], -1, 1)), np.arctan2(rays[:, 2], rays[:, 0]))
+
+
+def extent(fruit: Fruit) -> Extent:
+    """Return area and volume of the fresh fruit, from two coarse spheres: the error of order two cancels."""
+    coarse, fine = (_facets(_laid(fruit, cells), geodesic(cells)[1]) for cells in (16, 32))
+    return Extent(*((4 * fine - coarse) / 3).tolist())
+
+
+def _facets(points: Array, faces: NDArray[np.int64]) -> Array:
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return np.array([np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2, np.sum(a * np.cross(b, c)) / 6])
 
 
 @lru_cache(maxsize=4)
-def sampler(level: int, resolution: int) -> sparse.csr_array:
-    """Return the matrix that takes a field on `geodesic(level)` to the common lattice (n * 2n rows), linearly."""
-    return shares_at(*geodesic(level), directions(*lattice(resolution)).reshape(-1, 3))
+def sampler(cells: int, resolution: int) -> sparse.csr_array:
+    """Return the matrix that takes a field on `geodesic(cells)` to the common lattice (n * 2n rows), linearly."""
+    return shares_at(*geodesic(cells), directions(*lattice(resolution)).reshape(-1, 3))
 
 
 def shares_at(rays: Array, faces: NDArray[np.int64], wanted: Array) -> sparse.csr_array:

@@ -1,7 +1,7 @@
 """Rot and mould together on one fruit: initial fields, the gate between them, wounds and spawning.
 
 The soft rot lives on the flesh and eats what is in it, the mould lives on the skin and eats what is there; both start
-as random fields of one kind (D15). The mould spreads only where rot is (D14): the gate is 0 below 0.002 of rot.
+as random fields of one kind (D15). The mould spreads only where rot is (D14).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from scipy.spatial import KDTree
 from ..contract import Context
 from ..fruit import directions
 from .colony import Colony
+from .gate import SHUT, gates
+from .imported import rays_from
 from .layer import Layer, State
 from .noise import patches
 from .params import DecayParams
@@ -22,15 +24,12 @@ from .places import painted
 from .rates import Rates, daily
 from .seeds import seeds
 from .spawning import Landing, Spawner
-from .surface import geodesic, lay
+from .surface import Surface, geodesic, lay, triangulated
 
-__all__ = ["Both", "System"]
+__all__ = ["Both", "System", "laid"]
 
 Array = NDArray[np.float64]
 
-#: Rot map where the gate starts to open and where it is open; below the first the mould does not enter. Ten times more
-#: makes young colonies hang on how thin their rot is, and errors of the mesh four times larger.
-_SHUT, _OPEN = 0.002, 0.02
 #: Radius of a spawned colony [r1], and the share of the map above which a place is taken already.
 _SPORE = 0.06
 _TAKEN = 0.05
@@ -50,13 +49,28 @@ class _Due(NamedTuple):
     rots: bool
 
 
-class System:
-    """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it."""
+def laid(params: DecayParams, cells: int) -> Surface:
+    """Return what everything grows on: the imported mesh, or the fruit's own surface of so many cells.
 
-    def __init__(self, params: DecayParams, level: int, with_mould: bool) -> None:
+    Raises:
+        InvalidGeometry: the mesh has points that no triangle of positive area touches.
+
+    """
+    if params.mesh is None:
+        return lay(params, cells)
+    return triangulated(np.array(params.mesh.points, float), np.array(params.mesh.faces, np.int64))
+
+
+class System:
+    """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it.
+
+    surface: the fruit's own of so many cells, where it has been laid already.
+    """
+
+    def __init__(self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None) -> None:
         self._params = params
-        self.surface = lay(params, level)
-        self._rays, _ = geodesic(level)
+        self.surface = surface or laid(params, cells)
+        self._rays = geodesic(cells)[0] if params.mesh is None else rays_from(self.surface.points)
         self._tree = KDTree(self._rays)
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
         chance = params.spawning / (10 - params.propagation_rate)
@@ -77,9 +91,10 @@ class System:
     def _wounded(self, params: DecayParams) -> Both:
         rot, mould = self.rot.fresh, self.mould.fresh if self.mould else None
         for wound in seeds(params):
-            theta, phi = np.radians([wound.colatitude, wound.azimuth])
-            centre = params.surface(theta, phi)
-            ray = directions(theta, phi)
+            ray = directions(*np.radians([wound.colatitude, wound.azimuth]))
+            if wound.vertex is not None:
+                ray = self._rays[wound.vertex]
+            centre = self._place(ray) if wound.vertex is None else self.surface.points[wound.vertex]
             rot = self.rot.seeded(rot, centre, wound.radius)
             self._rot_spawner.settle(ray, 0.0)
             if self.mould is not None and mould is not None:
@@ -93,23 +108,27 @@ class System:
         return Both(rot, mould)
 
     @property
+    def imported(self) -> bool:
+        """Whether the surface is a mesh of the user's own, whose vertices have the fields."""
+        return self._params.mesh is not None
+
+    @property
     def steady(self) -> bool:
         """Whether nothing from outside changes in time."""
         return not self._params.weather
 
     def gate(self, rot: State) -> Array:
         """Return where the mould may spread, 0 to 1 (v)."""
-        x = np.clip((self.rot.share(rot) - _SHUT) / (_OPEN - _SHUT), 0, 1)
-        return x * x * (3 - 2 * x)
+        return gates(self.rot.share(rot))
 
     def advance(self, state: Both, day: float, dt: float) -> Both:
-        """Return the state dt [day] after a day, without new colonies; gate and air are those of the step's middle."""
+        """Return the state dt [day] after a day, without new colonies; rot and air are those of the step's middle."""
         rot = self.rot.advance(state.rot, dt, rates=self._rates(self._params.rot, day + dt / 2))
         if self.mould is None or state.mould is None:
             return Both(rot, None)
-        gate = (self.gate(state.rot) + self.gate(rot)) / 2
+        ground = (self.rot.share(state.rot) + self.rot.share(rot)) / 2
         rates = self._rates(self._params.mould, day + dt / 2)
-        return Both(rot, self.mould.advance(state.mould, dt, gate, rates))
+        return Both(rot, self.mould.advance(state.mould, dt, ground, rates))
 
     def _rates(self, colony: Colony, day: float) -> Rates | None:
         return daily(colony, self._params, day) if self._params.weather else None
@@ -148,8 +167,7 @@ class System:
         assert self._due is not None
         landing, rots = self._due
         self._due = None
-        x, y, z = landing.direction
-        place = self._params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
+        place = self._place(landing.direction)
         if rots:
             self._rot_spawner.settle(landing.direction, landing.day)
             return state._replace(rot=self.rot.seeded(state.rot, place, _SPORE))
@@ -158,6 +176,13 @@ class System:
         self._mould_spawner.settle(landing.direction, landing.day)
         return state._replace(mould=self.mould.seeded(state.mould, place, _SPORE, self.gate(state.rot)))
 
+    def _place(self, ray: Array) -> Array:
+        """Return the point (3) of the skin in a unit direction; of an imported mesh the vertex nearest to it."""
+        if self._params.mesh is not None:
+            return np.asarray(self.surface.points[int(self._tree.query(ray)[1])])
+        x, y, z = ray
+        return self._params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
+
     def _roots(self, state: Both, landing: Landing, site: int, rots: bool) -> bool:
         rotten = float(self.rot.share(state.rot)[site])
         if rots:
@@ -165,4 +190,4 @@ class System:
         assert self.mould is not None
         assert state.mould is not None
         chance = rotten if landing.stray else 1.0
-        return rotten > _SHUT and landing.mark < chance and float(self.mould.share(state.mould)[site]) < _TAKEN
+        return rotten > SHUT and landing.mark < chance and float(self.mould.share(state.mould)[site]) < _TAKEN

@@ -15,7 +15,7 @@ from scipy import sparse
 from ...fruit import directions, lattice
 from ..environment import reference_radius
 from ..params import DecayParams
-from ..surface import Surface, geodesic, shares_at
+from ..surface import Surface, extent, geodesic, shares_at
 from .equilibrium import Balance, Loads, rested, settle
 from .flesh import Softened, softened
 from .material import blocks
@@ -36,16 +36,16 @@ _TETHER, _CORE = 0.1, 0.5
 
 
 class Body:
-    """Tetrahedra of one fruit under a surface of `level`; tolerance: of the out-of-balance force."""
+    """Tetrahedra of one fruit under a surface of so many `cells`; tolerance: of the out-of-balance force."""
 
-    def __init__(self, params: DecayParams, surface: Surface, level: int, layers: int, tolerance: float) -> None:
+    def __init__(self, params: DecayParams, surface: Surface, cells: int, layers: int, tolerance: float) -> None:
         self._params = params
         self.solid = fill(params, layers)
         self._surface = surface
-        self._level, self._layers = level, layers
+        self._cells, self._layers = cells, layers
         self._tolerance = tolerance
         self._pattern = blocks(self.solid.tets, len(self.solid.points))
-        r1 = reference_radius(params, surface)
+        r1 = reference_radius(params, extent(params))
         self._pressure, self._inertia = _DENSITY * params.flesh.gravity * r1, _DENSITY * r1**2
 
     def state(self, water: float, rot: Array | None) -> Softened:
@@ -53,7 +53,7 @@ class Body:
         solid, flesh = self.solid, self._params.flesh
         inside = np.zeros(len(solid.tets))
         if rot is not None:
-            at = _inwards(self._level, self._layers) @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
+            at = _inwards(self._cells, self._layers) @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
             inside = at[solid.tets].mean(axis=1)
         state = softened(flesh, self._params.firmness, water, inside, solid.stone)
         return pressed(state, self._params, solid)
@@ -107,11 +107,11 @@ class Body:
     def on_surface(self, balance: Balance) -> Array:
         """Return the displacement of the surface's vertices (v, 3)."""
         even, rest = self.parted(balance)
-        return even * self._surface.points + self.onto(self._level) @ rest
+        return even * self._surface.points + self.onto(self._cells) @ rest
 
-    def onto(self, level: int) -> sparse.csr_array:
-        """Return the matrix that takes a field (s) of the body's skin to the vertices of a sphere of `level`."""
-        return _onto(level, self._layers)
+    def onto(self, cells: int) -> sparse.csr_array:
+        """Return the matrix that takes a field (s) of the body's skin to the vertices of a sphere of so many cells."""
+        return _onto(cells, self._layers)
 
     def parted(self, balance: Balance) -> tuple[float, Array]:
         """Return the even part of the skin's displacement, over its place, and the rest (s, 3), which is interpolated.
@@ -131,11 +131,11 @@ def _skin(layers: int) -> tuple[Array, NDArray[np.int64]]:
 
 
 @lru_cache(maxsize=4)
-def _inwards(level: int, layers: int) -> sparse.csr_array:
+def _inwards(cells: int, layers: int) -> sparse.csr_array:
     """Return the matrix that takes a field of the surface to the body's points, along rays."""
     rays = ball(layers)[0].copy()
     rays[~rays.any(axis=1)] = (0.0, 1.0, 0.0)  # the centre has no ray, and lies too deep for one
-    return shares_at(*geodesic(level), rays)
+    return shares_at(*geodesic(cells), rays)
 
 
 @lru_cache(maxsize=4)
@@ -144,5 +144,5 @@ def _outwards(layers: int, resolution: int) -> sparse.csr_array:
 
 
 @lru_cache(maxsize=4)
-def _onto(level: int, layers: int) -> sparse.csr_array:
-    return shares_at(*_skin(layers), geodesic(level)[0])
+def _onto(cells: int, layers: int) -> sparse.csr_array:
+    return shares_at(*_skin(layers), geodesic(cells)[0])

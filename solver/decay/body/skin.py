@@ -38,7 +38,7 @@ _STEPS, _HALVINGS, _ITERATIONS, _MEMORY = 1500, 30, 200, 20
 #: Steps that one tangent serves.
 _STALE = 10
 #: Tolerance of the linear solves.
-_LOOSE = 0.1
+_LOOSE = 0.3
 #: Random height that a flat skin starts from, over its thickness: without one it would stay flat.
 _UNEVEN = 1e-2
 

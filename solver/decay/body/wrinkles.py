@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 
 
 class Wrinkles:
-    """The skin of one fruit on a geodesic sphere of its own level, between the body's and the fields'."""
+    """The skin of one fruit on a geodesic sphere of its own, between the body's and the fields'."""
 
     def __init__(self, params: DecayParams, skin: Skin, body: Body, settings: Settings) -> None:
         self._body, self._skin, self._seed = body, skin, params.seed
-        self._level, self._fields, self._tolerance = settings.skin, settings.level, settings.smooth
+        self._cells, self._fields, self._tolerance = settings.skin, settings.cells, settings.smooth
         surface = lay(params, settings.skin)
         self._points = surface.points
         self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
@@ -44,7 +44,7 @@ class Wrinkles:
 
         """
         even, rest = self._body.parted(balance)
-        carried = (1 + even) * self._points + self._body.onto(self._level) @ rest
+        carried = (1 + even) * self._points + self._body.onto(self._cells) @ rest
         share = 1 + self._skin.shrinkage * even
         if folds is None:
             folds = self._shell.uneven(self._normals, Context.generator(self._seed))
@@ -53,8 +53,8 @@ class Wrinkles:
 
     def on_lattice(self, folds: Array, resolution: int) -> Array:
         """Return what `at` found on the common lattice (n, 2 n, 3)."""
-        return (sampler(self._level, resolution) @ folds).reshape(resolution, -1, 3)
+        return (sampler(self._cells, resolution) @ folds).reshape(resolution, -1, 3)
 
     def on_surface(self, folds: Array) -> Array:
         """Return what `at` found on the vertices of the fields' surface (v, 3)."""
-        return shares_at(*geodesic(self._level), geodesic(self._fields)[0]) @ folds
+        return shares_at(*geodesic(self._cells), geodesic(self._fields)[0]) @ folds

@@ -11,7 +11,7 @@ from solver.decay.body.equilibrium import Loads, rested, settle
 from solver.decay.body.flesh import Flesh, softened
 from solver.decay.body.material import blocks, energy, forces, hessian
 from solver.decay.body.solid import fill, volumes
-from solver.decay.surface import geodesic, lay
+from solver.decay.surface import extent, geodesic, lay
 from solver.fruit import PRESETS, Fruit
 
 
@@ -31,7 +31,7 @@ def fruit_named(name):
 @pytest.mark.parametrize("name", [*PRESETS, "none"])
 def test_volume_of_tetrahedra_is_the_fruits_to_second_order(name):
     fruit = fruit_named(name) if name in PRESETS else Fruit(stone=(0, 0))
-    surface = lay(fruit, 6)
+    surface = lay(fruit, 64)
     a, b, c = (surface.points[surface.faces[:, k]] for k in range(3))
     exact = np.sum(a * np.cross(b, c)) / 6 * (1 + 1 / (3 * 4**6))
     errors = []
@@ -199,11 +199,12 @@ def test_a_column_sags_under_its_weight_as_the_closed_form_says_to_second_order(
 @pytest.mark.parametrize("firmness", [80.0, 0.5])
 def test_the_floor_carries_the_weight_of_what_is_left(firmness):
     params = apple(firmness=firmness)
-    surface = lay(params, 4)
-    body = Body(params, surface, 4, 6, 1e-3)
+    surface = lay(params, 16)
+    body = Body(params, surface, 16, 6, 1e-3)
     balance = body.settled(body.state(0.3, None))
     rigid = body.state(0.3, None).mass
-    r1 = (params.weight * 1e-6 / surface_volume(surface)) ** (1 / 3)
+    assert extent(params).volume == pytest.approx(surface_volume(lay(params, 64)), rel=1e-3)
+    r1 = (params.weight * 1e-6 / extent(params).volume) ** (1 / 3)
     newtons = 9.81 * 1000 * np.sum(rigid * body.solid.volume) * r1**3
     assert balance.reaction * r1**2 == pytest.approx(newtons, rel=1e-6)
     assert balance.residual <= 1e-3
@@ -217,10 +218,10 @@ def surface_volume(surface):
 
 def test_rot_sinks_in_where_it_is_and_nowhere_else():
     params = apple(flesh={"gravity": 0})
-    surface = lay(params, 4)
-    rays = geodesic(4)[0]
+    surface = lay(params, 16)
+    rays = geodesic(16)[0]
     rot = np.clip(1 - np.arccos(np.clip(rays[:, 0], -1, 1)) / 0.5, 0, 1)
-    body = Body(params, surface, 4, 8, 1e-4)
+    body = Body(params, surface, 16, 8, 1e-4)
     gone = body.on_surface(body.settled(body.state(0.0, rot)))
     inward = -np.einsum("vi,vi->v", gone, surface.points) / np.linalg.norm(surface.points, axis=1)
     assert inward[rays[:, 0] > 0.99].min() > 0.05
@@ -279,8 +280,8 @@ def test_a_moved_mesh_is_the_lattices_surface():
 )
 def test_hostile_bodies_end_settled_or_typed(lost, values):
     params = apple(**values)
-    surface = lay(params, 4)
-    body = Body(params, surface, 4, 6, 1e-3)
+    surface = lay(params, 16)
+    body = Body(params, surface, 16, 6, 1e-3)
     try:
         balance = body.settled(body.state(lost, np.where(surface.points[:, 1] < 0, 1.0, 0.0)))
     except NotConverged as error:
@@ -293,7 +294,7 @@ def test_hostile_bodies_end_settled_or_typed(lost, values):
 
 def test_a_body_can_be_cancelled():
     params = apple()
-    body = Body(params, lay(params, 3), 3, 5, 1e-3)
+    body = Body(params, lay(params, 8), 8, 5, 1e-3)
 
     def stop():
         raise KeyboardInterrupt

@@ -12,7 +12,7 @@ from solver.decay.presets import ENVIRONMENTS
 from solver.decay.settings import choose
 from solver.decay.spawning import Spawner
 from solver.decay.stepping import march
-from solver.decay.surface import lay
+from solver.decay.surface import extent
 from solver.decay.system import System
 
 FAST = {"growth_rate": 100.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
@@ -50,14 +50,14 @@ def test_the_room_of_the_paper():
 )
 def test_daily_losses_of_table_1(fruit, daily):
     params = SOLVER.parse({"radii": (1.0,) * 8}, fruit)
-    fresh = lay(params, 3)
+    fresh = extent(params)
     assert water_lost(params, fresh, 1.0) == pytest.approx(daily, rel=0.1)
     assert water_lost(params, fresh, 1e6) == params.water_content / 100
 
 
 def test_water_lost_in_changing_air_is_the_integral():
     """Humidity falls evenly at a steady temperature: the mean of both ends, exactly."""
-    fresh = lay(DecayParams(), 2)
+    fresh = extent(DecayParams())
     falling = [{"day": 0, "temperature": 22.2, "humidity": 80}, {"day": 10, "temperature": 22.2, "humidity": 40}]
     lost = water_lost(DecayParams(weather=falling), fresh, 10.0)
     ends = [water_lost(DecayParams(humidity=h), fresh, 10.0) for h in (80, 40)]
@@ -80,8 +80,8 @@ def test_steady_weather_is_the_climate_and_frost_stops_the_front():
     assert gone[0].sum() == gone[1].sum() > 0
 
 
-def system(level: int = 3, mould: bool = True, **more: object) -> System:
-    return System(SOLVER.parse({**FAST, **more}), level, mould)
+def system(cells: int = 8, mould: bool = True, **more: object) -> System:
+    return System(SOLVER.parse({**FAST, **more}), cells, mould)
 
 
 def stages(system: System, days: tuple[float, ...]) -> list:
@@ -110,7 +110,7 @@ def test_the_rot_without_mould_is_the_rot_with_it():
 
 
 def test_mould_is_only_where_rot_is():
-    whole = system(level=4)
+    whole = system(cells=16)
     for reached in stages(whole, (0.0, 1.0, 2.0, 3.0)):
         rot, mould = reached.state
         fresh = whole.rot.share(rot) < 0.001
@@ -150,14 +150,14 @@ def test_clocks_run_at_their_rate_and_land_within_reach():
 
 
 def test_no_wounds_no_rot():
-    untouched = System(SOLVER.parse({"wounds": []}), 3, True)
+    untouched = System(SOLVER.parse({"wounds": []}), 8, True)
     (end,) = stages(untouched, (5.0,))
     assert not end.state.rot.u.any()
     assert not end.state.mould.u.any()
 
 
 def test_a_wound_stays_where_it_was_put():
-    one = System(SOLVER.parse({"wounds": [Wound(colatitude=90, azimuth=90).model_dump()]}), 4, True)
+    one = System(SOLVER.parse({"wounds": [Wound(colatitude=90, azimuth=90).model_dump()]}), 16, True)
     (end,) = stages(one, (3.0,))
     middle = (one.surface.points * (end.state.rot.u + end.state.rot.v)[:, None]).sum(axis=0)
     assert middle[2] > 0.95 * np.linalg.norm(middle)
@@ -202,7 +202,7 @@ def test_parameters_travel_as_json_and_nonsense_is_refused():
 
 def test_a_finer_quality_takes_a_finer_mesh():
     sizes = [choose(DecayParams(), quality).vertices for quality in ("preview", "default", "fine")]
-    assert sizes == [10242, 40962, 163842]
+    assert sizes == [10242, 92162, 368642]
 
 
 HOSTILE = {
@@ -223,7 +223,7 @@ HOSTILE = {
 
 @pytest.mark.parametrize("case", HOSTILE)
 def test_hostile_parameters_end_finite_positive_and_in_balance(case):
-    whole = System(SOLVER.parse({"growth_rate": 50.0} | HOSTILE[case]), 2, True)
+    whole = System(SOLVER.parse({"growth_rate": 50.0} | HOSTILE[case]), 4, True)
     for reached in march(whole, (0.5, 3.0), 1e-3, choose(DecayParams(), "preview").longest, Context()):
         for layer, state in zip((whole.rot, whole.mould), reached.state, strict=True):
             assert all(np.isfinite(part).all() and part.min() >= 0 for part in state[:3])

@@ -27,7 +27,7 @@ def test_a_painted_map_is_read_where_it_was_painted():
     theta, phi = lattice(24)
     rays = directions(theta, phi)
     smooth = (1 + rays @ np.array([0.3, 0.5, -0.2])) / 2
-    there = geodesic(3)[0]
+    there = geodesic(8)[0]
     gap = painted(tuple(map(tuple, smooth)), there) - (1 + there @ np.array([0.3, 0.5, -0.2])) / 2
     assert np.abs(gap).max() < 3e-3
     with pytest.raises(InvalidInput, match="rows"):
@@ -38,9 +38,9 @@ def test_painted_wounds_are_where_the_paint_is_and_keep_the_budget():
     theta, phi = lattice(32)
     paint = np.where((theta < 1.2) & (phi < 1.5), 1.0, 0.0)
     values = {"wounds": (), "wound_map": paint.tolist()}
-    system = System(SOLVER.parse(values), 3, True)
+    system = System(SOLVER.parse(values), 8, True)
     rot = system.rot.share(system.start.rot)
-    rays = geodesic(3)[0]
+    rays = geodesic(8)[0]
     down, around = np.arccos(rays[:, 1]), np.arctan2(rays[:, 2], rays[:, 0])
     assert (rot[(down < 1.0) & (around > 0.2) & (around < 1.3)] > 0.1).all()
     outside = (down > 0.2) & ((down > 1.4) | (around < -0.15) | (around > 1.8))
@@ -64,12 +64,12 @@ def test_contacts_seed_stem_floor_and_what_is_touched():
 def test_pressure_shortens_and_stiffens_where_it_is():
     values = {"body": "quasi-static", "wounds": (), "flesh": {"gravity": 0}}
     plain = SOLVER.parse(values, "orange")
-    fresh = lay(plain, 4)
+    fresh = lay(plain, 16)
     point = {"colatitude": 90, "radius": 0.5, "length": 0.8, "stiffness": 3.0}
     paint = np.zeros((16, 32))
     paint[6:10, :3] = 1.0
     for more in ({"pressure": [point]}, {"pressure_map": {"values": paint.tolist(), "length": 0.8}}):
-        body = Body(SOLVER.parse({**values, **more}, "orange"), fresh, 4, 6, 1e-4)
+        body = Body(SOLVER.parse({**values, **more}, "orange"), fresh, 16, 6, 1e-4)
         state = body.state(0.0, None)
         gone = body.on_surface(body.settled(state))
         outward = np.einsum("vi,vi->v", gone, fresh.points)

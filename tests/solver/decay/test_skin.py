@@ -15,7 +15,7 @@ THICKNESS, RADIUS, POISSON = 0.06, 1.06, 0.3
 
 @pytest.fixture(scope="module")
 def sphere():
-    return lay(Fruit(exocarp_thickness=THICKNESS, stone=(0, 0)), 4)
+    return lay(Fruit(exocarp_thickness=THICKNESS, stone=(0, 0)), 16)
 
 
 def onset():

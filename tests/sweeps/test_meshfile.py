@@ -1,0 +1,33 @@
+"""Mesh files as parameters."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver.decay.surface import geodesic
+from sweeps.errors import InvalidOption
+from sweeps.options import assignments
+
+trimesh = pytest.importorskip("trimesh")
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "glb", "stl"])
+def test_a_mesh_comes_with_shared_points(kind: str, tmp_path: Path) -> None:
+    points, faces = geodesic(4)
+    trimesh.Trimesh(points, faces, process=False).export(tmp_path / f"a.{kind}")
+    found = assignments([f"mesh=@{tmp_path}/a.{kind}"])["mesh"]
+    # STL has three points of its own per triangle
+    assert np.shape(found["points"]) == points.shape
+    ours = np.array(found["points"])[np.array(found["faces"])].mean(axis=1)
+    theirs = points[faces].mean(axis=1)
+    assert np.abs(np.sort(ours, axis=0) - np.sort(theirs, axis=0)).max() < 1e-6
+
+
+def test_what_is_no_mesh_is_refused(tmp_path: Path) -> None:
+    for name, text in (("a.txt", "x"), ("b.obj", "v 0 0 0\n"), ("c.ply", "nonsense")):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InvalidOption):
+            assignments([f"mesh=@{tmp_path}/{name}"])
+    with pytest.raises(InvalidOption):
+        assignments([f"mesh=@{tmp_path}/none.obj"])
