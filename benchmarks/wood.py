@@ -1,10 +1,13 @@
 """What wood costs and how well it keeps its energy: `python -m benchmarks.wood`; a minute or two on one core.
 
+`python -m benchmarks.wood --fig42` runs the thesis' splinters instead (--rods, --vertices, --seeds, --explicit).
+
 Times are CPU seconds, the least of three.
 """
 
 from __future__ import annotations
 
+import argparse
 import time
 from typing import Any
 
@@ -16,6 +19,8 @@ from solver.wood.bundle import lay
 from solver.wood.explicit import march
 from solver.wood.stability import longest_step
 from solver.wood.stepping import begin
+
+from .wood_splinters import splinters
 
 _PLAIN: dict[str, Any] = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 
@@ -69,5 +74,21 @@ def main() -> None:
         last = off
 
 
+def _asked() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fig42", action="store_true", help="run the splinters of Fig. 4.2")
+    parser.add_argument("--rods", type=int, default=200)
+    parser.add_argument("--vertices", type=int, default=30)
+    parser.add_argument("--until", type=float, default=3.0, help="seconds that are simulated")
+    parser.add_argument("--seeds", type=int, nargs="*", default=[1])
+    parser.add_argument("--explicit", action="store_true", help="run each seed explicitly too")
+    parser.add_argument("--no-elastic", action="store_true", help="leave the run without fracture out")
+    asked = parser.parse_args()
+    if asked.fig42:
+        splinters(asked.rods, asked.vertices, asked.seeds, asked.until, asked.explicit, not asked.no_elastic)
+    else:
+        main()
+
+
 if __name__ == "__main__":
-    main()
+    _asked()

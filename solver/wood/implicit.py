@@ -7,7 +7,7 @@ from forces and velocities alone and is booked as dissipated, so that the balanc
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from ..contract import Context, NotConverged
 from .bundle import Wood
 from .contact import RUBBING, contacts
 from .explicit import CONTACT, LOST, WORK, forces
+from .elements import apply, elements
 from .hessian import Stiffness
 from .newton import descend
 from .params import WoodParams
@@ -27,12 +28,14 @@ from .stepping import Reached, State, balanced, begin, broken, copied, floor, ki
 __all__ = ["implicit"]
 
 #: Solves before a stale factor is given up, and factors before a step is.
-_SOLVES, _FACTORS = 200, 2
+_SOLVES, _FACTORS = 60, 12
 #: A factor is renewed when it has cost this many solves more than a fresh one would have: about what a new one costs.
-_EXCESS = 60
+_EXCESS = 40
 #: The least residual that is asked for: this share of the tolerance, of the load that the bundle bears.
 _LEAST = 1e-4
 _HALVINGS = 12
+#: How far an edge's ends move against each other in one step of Newton's, over its length.
+_TURN = 0.3
 #: Times that breaking and solving alternate in one step.
 _PASSES = 40
 
@@ -73,7 +76,7 @@ class _Solver:
         pattern = self._pattern if self._key == key else None
         inertia = m.mass * (1 / bdt + self.params.damping) / bdt
         self._factor, self._pattern = preconditioner(
-            m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(state, bdt), pattern
+            m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(state, bdt, True), pattern
         )
         self._key, self._bdt, self._fresh, self._excess = key, bdt, 0, 0
         self.factors += 1
@@ -84,7 +87,7 @@ class _Solver:
         forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, state.scratch, False, time, dt, RUBBING, state.books)
         return state.scratch.f
 
-    def solve(self, state: State, step: _Step, guesses: tuple[np.ndarray, ...]) -> float:
+    def solve(self, state: State, step: _Step, guesses: tuple[np.ndarray, ...], least: float) -> tuple[float, float]:
         """Find x and v of the step in place, from the better of the guesses (v, 3); return the relative residual.
 
         Raises:
@@ -106,9 +109,34 @@ class _Solver:
 
         norms = [float(np.linalg.norm(residual(x))) for x in guesses]
         x = guesses[int(np.nanargmin(norms))]
-        scale = max(norms[0], _LEAST * strength(wood, p))
+        scale = max(norms[0], _LEAST * strength(wood, p), least)
         wanted = self.tolerance * scale
-        longest = 0.2 * float(wood.rods.rest[wood.rods.k > 0].mean())
+        contact = 0.2 * float(wood.bodies.half[:, 0].min()) if len(wood.bodies.kind) else np.inf
+        first, second = wood.rods.a, wood.rods.b
+        turned = _TURN * wood.rods.rest
+
+        def limit(way: np.ndarray) -> float:
+            """Return the share of a step that turns and stretches no edge by much, and passes through no body."""
+            apart = np.linalg.norm(way[second] - way[first], axis=1)
+            share = 1.0 / max(float((apart / turned).max()), 1e-300)
+            return min(share, contact / max(float(np.abs(way).max()), 1e-300))
+
+        inertia = (m.mass * (1 / step.bdt + p.damping) / step.bdt)[:, None]
+
+        def stiffness(positive: bool) -> Callable[[np.ndarray], np.ndarray]:
+            parts = elements(m.x, wood.rods, wood.bonds, positive)
+            touching = contacts(state, step.bdt, positive)
+
+            def times(way: np.ndarray) -> np.ndarray:
+                out: np.ndarray = inertia * way
+                apply(parts, way, out)
+                if touching is not None:
+                    out += np.einsum("vij,vj->vi", touching, way)
+                out[held] = 0.0
+                return out
+
+            return times
+
         root = np.arange(len(m.x))
         norm = min(norms)
         for attempt in range(_FACTORS):
@@ -121,7 +149,7 @@ class _Solver:
             while (root >= old).any():
                 root = np.where(root >= old, wood.parent[root], root)
             factor = self._factor
-            found = descend(residual, x, partial(factor.solve, root=root), wanted, _SOLVES, longest)
+            found = descend(residual, stiffness, x, partial(factor.solve, root=root), wanted, _SOLVES, limit)
             self.solves += found.solves
             x, norm = found.x, found.norm
             if not self._fresh:
@@ -129,7 +157,7 @@ class _Solver:
             self._excess += max(found.solves - self._fresh, 0)
             if norm <= wanted:
                 residual(x)
-                return norm / scale
+                return norm / scale, scale
         raise NotConverged(
             f"an implicit step of {step.bdt:.2g} s at t = {step.time:.4g} s was not solved.",
             advice="Give a shorter step, or take the explicit mode.",
@@ -145,7 +173,7 @@ def _grown(past: np.ndarray, parent: np.ndarray) -> np.ndarray:
 
 
 def _step(
-    solver: _Solver, state: State, past: _Past | None, time: float, dt: float, depth: int
+    solver: _Solver, state: State, past: _Past | None, time: float, dt: float, depth: int = 0, scale: float = 0.0
 ) -> tuple[State, _Past, float]:
     """Return the state a step later, its past, and the residual; halves the step where it is not solved.
 
@@ -173,7 +201,7 @@ def _step(
     state.scratch.lagged[:] = state.scratch.normals
     try:
         for _ in range(_PASSES):
-            error = solver.solve(state, to, guesses)
+            error, scale = solver.solve(state, to, guesses, scale)
             now = state.wood.motion
             done += _along(state, f0, now.x - here)
             found = broken(state, params, time + dt, dt) if params.fracture != "none" else state
@@ -187,13 +215,13 @@ def _step(
             to = to._replace(xh=_grown(to.xh, parent), vh=_grown(to.vh, parent))
             guesses = (here,)
         else:
-            error = solver.solve(state, to, guesses)
+            error, scale = solver.solve(state, to, guesses, scale)
             done += _along(state, f0, state.wood.motion.x - here)
     except NotConverged:
         if depth == _HALVINGS:
             raise
-        state, past, _ = _step(solver, kept, past, time, dt / 2, depth + 1)
-        return _step(solver, state, past, time + dt / 2, dt / 2, depth + 1)
+        state, past, _ = _step(solver, kept, past, time, dt / 2, depth + 1, scale)
+        return _step(solver, state, past, time + dt / 2, dt / 2, depth + 1, scale)
     power1 = _power(state, params)
     x0, v0 = (_grown(a, state.wood.parent) for a in (x0, v0))
     w = state.wood.motion
@@ -239,12 +267,12 @@ def implicit(
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
         while done < ahead:
             context.check_cancelled()
-            state, past, _ = _step(solver, state, past, done * dt, dt, 0)
+            state, past, _ = _step(solver, state, past, done * dt, dt)
             done += 1
             context.report(done * dt / times[-1], f"t = {done * dt:.4g} s")
         shown = state
         rest = wanted - ahead * dt
         if rest > 1e-9 * dt:
             # on a factor of its own: later steps must not know of this one
-            shown, _, _ = _step(_Solver(params, settings.tolerance), copied(state), past, ahead * dt, rest, 0)
+            shown, _, _ = _step(_Solver(params, settings.tolerance), copied(state), past, ahead * dt, rest)
         yield balanced(copied(shown), wanted, start, floor(wood, params), balance)
