@@ -33,7 +33,8 @@ def _run(values: dict[str, Any], until: float, quality: Any) -> str:
         found, error = failed.partial, f"  {failed}"
     cpu = time.process_time() - begun
     return (
-        f"{found.attrs['rods']:4d}  {found.attrs['vertices']:8d}  {params.seed:4d}  {params.fracture:>8}  {params.mode:>8}"
+        f"{found.attrs['rods']:4d}  {found.attrs['vertices']:8d}  {params.seed:4d}"
+        f"  {params.fracture:>8}  {params.mode:>8}"
         f"  {float(found.stage[-1]):9.2f}  {cpu:5.0f}  {int(found.broken_rods[-1]):14d}"
         f"  {int(found.broken_bonds[-1]):8d}  {found.attrs['bonds']:12d}  {float(found.residual.max()):13.1e}{error}"
     )

@@ -38,7 +38,7 @@ def pose(bodies: Bodies, time: float, centre: np.ndarray, speed: np.ndarray) -> 
 def touch(
     kind: int, axis: int, reach: np.ndarray, o0: float, o1: float, o2: float
 ) -> tuple[float, float, float, float, float]:
-    """Return depth [m] (not positive: apart), radius of curvature [m] (0: flat) and outward normal at o from the centre."""
+    """Return depth [m] (0: apart), radius of curvature [m] (0: flat) and outward normal at o from the centre [m]."""
     if kind == 0:
         g0 = reach[0] - abs(o0)
         g1 = reach[1] - abs(o1)

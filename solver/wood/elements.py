@@ -146,7 +146,7 @@ def _fill(
 
 
 def elements(x: np.ndarray, rods: Rods, bonds: Bonds, positive: bool = False) -> Elements:
-    """Return the elements at x (v, 3); `positive` keeps what cannot be negative: Gauss and Newton's part and tension."""
+    """Return the elements at x (v, 3); `positive` keeps Gauss and Newton's part and tension, never negative."""
     count = len(rods.a) + len(rods.before) + len(bonds.i)
     out = Elements(np.zeros((count, 6, 6)), np.zeros((count, 3), np.int32), np.zeros((count, 2, 3)))
     _fill(x, rods, bonds, positive, *out)

@@ -91,7 +91,7 @@ def forces(
         )
     else:
         books[BENDING] = bend(f, rods, scratch.t, scratch.inverse)
-    books[BONDS] = bind(motion.x, f, rods, bonds, scratch.each)
+    books[BONDS] = bind(motion.x, f, rods, bonds, scratch.t, scratch.inverse, scratch.each)
     books[CONTACT] = 0.0
     if len(bodies.kind) > 0:
         pose(bodies, time, scratch.centre, scratch.speed)

@@ -16,8 +16,8 @@ import numpy as np
 from ..contract import Context, NotConverged
 from .bundle import Wood
 from .contact import RUBBING, contacts
-from .explicit import CONTACT, LOST, WORK, forces
 from .elements import apply, elements
+from .explicit import CONTACT, LOST, WORK, forces
 from .hessian import Stiffness
 from .newton import descend
 from .params import WoodParams

@@ -92,7 +92,8 @@ def descend(
     """Iterate from x (v, 3) until the norm of the residual is at most `wanted`, or `most` solves are used up.
 
     residual: gradient (v, 3) [N], zero where held. stiffness: the product with the second derivatives where residual
-    was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that can be trusted.
+    was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that
+    can be trusted.
     """
     r = residual(x)
     norm = float(np.linalg.norm(r))
