@@ -17,8 +17,8 @@ from solver.contract import Need
 from solver.wood import SOLVER
 from solver.wood.bundle import lay
 from solver.wood.explicit import march
+from solver.wood.moment import begin
 from solver.wood.stability import longest_step
-from solver.wood.stepping import begin
 
 from .wood_splinters import splinters
 

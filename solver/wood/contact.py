@@ -7,7 +7,7 @@ from numba import njit
 
 from .arrays import Bodies
 from .bodies import touch
-from .stepping import State
+from .moment import State
 
 __all__ = ["RUBBING", "contacts"]
 

@@ -14,16 +14,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contract import Context, NotConverged
-from .bundle import Wood
 from .contact import RUBBING, contacts
 from .elements import apply, elements
 from .explicit import CONTACT, LOST, WORK, forces
 from .hessian import Stiffness
+from .moment import Reached, State, balanced, begin, copied, floor, kinetic, strength
 from .newton import descend
 from .params import WoodParams
 from .precondition import Preconditioner, preconditioner
 from .settings import Settings
-from .stepping import Reached, State, balanced, begin, broken, copied, floor, kinetic, strength
+from .state import Wood
+from .stepping import broken
 
 __all__ = ["implicit"]
 

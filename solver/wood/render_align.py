@@ -14,9 +14,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .bundle import Wood
 from .render_rows import Rows, Spans
 from .render_section import Section
+from .state import Wood
 
 __all__ = ["Pairs", "aligned", "bonded", "corners", "meeting", "turned"]
 

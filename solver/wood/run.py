@@ -11,12 +11,15 @@ import xarray as xr
 
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
-from .bundle import Wood, lay
+from .bundle import lay
+from .listing import law
+from .moment import Reached
 from .params import WoodParams
 from .render import Skin
 from .settings import choose
 from .stability import longest_step
-from .stepping import Reached, explicit
+from .state import Wood
+from .stepping import explicit
 
 __all__ = ["run"]
 
@@ -56,7 +59,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]
     if params.mode == "explicit":
-        longest = longest_step(wood)
+        longest = longest_step(wood, law(wood, params)[1] if params.rod_contact else 0.0)
         dt = min(settings.courant * longest, params.step or np.inf)
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context)

@@ -11,13 +11,14 @@ from scipy.optimize import brentq
 from solver.contract import Context, Need
 from solver.wood import SOLVER
 from solver.wood.arrays import Bodies
-from solver.wood.bundle import Wood, lay, scratch_for
+from solver.wood.bundle import lay
 from solver.wood.contact import RUBBING, contacts
 from solver.wood.elements import apply, elements
 from solver.wood.explicit import forces
 from solver.wood.hessian import Stiffness
+from solver.wood.moment import begin, kinetic
+from solver.wood.state import Wood, scratch_for
 from solver.wood.static import equilibrium
-from solver.wood.stepping import begin, kinetic
 from solver.wood.stepping import explicit as march
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
