@@ -29,7 +29,7 @@ from .stepping import broken
 __all__ = ["implicit"]
 
 #: Solves before a stale factor is given up, and factors before a step is.
-_SOLVES, _FACTORS = 60, 12
+_SOLVES, _FACTORS = 60, 5
 #: A factor is renewed when it has cost this many solves more than a fresh one would have: about what a new one costs.
 _EXCESS = 40
 #: The least residual that is asked for: this share of the tolerance, of the load that the bundle bears.
