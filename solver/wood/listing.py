@@ -24,7 +24,8 @@ def law(wood: Wood, params: WoodParams) -> np.ndarray:
     """Return thickness [m], stiffness [N/m] and friction (3,) of contacts between rods."""
     rods: Rods = wood.rods
     feet = wood.motion.x[wood.grid[:, 0]]
-    least = float(cKDTree(feet).query(feet, 2)[0][:, 1].min()) if len(feet) > 1 else 0.0
+    apart = np.asarray(cKDTree(feet).query(feet, 2)[0])
+    least = float(apart[:, 1].min()) if len(feet) > 1 else 0.0
     real = rods.k > 0
     stiff = params.contact_stiffness or _CONTACT * float(np.median(rods.k[real] / rods.rest[real]))
     return np.array([min(_THICK * least, 2 * float(rods.radius.min())), stiff, params.rod_friction])

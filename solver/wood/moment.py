@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,12 +90,17 @@ def begin(wood: Wood) -> State:
     return State(wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), 0, 0, 0)
 
 
+def _again(scratch: Scratch) -> Scratch:
+    fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name != "rubbing"}
+    return Scratch(**fresh, rubbing=scratch.rubbing)
+
+
 def copied(state: State) -> State:
     """Return a state that can be stepped without touching this one."""
     wood = state.wood.copied()
     return state._replace(
         wood=wood,
-        scratch=Scratch(*(a.copy() for a in state.scratch[:-1]), state.scratch.rubbing),
+        scratch=_again(state.scratch),
         books=state.books.copy(),
         impulse=state.impulse.copy(),
     )
