@@ -138,6 +138,8 @@ def _dataset(
     if frames:
         bare = [f if "inside" in need.fields else f._replace(fields={}) for f in frames[: len(rows)]]
         data |= changing(bare, need.dtype)
+        if "mesh_position" not in need.fields:
+            del data["mesh_position"]
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
     if any("component" in entry[0] for entry in data.values()):
         coords["component"] = ["x", "y", "z"]
