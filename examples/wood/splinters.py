@@ -1,37 +1,87 @@
-"""Draw Fig. 4.2's runs: three seeds of one branch under three blocks (`splinter.toml`), a row each.
+"""Draw Fig. 4.2's runs: three seeds of one branch under three blocks (`splinter.toml`), a row each, blocks and all.
 
-python -m examples.wood.splinters OUT.png
+python -m examples.wood.splinters OUT.png [SEED ...]; writes OUT-SEED.glb, animated, beside it.
 """
 
 from __future__ import annotations
 
 import sys
+import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from service.sequences import EXPORTS, Options, prepared, write
 from solver.contract import Need
-from solver.wood import SOLVER
+from solver.wood import SOLVER, Body, WoodParams
 from sweeps.outputs import triangles
-from sweeps.picture import sheet
+from sweeps.picture import Panel, sheet
 
-_STAGES = (0.01, 0.02, 0.03, 0.04)
+_STAGES = (0.015, 0.03, 0.045, 0.06)
 _SEEDS = (1, 2, 3)
+_AROUND = 48
+_STEEL = (0.25, 0.28, 0.32)
 
 
-def main(out: Path) -> None:
-    """Solve and draw."""
+def _solid(body: Body, when: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (v, 3) [m] and triangles (f, 3) of a cylinder along y, as it stands at a time [s]."""
+    angle = np.linspace(0, 2 * np.pi, _AROUND, endpoint=False)
+    ring = body.size[0] / 2 * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    half = np.array([0, body.size[1] / 2, 0])
+    # the ends have vertices of their own, so that their edges are sharp
+    points = np.concatenate([ring - half, ring + half, ring - half, ring + half])
+    n = np.arange(_AROUND)
+    m = (n + 1) % _AROUND
+    side = np.concatenate(
+        [np.stack([n, m, n + _AROUND], axis=1), np.stack([m, m + _AROUND, n + _AROUND], axis=1)],
+    )
+    fan = np.stack([0 * n[1:-1], n[1:-1], m[1:-1]], axis=1)
+    faces = np.concatenate([side, fan + 2 * _AROUND, fan[:, ::-1] + 3 * _AROUND])
+    times = [w.time for w in body.path]
+    at = [np.interp(when, times, [w.position[c] for w in body.path]) for c in range(3)]
+    return points + np.array(at), faces
+
+
+def _with_bodies(panel: Panel, params: WoodParams, view: np.ndarray, when: float) -> Panel:
+    """Return the panel with the bodies in it."""
+    position, faces, colour = panel.position, panel.triangles, panel.colour
+    assert faces is not None
+    if colour is None:
+        colour = np.broadcast_to((0.4, 0.23, 0.11), position.shape)
+    for body in params.bodies:
+        points, more = _solid(body, when)
+        faces = np.concatenate([faces, more + len(position)])
+        position = np.concatenate([position, (points - view[:3]) / view[3]])
+        colour = np.concatenate([colour, np.broadcast_to(_STEEL, points.shape)])
+    return replace(panel, position=position, triangles=faces, colour=colour)
+
+
+def main(out: Path, seeds: tuple[int, ...]) -> None:
+    """Solve, draw and export."""
     values = tomllib.loads(Path(__file__).with_name("splinter.toml").read_text())
     need = Need(stages=_STAGES, quality="preview", fields=("mesh_position", "inside", "broken_rods", "broken_bonds"))
     rows, labels = [], []
-    for seed in _SEEDS:
-        run = SOLVER.solve(SOLVER.parse(values | {"seed": seed}), need)
-        rows.append(triangles(run))
+    for seed in seeds:
+        params, begun = SOLVER.parse(values | {"seed": seed}), time.process_time()
+        assert isinstance(params, WoodParams)
+        run = SOLVER.solve(params, need)
+        cpu = time.process_time() - begun
+        view = np.asarray(run.attrs["view"], float)
+        panels = zip(triangles(run), _STAGES, strict=True)
+        rows.append([_with_bodies(panel, params, view, when) for panel, when in panels])
         labels.append(f"seed {seed}")
         broken = int(run.broken_rods[-1]), int(run.broken_bonds[-1])
-        print(f"seed {seed}: {broken[0]} breaks of {run.attrs['rods']} rods, {broken[1]} of {run.attrs['bonds']} bonds")
+        counts = f"{broken[0]} breaks of {run.attrs['rods']} rods, {broken[1]} of {run.attrs['bonds']} bonds"
+        print(f"seed {seed}: {counts}, {cpu:.0f} CPU s", flush=True)
+        options = Options()
+        out.with_name(f"{out.stem}-{seed}.glb").write_bytes(
+            write(prepared(run, options), EXPORTS["animation"], options)
+        )
     stages = [f"t = {1000 * stage:g} ms" for stage in _STAGES]
     out.write_bytes(sheet(rows, title="Splinters", row_labels=labels, column_labels=stages, pixels=300))
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), tuple(int(seed) for seed in sys.argv[2:]) or _SEEDS)

@@ -12,9 +12,7 @@ from numba import njit
 
 from .arrays import Bodies
 
-__all__ = ["pose", "press"]
-
-_TINY = 1e-30
+__all__ = ["pose", "press", "touch"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -34,6 +32,40 @@ def pose(bodies: Bodies, time: float, centre: np.ndarray, speed: np.ndarray) -> 
                 for c in range(3):
                     speed[r, c] = (bodies.points[r, last + 1, c] - bodies.points[r, last, c]) / width
                     centre[r, c] += speed[r, c] * (time - bodies.times[r, last])
+
+
+@njit(cache=True, error_model="numpy")
+def touch(
+    kind: int, axis: int, reach: np.ndarray, o0: float, o1: float, o2: float
+) -> tuple[float, float, float, float, float]:
+    """Return depth [m] (0: apart), radius of curvature [m] (0: flat) and outward normal at o from the centre [m]."""
+    if kind == 0:
+        g0 = reach[0] - abs(o0)
+        g1 = reach[1] - abs(o1)
+        g2 = reach[2] - abs(o2)
+        gap = min(g0, min(g1, g2))
+        if gap <= 0.0:
+            return 0.0, 0.0, 0.0, 0.0, 0.0
+        if gap == g2:
+            return gap, 0.0, 0.0, 0.0, 1.0 if o2 > 0 else -1.0
+        if gap == g1:
+            return gap, 0.0, 0.0, 1.0 if o1 > 0 else -1.0, 0.0
+        return gap, 0.0, 1.0 if o0 > 0 else -1.0, 0.0, 0.0
+    along = o0 if axis == 0 else (o1 if axis == 1 else o2)
+    cap = reach[1] - abs(along)
+    c0 = 0.0 if axis == 0 else o0
+    c1 = 0.0 if axis == 1 else o1
+    c2 = 0.0 if axis == 2 else o2
+    away = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
+    gap = reach[0] - away
+    if cap <= 0.0 or gap <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    if gap > cap and away > 0.0:
+        side = 1.0 if along > 0 else -1.0
+        return cap, 0.0, side if axis == 0 else 0.0, side if axis == 1 else 0.0, side if axis == 2 else 0.0
+    if away == 0.0:
+        return gap, reach[0], 0.0, 0.0 if axis != 2 else 1.0, 1.0 if axis != 2 else 0.0
+    return gap, away, c0 / away, c1 / away, c2 / away
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,50 +100,16 @@ def press(
         for i in range(len(x)):
             if held[i] == 1:
                 continue
-            o0 = x[i, 0] - centre[r, 0]
-            o1 = x[i, 1] - centre[r, 1]
-            o2 = x[i, 2] - centre[r, 2]
-            n0 = 0.0
-            n1 = 0.0
-            n2 = 0.0
-            if bodies.kind[r] == 0:
-                g0 = reach[0] - abs(o0)
-                g1 = reach[1] - abs(o1)
-                g2 = reach[2] - abs(o2)
-                gap = min(g0, min(g1, g2))
-                if gap <= 0.0:
-                    continue
-                if gap == g2:
-                    n2 = 1.0 if o2 > 0 else -1.0
-                elif gap == g1:
-                    n1 = 1.0 if o1 > 0 else -1.0
-                else:
-                    n0 = 1.0 if o0 > 0 else -1.0
-            else:
-                along = o0 if axis == 0 else (o1 if axis == 1 else o2)
-                cap = reach[1] - abs(along)
-                if cap <= 0.0:
-                    continue
-                c0 = 0.0 if axis == 0 else o0
-                c1 = 0.0 if axis == 1 else o1
-                c2 = 0.0 if axis == 2 else o2
-                away = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
-                gap = reach[0] - away
-                if gap <= 0.0:
-                    continue
-                if gap <= cap or away == 0.0:
-                    n0 = c0 / max(away, _TINY)
-                    n1 = c1 / max(away, _TINY)
-                    n2 = c2 / max(away, _TINY)
-                    if away == 0.0:
-                        n2 = 1.0 if axis != 2 else 0.0
-                        n1 = 0.0 if axis != 2 else 1.0
-                else:
-                    gap = cap
-                    side = 1.0 if along > 0 else -1.0
-                    n0 = side if axis == 0 else 0.0
-                    n1 = side if axis == 1 else 0.0
-                    n2 = side if axis == 2 else 0.0
+            gap, _, n0, n1, n2 = touch(
+                bodies.kind[r],
+                axis,
+                reach,
+                x[i, 0] - centre[r, 0],
+                x[i, 1] - centre[r, 1],
+                x[i, 2] - centre[r, 2],
+            )
+            if gap <= 0.0:
+                continue
             if gap < bodies.ease[r]:
                 normal = 0.5 * bodies.k[r] * gap * gap / bodies.ease[r]
                 energy += normal * gap / 3.0

@@ -18,46 +18,58 @@ _TINY = 1e-30
 
 
 @njit(cache=True, error_model="numpy")
-def bind(x: np.ndarray, f: np.ndarray, rods: Rods, bonds: Bonds, each: np.ndarray) -> float:
-    """Add the bonds' forces to f (v, 3) [N] and write the energy of each (b,) [J]; return their sum [J]."""
+def bind(
+    x: np.ndarray,
+    f: np.ndarray,
+    rods: Rods,
+    bonds: Bonds,
+    t: np.ndarray,
+    inverse: np.ndarray,
+    each: np.ndarray,
+) -> float:
+    """Add the bonds' forces to f (v, 3) [N] and write the energy of each (b,) [J]; return their sum [J].
+
+    t (e, 3) and inverse (e,): unit vectors and 1/|e| of the edges, as `rods.stretch` leaves them.
+    """
     energy = 0.0
     for n in range(len(bonds.i)):
         if bonds.on[n] == 0:
             each[n] = 0.0
             continue
         i = bonds.i[n]
-        a = rods.a[bonds.j[n]]
-        b = rods.b[bonds.j[n]]
+        j = bonds.j[n]
+        a = rods.a[j]
+        b = rods.b[j]
         u = bonds.share[n]
         m = 1.0 - u
         dx = x[i, 0] - m * x[a, 0] - u * x[b, 0]
         dy = x[i, 1] - m * x[a, 1] - u * x[b, 1]
         dz = x[i, 2] - m * x[a, 2] - u * x[b, 2]
-        ex = x[b, 0] - x[a, 0]
-        ey = x[b, 1] - x[a, 1]
-        ez = x[b, 2] - x[a, 2]
+        tx = t[j, 0]
+        ty = t[j, 1]
+        tz = t[j, 2]
+        # one root and two divisions: they are most of what a bond costs
         d2 = max(dx * dx + dy * dy + dz * dz, _TINY)
-        e2 = max(ex * ex + ey * ey + ez * ez, _TINY)
-        id2 = 1.0 / d2
-        ie2 = 1.0 / e2
-        d = np.sqrt(d2)
-        ide = np.sqrt(id2 * ie2)
-        cosine = (ex * dx + ey * dy + ez * dz) * ide
-        strain = d / bonds.rest[n] - 1.0
+        away = 1.0 / np.sqrt(d2)
+        strain = d2 * away / bonds.rest[n] - 1.0
+        dx *= away
+        dy *= away
+        dz *= away
+        cosine = tx * dx + ty * dy + tz * dz
         off = cosine - bonds.cosine[n]
         own = 0.5 * bonds.k[n] * strain * strain * bonds.rest[n] + bonds.s[n] * off * off
         each[n] = own
         energy += own
         w = -2.0 * bonds.s[n] * off
-        q = -bonds.k[n] * strain / d - w * cosine * id2
-        r = -w * cosine * ie2
-        w *= ide
-        px = q * dx + w * ex  # -dE/dd
-        py = q * dy + w * ey
-        pz = q * dz + w * ez
-        rx = w * dx + r * ex  # -dE/de
-        ry = w * dy + r * ey
-        rz = w * dz + r * ez
+        q = -bonds.k[n] * strain - w * cosine * away
+        w1 = w * away
+        px = q * dx + w1 * tx  # -dE/dd
+        py = q * dy + w1 * ty
+        pz = q * dz + w1 * tz
+        w *= inverse[j]
+        rx = w * (dx - cosine * tx)  # -dE/de
+        ry = w * (dy - cosine * ty)
+        rz = w * (dz - cosine * tz)
         f[i, 0] += px
         f[i, 1] += py
         f[i, 2] += pz

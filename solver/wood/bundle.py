@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..contract import Context, InvalidGeometry
-from .arrays import Bodies, Bonds, Rods, Turns
-from .explicit import Motion, Scratch
+from .arrays import Rods, Turns
+from .explicit import Motion
 from .grain import Field
+from .joining import bodied, bonded
 from .params import WoodParams
 from .section import areas, balanced, place
+from .state import Wood
 
-__all__ = ["SAMPLES", "Wood", "lay", "scratch_for"]
+__all__ = ["SAMPLES", "lay"]
 
 #: Where on an edge, 0 to 1, its strength is known.
 SAMPLES = np.linspace(0.0, 1.0, 9)
@@ -22,54 +21,6 @@ SAMPLES = np.linspace(0.0, 1.0, 9)
 _CONTACT = 0.1
 #: Depth over which a contact gains its stiffness, over a rod's radius.
 _EASE = 0.1
-#: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
-#: density c eps_n^2 / 2 has the Young's modulus c / 3.
-_NET = 3.0
-
-
-@dataclass(frozen=True)
-class Wood:
-    """All arrays of a run. Their contents change as it runs, and a break that adds vertices makes a new value."""
-
-    motion: Motion
-    rods: Rods
-    bonds: Bonds
-    turns: Turns
-    bodies: Bodies
-    turning: bool
-    strength: np.ndarray  # (e, samples) tensile strain that each place bears
-    rod: np.ndarray  # (e,) int32 rod of an edge, ghosts too
-    grid: np.ndarray  # (rods, vertices) int32: vertex numbers as laid
-    cut: np.ndarray  # (e,) where an edge is cut, 0 to 1; -1: it is not
-    parent: np.ndarray  # (v,) int32 vertex that one was split from; itself as laid
-
-    def copied(self) -> Wood:
-        """Return a copy that can be stepped without touching this one."""
-        return replace(
-            self,
-            motion=Motion(*(a.copy() for a in self.motion)),
-            rods=Rods(*(a.copy() for a in self.rods)),
-            bonds=Bonds(*(a.copy() for a in self.bonds)),
-            cut=self.cut.copy(),
-        )
-
-
-def scratch_for(wood: Wood) -> Scratch:
-    """Return work arrays that fit."""
-    v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
-    return Scratch(
-        np.zeros((v, 3)),
-        wood.motion.old.copy(),
-        1.0 / wood.rods.rest,
-        np.zeros(e),
-        np.zeros(len(wood.bonds.i)),
-        np.zeros((r, 3)),
-        np.zeros((r, 3)),
-        np.zeros((r, 3)),
-        np.zeros(2),
-        np.zeros((r, v)),
-        np.zeros((r, v)),
-    )
 
 
 def _along(rods: int, vertices: int, params: WoodParams, generator: np.random.Generator) -> np.ndarray:
@@ -122,33 +73,6 @@ def _strength(points: np.ndarray, field: Field, params: WoodParams) -> np.ndarra
         # a ring cut in: the load a section bears goes with its area
         strength = np.where(inside, strength * (1 - notch.depth) ** 2, strength)
     return strength
-
-
-def _bodies(params: WoodParams, k: float, ease: float) -> Bodies:
-    found, width = params.bodies, max((len(b.path) for b in params.bodies), default=1)
-    times = np.zeros((len(found), width))
-    points = np.zeros((len(found), width, 3))
-    half = np.zeros((len(found), 3))
-    for r, body in enumerate(found):
-        count = len(body.path)
-        times[r, :count] = [w.time for w in body.path]
-        # never reached: the body rests at its last place
-        times[r, count:] = np.inf
-        points[r, :count] = [w.position for w in body.path]
-        points[r, count:] = points[r, count - 1]
-        half[r] = np.array(body.size) / 2
-        if body.shape == "cylinder":
-            half[r, 2] = 0.0
-    return Bodies(
-        np.array([b.shape == "cylinder" for b in found], np.int32),
-        np.array(["xyz".index(b.axis) for b in found], np.int32),
-        half,
-        np.array([b.friction for b in found], float),
-        times,
-        points,
-        np.full(len(found), k),
-        np.full(len(found), ease),
-    )
 
 
 def lay(params: WoodParams, vertices: int) -> Wood:
@@ -252,7 +176,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     places = straight[:, :-1, None] + SAMPLES[:, None] * (straight[:, 1:] - straight[:, :-1])[:, :, None]
     strength = np.where(real.ravel()[:, None], _strength(places, strong, params).reshape(len(a), -1), np.inf)
     k = params.contact_stiffness or _CONTACT * float(np.median(rods_.k[rods_.k > 0] / length[rods_.k > 0]))
-    bonds = _bonds(params, points, s, grid, edge[:, int(ghosts[0]) :], flat, grain, strong)
+    bonds = bonded(params, points, s, grid, edge[:, int(ghosts[0]) :], flat, grain, strong)
     rod = np.repeat(np.arange(rods, dtype=np.int32), count - 1)
     turning = params.twist or params.curvature != 0
     return Wood(
@@ -260,63 +184,11 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         rods_,
         bonds,
         turns,
-        _bodies(params, k, _EASE * float(np.median(rods_.radius))),
+        bodied(params, k, _EASE * float(np.median(rods_.radius))),
         turning,
         strength,
         rod,
         grid,
         np.full(len(a), -1.0),
         number.ravel(),
-    )
-
-
-def _bonds(
-    params: WoodParams,
-    points: np.ndarray,
-    s: np.ndarray,
-    grid: np.ndarray,
-    edge: np.ndarray,
-    rest: np.ndarray,
-    grain: Field,
-    strong: Field,
-) -> Bonds:
-    """Bond every vertex to the closest point of each rod within reach.
-
-    points (k, 2) in the section, s (k, n) places along, grid (k, n) vertex numbers, edge (k, n - 1) edge numbers,
-    rest (v, 3) places at rest.
-    """
-    near = params.reach * float(np.sqrt(np.pi * params.radius**2 / len(points)))
-    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
-    pairs = pairs[np.lexsort(pairs.T)] if len(pairs) else np.zeros((0, 2), int)
-    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
-    n = s.shape[1]
-    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
-        # rods are parallel at rest: the closest point lies at the same place along
-        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, n - 2)
-        vertex.append(grid[p])
-        on.append(edge[q][j])
-        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
-    i, e, u = np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
-    width = (np.searchsorted(edge[:, 0], e, side="right") - 1).astype(int)
-    first = grid[width, e - edge[width, 0]]
-    a, b = rest[first], rest[first + 1]
-    d = rest[i] - (1 - u[:, None]) * a - u[:, None] * b
-    length = np.linalg.norm(d, axis=1)
-    if len(i) and not length.min() > 0:
-        raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    cosine = ((b - a) * d).sum(1) / np.maximum(np.linalg.norm(b - a, axis=1) * length, 1e-300)
-    volume = np.pi * params.radius**2 * params.length / max(len(i), 1)
-    middle = rest[i] - d / 2
-    stiff = grain.factor(middle, params.grain.stiffness)
-    strength = strong.factor(middle, params.grain.strength)
-    return Bonds(
-        i.astype(np.int32),
-        e.astype(np.int32),
-        u,
-        length,
-        _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff,
-        params.shear * volume * stiff,
-        cosine,
-        params.bond_energy * volume * strength**2,
-        np.ones(len(i), np.uint8),
     )

@@ -1,11 +1,13 @@
-"""The stiffness of contacts with rigid bodies, vertex by vertex, as the implicit scheme factors it."""
+"""The stiffness of contacts with rigid bodies, vertex by vertex, for the implicit scheme."""
 
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
-from .bodies import press
-from .stepping import State
+from .arrays import Bodies
+from .bodies import touch
+from .moment import State
 
 __all__ = ["RUBBING", "contacts"]
 
@@ -13,30 +15,77 @@ __all__ = ["RUBBING", "contacts"]
 RUBBING = 1e-3
 
 
-def contacts(state: State, dt: float) -> np.ndarray | None:
-    """Return the stiffness (v, 3, 3) [N/m]: along the normal, and what friction resists; None without bodies."""
-    wood, s = state.wood, state.scratch
-    m = wood.motion
-    if not len(wood.bodies.kind):
+@njit(cache=True, error_model="numpy")
+def _contacts(
+    x: np.ndarray,
+    v: np.ndarray,
+    bodies: Bodies,
+    centre: np.ndarray,
+    speed: np.ndarray,
+    lagged: np.ndarray,
+    dt: float,
+    positive: bool,
+    out: np.ndarray,
+) -> None:
+    n = np.zeros(3)
+    s = np.zeros(3)
+    for r in range(len(bodies.kind)):
+        k = bodies.k[r]
+        ease = bodies.ease[r]
+        for i in range(len(x)):
+            gap, bow, n[0], n[1], n[2] = touch(
+                bodies.kind[r],
+                bodies.axis[r],
+                bodies.half[r],
+                x[i, 0] - centre[r, 0],
+                x[i, 1] - centre[r, 1],
+                x[i, 2] - centre[r, 2],
+            )
+            if gap <= 0.0:
+                continue
+            stiff = k
+            normal = k * (gap - 0.5 * ease)
+            if gap < ease:
+                stiff = k * gap / ease
+                normal = 0.5 * stiff * gap
+            sn = 0.0
+            for c in range(3):
+                s[c] = v[i, c] - speed[r, c]
+                sn += s[c] * n[c]
+            slip = 0.0
+            for c in range(3):
+                s[c] -= sn * n[c]
+                slip += s[c] * s[c]
+            slip = np.sqrt(slip)
+            soft = min(slip / RUBBING, 1.0)
+            drag = bodies.friction[r] * lagged[r, i] / dt
+            secant = drag * (2.0 - soft) / max(slip, RUBBING)
+            slope = drag * 2.0 * (1.0 - soft) / RUBBING
+            if positive:
+                # what only slides would be free to
+                secant = drag / max(slip, 0.5 * RUBBING)
+                slope = secant
+            turn = 0.0 if positive or bow == 0.0 else normal / bow
+            for p in range(3):
+                for q in range(3):
+                    one = 1.0 if p == q else 0.0
+                    flat = one - n[p] * n[q]
+                    out[i, p, q] += stiff * n[p] * n[q] + secant * flat
+                    if slip > 0.0:
+                        out[i, p, q] += (slope - secant) * s[p] * s[q] / (slip * slip)
+                    if turn > 0.0 and p != bodies.axis[r] and q != bodies.axis[r]:
+                        out[i, p, q] -= turn * flat
+
+
+def contacts(state: State, dt: float, positive: bool) -> np.ndarray | None:
+    """Return the stiffness (v, 3, 3) [N/m] of the contacts at the state's x and v; None without bodies.
+
+    positive: as the factor needs it, without the body's curvature and the slope of friction.
+    """
+    m, s, bodies = state.wood.motion, state.scratch, state.wood.bodies
+    if not len(bodies.kind):
         return None
     out = np.zeros((len(m.x), 3, 3))
-    for r in range(len(wood.bodies.kind)):
-        one = type(wood.bodies)(*(a[r : r + 1] for a in wood.bodies))
-        normal, none = np.zeros_like(m.x), np.zeros((1, len(m.x)))
-        smooth = one._replace(friction=np.zeros(1))
-        centre, speed = s.centre[r : r + 1], s.speed[r : r + 1]
-        books = np.zeros((1, 3)), np.zeros(2), none, none
-        press(m.x, m.v, normal, m.mass, m.held, smooth, centre, speed, dt, RUBBING, *books)
-        size = np.linalg.norm(normal, axis=1)
-        n = normal / np.maximum(size, 1e-300)[:, None]
-        along = n[:, :, None] * n[:, None, :]
-        slip = m.v - speed[0]
-        slip -= n * (slip * n).sum(1)[:, None]
-        # between the secant of friction and its slope, which is nothing where it slides
-        drag = one.friction[0] * s.lagged[r] / np.maximum(np.linalg.norm(slip, axis=1), RUBBING / 2) / dt
-        # at a normal force N the stiffness is sqrt(2 k N / ease), up to k
-        k, ease = one.k[0], one.ease[0]
-        stiff = np.minimum(k, np.sqrt(2 * k * size / ease)) if ease > 0 else np.full(len(size), k)
-        touching = size > 0
-        out[touching] += (stiff[:, None, None] * along + drag[:, None, None] * (np.eye(3) - along))[touching]
+    _contacts(m.x, m.v, bodies, s.centre, s.speed, s.lagged, dt, positive, out)
+    out[m.held == 1] = 0.0
     return out

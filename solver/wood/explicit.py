@@ -15,6 +15,7 @@ from .arrays import Bodies, Bonds, Rods, Turns
 from .bodies import pose, press
 from .bonds import bind
 from .rods import bend, stretch
+from .rubbing import Rubbing, rub
 from .twist import carry, turn, twists
 
 __all__ = ["BENDING", "BONDS", "CONTACT", "LOST", "STRETCH", "WORK", "Motion", "Scratch", "forces", "march"]
@@ -39,7 +40,7 @@ class Motion(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3), contacts (r, v)."""
+    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3), contacts (r, v); pairs of edges."""
 
     f: np.ndarray
     t: np.ndarray
@@ -52,6 +53,7 @@ class Scratch(NamedTuple):
     power: np.ndarray
     normals: np.ndarray
     lagged: np.ndarray
+    rubbing: Rubbing
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,7 +93,7 @@ def forces(
         )
     else:
         books[BENDING] = bend(f, rods, scratch.t, scratch.inverse)
-    books[BONDS] = bind(motion.x, f, rods, bonds, scratch.each)
+    books[BONDS] = bind(motion.x, f, rods, bonds, scratch.t, scratch.inverse, scratch.each)
     books[CONTACT] = 0.0
     if len(bodies.kind) > 0:
         pose(bodies, time, scratch.centre, scratch.speed)
@@ -111,6 +113,8 @@ def forces(
             scratch.normals,
             scratch.lagged,
         )
+    if len(scratch.rubbing.pair) > 0:
+        books[CONTACT] += rub(motion.x, motion.v, f, motion.mass, rods, scratch.rubbing, dt, scratch.power)
 
 
 @njit(cache=True, error_model="numpy")

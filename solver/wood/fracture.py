@@ -16,8 +16,9 @@ import numpy as np
 from numba import njit
 
 from .arrays import Bonds, Rods
-from .bundle import SAMPLES, Wood
+from .bundle import SAMPLES
 from .explicit import Motion
+from .state import Wood
 
 __all__ = ["Breaks", "break_worst", "overstress"]
 

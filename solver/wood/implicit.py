@@ -8,30 +8,21 @@ from forces and velocities alone and is booked as dissipated, so that the balanc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..contract import Context, NotConverged
-from .bundle import Wood
-from .contact import RUBBING, contacts
-from .explicit import CONTACT, LOST, WORK, forces
-from .hessian import Stiffness
-from .newton import descend
+from .explicit import CONTACT, LOST, WORK
+from .moment import Reached, State, balanced, begin, copied, floor, kinetic
 from .params import WoodParams
-from .precondition import Preconditioner, preconditioner
 from .settings import Settings
-from .stepping import Reached, State, balanced, begin, broken, copied, floor, kinetic, strength
+from .solving import Solver, Step
+from .state import Wood
+from .stepping import broken
 
 __all__ = ["implicit"]
 
-#: Solves before a stale factor is given up, and factors before a step is.
-_SOLVES, _FACTORS = 200, 2
-#: A factor is renewed when it has cost this many solves more than a fresh one would have: about what a new one costs.
-_EXCESS = 60
-#: The least residual that is asked for: this share of the tolerance, of the load that the bundle bears.
-_LEAST = 1e-4
 _HALVINGS = 12
 #: Times that breaking and solving alternate in one step.
 _PASSES = 40
@@ -45,98 +36,6 @@ class _Past(NamedTuple):
     dt: float
 
 
-class _Step(NamedTuple):
-    """What a step sets out from: xh, vh (v, 3), b dt [s], its end [s]."""
-
-    xh: np.ndarray
-    vh: np.ndarray
-    bdt: float
-    time: float
-
-
-class _Solver:
-    """The iteration with its factor, over one run."""
-
-    def __init__(self, params: WoodParams, tolerance: float) -> None:
-        self.params, self.tolerance = params, tolerance
-        self._factor: Preconditioner | None = None
-        self._pattern: Stiffness | None = None
-        self._key: tuple[int, ...] = ()
-        self._bdt, self._fresh, self._excess = 0.0, 0, 0
-        self.factors, self.solves = 0, 0
-
-    def _renew(self, state: State, bdt: float) -> None:
-        wood = state.wood
-        m = wood.motion
-        # bonds change hands and vertices are added only by breaks of rods
-        key = (len(m.x), state.rods)
-        pattern = self._pattern if self._key == key else None
-        inertia = m.mass * (1 / bdt + self.params.damping) / bdt
-        self._factor, self._pattern = preconditioner(
-            m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(state, bdt), pattern
-        )
-        self._key, self._bdt, self._fresh, self._excess = key, bdt, 0, 0
-        self.factors += 1
-
-    def forces(self, state: State, time: float, dt: float) -> np.ndarray:
-        """Fill the state's forces for its x and v at `time`; return them (v, 3) [N]."""
-        w = state.wood
-        forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, state.scratch, False, time, dt, RUBBING, state.books)
-        return state.scratch.f
-
-    def solve(self, state: State, step: _Step, guesses: tuple[np.ndarray, ...]) -> float:
-        """Find x and v of the step in place, from the better of the guesses (v, 3); return the relative residual.
-
-        Raises:
-            NotConverged: it is not found.
-
-        """
-        wood, p = state.wood, self.params
-        m = wood.motion
-        held = m.held == 1
-        free = ~held
-
-        def residual(x: np.ndarray) -> np.ndarray:
-            m.x[:] = x
-            m.v[free] = (x[free] - step.xh[free]) / step.bdt
-            f = self.forces(state, step.time, step.bdt)
-            r: np.ndarray = m.mass[:, None] * ((m.v - step.vh) / step.bdt + p.damping * m.v) - f
-            r[held] = 0.0
-            return r
-
-        norms = [float(np.linalg.norm(residual(x))) for x in guesses]
-        x = guesses[int(np.nanargmin(norms))]
-        scale = max(norms[0], _LEAST * strength(wood, p))
-        wanted = self.tolerance * scale
-        longest = 0.2 * float(wood.rods.rest[wood.rods.k > 0].mean())
-        root = np.arange(len(m.x))
-        norm = min(norms)
-        for attempt in range(_FACTORS):
-            stale = self._factor is None or self._bdt != step.bdt or self._excess > _EXCESS
-            if stale or attempt:
-                residual(x)
-                self._renew(state, step.bdt)
-            assert self._factor is not None
-            old = len(self._factor.free)
-            while (root >= old).any():
-                root = np.where(root >= old, wood.parent[root], root)
-            factor = self._factor
-            found = descend(residual, x, partial(factor.solve, root=root), wanted, _SOLVES, longest)
-            self.solves += found.solves
-            x, norm = found.x, found.norm
-            if not self._fresh:
-                self._fresh = found.solves + 1
-            self._excess += max(found.solves - self._fresh, 0)
-            if norm <= wanted:
-                residual(x)
-                return norm / scale
-        raise NotConverged(
-            f"an implicit step of {step.bdt:.2g} s at t = {step.time:.4g} s was not solved.",
-            advice="Give a shorter step, or take the explicit mode.",
-            residual=norm / scale,
-        )
-
-
 def _grown(past: np.ndarray, parent: np.ndarray) -> np.ndarray:
     """Return what new vertices had before they were split off: what the split one had."""
     while len(past) < len(parent):
@@ -145,7 +44,7 @@ def _grown(past: np.ndarray, parent: np.ndarray) -> np.ndarray:
 
 
 def _step(
-    solver: _Solver, state: State, past: _Past | None, time: float, dt: float, depth: int
+    solver: Solver, state: State, past: _Past | None, time: float, dt: float, depth: int = 0, scale: float = 0.0
 ) -> tuple[State, _Past, float]:
     """Return the state a step later, its past, and the residual; halves the step where it is not solved.
 
@@ -169,11 +68,11 @@ def _step(
     still, here, f0 = kinetic(state.wood), x0, state.scratch.f.copy()
     moved = np.where(m.held[:, None] == 1, x0 + dt * v0, x0)
     guesses: tuple[np.ndarray, ...] = (moved, x0 + dt * v0)
-    to, done = _Step(xh, vh, share * dt, time + dt), 0.0
+    to, done = Step(xh, vh, share * dt, time + dt), 0.0
     state.scratch.lagged[:] = state.scratch.normals
     try:
         for _ in range(_PASSES):
-            error = solver.solve(state, to, guesses)
+            error, scale = solver.solve(state, to, guesses, scale)
             now = state.wood.motion
             done += _along(state, f0, now.x - here)
             found = broken(state, params, time + dt, dt) if params.fracture != "none" else state
@@ -187,13 +86,13 @@ def _step(
             to = to._replace(xh=_grown(to.xh, parent), vh=_grown(to.vh, parent))
             guesses = (here,)
         else:
-            error = solver.solve(state, to, guesses)
+            error, scale = solver.solve(state, to, guesses, scale)
             done += _along(state, f0, state.wood.motion.x - here)
     except NotConverged:
         if depth == _HALVINGS:
             raise
-        state, past, _ = _step(solver, kept, past, time, dt / 2, depth + 1)
-        return _step(solver, state, past, time + dt / 2, dt / 2, depth + 1)
+        state, past, _ = _step(solver, kept, past, time, dt / 2, depth + 1, scale)
+        return _step(solver, state, past, time + dt / 2, dt / 2, depth + 1, scale)
     power1 = _power(state, params)
     x0, v0 = (_grown(a, state.wood.parent) for a in (x0, v0))
     w = state.wood.motion
@@ -234,17 +133,17 @@ def implicit(
     """
     state, past, dt = begin(wood), None, settings.step
     start = kinetic(wood) + float(state.books[: CONTACT + 1].sum())
-    solver, done = _Solver(params, settings.tolerance), 0
+    solver, done = Solver(params, settings.tolerance), 0
     for wanted in times:
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
         while done < ahead:
             context.check_cancelled()
-            state, past, _ = _step(solver, state, past, done * dt, dt, 0)
+            state, past, _ = _step(solver, state, past, done * dt, dt)
             done += 1
             context.report(done * dt / times[-1], f"t = {done * dt:.4g} s")
         shown = state
         rest = wanted - ahead * dt
         if rest > 1e-9 * dt:
             # on a factor of its own: later steps must not know of this one
-            shown, _, _ = _step(_Solver(params, settings.tolerance), copied(state), past, ahead * dt, rest, 0)
+            shown, _, _ = _step(Solver(params, settings.tolerance), copied(state), past, ahead * dt, rest)
         yield balanced(copied(shown), wanted, start, floor(wood, params), balance)

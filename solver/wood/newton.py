@@ -1,12 +1,13 @@
-"""Quasi-Newton iteration on a stale factor: two-loop L-BFGS with a line search on slopes (Liu and Nocedal 1989).
+"""Newton's method for one implicit step, its systems solved by conjugate gradients on a stale factor.
 
-Forces of contact and friction have kinks: the iteration is semi-smooth. A step is accepted where the slope along it
-has fallen enough, which needs no energy and holds where friction has none.
+Contact and friction have kinks: the iteration is semi-smooth. A step is accepted where the slope along it has fallen
+enough, which needs no energy and holds where friction has none. A direction of negative curvature ends the inner
+iteration (Steihaug 1983) and what is negative is left out until the residual has fallen; each system is solved no
+more exactly than its step is worth (Eisenstat and Walker 1996).
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -14,102 +15,103 @@ import numpy as np
 
 __all__ = ["Found", "descend"]
 
-#: Pairs that are remembered.
-_MEMORY = 20
+Field = np.ndarray
+#: Residual of the inner iteration over that of the outer, at first and at least.
+_LOOSE, _TIGHT = 0.1, 1e-2
 #: A step is accepted when the slope along it is below this part of the slope at its start.
-_ENOUGH = 0.3
+_ENOUGH = 0.5
 _TRIALS = 8
+#: What the residual falls to before negative second derivatives are tried again.
+_AGAIN = 0.1
+#: Solves in one inner iteration.
+_INNER = 60
 
 
 class Found(NamedTuple):
-    """Where the iteration ended: x and residual (v, 3), its norm, and solves with the factor."""
+    """Where the iteration ended: x (v, 3), the norm of the residual, and solves with the factor."""
 
-    x: np.ndarray
-    r: np.ndarray
+    x: Field
     norm: float
     solves: int
+    rounds: int
 
 
-def _two_loops(
-    r: np.ndarray, pairs: deque[tuple[np.ndarray, np.ndarray, float]], solve: Callable[[np.ndarray], np.ndarray]
-) -> np.ndarray:
-    q, shares = r.copy(), []
-    for s, y, rho in reversed(pairs):
-        share = rho * float(np.vdot(s, q))
-        q -= share * y
-        shares.append(share)
-    p = solve(q)
-    for (s, y, rho), share in zip(pairs, reversed(shares), strict=True):
-        p += (share - rho * float(np.vdot(y, p))) * s
-    return -p
+def _direction(
+    r: Field, apply: Callable[[Field], Field], solve: Callable[[Field], Field], share: float, most: int
+) -> tuple[Field, int, bool]:
+    """Return a step p with K p about -r, up to `share` of r, the solves it took, and whether K was not positive."""
+    p, rest = np.zeros_like(r), -r
+    wanted = share * float(np.linalg.norm(r))
+    z = solve(rest)
+    way, gain = z, float(np.vdot(rest, z))
+    for count in range(1, most + 1):
+        bent = apply(way)
+        curve = float(np.vdot(way, bent))
+        if curve <= 0 or gain <= 0:
+            return (way if count == 1 else p), count, True
+        a = gain / curve
+        p = p + a * way
+        less = rest - a * bent
+        if float(np.linalg.norm(less)) <= wanted or count == most:
+            return p, count, False
+        z = solve(less)
+        # Polak and Ribiere's form: the factor is in single precision
+        turn = float(np.vdot(z, less - rest)) / gain
+        rest, gain = less, float(np.vdot(z, less))
+        way = z + turn * way
+    return p, most, False
 
 
-def _searched(
-    residual: Callable[[np.ndarray], np.ndarray], x: np.ndarray, p: np.ndarray, slope: float, longest: float
-) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Return x + a p, the residual there, and whether the slope has fallen; a is 1 where that will do."""
-    low, high, at, last = 0.0, np.inf, slope, slope
-    a = min(1.0, longest / max(float(np.abs(p).max()), 1e-300))
-    r = residual(x + a * p)
+def _searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, a: float) -> tuple[Field, Field]:
+    """Return x + a p and the residual there, a shortened until the slope has not turned uphill by much."""
+    low, at, high, beyond = 0.0, slope, np.inf, 0.0
     for _ in range(_TRIALS):
-        along = float(np.vdot(r, p))
-        if np.isfinite(along) and abs(along) <= _ENOUGH * abs(slope):
-            return x + a * p, r, True
-        if np.isfinite(along) and along < 0:
-            # still downhill: further, but not beyond what is known to be uphill
-            low, at = a, along
-            if not np.isfinite(high):
-                a = a * min(4.0, max(1.5, along / (along - last) if along > last else 4.0))
-                last = along
-                if a * float(np.abs(p).max()) > 4 * longest:
-                    return x + low * p, residual(x + low * p), True
-            else:
-                a = (low + high) / 2
-        else:
-            high = a
-            # regula falsi between the slopes, away from both ends
-            share = at / (at - along) if np.isfinite(along) else 0.1
-            a = low + (high - low) * min(max(share, 0.1), 0.9)
         r = residual(x + a * p)
-    return x + a * p, r, False
+        along = float(np.vdot(r, p))
+        if np.isfinite(along) and along <= _ENOUGH * abs(slope) and (high == np.inf or along >= _ENOUGH * slope):
+            break
+        if np.isfinite(along) and along < 0:
+            # Illinois: the end that stays counts half
+            low, at, beyond = a, along, beyond / 2
+        else:
+            high, beyond, at = a, along if np.isfinite(along) else -9 * at, at if high == np.inf else at / 2
+        share = at / (at - beyond)
+        a = low + (high - low) * min(max(share, 0.1), 0.9)
+    return x + a * p, r
 
 
 def descend(
-    residual: Callable[[np.ndarray], np.ndarray],
-    x: np.ndarray,
-    solve: Callable[[np.ndarray], np.ndarray],
+    residual: Callable[[Field], Field],
+    stiffness: Callable[[bool], Callable[[Field], Field]],
+    x: Field,
+    solve: Callable[[Field], Field],
     wanted: float,
     most: int,
-    longest: float,
+    limit: Callable[[Field], float],
 ) -> Found:
     """Iterate from x (v, 3) until the norm of the residual is at most `wanted`, or `most` solves are used up.
 
-    residual: gradient (v, 3) [N], zero where held. solve: the factor's step for a residual. longest: the farthest that
-    a vertex moves at once [m].
+    residual: gradient (v, 3) [N], zero where held. stiffness: the product with the second derivatives where residual
+    was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that
+    can be trusted.
     """
     r = residual(x)
     norm = float(np.linalg.norm(r))
-    pairs: deque[tuple[np.ndarray, np.ndarray, float]] = deque(maxlen=_MEMORY)
-    solves, poor = 0, 0
-    best = (x, r, norm)
+    solves, rounds, share, turned = 0, 0, _LOOSE, np.inf
     while norm > wanted and solves < most and np.isfinite(norm):
-        p = _two_loops(r, pairs, solve)
-        solves += 1
+        aim = max(share, 0.5 * wanted / norm)
+        positive = norm > turned
+        p, spent, bent = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves))
+        solves, rounds = solves + spent, rounds + 1
+        if bent and not positive:
+            turned = _AGAIN * norm
+            if solves < most:
+                p, spent, _ = _direction(r, stiffness(True), solve, aim, min(_INNER, most - solves))
+                solves += spent
         slope = float(np.vdot(r, p))
         if not slope < 0:
-            if not pairs:
-                break
-            pairs.clear()
-            continue
-        x1, r1, fell = _searched(residual, x, p, slope, longest)
-        s, y = x1 - x, r1 - r
-        curve = float(np.vdot(s, y))
-        if curve > 1e-10 * float(np.linalg.norm(s)) * float(np.linalg.norm(y)):
-            pairs.append((s, y, 1.0 / curve))
-        poor = 0 if fell else poor + 1
-        x, r, norm = x1, r1, float(np.linalg.norm(r1))
-        if norm < best[2]:
-            best = (x, r, norm)
-        if poor == 2:
             break
-    return Found(*best, solves)
+        x, r = _searched(residual, x, p, slope, min(1.0, limit(p)))
+        last, norm = norm, float(np.linalg.norm(r))
+        share = min(_LOOSE, max(_TIGHT, (norm / last) ** 2))
+    return Found(x, norm, solves, rounds)

@@ -195,6 +195,14 @@ class WoodParams(Params):
         description="Stiffness of a vertex's contact; by default a tenth of an edge's",
         json_schema_extra={"units": "N/m"},
     )
+    rod_contact: bool = Field(
+        False,
+        description="Whether rods that no bond joins touch each other (explicit only)",
+        json_schema_extra={"units": "1"},
+    )
+    rod_friction: float = Field(
+        0.3, ge=0, le=2, description="Coulomb friction between rods", json_schema_extra={"units": "1"}
+    )
     mode: Literal["explicit", "implicit", "static"] = Field(
         "explicit",
         description="Explicit (the truth), implicit (BDF2, for long runs), or equilibrium at every stage",
@@ -218,6 +226,8 @@ class WoodParams(Params):
             raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
         if self.mode != "explicit" and (self.twist or self.curvature):
             raise ValueError("twist and curved axes need the explicit mode: set mode explicit")
+        if self.mode != "explicit" and self.rod_contact:
+            raise ValueError("contact of rods needs the explicit mode: set mode explicit, or rod_contact false")
         if self.mode == "static" and (self.clamp == "none" or self.bodies or any(self.pull)):
             raise ValueError("equilibria need a clamped end, no bodies and no pull: set clamp start, or another mode")
         if any(self.pull) and self.clamp != "both":

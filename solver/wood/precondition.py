@@ -16,91 +16,10 @@ from scipy.linalg import lapack
 from ..multifrontal import Factor, factorise
 from .arrays import Bonds, Rods
 from .dissection import dissected
-from .hessian import Stiffness, spread
+from .elements import elements
+from .hessian import Stiffness
 
 __all__ = ["Preconditioner", "preconditioner"]
-
-
-@njit(cache=True, error_model="numpy")
-def _gauss(x: np.ndarray, rods: Rods, bonds: Bonds, place: np.ndarray, out: np.ndarray) -> None:
-    """Add Gauss and Newton's part of the second derivatives, and that of tension, to the blocks out (nnz, 3, 3)."""
-    h = np.zeros((6, 6))
-    weights = np.zeros((2, 3))
-    weights[0, 0] = -1.0
-    weights[0, 1] = 1.0
-    weights[1, 1] = -1.0
-    weights[1, 2] = 1.0
-    for n in range(len(rods.a)):
-        if rods.alive[n] == 0 or rods.k[n] == 0.0:
-            continue
-        d = x[rods.b[n]] - x[rods.a[n]]
-        length = np.sqrt((d * d).sum())
-        d /= length
-        pull = max(rods.k[n] * (length / rods.rest[n] - 1.0) / length, 0.0)
-        for r in range(3):
-            for c in range(3):
-                h[r, c] = (rods.k[n] / rods.rest[n] - pull) * d[r] * d[c] + (pull if r == c else 0.0)
-                h[r, 3 + c] = 0.0
-                h[3 + r, c] = 0.0
-                h[3 + r, 3 + c] = 0.0
-        spread(h, weights, place[n], out)
-    base = len(rods.a)
-    for n in range(len(rods.before)):
-        if rods.whole[n] == 0:
-            continue
-        p = rods.before[n]
-        q = rods.after[n]
-        u = x[rods.b[p]] - x[rods.a[p]]
-        w = x[rods.b[q]] - x[rods.a[q]]
-        lu = np.sqrt((u * u).sum())
-        lw = np.sqrt((w * w).sum())
-        u /= lu
-        w /= lw
-        more = max(1.0 + (u * w).sum(), 0.1)
-        stiff = 8.0 * rods.alpha[n] / rods.span[n] / (more * more)
-        for r in range(3):
-            for c in range(3):
-                pu = (1.0 if r == c else 0.0) - u[r] * u[c]
-                pw = (1.0 if r == c else 0.0) - w[r] * w[c]
-                across = 0.0
-                for m in range(3):
-                    across += ((1.0 if r == m else 0.0) - u[r] * u[m]) * ((1.0 if c == m else 0.0) - w[c] * w[m])
-                h[r, c] = stiff * pu / (lu * lu)
-                h[3 + r, 3 + c] = stiff * pw / (lw * lw)
-                h[r, 3 + c] = -stiff * across / (lu * lw)
-                h[3 + c, r] = h[r, 3 + c]
-        spread(h, weights, place[base + n], out)
-    base += len(rods.before)
-    g = np.zeros(6)
-    for n in range(len(bonds.i)):
-        if bonds.on[n] == 0:
-            continue
-        a = rods.a[bonds.j[n]]
-        b = rods.b[bonds.j[n]]
-        s = bonds.share[n]
-        d = x[bonds.i[n]] - (1.0 - s) * x[a] - s * x[b]
-        e = x[b] - x[a]
-        ld = max(np.sqrt((d * d).sum()), 1e-30)
-        le = max(np.sqrt((e * e).sum()), 1e-30)
-        d /= ld
-        e /= le
-        cosine = (d * e).sum()
-        for c in range(3):
-            g[c] = (e[c] - cosine * d[c]) / ld
-            g[3 + c] = (d[c] - cosine * e[c]) / le
-        for r in range(6):
-            for c in range(6):
-                h[r, c] = 2.0 * bonds.s[n] * g[r] * g[c]
-        for r in range(3):
-            for c in range(3):
-                h[r, c] += bonds.k[n] / bonds.rest[n] * d[r] * d[c]
-        weights[0, 0] = 1.0
-        weights[0, 1] = s - 1.0
-        weights[0, 2] = -s
-        weights[1, 0] = 0.0
-        weights[1, 1] = -1.0
-        weights[1, 2] = 1.0
-        spread(h, weights, place[base + n], out)
 
 
 @njit(cache=True)
@@ -211,11 +130,7 @@ def preconditioner(
     pattern = known or Stiffness(rods, bonds, free)
     analysis = dissected(x[free], pattern.indptr, pattern.indices)
     for full in (True, False):
-        if full:
-            blocks = pattern.blocks(x, rods, bonds)
-        else:
-            blocks = np.zeros((len(pattern.indices), 3, 3))
-            _gauss(x, rods, bonds, pattern.place, blocks)
+        blocks = pattern.summed(elements(x, rods, bonds, positive=not full))
         for c in range(3):
             blocks[pattern.diagonal, c, c] += inertia[free]
         if contacts is not None:

@@ -11,12 +11,12 @@ import numpy as np
 
 from ..contract import Context
 from ..meshes import Frame
-from .bundle import Wood
 from .grain import Field
 from .params import WoodParams
 from .render_align import aligned, bonded, corners, meeting, turned
 from .render_rows import Rows, rows, spans
 from .render_section import Section, section
+from .state import Wood
 
 __all__ = ["Skin"]
 

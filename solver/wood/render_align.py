@@ -14,14 +14,16 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .bundle import Wood
 from .render_rows import Rows, Spans
 from .render_section import Section
+from .state import Wood
 
 __all__ = ["Pairs", "aligned", "bonded", "corners", "meeting", "turned"]
 
 #: A bond speaks for a place no farther than this, over the longest edge as laid.
 _SPEAKS = 0.75
+#: Rods that bonds hold are never this far apart, over their distance as laid; shear moves them by less.
+_FARTHEST = 2.0
 
 
 class Pairs(NamedTuple):
@@ -110,6 +112,21 @@ def bonded(wood: Wood, span: Spans, pairs: Pairs) -> np.ndarray:
             return holds
 
 
+def _together(
+    rows: Rows, section: Section, pairs: Pairs, n: np.ndarray, k: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows a and b (m,) of the pairs n at the stations k, and which (m,) of those asked for they are.
+
+    The nearest bond may hold what lies beyond a break: rows farther apart than any bond stretches are not together.
+    """
+    p, q = pairs.p[n], pairs.q[n]
+    a, b = rows.at[p, k], rows.at[q, k]
+    apart = np.linalg.norm(rows.point[b] - rows.point[a], axis=1)
+    rest = np.linalg.norm(section.points[q] - section.points[p], axis=1)
+    there = np.flatnonzero((a >= 0) & (b >= 0) & (apart < _FARTHEST * rest))
+    return a[there], b[there], there
+
+
 def turned(rows: Rows, section: Section, pairs: Pairs, holds: np.ndarray) -> np.ndarray:
     """Return where the section's y axis points (w, 3), turned about the tangents to fit the bonded neighbours.
 
@@ -117,9 +134,8 @@ def turned(rows: Rows, section: Section, pairs: Pairs, holds: np.ndarray) -> np.
     piece that have some.
     """
     n, k = np.nonzero(holds)
-    a, b = rows.at[pairs.p[n], k], rows.at[pairs.q[n], k]
-    there = (a >= 0) & (b >= 0)
-    a, b, n = a[there], b[there], n[there]
+    a, b, there = _together(rows, section, pairs, n, k)
+    n = n[there]
     turn = np.zeros(len(rows.rod), complex)
     apart = rows.point[b] - rows.point[a]
     rest = section.points[pairs.q[n]] - section.points[pairs.p[n]]
@@ -151,9 +167,8 @@ def aligned(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the group (c,) of every corner and the groups' places (g, 3) [m], from places (c, 3) of single corners."""
     m, k = np.nonzero(holds[pairs.pair])
-    a, b = rows.at[pairs.p[pairs.pair[m]], k], rows.at[pairs.q[pairs.pair[m]], k]
-    there = (a >= 0) & (b >= 0)
-    a, b, m = a[there], b[there], m[there]
+    a, b, there = _together(rows, section, pairs, pairs.pair[m], k)
+    m = m[there]
     first = begin[a] + pairs.here[m] - section.start[rows.rod[a]]
     second = begin[b] + pairs.there[m] - section.start[rows.rod[b]]
     count = len(positions)

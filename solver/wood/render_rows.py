@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bundle import Wood
+from .state import Wood
 
 __all__ = ["Rows", "Spans", "rows", "spans"]
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from ..contract import Context, NotConverged
 from ..multifrontal import factorise
-from .bundle import Wood
 from .dissection import dissected
 from .explicit import CONTACT, WORK, forces
 from .hessian import Stiffness
+from .moment import Reached, State, begin, copied, reached, strength
 from .params import WoodParams
-from .stepping import Reached, State, begin, copied, reached, strength
+from .state import Wood
 
 __all__ = ["equilibrium", "static"]
 

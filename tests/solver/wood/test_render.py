@@ -176,3 +176,23 @@ def test_a_run_that_breaks_stays_closed_and_meshes_only_when_asked():
     np.testing.assert_array_equal(meshes.frame(alone, 0).vertices, meshes.frame(run, 1).vertices)
     assert "inside" not in alone
     assert "mesh_position" not in SOLVER.solve(params, Need(stages=stages[:1]))
+
+
+def test_nothing_is_stretched_between_halves_that_have_parted():
+    params = SOLVER.parse({"rods": 30, "vertices": 9, "clamp": "none", "unevenness": 0.6})
+    wood = lay(params, params.vertices)
+    skin, count = Skin(wood, params), len(wood.grid)
+    for rod in range(count):
+        # each rod at another vertex, so that bonds of both halves reach past the break
+        wood = _split(wood, int(np.flatnonzero(wood.rods.b[wood.rods.before] == wood.grid[rod, 3 + rod % 3])[0]))
+    far = np.zeros(len(wood.motion.x), bool)
+    for rod in range(count):
+        far[wood.grid[rod, 4 + rod % 3 :]] = True
+    far[count * 9 :] = True
+    b, r = wood.bonds, wood.rods
+    b.on[(far[b.i] != far[r.a[b.j]]) | (far[r.a[b.j]] != far[r.b[b.j]])] = 0
+    wood.motion.x[far] += [0.0, 0.0, 0.1]
+    frame = skin.frame(wood)
+    corner = np.asarray(frame.vertices, float)[frame.triangles]
+    sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=-1)
+    assert sides.max() < 0.04

@@ -1,0 +1,59 @@
+"""All arrays of a run, and the work arrays that fit them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import Bodies, Bonds, Rods, Turns
+from .explicit import Motion, Scratch
+from .rubbing import none
+
+__all__ = ["Wood", "scratch_for"]
+
+
+@dataclass(frozen=True)
+class Wood:
+    """All arrays of a run. Their contents change as it runs, and a break that adds vertices makes a new value."""
+
+    motion: Motion
+    rods: Rods
+    bonds: Bonds
+    turns: Turns
+    bodies: Bodies
+    turning: bool
+    strength: np.ndarray  # (e, samples) tensile strain that each place bears
+    rod: np.ndarray  # (e,) int32 rod of an edge, ghosts too
+    grid: np.ndarray  # (rods, vertices) int32: vertex numbers as laid
+    cut: np.ndarray  # (e,) where an edge is cut, 0 to 1; -1: it is not
+    parent: np.ndarray  # (v,) int32 vertex that one was split from; itself as laid
+
+    def copied(self) -> Wood:
+        """Return a copy that can be stepped without touching this one."""
+        return replace(
+            self,
+            motion=Motion(*(a.copy() for a in self.motion)),
+            rods=Rods(*(a.copy() for a in self.rods)),
+            bonds=Bonds(*(a.copy() for a in self.bonds)),
+            cut=self.cut.copy(),
+        )
+
+
+def scratch_for(wood: Wood) -> Scratch:
+    """Return work arrays that fit."""
+    v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
+    return Scratch(
+        np.zeros((v, 3)),
+        wood.motion.old.copy(),
+        1.0 / wood.rods.rest,
+        np.zeros(e),
+        np.zeros(len(wood.bonds.i)),
+        np.zeros((r, 3)),
+        np.zeros((r, 3)),
+        np.zeros((r, 3)),
+        np.zeros(2),
+        np.zeros((r, v)),
+        np.zeros((r, v)),
+        none(),
+    )
