@@ -84,6 +84,7 @@ class StepEnergy:
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
+        self._last: tuple[Floats, float, Floats] | None = None
         self._distance, self._looked = distance, state.x
         self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
         thirds = np.repeat(shell.areas(state.g) / 3, 3)
@@ -93,7 +94,12 @@ class StepEnergy:
             self.load = weight if self.load is None else self.load + weight
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:
-        """Return energy and gradient; the gradient of held directions is 0."""
+        """Return energy and gradient; the gradient of held directions is 0. What was asked last is remembered."""
+        if self._last is None or self._last[0] is not x:
+            self._last = x, *self._at(x)
+        return self._last[1:]
+
+    def _at(self, x: Floats) -> tuple[float, Floats]:
         state, gradient = self.state, np.zeros_like(x)
         energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient)
         if self._mean is None:

@@ -208,7 +208,8 @@ def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
     x = state.x + dt * state.drift
     if float(np.abs(x - state.x).max()) > energy.longest:
         return state.x
-    return x if energy(x)[0] < energy(state.x)[0] else state.x
+    least = energy(state.x)[0]
+    return x if energy(x)[0] < least else state.x
 
 
 def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
