@@ -59,10 +59,11 @@ def measure(values: dict, tool: dict, vertices: int, way: str) -> str:
     return f"{sum(seconds) / _STEPS:.3f} s a step, {engine.state.iterations / _STEPS:.0f} iterations"
 
 
-def paint(name: str, vertices: int, frames: int = _FRAMES) -> str:
+def paint(name: str, vertices: int, frames: int = _FRAMES, active: bool = False) -> str:
     """Paint with a brush that moves on after some frames; a frame is one growth step to a residual of 1e-3."""
     values, path = _PAINTINGS[name]
-    engine = Engine(GrowthParams.parse({**values, "tools": [], "step": 1.0, "remesh": 1.3}), vertices, 1e-3)
+    values = {**values, "tools": [], "step": 1.0, "remesh": 1.3, "active": active}
+    engine = Engine(GrowthParams.parse(values), vertices, 1e-3)
     frame: list[float] = []
     piece: list[float] = []
     before = len(engine.state.x)

@@ -14,7 +14,7 @@ from ..shell.inverse import Inverse, fronts_of, inverse_of, normals
 from .params import Bending, Plane, SolidBall
 from .state import State
 
-__all__ = ["StepEnergy", "Tangent", "elastic"]
+__all__ = ["StepEnergy", "Tangent", "ahead", "elastic"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -65,6 +65,17 @@ def elastic(state: State, material: shell.Material, bending: Bending) -> float:
     return StepEnergy(state, material, 0.0, (), Tangent(state.mesh), bending=bending)(state.x)[0]
 
 
+def ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
+    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
+    if state.drift is None:
+        return state.x
+    x = state.x + dt * state.drift
+    if float(np.abs(x - state.x).max()) > energy.longest:
+        return state.x
+    least = energy(state.x)[0]
+    return x if energy(x)[0] < least else state.x
+
+
 class StepEnergy:
     """Energy of positions (n, 3) against a state's rest metrics and angles, in mu l^2."""
 
@@ -80,6 +91,7 @@ class StepEnergy:
         bending: Bending = "hinges",
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
+        self._pressure, self._gravity, self._bending = pressure, gravity, bending
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
@@ -120,6 +132,11 @@ class StepEnergy:
             gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
         gradient[state.held] = 0.0
         return energy, gradient
+
+    def part(self, state: State, tangent: Tangent) -> StepEnergy:
+        """Return the same energy, without contact, of a part of the state."""
+        rest = tangent, self._gravity, 0.0, self._bending
+        return StepEnergy(state, self.material, self._pressure, self.solids, *rest)
 
     def rounding(self, x: Floats) -> float:
         """Return the largest gradient component that is rounding: what it changes by where x moves by last digits.

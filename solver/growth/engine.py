@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from .. import shell
 from ..contract import Context, NotConverged, Unstable
 from ..shell.inverse import normals
-from .energy import StepEnergy, Tangent
+from .active import Habit, settle
+from .energy import StepEnergy, Tangent, ahead
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 from .params import GrowthParams
 from .places import share
@@ -54,12 +55,12 @@ class Engine:
         self.params, self.tolerance, self._most = params, tolerance, most
         self._material = shell.Material(params.thickness, params.poisson)
         self._tools: list[Tool] = list(params.tools)
-        self._history: list[tuple[State, int, Tangent]] = []
+        self._history: list[tuple[State, int, Tangent, Habit]] = []
         self._work: Generator[None, None, None] | None = None
         self.state = _begin(params, start(params.shape, vertices, params.aspect))
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
-        self._tangent = Tangent(self.state.mesh)
+        self._tangent, self._habit = Tangent(self.state.mesh), Habit()
         self._steps = 0
 
     @property
@@ -110,7 +111,7 @@ class Engine:
             self._work = None
         if not self._history:
             return False
-        self.state, tools, self._tangent = self._history.pop()
+        self.state, tools, self._tangent, self._habit = self._history.pop()
         self._steps -= 1
         del self._tools[tools:]
         return True
@@ -129,20 +130,20 @@ class Engine:
         if rest <= 1e-9 and self._steps:
             return self.state
         # a step of its own, which leaves no trace
-        kept = self.state, list(self._history), self._tangent, self._steps
-        self._tangent = Tangent(self.state.mesh)
+        kept = self.state, list(self._history), self._tangent, self._habit, self._steps
+        self._tangent, self._habit = Tangent(self.state.mesh), Habit()
         try:
             for _ in self._step(max(rest, 0.0)):
                 context.check_cancelled()
             return self.state
         finally:
-            self.state, self._history, self._tangent, self._steps = kept
+            self.state, self._history, self._tangent, self._habit, self._steps = kept
 
     def _step(self, dt: float) -> Generator[None, None, None]:
         """Grow by dt and find the equilibrium; yields after every piece of work."""
         before, tools = self.state, len(self._tools)
         # the way on from here is the same after an undo only with the same inverse
-        kept, self._tangent = self._tangent, self._tangent.copy()
+        kept, self._tangent = (self._tangent, self._habit), self._tangent.copy()
         state = started(before, self._tools, self.params.step, self.params.seed)
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
@@ -155,7 +156,15 @@ class Engine:
         energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         yield
-        begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
+        if p.active and p.imperfection and not p.contact:
+            changed = (g != before.g).any(axis=1)
+            if rest is not before.rest:
+                changed[state.mesh.hinge_faces[rest != before.rest]] = True
+            settled = yield from settle(energy, changed, goal, dt, self._habit.copy(), _WAYS[p.solver])
+            begin, spent, self._habit = settled.x, settled.spent, settled.habit
+        else:
+            begin = ahead(energy, state, dt)
+        nudges = 0 if p.imperfection else 1
         while True:
             for nearer in _WAYS[self.params.solver](energy, begin):
                 spent += nearer.x is not point.x
@@ -193,23 +202,15 @@ class Engine:
                 tangent = tangent.remeshed(finer.mesh, pairs)
             if finer.mesh is not state.mesh:
                 self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
+                self._habit = self._habit.remeshed(finer.mesh, changes)
             state = finer
-        self._history.append((before, tools, kept))
+        self._history.append((before, tools, *kept))
         if len(self._history) > _EXACT:
-            self._history[-_EXACT - 1][2].inverse = None
+            old = self._history[-_EXACT - 1]
+            old[2].inverse = None
+            self._history[-_EXACT - 1] = (*old[:3], Habit())
         self.state = state
         self._steps += 1
-
-
-def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
-    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
-    if state.drift is None:
-        return state.x
-    x = state.x + dt * state.drift
-    if float(np.abs(x - state.x).max()) > energy.longest:
-        return state.x
-    least = energy(state.x)[0]
-    return x if energy(x)[0] < least else state.x
 
 
 def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:

@@ -1,0 +1,183 @@
+"""Equilibrium by need: first of the part whose rest state changed, the rest held; then the whole is looked at.
+
+Where the forces of the whole are below the goal after the part has settled, nothing else need move, and nothing else
+does, to the last bit. Where they are not, the whole is solved, and the part waits for some steps, longer each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import shell
+from .energy import StepEnergy, Tangent, ahead
+from .minimise import Point
+from .state import State
+
+__all__ = ["Habit", "Settled", "settle"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Way = Callable[[StepEnergy, Floats], Iterator[Point]]
+
+#: Rings about what changed that move with it, and the share of the vertices beyond which the whole is no more work.
+_RINGS, _LARGEST = 4, 0.4
+#: How far below the goal the part comes to rest, and its steps until then.
+_BELOW, _STEPS = 0.7, 12
+#: Most steps of growth without a part after parts did not do.
+_PAUSE = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a mesh with all that acts on its free vertices.
+
+    vertices (m,), faces, hinges: numbers in the whole, rising. free: (m,) those that may move.
+    """
+
+    vertices: Ints
+    faces: Ints
+    hinges: Ints
+    free: Bools
+    tangent: Tangent
+
+    def inside(self, count: int) -> Bools:
+        """Return which of the whole's vertices (count,) are free."""
+        found = np.zeros(count, bool)
+        found[self.vertices[self.free]] = True
+        return found
+
+    def of(self, state: State) -> State:
+        """Return the part of a state, held where it is not free."""
+        v = self.vertices
+        return replace(
+            state,
+            x=state.x[v],
+            mesh=self.tangent.mesh,
+            g=state.g[self.faces],
+            rest=state.rest[self.hinges],
+            held=state.held[v] | ~self.free[:, None],
+            drift=None if state.drift is None else state.drift[v] * self.free[:, None],
+            shares={},
+            spots={},
+            curves={},
+        )
+
+    def copy(self) -> Part:
+        """Return a part whose tangent may take another inverse."""
+        return replace(self, tangent=self.tangent.copy())
+
+    def remeshed(self, mesh: shell.Topology, changes: list[Ints]) -> Part:
+        """Return the part of a mesh that came from this one's by changes (`remesh`), with its inverse."""
+        vertices, free, inverse = self.vertices, self.free, self.tangent.inverse
+        for pairs in changes:
+            number = np.full(int(max(pairs.max(), vertices.max())) + 1, -1)
+            number[vertices] = np.arange(len(vertices))
+            local = number[pairs]
+            kept = np.flatnonzero((local >= 0).all(axis=1))
+            inverse = inverse.remeshed(local[kept]) if inverse else None
+            vertices, free = kept, free[local[kept]].all(axis=1)
+        moving = np.zeros(mesh.vertices, bool)
+        moving[vertices[free]] = True
+        found = _part(mesh, moving)
+        # vertices that the part did not have are held: what the inverse has for them is not asked for
+        number = np.zeros(mesh.vertices, np.int64)
+        number[vertices] = np.arange(len(vertices))
+        here = number[found.vertices]
+        if inverse is not None and not np.array_equal(here, np.arange(len(vertices))):
+            inverse = Tangent(mesh, inverse).remeshed(mesh, np.stack([here, here], -1)).inverse
+        return replace(found, tangent=Tangent(found.tangent.mesh, inverse))
+
+
+@dataclass(frozen=True, eq=False)
+class Habit:
+    """What the search keeps between steps: the last part, how often parts did not do, steps to wait for the next."""
+
+    part: Part | None = None
+    failures: int = 0
+    wait: int = 0
+
+    def copy(self) -> Habit:
+        """Return a habit whose part may take another inverse."""
+        return replace(self, part=self.part.copy() if self.part else None)
+
+    def remeshed(self, mesh: shell.Topology, changes: list[Ints]) -> Habit:
+        """Return the habit on a mesh that came from the present one by changes."""
+        return replace(self, part=self.part.remeshed(mesh, changes) if self.part else None)
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Where the search for the whole begins, the steps taken, what is kept for the next."""
+
+    x: Floats
+    spent: int
+    habit: Habit
+
+
+def settle(
+    energy: StepEnergy, changed: Bools, goal: float, dt: float, habit: Habit, way: Way
+) -> Generator[None, None, Settled]:
+    """Let the part about `changed` triangles (f,) settle to the goal; yields after every piece of work.
+
+    The generator's value is where the whole is then: in equilibrium, or nearer to it.
+    """
+    state = energy.state
+    if habit.wait:
+        return Settled(ahead(energy, state, dt), 0, replace(habit, wait=habit.wait - 1))
+    part = _about(state.mesh, changed, habit.part)
+    if part is None:
+        return Settled(ahead(energy, state, dt), 0, _failed(habit, None))
+    yield
+    x, spent = state.x, 0
+    if part.free.any():
+        own = part.of(state)
+        smaller = energy.part(own, part.tangent)
+        point = Point(own.x, 0.0, np.inf)
+        for nearer in way(smaller, ahead(smaller, own, dt)):
+            spent += nearer.x is not point.x
+            point = nearer
+            if point.gradient <= _BELOW * goal or point.stuck or spent > _STEPS or not np.isfinite(point.gradient):
+                break
+            yield
+        if np.isfinite(point.gradient):
+            x = state.x.copy()
+            x[part.vertices[part.free]] = point.x[part.free]
+        yield
+    quiet = float(np.abs(energy(x)[1]).max()) <= goal
+    return Settled(x, max(spent - 1, 0), replace(habit, part=part, failures=0) if quiet else _failed(habit, part))
+
+
+def _failed(habit: Habit, part: Part | None) -> Habit:
+    failures = habit.failures + 1
+    return Habit(part, failures, min(2 ** (failures - 1) - 1, _PAUSE))
+
+
+def _about(mesh: shell.Topology, changed: Bools, before: Part | None) -> Part | None:
+    """Return the part about changed triangles, the one before if that will do; None if it were most of the whole."""
+    moving = np.zeros(mesh.vertices, bool)
+    moving[mesh.triangles[changed]] = True
+    if before is not None and not (_wider(mesh, moving, 1) & ~before.inside(mesh.vertices)).any():
+        return before
+    moving = _wider(mesh, moving, _RINGS)
+    return _part(mesh, moving) if moving.sum() <= _LARGEST * mesh.vertices else None
+
+
+def _wider(mesh: shell.Topology, some: Bools, rings: int) -> Bools:
+    for _ in range(rings):
+        found = np.zeros(mesh.vertices, bool)
+        found[mesh.triangles[some[mesh.triangles].any(axis=1)]] = True
+        some = found
+    return some
+
+
+def _part(mesh: shell.Topology, moving: Bools) -> Part:
+    """Return the part whose free vertices are `moving` (n,)."""
+    # a vertex feels the hinges of its neighbours' edges (and, with mean curvature, all hinges of its neighbours)
+    faces = np.flatnonzero(_wider(mesh, moving, 1)[mesh.triangles].any(axis=1))
+    smaller, vertices, hinges = shell.part_of(mesh, faces)
+    return Part(vertices, faces, hinges, moving[vertices], Tangent(smaller))
