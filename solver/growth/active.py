@@ -27,9 +27,9 @@ Way = Callable[[StepEnergy, Floats], Iterator[Point]]
 #: Rings about what changed that move with it, and the share of the vertices beyond which the whole is no more work.
 _RINGS, _LARGEST = 4, 0.4
 #: How far below the goal the part comes to rest, and its steps until then.
-_BELOW, _STEPS = 0.7, 12
-#: Most steps of growth without a part after parts did not do.
-_PAUSE = 16
+_BELOW, _STEPS = 0.7, 6
+#: Steps of growth without a part after parts did not do, once, twice, and so on.
+_PAUSES = (0, 3, 15, 63)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +95,16 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Habit:
-    """What the search keeps between steps: the last part, how often parts did not do, steps to wait for the next."""
+    """What the search keeps between steps.
+
+    part: the last one. failures: how often in a row parts did not do. wait: steps until the next try. seen: vertices
+    (n,) that changed in the last step and had no part: one is taken where the same change again, for it must pay.
+    """
 
     part: Part | None = None
     failures: int = 0
     wait: int = 0
+    seen: Bools | None = None
 
     def copy(self) -> Habit:
         """Return a habit whose part may take another inverse."""
@@ -107,7 +112,10 @@ class Habit:
 
     def remeshed(self, mesh: shell.Topology, changes: list[Ints]) -> Habit:
         """Return the habit on a mesh that came from the present one by changes."""
-        return replace(self, part=self.part.remeshed(mesh, changes) if self.part else None)
+        seen = self.seen
+        for pairs in changes:
+            seen = None if seen is None else np.asarray(seen[pairs].any(axis=1))
+        return replace(self, part=self.part.remeshed(mesh, changes) if self.part else None, seen=seen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +134,20 @@ def settle(
 
     The generator's value is where the whole is then: in equilibrium, or nearer to it.
     """
-    state = energy.state
+    state, n = energy.state, energy.state.mesh.vertices
     if habit.wait:
         return Settled(ahead(energy, state, dt), 0, replace(habit, wait=habit.wait - 1))
-    part = _about(state.mesh, changed, habit.part)
-    if part is None:
-        return Settled(ahead(energy, state, dt), 0, _failed(habit, None))
-    yield
-    x, spent = state.x, 0
-    if part.free.any():
+    moving = np.zeros(n, bool)
+    moving[state.mesh.triangles[changed]] = True
+    x, spent, part = state.x, 0, habit.part
+    if moving.any():
+        if part is None or (_wider(state.mesh, moving, 1) & ~part.inside(n)).any():
+            again = habit.seen is not None and not (moving & ~_wider(state.mesh, habit.seen, 1)).any()
+            free = _wider(state.mesh, moving, _RINGS)
+            if not again or free.sum() > _LARGEST * n:
+                return Settled(ahead(energy, state, dt), 0, replace(habit, seen=moving))
+            part = _part(state.mesh, free)
+        yield
         own = part.of(state)
         smaller = energy.part(own, part.tangent)
         point = Point(own.x, 0.0, np.inf)
@@ -148,23 +161,14 @@ def settle(
             x = state.x.copy()
             x[part.vertices[part.free]] = point.x[part.free]
         yield
-    quiet = float(np.abs(energy(x)[1]).max()) <= goal
-    return Settled(x, max(spent - 1, 0), replace(habit, part=part, failures=0) if quiet else _failed(habit, part))
-
-
-def _failed(habit: Habit, part: Part | None) -> Habit:
+    value, forces = energy(x)
+    if float(np.abs(forces).max()) <= goal:
+        return Settled(x, max(spent - 1, 0), Habit(part))
+    yield
+    further = ahead(energy, state, dt)
+    x = further if energy(further)[0] < value else x
     failures = habit.failures + 1
-    return Habit(part, failures, min(2 ** (failures - 1) - 1, _PAUSE))
-
-
-def _about(mesh: shell.Topology, changed: Bools, before: Part | None) -> Part | None:
-    """Return the part about changed triangles, the one before if that will do; None if it were most of the whole."""
-    moving = np.zeros(mesh.vertices, bool)
-    moving[mesh.triangles[changed]] = True
-    if before is not None and not (_wider(mesh, moving, 1) & ~before.inside(mesh.vertices)).any():
-        return before
-    moving = _wider(mesh, moving, _RINGS)
-    return _part(mesh, moving) if moving.sum() <= _LARGEST * mesh.vertices else None
+    return Settled(x, spent, Habit(part, failures, _PAUSES[min(failures, len(_PAUSES)) - 1]))
 
 
 def _wider(mesh: shell.Topology, some: Bools, rings: int) -> Bools:
