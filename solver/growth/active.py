@@ -174,14 +174,20 @@ def settle(
 def _wider(mesh: shell.Topology, some: Bools, rings: int) -> Bools:
     for _ in range(rings):
         found = np.zeros(mesh.vertices, bool)
-        found[mesh.triangles[some[mesh.triangles].any(axis=1)]] = True
+        found[mesh.triangles[_touched(mesh, some)]] = True
         some = found
     return some
+
+
+def _touched(mesh: shell.Topology, some: Bools) -> Bools:
+    """Return which triangles (f,) have a corner among some vertices (n,)."""
+    i, j, k = mesh.triangles.T
+    return some[i] | some[j] | some[k]
 
 
 def _part(mesh: shell.Topology, moving: Bools) -> Part:
     """Return the part whose free vertices are `moving` (n,)."""
     # a vertex feels the hinges of its neighbours' edges (and, with mean curvature, all hinges of its neighbours)
-    faces = np.flatnonzero(_wider(mesh, moving, 1)[mesh.triangles].any(axis=1))
+    faces = np.flatnonzero(_touched(mesh, _wider(mesh, moving, 1)))
     smaller, vertices, hinges = shell.part_of(mesh, faces)
     return Part(vertices, faces, hinges, moving[vertices], Tangent(smaller))

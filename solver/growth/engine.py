@@ -157,7 +157,8 @@ class Engine:
         goal = self.tolerance * state.length
         yield
         if p.active and p.imperfection and not p.contact:
-            changed = (g != before.g).any(axis=1)
+            now, last = g.T, before.g.T
+            changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])
             if rest is not before.rest:
                 changed[state.mesh.hinge_faces[rest != before.rest]] = True
             settled = yield from settle(energy, changed, goal, dt, self._habit.copy(), _WAYS[p.solver])

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
 from .. import shell
@@ -65,7 +64,7 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     Angles stay under stretching (so that a sphere's curvature scales by 1/s) and take what curving adds. What does not
     grow keeps its numbers.
     """
-    some = np.flatnonzero(found.strain.any(axis=1) | found.curving.any(axis=1))
+    some = np.flatnonzero(_nonzero(found.strain) | _nonzero(found.curving))
     h11, h12, h22 = (dt * found.strain[some]).T
     mean, half = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
     slope = np.where(half > 1e-12, np.sinh(half) / np.maximum(half, 1e-300), 1.0)
@@ -77,7 +76,7 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     # rows of the stretched frame: U L
     u11, u12 = e11 * l11, e11 * l12 + e12 * l22
     u21, u22 = e12 * l11, e12 * l12 + e22 * l22
-    moved, g = found.strain[some].any(axis=1), state.g.copy()
+    moved, g = _nonzero(found.strain[some]), state.g.copy()
     g[some[moved]] = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)[moved]
     rest = state.rest
     if found.curving.any():
@@ -93,6 +92,12 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
         )
         rest = rest + shell.added_angles(b, g, state.mesh)
     return g, rest
+
+
+def _nonzero(rates: Floats) -> NDArray[np.bool_]:
+    """Return which rows (m,) of (m, 3) are not all 0; column by column, as numpy is slow along short rows."""
+    a, b, c = rates.T
+    return np.asarray((a != 0) | (b != 0) | (c != 0))
 
 
 def _frames(g: Floats) -> tuple[Floats, Floats, Floats]:
@@ -124,7 +129,8 @@ def _tensor(first: Floats, second: Floats, v: Floats) -> Floats:
 
 def _corners(state: State, share: Floats) -> tuple[Ints, Floats]:
     """Return triangles (m,) and the mean of their corners' shares where it is not 0 (the paper's, over edge tips)."""
-    mean = share[state.mesh.triangles].mean(axis=1)
+    i, j, k = state.mesh.triangles.T
+    mean = (share[i] + share[j] + share[k]) / 3
     some = np.flatnonzero(mean)
     return some, mean[some]
 
@@ -227,14 +233,35 @@ def _near(state: State, sources: Ints, radius: float, away: Floats) -> Ints:
     reach = _DETOUR * radius + 2 * state.length
     # ways along edges are no shorter than those through the air: beyond none leads through
     inside = away <= 1.001 * reach + away[sources].max()
-    some = np.flatnonzero(inside)
-    number = np.cumsum(inside) - 1
     edges = state.mesh.edges
-    i, j = edges[inside[edges[:, 0]] & inside[edges[:, 1]]].T
-    lengths = np.maximum(_lengths(state.x[i] - state.x[j]), 1e-300)
-    graph = csr_matrix((lengths, (number[i], number[j])), shape=(len(some),) * 2)
-    ways = dijkstra(graph, directed=False, indices=number[np.unique(sources)], limit=reach, min_only=True)
-    return some[np.isfinite(ways)]
+    found = _ways(state.x, edges[inside[edges[:, 0]] & inside[edges[:, 1]]], np.unique(sources), reach)
+    return np.flatnonzero(found <= reach)
+
+
+@njit(cache=True)
+def _ways(x: Floats, edges: Ints, sources: Ints, limit: float) -> Floats:
+    """Return the shortest ways (n,) along edges (e, 2) from sources; longer ones than the limit need not be."""
+    found = np.full(len(x), np.inf)
+    found[sources] = 0.0
+    lengths = np.empty(len(edges))
+    for e in range(len(edges)):
+        i, j = edges[e]
+        lengths[e] = np.sqrt((x[i, 0] - x[j, 0]) ** 2 + (x[i, 1] - x[j, 1]) ** 2 + (x[i, 2] - x[j, 2]) ** 2)
+    # shortened edge by edge until nothing changes (Bellman 1958): a few sweeps, to and fro
+    changed, forth = True, True
+    while changed:
+        changed = False
+        for step in range(len(edges)):
+            e = step if forth else len(edges) - 1 - step
+            i, j = edges[e]
+            if found[i] + lengths[e] < found[j] and found[i] + lengths[e] <= limit:
+                found[j] = found[i] + lengths[e]
+                changed = True
+            elif found[j] + lengths[e] < found[i] and found[j] + lengths[e] <= limit:
+                found[i] = found[j] + lengths[e]
+                changed = True
+        forth = not forth
+    return found
 
 
 def _lengths(v: Floats) -> Floats:

@@ -69,8 +69,8 @@ class State:
     @cached_property
     def length(self) -> float:
         """Mean rest edge."""
-        g = self.g
-        return float(np.sqrt(np.concatenate([g[:, 0], g[:, 2], g[:, 0] + g[:, 2] - 2 * g[:, 1]])).mean())
+        a, b, c = self.g.T
+        return float((np.sqrt(a).sum() + np.sqrt(c).sum() + np.sqrt(a + c - 2 * b).sum()) / (3 * len(a)))
 
 
 class Corners(NamedTuple):
