@@ -2,7 +2,8 @@
 
 python -m benchmarks.growth [vertices ...]            seconds to equal residual: quasi-Newton, L-BFGS and conjugate
                                                       gradients on a growing disc and sphere, in one run
-python -m benchmarks.growth --slices [vertices ...]   frames of a scripted painting, 0.3 % growth in each
+python -m benchmarks.growth --slices [vertices ...]   frames of a scripted painting, 0.3 % growth in each; the whole
+                                                      solved in every frame, and only what is active
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from solver import shell
 from solver.contract import NotConverged
+from solver.growth.energy import elastic
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.tools import HotSpot
@@ -59,8 +62,11 @@ def measure(values: dict, tool: dict, vertices: int, way: str) -> str:
     return f"{sum(seconds) / _STEPS:.3f} s a step, {engine.state.iterations / _STEPS:.0f} iterations"
 
 
-def paint(name: str, vertices: int, frames: int = _FRAMES, active: bool = False) -> str:
-    """Paint with a brush that moves on after some frames; a frame is one growth step to a residual of 1e-3."""
+def paint(name: str, vertices: int, frames: int = _FRAMES, active: bool = False) -> tuple[str, Engine]:
+    """Paint with a brush that moves on after some frames; a frame is one growth step to a residual of 1e-3.
+
+    Returns what was measured, and the painting.
+    """
     values, path = _PAINTINGS[name]
     values = {**values, "tools": [], "step": 1.0, "remesh": 1.3, "active": active}
     engine = Engine(GrowthParams.parse(values), vertices, 1e-3)
@@ -79,11 +85,25 @@ def paint(name: str, vertices: int, frames: int = _FRAMES, active: bool = False)
             piece.append(1e3 * (time.process_time() - since))
         frame.append(1e3 * (time.process_time() - begun))
     median, late = np.percentile(frame, [50, 95])
-    return (
+    said = (
         f"median {median:.0f} ms, p95 {late:.0f} ms, worst {max(frame):.0f} ms, slices of "
         f"{1e3 * _SLICE:.0f} ms: p95 {np.percentile(piece, 95):.0f} ms, longest {max(piece):.0f} ms, "
         f"{engine.state.iterations / frames:.1f} iterations a frame, {before} to {len(engine.state.x)} vertices"
     )
+    return said, engine
+
+
+def compared(one: Engine, other: Engine) -> str:
+    """Return how far two paintings of one script are from each other, laid on each other, and their energies."""
+    material = shell.Material(one.params.thickness)
+    energies = [elastic(e.state, material, e.params.bending) for e in (one, other)]
+    said = f"energies {energies[0]:.4e} {energies[1]:.4e}"
+    if not np.array_equal(one.state.mesh.triangles, other.state.mesh.triangles):
+        return f"other triangles, {said}"
+    x, y = (e.state.x - e.state.x.mean(axis=0) for e in (one, other))
+    u, _, v = np.linalg.svd(x.T @ y)
+    away = np.linalg.norm(x @ (u @ v) - y, axis=1)
+    return f"apart: largest {away.max():.1e}, rms {np.sqrt((away**2).mean()):.1e}, {said}"
 
 
 def main() -> None:
@@ -94,10 +114,16 @@ def main() -> None:
     given = parser.parse_args()
     with threadpool_limits(1, user_api="blas"):
         if given.slices:
-            paint("leaf", 200, 20)  # compile
+            for name in _PAINTINGS:  # compile
+                paint(name, 600, 40, active=True)
             for vertices in given.vertices or [5000, 10_000]:
                 for name in _PAINTINGS:
-                    print(f"{vertices:6d} {name:7s} {paint(name, vertices)}", flush=True)
+                    engines = []
+                    for active in (False, True):
+                        said, engine = paint(name, vertices, active=active)
+                        engines.append(engine)
+                        print(f"{vertices:6d} {name:7s} {'active' if active else 'whole':7s} {said}", flush=True)
+                    print(f"{vertices:6d} {name:7s} {compared(*engines)}", flush=True)
             return
         for values, tool in _CASES.values():  # compile
             measure(values, tool, 100, "quasi_newton")
