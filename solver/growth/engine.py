@@ -45,8 +45,12 @@ _MOST = 20
 class Engine:
     """A run that can be advanced, given tools, and undone."""
 
-    def __init__(self, params: GrowthParams, vertices: int, tolerance: float = 1e-3, most: int = 4000) -> None:
+    def __init__(
+        self, params: GrowthParams, vertices: int, tolerance: float = 1e-3, most: int = 4000, history: bool = True
+    ) -> None:
         """Start from the parameters' shape with about `vertices`; tolerance: residual; most: steps to an equilibrium.
+
+        history: whether states are kept for `undo`.
 
         Raises:
             InvalidInput: a tool or an attachment that the shape cannot have.
@@ -55,6 +59,7 @@ class Engine:
         self.params, self.tolerance, self._most = params, tolerance, most
         self._material = shell.Material(params.thickness, params.poisson)
         self._tools: list[Tool] = list(params.tools)
+        self._keeps = history
         self._history: list[tuple[State, int, Tangent, Habit]] = []
         self._work: Generator[None, None, None] | None = None
         self.state = _begin(params, start(params.shape, vertices, params.aspect))
@@ -205,13 +210,18 @@ class Engine:
                 self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
                 self._habit = self._habit.remeshed(finer.mesh, changes)
             state = finer
-        self._history.append((before, tools, *kept))
-        if len(self._history) > _EXACT:
-            old = self._history[-_EXACT - 1]
-            old[2].inverse = None
-            self._history[-_EXACT - 1] = (*old[:3], Habit())
+        if self._keeps:
+            self._remember(before, tools, *kept)
         self.state = state
         self._steps += 1
+
+    def _remember(self, before: State, tools: int, tangent: Tangent, habit: Habit) -> None:
+        """Keep what `undo` goes back to; inverses of the last steps only, for they are large."""
+        self._history.append((before, tools, tangent, habit))
+        if len(self._history) > _EXACT:
+            state, tools, old, _ = self._history[-_EXACT - 1]
+            old.inverse = None
+            self._history[-_EXACT - 1] = (state, tools, old, Habit())
 
 
 def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:

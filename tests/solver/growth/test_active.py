@@ -100,6 +100,15 @@ def test_where_nothing_changes_nothing_moves():
     assert np.array_equal(done.state.x, x)
 
 
+def test_without_history_the_way_is_the_same_and_there_is_none_back():
+    kept, bare = engine(300, 2), Engine(GrowthParams.parse(BALL), 300, history=False)
+    while bare.state.time < 2 - 1e-9:
+        bare.advance(1e9, until=2.0)
+    assert np.array_equal(bare.state.x, kept.state.x)
+    assert kept.undo()
+    assert not bare.undo()
+
+
 @pytest.mark.parametrize("shape", ["sphere", "disc"])
 def test_slices_undo_and_remeshing_leave_the_same_bytes(shape):
     """Also on a leaf, where parts do not do: every step ends at the residual."""
