@@ -23,6 +23,7 @@ from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 from .params import GrowthParams
 from .places import share
 from .placing import border, branched, started
+from .plastic import forgotten
 from .rates import grown, rates
 from .remesh import remesh
 from .shapes import Mesh, start
@@ -198,7 +199,7 @@ class Engine:
         drift = (point.x - state.x) / dt if dt else None
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
         if self.params.plasticity:
-            state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
+            state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = branched(state, acting, self.params.seed)
         yield
         if self.params.remesh:
@@ -266,22 +267,3 @@ def _begin(params: GrowthParams, mesh: Mesh) -> State:
         spots={},
         curves={},
     )
-
-
-def _forgotten(state: State, k: float, threshold: float) -> Floats:
-    """Return rest metrics after plastic flow: principal stretches beyond 1 +- alpha move by k towards that bound."""
-    a = shell.metric(state.x, state.mesh.triangles)
-    mixed = np.linalg.solve(_matrix(state.g), _matrix(a))
-    squares, vectors = np.linalg.eig(mixed)
-    stretches = np.sqrt(np.maximum(squares.real, 1e-12))
-    vectors = vectors.real
-    beyond = stretches / np.clip(stretches, 1 - threshold, 1 + threshold)
-    factors = (1 + k * (beyond - 1)) ** 2
-    found = _matrix(state.g) @ (vectors * factors[:, None, :]) @ np.linalg.inv(vectors)
-    changed = (beyond != 1).any(axis=1)
-    g = np.stack([found[:, 0, 0], (found[:, 0, 1] + found[:, 1, 0]) / 2, found[:, 1, 1]], -1)
-    return np.where(changed[:, None], g, state.g)
-
-
-def _matrix(g: Floats) -> Floats:
-    return np.stack([g[:, [0, 1]], g[:, [1, 2]]], axis=1)

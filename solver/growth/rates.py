@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from .. import shell
+from .reach import within
 from .state import State
 from .tools import HotCurve, HotSpot, HotSurface, Tool, intensities
 
@@ -18,9 +18,6 @@ __all__ = ["Rates", "grown", "rates"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-#: Along the surface, how many radii a tool reaches at most: what is nearer through the air is another part.
-_DETOUR = 1.6
 
 
 class Rates(NamedTuple):
@@ -173,7 +170,7 @@ def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Ints,
         if spot.letter and spot.letter in tool.resting:
             continue
         away = _lengths(x - spot.anchor.at(x, triangles)[0])
-        near = _near(state, triangles[spot.anchor.faces[0]], spot.radius, away)
+        near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
         whole[near] = np.maximum(whole[near], _kernel(tool.kernel, away[near] / spot.radius))
     some, share = _corners(state, whole)
     p = x[triangles[some]]
@@ -221,47 +218,11 @@ def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[In
     # a curve is near all along, and not only where its control points are
     pieces = max(2, int(np.linalg.norm(heads - tails, axis=1).max(initial=0) / (0.5 * tool.radius)) + 1)
     path = (tails[:, None] + np.linspace(0, 1, min(pieces, 200))[:, None] * (heads - tails)[:, None]).reshape(-1, 3)
-    near = _near(state, np.unique(KDTree(x).query(path)[1]), tool.radius, best)
+    near = within(state, np.unique(KDTree(x).query(path)[1]), tool.radius, best)
     whole = np.zeros(len(x))
     whole[near] = share[near] * _kernel("smooth", best[near] / tool.radius)
     some, mean = _corners(state, whole)
     return some, mean, along[triangles[some]].mean(axis=1)
-
-
-def _near(state: State, sources: Ints, radius: float, away: Floats) -> Ints:
-    """Return the vertices within reach of `sources` along the edges; away: (n,) distance from the tool in space."""
-    reach = _DETOUR * radius + 2 * state.length
-    # ways along edges are no shorter than those through the air: beyond none leads through
-    inside = away <= 1.001 * reach + away[sources].max()
-    edges = state.mesh.edges
-    found = _ways(state.x, edges[inside[edges[:, 0]] & inside[edges[:, 1]]], np.unique(sources), reach)
-    return np.flatnonzero(found <= reach)
-
-
-@njit(cache=True)
-def _ways(x: Floats, edges: Ints, sources: Ints, limit: float) -> Floats:
-    """Return the shortest ways (n,) along edges (e, 2) from sources; longer ones than the limit need not be."""
-    found = np.full(len(x), np.inf)
-    found[sources] = 0.0
-    lengths = np.empty(len(edges))
-    for e in range(len(edges)):
-        i, j = edges[e]
-        lengths[e] = np.sqrt((x[i, 0] - x[j, 0]) ** 2 + (x[i, 1] - x[j, 1]) ** 2 + (x[i, 2] - x[j, 2]) ** 2)
-    # shortened edge by edge until nothing changes (Bellman 1958): a few sweeps, to and fro
-    changed, forth = True, True
-    while changed:
-        changed = False
-        for step in range(len(edges)):
-            e = step if forth else len(edges) - 1 - step
-            i, j = edges[e]
-            if found[i] + lengths[e] < found[j] and found[i] + lengths[e] <= limit:
-                found[j] = found[i] + lengths[e]
-                changed = True
-            elif found[j] + lengths[e] < found[i] and found[j] + lengths[e] <= limit:
-                found[i] = found[j] + lengths[e]
-                changed = True
-        forth = not forth
-    return found
 
 
 def _lengths(v: Floats) -> Floats:

@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from solver import shell
-from solver.growth import active, rates
+from solver.growth import active, reach
 from solver.growth.energy import StepEnergy, Tangent, elastic
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
@@ -169,7 +169,7 @@ def test_ways_along_the_surface_are_those_of_dijkstra():
     graph = csr_matrix((lengths, (i, j)), shape=(len(state.x),) * 2)
     sources = np.array([3, 40])
     whole = dijkstra(graph, directed=False, indices=sources, min_only=True)
-    found = rates._ways(state.x, state.mesh.edges, sources, 0.8)
+    found = reach.ways(state.x, state.mesh.edges, sources, 0.8)
     near = whole < 0.8 - 1e-9
     assert 20 < near.sum() < len(near) - 20
     assert found[near] == pytest.approx(whole[near], rel=1e-12)
