@@ -134,7 +134,8 @@ def main() -> None:
                 paint(name, 600, 40, active=True)
             for vertices in given.vertices or [5000, 10_000]:
                 for name in _PAINTINGS:
-                    print(*painted(name, vertices), sep="\n", flush=True)
+                    for line in painted(name, vertices):
+                        print(line, flush=True)
             return
         for values, tool in _CASES.values():  # compile
             measure(values, tool, 100, "quasi_newton")
