@@ -169,13 +169,13 @@ def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Ints,
     for spot in state.spots[number]:
         if spot.letter and spot.letter in tool.resting:
             continue
-        away = _lengths(x - spot.anchor.at(x, triangles)[0])
+        away = np.linalg.norm(x - spot.anchor.at(x, triangles)[0], axis=1)
         near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
         whole[near] = np.maximum(whole[near], _kernel(tool.kernel, away[near] / spot.radius))
     some, share = _corners(state, whole)
     p = x[triangles[some]]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normal /= np.maximum(_lengths(normal)[:, None], 1e-300)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     axis = np.array(tool.frame)
     axis = axis - (normal @ axis)[:, None] * normal
     turn = np.radians(tool.angle + tool.turning * (time - tool.start))
@@ -223,9 +223,3 @@ def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[In
     whole[near] = share[near] * _kernel("smooth", best[near] / tool.radius)
     some, mean = _corners(state, whole)
     return some, mean, along[triangles[some]].mean(axis=1)
-
-
-def _lengths(v: Floats) -> Floats:
-    """Return the lengths (m,) of vectors (m, 3)."""
-    found: Floats = np.sqrt(np.einsum("md,md->m", v, v))
-    return found

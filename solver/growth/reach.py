@@ -19,12 +19,21 @@ _DETOUR = 1.6
 
 def within(state: State, sources: Ints, radius: float, away: Floats) -> Ints:
     """Return the vertices within reach of `sources` along the edges; away: (n,) distance from the tool in space."""
-    reach = _DETOUR * radius + 2 * state.length
+    edges = state.mesh.edges
+    reach = _DETOUR * radius + 2 * float(_lengths(state.x, edges).mean())
     # ways along edges are no shorter than those through the air: beyond none leads through
     inside = away <= 1.001 * reach + away[sources].max()
-    edges = state.mesh.edges
     found = ways(state.x, edges[inside[edges[:, 0]] & inside[edges[:, 1]]], np.unique(sources), reach)
     return np.flatnonzero(found <= reach)
+
+
+@njit(cache=True)
+def _lengths(x: Floats, edges: Ints) -> Floats:
+    found = np.empty(len(edges))
+    for e in range(len(edges)):
+        i, j = edges[e]
+        found[e] = np.sqrt((x[i, 0] - x[j, 0]) ** 2 + (x[i, 1] - x[j, 1]) ** 2 + (x[i, 2] - x[j, 2]) ** 2)
+    return found
 
 
 @njit(cache=True)
@@ -32,10 +41,7 @@ def ways(x: Floats, edges: Ints, sources: Ints, limit: float) -> Floats:
     """Return the shortest ways (n,) along edges (e, 2) from sources; longer ones than the limit need not be."""
     found = np.full(len(x), np.inf)
     found[sources] = 0.0
-    lengths = np.empty(len(edges))
-    for e in range(len(edges)):
-        i, j = edges[e]
-        lengths[e] = np.sqrt((x[i, 0] - x[j, 0]) ** 2 + (x[i, 1] - x[j, 1]) ** 2 + (x[i, 2] - x[j, 2]) ** 2)
+    lengths = _lengths(x, edges)
     # shortened edge by edge until nothing changes (Bellman 1958): a few sweeps, to and fro
     changed, forth = True, True
     while changed:
