@@ -2,18 +2,22 @@
 
 python -m benchmarks.growth [vertices ...]            seconds to equal residual: quasi-Newton, L-BFGS and conjugate
                                                       gradients on a growing disc and sphere, in one run
-python -m benchmarks.growth --slices [vertices ...]   frames of a scripted painting, 0.3 % growth in each
+python -m benchmarks.growth --slices [vertices ...]   frames of a scripted painting, 0.3 % growth in each; the whole
+                                                      solved in every frame, and only what is active
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterator
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from solver import shell
 from solver.contract import NotConverged
+from solver.growth.energy import elastic
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.tools import HotSpot
@@ -34,7 +38,7 @@ _CASES = {
 }
 _STEPS, _PATIENCE = 4, 3000
 _FRAMES, _STROKE = 150, 15
-_SLICE = 0.01
+_SLICE, _EXACT = 0.01, 1e-5
 #: A painting: shape, and where its strokes of `_STROKE` frames lie.
 _PAINTINGS = {
     "leaf": ({"shape": "disc", "thickness": 0.02, "curved": False}, lambda a: (0.8 * np.cos(a), 0.8 * np.sin(a), 0.0)),
@@ -59,10 +63,16 @@ def measure(values: dict, tool: dict, vertices: int, way: str) -> str:
     return f"{sum(seconds) / _STEPS:.3f} s a step, {engine.state.iterations / _STEPS:.0f} iterations"
 
 
-def paint(name: str, vertices: int, frames: int = _FRAMES) -> str:
-    """Paint with a brush that moves on after some frames; a frame is one growth step to a residual of 1e-3."""
+def paint(
+    name: str, vertices: int, frames: int = _FRAMES, active: bool = False, residual: float = 1e-3
+) -> tuple[str, Engine]:
+    """Paint with a brush that moves on after some frames; a frame is one growth step to a residual.
+
+    Returns what was measured, and the painting.
+    """
     values, path = _PAINTINGS[name]
-    engine = Engine(GrowthParams.parse({**values, "tools": [], "step": 1.0, "remesh": 1.3}), vertices, 1e-3)
+    values = {**values, "tools": [], "step": 1.0, "remesh": 1.3, "active": active}
+    engine = Engine(GrowthParams.parse(values), vertices, residual)
     frame: list[float] = []
     piece: list[float] = []
     before = len(engine.state.x)
@@ -78,11 +88,38 @@ def paint(name: str, vertices: int, frames: int = _FRAMES) -> str:
             piece.append(1e3 * (time.process_time() - since))
         frame.append(1e3 * (time.process_time() - begun))
     median, late = np.percentile(frame, [50, 95])
-    return (
+    said = (
         f"median {median:.0f} ms, p95 {late:.0f} ms, worst {max(frame):.0f} ms, slices of "
         f"{1e3 * _SLICE:.0f} ms: p95 {np.percentile(piece, 95):.0f} ms, longest {max(piece):.0f} ms, "
         f"{engine.state.iterations / frames:.1f} iterations a frame, {before} to {len(engine.state.x)} vertices"
     )
+    return said, engine
+
+
+def compared(one: Engine, other: Engine) -> str:
+    """Return how far two paintings of one script are from each other, laid on each other, and their energies."""
+    material = shell.Material(one.params.thickness)
+    energies = [elastic(e.state, material, e.params.bending) for e in (one, other)]
+    said = f"energies {energies[0]:.4e} {energies[1]:.4e}"
+    if not np.array_equal(one.state.mesh.triangles, other.state.mesh.triangles):
+        return f"other triangles, {said}"
+    x, y = (e.state.x - e.state.x.mean(axis=0) for e in (one, other))
+    u, _, v = np.linalg.svd(x.T @ y)
+    away = np.linalg.norm(x @ (u @ v) - y, axis=1)
+    return f"apart: largest {away.max():.1e}, rms {np.sqrt((away**2).mean()):.1e}, {said}"
+
+
+def painted(name: str, vertices: int) -> Iterator[str]:
+    """Yield what a painting costs both ways, and how far they end from each other and from a hundredth of the goal."""
+    what = f"{vertices:6d} {name:7s}"
+    said, whole = paint(name, vertices)
+    yield f"{what} whole: {said}"
+    said, active = paint(name, vertices, active=True)
+    yield f"{what} active: {said}"
+    exact = paint(name, vertices, residual=_EXACT)[1]
+    yield f"{what} active to whole: {compared(active, whole)}"
+    yield f"{what} whole to a residual of {_EXACT:g}: {compared(whole, exact)}"
+    yield f"{what} active to a residual of {_EXACT:g}: {compared(active, exact)}"
 
 
 def main() -> None:
@@ -93,10 +130,12 @@ def main() -> None:
     given = parser.parse_args()
     with threadpool_limits(1, user_api="blas"):
         if given.slices:
-            paint("leaf", 200, 20)  # compile
+            for name in _PAINTINGS:  # compile
+                paint(name, 600, 40, active=True)
             for vertices in given.vertices or [5000, 10_000]:
                 for name in _PAINTINGS:
-                    print(f"{vertices:6d} {name:7s} {paint(name, vertices)}", flush=True)
+                    for line in painted(name, vertices):
+                        print(line, flush=True)
             return
         for values, tool in _CASES.values():  # compile
             measure(values, tool, 100, "quasi_newton")

@@ -14,7 +14,7 @@ from ..shell.inverse import Inverse, fronts_of, inverse_of, normals
 from .params import Bending, Plane, SolidBall
 from .state import State
 
-__all__ = ["StepEnergy", "Tangent", "elastic"]
+__all__ = ["StepEnergy", "Tangent", "ahead", "elastic"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -65,6 +65,17 @@ def elastic(state: State, material: shell.Material, bending: Bending) -> float:
     return StepEnergy(state, material, 0.0, (), Tangent(state.mesh), bending=bending)(state.x)[0]
 
 
+def ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
+    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
+    if state.drift is None:
+        return state.x
+    x = state.x + dt * state.drift
+    if float(np.abs(x - state.x).max()) > energy.longest:
+        return state.x
+    least = energy(state.x)[0]
+    return x if energy(x)[0] < least else state.x
+
+
 class StepEnergy:
     """Energy of positions (n, 3) against a state's rest metrics and angles, in mu l^2."""
 
@@ -80,10 +91,12 @@ class StepEnergy:
         bending: Bending = "hinges",
     ) -> None:
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
+        self._pressure, self._gravity, self._bending = pressure, gravity, bending
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
         self.free = ~state.held
+        self._last: tuple[Floats, float, Floats] | None = None
         self._distance, self._looked = distance, state.x
         self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
         thirds = np.repeat(shell.areas(state.g) / 3, 3)
@@ -93,7 +106,12 @@ class StepEnergy:
             self.load = weight if self.load is None else self.load + weight
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:
-        """Return energy and gradient; the gradient of held directions is 0."""
+        """Return energy and gradient; the gradient of held directions is 0. What was asked last is remembered."""
+        if self._last is None or self._last[0] is not x:
+            self._last = x, *self._at(x)
+        return self._last[1:]
+
+    def _at(self, x: Floats) -> tuple[float, Floats]:
         state, gradient = self.state, np.zeros_like(x)
         energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient)
         if self._mean is None:
@@ -114,6 +132,11 @@ class StepEnergy:
             gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
         gradient[state.held] = 0.0
         return energy, gradient
+
+    def part(self, state: State, tangent: Tangent) -> StepEnergy:
+        """Return the same energy, without contact, of a part of the state."""
+        rest = tangent, self._gravity, 0.0, self._bending
+        return StepEnergy(state, self.material, self._pressure, self.solids, *rest)
 
     def rounding(self, x: Floats) -> float:
         """Return the largest gradient component that is rounding: what it changes by where x moves by last digits.

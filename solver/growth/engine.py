@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from .. import shell
 from ..contract import Context, NotConverged, Unstable
 from ..shell.inverse import normals
-from .energy import StepEnergy, Tangent
+from .active import Habit, settle
+from .energy import StepEnergy, Tangent, ahead
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 from .params import GrowthParams
 from .places import share
 from .placing import border, branched, started
+from .plastic import forgotten
 from .rates import grown, rates
 from .remesh import remesh
 from .shapes import Mesh, start
@@ -44,8 +46,12 @@ _MOST = 20
 class Engine:
     """A run that can be advanced, given tools, and undone."""
 
-    def __init__(self, params: GrowthParams, vertices: int, tolerance: float = 1e-3, most: int = 4000) -> None:
+    def __init__(
+        self, params: GrowthParams, vertices: int, tolerance: float = 1e-3, most: int = 4000, history: bool = True
+    ) -> None:
         """Start from the parameters' shape with about `vertices`; tolerance: residual; most: steps to an equilibrium.
+
+        history: whether states are kept for `undo`.
 
         Raises:
             InvalidInput: a tool or an attachment that the shape cannot have.
@@ -54,12 +60,13 @@ class Engine:
         self.params, self.tolerance, self._most = params, tolerance, most
         self._material = shell.Material(params.thickness, params.poisson)
         self._tools: list[Tool] = list(params.tools)
-        self._history: list[tuple[State, int, Tangent]] = []
+        self._keeps = history
+        self._history: list[tuple[State, int, Tangent, Habit]] = []
         self._work: Generator[None, None, None] | None = None
         self.state = _begin(params, start(params.shape, vertices, params.aspect))
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
-        self._tangent = Tangent(self.state.mesh)
+        self._tangent, self._habit = Tangent(self.state.mesh), Habit()
         self._steps = 0
 
     @property
@@ -110,7 +117,7 @@ class Engine:
             self._work = None
         if not self._history:
             return False
-        self.state, tools, self._tangent = self._history.pop()
+        self.state, tools, self._tangent, self._habit = self._history.pop()
         self._steps -= 1
         del self._tools[tools:]
         return True
@@ -129,20 +136,20 @@ class Engine:
         if rest <= 1e-9 and self._steps:
             return self.state
         # a step of its own, which leaves no trace
-        kept = self.state, list(self._history), self._tangent, self._steps
-        self._tangent = Tangent(self.state.mesh)
+        kept = self.state, list(self._history), self._tangent, self._habit, self._steps
+        self._tangent, self._habit = Tangent(self.state.mesh), Habit()
         try:
             for _ in self._step(max(rest, 0.0)):
                 context.check_cancelled()
             return self.state
         finally:
-            self.state, self._history, self._tangent, self._steps = kept
+            self.state, self._history, self._tangent, self._habit, self._steps = kept
 
     def _step(self, dt: float) -> Generator[None, None, None]:
         """Grow by dt and find the equilibrium; yields after every piece of work."""
         before, tools = self.state, len(self._tools)
         # the way on from here is the same after an undo only with the same inverse
-        kept, self._tangent = self._tangent, self._tangent.copy()
+        kept, self._tangent = (self._tangent, self._habit), self._tangent.copy()
         state = started(before, self._tools, self.params.step, self.params.seed)
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
@@ -155,7 +162,16 @@ class Engine:
         energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         yield
-        begin, nudges = _ahead(energy, state, dt), 0 if self.params.imperfection else 1
+        if p.active and p.imperfection and not p.contact:
+            now, last = g.T, before.g.T
+            changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])
+            if rest is not before.rest:
+                changed[state.mesh.hinge_faces[rest != before.rest]] = True
+            settled = yield from settle(energy, changed, goal, dt, self._habit.copy(), _WAYS[p.solver])
+            begin, spent, self._habit = settled.x, settled.spent, settled.habit
+        else:
+            begin = ahead(energy, state, dt)
+        nudges = 0 if p.imperfection else 1
         while True:
             for nearer in _WAYS[self.params.solver](energy, begin):
                 spent += nearer.x is not point.x
@@ -183,7 +199,7 @@ class Engine:
         drift = (point.x - state.x) / dt if dt else None
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
         if self.params.plasticity:
-            state = replace(state, g=_forgotten(state, self.params.plasticity, self.params.yield_strain))
+            state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = branched(state, acting, self.params.seed)
         yield
         if self.params.remesh:
@@ -193,22 +209,20 @@ class Engine:
                 tangent = tangent.remeshed(finer.mesh, pairs)
             if finer.mesh is not state.mesh:
                 self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
+                self._habit = self._habit.remeshed(finer.mesh, changes)
             state = finer
-        self._history.append((before, tools, kept))
-        if len(self._history) > _EXACT:
-            self._history[-_EXACT - 1][2].inverse = None
+        if self._keeps:
+            self._remember(before, tools, *kept)
         self.state = state
         self._steps += 1
 
-
-def _ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
-    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
-    if state.drift is None:
-        return state.x
-    x = state.x + dt * state.drift
-    if float(np.abs(x - state.x).max()) > energy.longest:
-        return state.x
-    return x if energy(x)[0] < energy(state.x)[0] else state.x
+    def _remember(self, before: State, tools: int, tangent: Tangent, habit: Habit) -> None:
+        """Keep what `undo` goes back to; inverses of the last steps only, for they are large."""
+        self._history.append((before, tools, tangent, habit))
+        if len(self._history) > _EXACT:
+            state, tools, old, _ = self._history[-_EXACT - 1]
+            old.inverse = None
+            self._history[-_EXACT - 1] = (state, tools, old, Habit())
 
 
 def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
@@ -253,22 +267,3 @@ def _begin(params: GrowthParams, mesh: Mesh) -> State:
         spots={},
         curves={},
     )
-
-
-def _forgotten(state: State, k: float, threshold: float) -> Floats:
-    """Return rest metrics after plastic flow: principal stretches beyond 1 +- alpha move by k towards that bound."""
-    a = shell.metric(state.x, state.mesh.triangles)
-    mixed = np.linalg.solve(_matrix(state.g), _matrix(a))
-    squares, vectors = np.linalg.eig(mixed)
-    stretches = np.sqrt(np.maximum(squares.real, 1e-12))
-    vectors = vectors.real
-    beyond = stretches / np.clip(stretches, 1 - threshold, 1 + threshold)
-    factors = (1 + k * (beyond - 1)) ** 2
-    found = _matrix(state.g) @ (vectors * factors[:, None, :]) @ np.linalg.inv(vectors)
-    changed = (beyond != 1).any(axis=1)
-    g = np.stack([found[:, 0, 0], (found[:, 0, 1] + found[:, 1, 0]) / 2, found[:, 1, 1]], -1)
-    return np.where(changed[:, None], g, state.g)
-
-
-def _matrix(g: Floats) -> Floats:
-    return np.stack([g[:, [0, 1]], g[:, [1, 2]]], axis=1)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import shell
+from .rest import edge_squares, flat_hinges
 from .state import Anchors, State, corners_of, on_surface
 
 __all__ = ["collapse", "flip"]
@@ -30,7 +31,7 @@ _NEAR = 0.3
 def flip(state: State) -> State:
     """Return the state with edges flipped where the rest metric is not Delaunay; itself if there are none."""
     mesh = state.mesh
-    some = _flat(state)
+    some = flat_hinges(state.g, mesh, _NEAR)
     corners = _unfolded(state, some)
     angle = [_angle(corners[:, k], corners[:, 0], corners[:, 1]) for k in (2, 3)]
     excess = angle[0] + angle[1] - np.pi
@@ -74,11 +75,8 @@ def collapse(state: State, shortest: float) -> tuple[State, Ints]:
     Of an edge one vertex goes and the other stays where it is. Borders, held vertices and folds stay.
     """
     mesh = state.mesh
-    squares = np.zeros(len(mesh.edges))
-    faces = np.stack([state.g[:, 0] + state.g[:, 2] - 2 * state.g[:, 1], state.g[:, 2], state.g[:, 0]], -1)
-    count = np.bincount(mesh.face_edges.ravel(), minlength=len(squares))
-    squares += np.bincount(mesh.face_edges.ravel(), faces.ravel(), len(squares))
-    short = np.flatnonzero(squares / count < shortest**2)
+    squares = edge_squares(state.g, mesh)
+    short = np.flatnonzero(squares < shortest**2)
     everything = np.arange(len(state.x))
     if not len(short):
         return state, everything
@@ -89,7 +87,7 @@ def collapse(state: State, shortest: float) -> tuple[State, Ints]:
     rings = _rings(mesh)
     triangles, g = mesh.triangles.copy(), state.g.copy()
     taken, gone = np.zeros(len(state.x), bool), np.zeros(len(triangles), bool)
-    for edge in short[np.argsort(squares[short] / count[short], kind="stable")]:
+    for edge in short[np.argsort(squares[short], kind="stable")]:
         i, j = (int(v) for v in mesh.edges[edge])
         if fixed[i]:
             i, j = j, i
@@ -170,17 +168,6 @@ def _turned(g: Floats, at: int) -> tuple[float, float, float]:
     if at == 1:
         return a + c - 2 * b, a - b, a
     return c, c - b, a + c - 2 * b
-
-
-def _flat(state: State) -> Ints:
-    """Return the hinges whose opposite rest angles come near pi together, or exceed it."""
-    g, mesh = state.g, state.mesh
-    squares = np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
-    dots = np.stack([g[:, 1], g[:, 0] - g[:, 1], g[:, 2] - g[:, 1]], -1)
-    sizes = np.sqrt(np.stack([squares[:, (k + 1) % 3] * squares[:, (k + 2) % 3] for k in range(3)], -1))
-    cosines, sines = dots / sizes, 2 * shell.areas(g)[:, None] / sizes
-    first, second = ((mesh.hinge_faces[:, side], mesh.hinge_corners[:, side]) for side in range(2))
-    return np.flatnonzero(sines[first] * cosines[second] + cosines[first] * sines[second] < np.sin(_NEAR))
 
 
 def _unfolded(state: State, some: Ints) -> Floats:

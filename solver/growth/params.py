@@ -145,3 +145,8 @@ class GrowthParams(Params):
     solver: Literal["quasi_newton", "lbfgs", "cg"] = Field(
         "quasi_newton", description="Way to equilibrium; cg is the paper's", json_schema_extra=_units("1")
     )
+    active: bool = Field(
+        False,
+        description="Whether a part that grows settles alone where the rest stays in balance; not with contact",
+        json_schema_extra=_units("1"),
+    )

@@ -7,20 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
 from .. import shell
+from .reach import within
 from .state import State
 from .tools import HotCurve, HotSpot, HotSurface, Tool, intensities
 
 __all__ = ["Rates", "grown", "rates"]
 
 Floats = NDArray[np.float64]
-
-#: Along the surface, how many radii a tool reaches at most: what is nearer through the air is another part.
-_DETOUR = 1.6
+Ints = NDArray[np.int64]
 
 
 class Rates(NamedTuple):
@@ -44,15 +41,14 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
         if strength == 0:
             continue
         if isinstance(tool, HotSurface):
-            share, along = _surface(state, tool, number, time)
+            some, share, along = _surface(state, tool, number, time)
         elif isinstance(tool, HotCurve):
-            share, along = _curve(state, tool, state.curves[number].at(state.x, state.mesh.triangles), since)
+            some, share, along = _curve(state, tool, state.curves[number].at(state.x, state.mesh.triangles), since)
         else:
-            share, along = _spots(state, tool, number, time)
+            some, share, along = _spots(state, tool, number, time)
         first, second = np.log(_stretches(state, tool, number))
-        some = np.flatnonzero(share)
-        share = strength * share[some]
-        v = _in_rest_frame(state, along[some], some)
+        share = strength * share
+        v = _in_rest_frame(state, along, some)
         strain[some] += _tensor(share * first, share * second, v)
         if isinstance(tool, HotSurface) and any(tool.curl):
             curving[some] += _tensor(share * tool.curl[0], share * tool.curl[1], v)
@@ -62,27 +58,28 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
 def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     """Return rest metrics (f, 3) and rest angles (h,) after dt: G = exp(2 dt strain) in each triangle's rest frame.
 
-    Angles stay under stretching (so that a sphere's curvature scales by 1/s) and take what curving adds.
+    Angles stay under stretching (so that a sphere's curvature scales by 1/s) and take what curving adds. What does not
+    grow keeps its numbers.
     """
-    h11, h12, h22 = (dt * found.strain).T
+    some = np.flatnonzero(_nonzero(found.strain) | _nonzero(found.curving))
+    h11, h12, h22 = (dt * found.strain[some]).T
     mean, half = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
     slope = np.where(half > 1e-12, np.sinh(half) / np.maximum(half, 1e-300), 1.0)
     even = np.cosh(half)
     e11 = np.exp(mean) * (even + slope * (h11 - h22) / 2)
     e22 = np.exp(mean) * (even - slope * (h11 - h22) / 2)
     e12 = np.exp(mean) * slope * h12
-    l11, l12, l22 = _frames(state.g)
+    l11, l12, l22 = _frames(state.g[some])
     # rows of the stretched frame: U L
     u11, u12 = e11 * l11, e11 * l12 + e12 * l22
     u21, u22 = e12 * l11, e12 * l12 + e22 * l22
-    g = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)
-    # what does not grow keeps its numbers
-    still = (found.strain == 0).all(axis=1)
-    g[still] = state.g[still]
+    moved, g = _nonzero(found.strain[some]), state.g.copy()
+    g[some[moved]] = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)[moved]
     rest = state.rest
     if found.curving.any():
-        k11, k12, k22 = (dt * found.curving).T
-        b = np.stack(
+        k11, k12, k22 = (dt * found.curving[some]).T
+        b = np.zeros_like(g)
+        b[some] = np.stack(
             [
                 k11 * u11 * u11 + 2 * k12 * u11 * u21 + k22 * u21 * u21,
                 k11 * u11 * u12 + k12 * (u11 * u22 + u21 * u12) + k22 * u21 * u22,
@@ -94,6 +91,12 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     return g, rest
 
 
+def _nonzero(rates: Floats) -> NDArray[np.bool_]:
+    """Return which rows (m,) of (m, 3) are not all 0; column by column, as numpy is slow along short rows."""
+    a, b, c = rates.T
+    return np.asarray((a != 0) | (b != 0) | (c != 0))
+
+
 def _frames(g: Floats) -> tuple[Floats, Floats, Floats]:
     """Return L = [[l11, l12], [0, l22]] with L^T L = g: the edges in the triangle's own orthonormal frame."""
     l11 = np.sqrt(g[:, 0])
@@ -101,7 +104,7 @@ def _frames(g: Floats) -> tuple[Floats, Floats, Floats]:
     return l11, l12, np.sqrt(g[:, 2] - l12 * l12)
 
 
-def _in_rest_frame(state: State, along: Floats, some: NDArray[np.int64]) -> Floats:
+def _in_rest_frame(state: State, along: Floats, some: Ints) -> Floats:
     """Return unit vectors (m, 2) of directions in space (m, 3), carried back to some rest frames by the shape."""
     p = state.x[state.mesh.triangles[some]]
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
@@ -121,9 +124,12 @@ def _tensor(first: Floats, second: Floats, v: Floats) -> Floats:
     return np.stack([first * c * c + second * s * s, (first - second) * c * s, first * s * s + second * c * c], -1)
 
 
-def _corners(state: State, share: Floats) -> Floats:
-    """Return the mean of the corners' shares (the paper's average over an edge's tips)."""
-    return share[state.mesh.triangles].mean(axis=1)
+def _corners(state: State, share: Floats) -> tuple[Ints, Floats]:
+    """Return triangles (m,) and the mean of their corners' shares where it is not 0 (the paper's, over edge tips)."""
+    i, j, k = state.mesh.triangles.T
+    mean = (share[i] + share[j] + share[k]) / 3
+    some = np.flatnonzero(mean)
+    return some, mean[some]
 
 
 def _stretches(state: State, tool: Tool, number: int) -> Floats:
@@ -146,35 +152,34 @@ def _turning(line: Floats, closed: bool) -> float:
     return float(turns.sum() / (lengths[:-1] if closed else lengths).sum())
 
 
-def _surface(state: State, tool: HotSurface, number: int, time: float) -> tuple[Floats, Floats]:
+def _surface(state: State, tool: HotSurface, number: int, time: float) -> tuple[Ints, Floats, Floats]:
     values = state.shares[number]
-    if tool.later is None:
-        share = _corners(state, values)
-    else:
-        share = _corners(state, values[:, 0] * intensities(tool, time - tool.start - tool.offset * values[:, 1]))
+    if tool.later is not None:
+        values = values[:, 0] * intensities(tool, time - tool.start - tool.offset * values[:, 1])
+    some, share = _corners(state, values)
     if tool.frame == "around":
-        middle = state.x[state.mesh.triangles].mean(axis=1)
-        return share, np.stack([-middle[:, 1], middle[:, 0], np.zeros(len(middle))], -1)
-    return share, np.broadcast_to(np.array(tool.frame), (len(share), 3))
+        middle = state.x[state.mesh.triangles[some]].mean(axis=1)
+        return some, share, np.stack([-middle[:, 1], middle[:, 0], np.zeros(len(middle))], -1)
+    return some, share, np.broadcast_to(np.array(tool.frame), (len(share), 3))
 
 
-def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Floats, Floats]:
+def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Ints, Floats, Floats]:
     triangles, x = state.mesh.triangles, state.x
-    share = np.zeros(len(x))
+    whole = np.zeros(len(x))
     for spot in state.spots[number]:
         if spot.letter and spot.letter in tool.resting:
             continue
-        centre = spot.anchor.at(x, triangles)[0]
-        r = np.linalg.norm(x - centre, axis=1) / spot.radius
-        r[~_near(state, triangles[spot.anchor.faces[0]], spot.radius)] = np.inf
-        share = np.maximum(share, _kernel(tool.kernel, r))
-    p = x[triangles]
+        away = np.linalg.norm(x - spot.anchor.at(x, triangles)[0], axis=1)
+        near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
+        whole[near] = np.maximum(whole[near], _kernel(tool.kernel, away[near] / spot.radius))
+    some, share = _corners(state, whole)
+    p = x[triangles[some]]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     axis = np.array(tool.frame)
     axis = axis - (normal @ axis)[:, None] * normal
     turn = np.radians(tool.angle + tool.turning * (time - tool.start))
-    return _corners(state, share), np.cos(turn) * axis + np.sin(turn) * np.cross(normal, axis)
+    return some, share, np.cos(turn) * axis + np.sin(turn) * np.cross(normal, axis)
 
 
 def _kernel(name: str, r: Floats) -> Floats:
@@ -185,7 +190,7 @@ def _kernel(name: str, r: Floats) -> Floats:
     return 1 - near if name == "cone" else (1 - near * near) ** 2
 
 
-def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[Floats, Floats]:
+def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[Ints, Floats, Floats]:
     x, triangles = state.x, state.mesh.triangles
     tails, heads = line, np.roll(line, -1, axis=0)
     if not tool.closed:
@@ -210,19 +215,11 @@ def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[Fl
     share = local[:, 0]
     if tool.offsets or tool.paces:
         share = share * intensities(tool, (since - local[:, 1]) * local[:, 2])
-    r = best / tool.radius
     # a curve is near all along, and not only where its control points are
     pieces = max(2, int(np.linalg.norm(heads - tails, axis=1).max(initial=0) / (0.5 * tool.radius)) + 1)
     path = (tails[:, None] + np.linspace(0, 1, min(pieces, 200))[:, None] * (heads - tails)[:, None]).reshape(-1, 3)
-    r[~_near(state, np.unique(KDTree(x).query(path)[1]), tool.radius)] = np.inf
-    return _corners(state, share * _kernel("smooth", r)), along[triangles].mean(axis=1)
-
-
-def _near(state: State, sources: NDArray[np.int64], radius: float) -> NDArray[np.bool_]:
-    """Return which vertices lie within reach of `sources` along the edges."""
-    i, j = state.mesh.edges.T
-    lengths = np.maximum(np.linalg.norm(state.x[i] - state.x[j], axis=1), 1e-300)
-    graph = csr_matrix((lengths, (i, j)), shape=(len(state.x),) * 2)
-    reach = _DETOUR * radius + 2 * lengths.mean()
-    away = dijkstra(graph, directed=False, indices=np.unique(sources), limit=reach, min_only=True)
-    return np.isfinite(away)
+    near = within(state, np.unique(KDTree(x).query(path)[1]), tool.radius, best)
+    whole = np.zeros(len(x))
+    whole[near] = share[near] * _kernel("smooth", best[near] / tool.radius)
+    some, mean = _corners(state, whole)
+    return some, mean, along[triangles[some]].mean(axis=1)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .. import shell
 from .flips import collapse, flip
+from .rest import edge_squares
 from .state import Spot, State, corners_of, on_surface
 
 __all__ = ["remesh", "split"]
@@ -68,9 +69,7 @@ def split(state: State, longest: float) -> State:
 def _split(state: State, longest: float) -> tuple[State, Ints]:
     """Return the state and the ends (m, 2) of the edges that were cut."""
     mesh = state.mesh
-    squares = _squares(state.g)
-    around = mesh.face_edges.ravel()
-    mean = np.bincount(around, squares.ravel(), len(mesh.edges)) / np.bincount(around, minlength=len(mesh.edges))
+    mean = edge_squares(state.g, mesh)
     marked = mean > longest**2
     if not marked.any():
         return state, mesh.edges[:0]
@@ -112,11 +111,6 @@ def _split(state: State, longest: float) -> tuple[State, Ints]:
         curves={k: on_surface(a, state.x, mesh.triangles, corners) for k, a in state.curves.items()},
     )
     return found, mesh.edges[marked]
-
-
-def _squares(g: Floats) -> Floats:
-    """Return squared rest edges (f, 3), edge k opposite to corner k."""
-    return np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
 
 
 def _cut(state: State, first: Ints, middles: Ints) -> tuple[Ints, Floats, Floats, NDArray[np.bool_]]:

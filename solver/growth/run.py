@@ -43,7 +43,7 @@ def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
 def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     settings = choose(need.quality)
     begun = time.perf_counter()
-    engine = Engine(params, settings.vertices, settings.tolerance)
+    engine = Engine(params, settings.vertices, settings.tolerance, history=False)
     rows: list[dict[str, Any]] = []
     frames: list[Frame] = []
     try:

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from .. import shell
@@ -68,8 +69,8 @@ class State:
     @cached_property
     def length(self) -> float:
         """Mean rest edge."""
-        g = self.g
-        return float(np.sqrt(np.concatenate([g[:, 0], g[:, 2], g[:, 0] + g[:, 2] - 2 * g[:, 1]])).mean())
+        a, b, c = self.g.T
+        return float((np.sqrt(a).sum() + np.sqrt(c).sum() + np.sqrt(a + c - 2 * b).sum()) / (3 * len(a)))
 
 
 class Corners(NamedTuple):
@@ -82,9 +83,24 @@ class Corners(NamedTuple):
 
 def corners_of(x: Floats, triangles: Ints) -> Corners:
     """Return the triangles of a surface."""
-    at = x[triangles]
-    middles = at.mean(axis=1)
-    return Corners(at, middles, np.linalg.norm(at - middles[:, None], axis=2).max(axis=1))
+    middles, sizes = np.empty((len(triangles), 3)), np.empty(len(triangles))
+    _middles(x, triangles, middles, sizes)
+    return Corners(x[triangles], middles, sizes)
+
+
+@njit(cache=True)
+def _middles(x: Floats, triangles: Ints, middles: Floats, sizes: Floats) -> None:
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        for d in range(3):
+            middles[t, d] = (x[i, d] + x[j, d] + x[k, d]) / 3
+        largest = 0.0
+        for v in (i, j, k):
+            square = 0.0
+            for d in range(3):
+                square += (x[v, d] - middles[t, d]) ** 2
+            largest = max(largest, square)
+        sizes[t] = np.sqrt(largest)
 
 
 def place(points: Floats, x: Floats, triangles: Ints) -> Anchors:

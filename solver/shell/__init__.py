@@ -11,7 +11,7 @@ from .material import Material
 from .mean import mean_bending, mean_stiffness
 from .membrane import areas, membrane, membrane_tangent, metric, metric_of_lengths
 from .pattern import Pattern, pattern
-from .topology import Topology, topology
+from .topology import Topology, part_of, topology
 
 __all__ = [
     "Material",
@@ -33,6 +33,7 @@ __all__ = [
     "membrane_tangent",
     "metric",
     "metric_of_lengths",
+    "part_of",
     "pattern",
     "to_angles",
     "topology",

@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .membrane import areas
 from .topology import Topology
 
 __all__ = ["angles", "bending", "bending_tangent", "hinge_stiffness"]
@@ -23,15 +22,26 @@ Ints = NDArray[np.int64]
 
 def hinge_stiffness(g: Floats, mesh: Topology, flexural: float) -> Floats:
     """Return k (h,) from rest metrics g (f, 3); the rest length of an edge is the mean of its two triangles'."""
-    a, b = mesh.hinge_faces.T
-    square = 0.5 * (_squares(g)[a, mesh.hinge_corners[:, 0]] + _squares(g)[b, mesh.hinge_corners[:, 1]])
-    area = areas(g)
-    return flexural * square / (2 * (area[a] + area[b]))
+    found = np.empty(len(mesh.hinge_faces))
+    _stiffness(g, mesh.hinge_faces, mesh.hinge_corners, flexural, found)
+    return found
 
 
 def _squares(g: Floats) -> Floats:
     """Return the squared rest edges (f, 3), edge k opposite to corner k."""
     return np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
+
+
+@njit(cache=True, error_model="numpy")
+def _stiffness(g: Floats, hinge_faces: Ints, hinge_corners: Ints, flexural: float, found: Floats) -> None:
+    for h in range(len(hinge_faces)):
+        square, area = 0.0, 0.0
+        for side in range(2):
+            t, k = hinge_faces[h, side], hinge_corners[h, side]
+            a, b, c = g[t, 0], g[t, 1], g[t, 2]
+            square += 0.5 * (a + c - 2 * b if k == 0 else (c if k == 1 else a))
+            area += 0.5 * np.sqrt(a * c - b * b)
+        found[h] = flexural * square / (2 * area)
 
 
 @njit(cache=True, error_model="numpy")

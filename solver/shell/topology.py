@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..contract import InvalidGeometry
 
-__all__ = ["Topology", "distinct", "topology"]
+__all__ = ["Topology", "distinct", "part_of", "topology"]
 
 Ints = NDArray[np.int64]
 
@@ -78,6 +78,39 @@ def topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
         border=np.flatnonzero(counts == 1),
         vertices=vertices,
     )
+
+
+def part_of(mesh: Topology, faces: Ints) -> tuple[Topology, Ints, Ints]:
+    """Return the topology of some triangles (m,), rising, and which vertices and hinges of `mesh` it has, in order.
+
+    Vertices, edges and hinges keep their order, so that what belongs to them can be taken by number.
+    """
+    triangles, face_edges = mesh.triangles[faces], mesh.face_edges[faces]
+    vertices, number = _kept(triangles, mesh.vertices)
+    edges, edge_number = _kept(face_edges, len(mesh.edges))
+    face_number = np.full(len(mesh.triangles), -1)
+    face_number[faces] = np.arange(len(faces))
+    sides = face_number[mesh.hinge_faces]
+    hinges = np.flatnonzero((sides >= 0).all(axis=1))
+    found = Topology(
+        triangles=number[triangles],
+        edges=number[mesh.edges[edges]],
+        face_edges=edge_number[face_edges],
+        hinges=number[mesh.hinges[hinges]],
+        hinge_edges=edge_number[mesh.hinge_edges[hinges]],
+        hinge_faces=sides[hinges],
+        hinge_corners=mesh.hinge_corners[hinges],
+        border=np.flatnonzero(np.bincount(edge_number[face_edges].ravel(), minlength=len(edges)) == 1),
+        vertices=len(vertices),
+    )
+    return found, vertices, hinges
+
+
+def _kept(used: Ints, count: int) -> tuple[Ints, Ints]:
+    """Return the different numbers below count that are used, sorted, and for each number its place among them."""
+    there = np.zeros(count, bool)
+    there[used] = True
+    return np.flatnonzero(there), np.cumsum(there) - 1
 
 
 def distinct(keys: Ints) -> Ints:
