@@ -25,7 +25,11 @@ __all__ = ["implicit"]
 
 _HALVINGS = 12
 #: Times that breaking and solving alternate in one step.
-_PASSES = 40
+_PASSES = 60
+#: What a pass may release over what an explicit one may: it stands for the many that the load takes to find a new way.
+_AT_ONCE = 5.0
+#: The residual that a solve between two breaks may leave, over that of a step's last.
+_ROUGH = 10.0
 
 
 class _Past(NamedTuple):
@@ -70,24 +74,24 @@ def _step(
     guesses: tuple[np.ndarray, ...] = (moved, x0 + dt * v0)
     to, done = Step(xh, vh, share * dt, time + dt), 0.0
     state.scratch.lagged[:] = state.scratch.normals
+    rough = 1.0
     try:
-        for _ in range(_PASSES):
-            error, scale = solver.solve(state, to, guesses, scale)
-            now = state.wood.motion
-            done += _along(state, f0, now.x - here)
-            found = broken(state, params, time + dt, dt) if params.fracture != "none" else state
-            if found is state:
+        for count in range(_PASSES + 1):
+            error, scale = solver.solve(state, to, guesses, scale, rough if count < _PASSES else 1.0)
+            done += _along(state, f0, state.wood.motion.x - here)
+            found = state
+            if params.fracture != "none" and count < _PASSES:
+                found = broken(state, params, time + dt, dt, _AT_ONCE)
+            if found is state and (rough == 1 or count == _PASSES):
                 break
-            state = found
+            rough = 1.0 if found is state else _ROUGH
             # the force jumps where something breaks: the way is taken in pieces
+            state = found
             here, parent = state.wood.motion.x.copy(), state.wood.parent
             state.scratch.lagged[:] = state.scratch.normals
             f0 = solver.forces(state, time + dt, share * dt).copy()
             to = to._replace(xh=_grown(to.xh, parent), vh=_grown(to.vh, parent))
             guesses = (here,)
-        else:
-            error, scale = solver.solve(state, to, guesses, scale)
-            done += _along(state, f0, state.wood.motion.x - here)
     except NotConverged:
         if depth == _HALVINGS:
             raise
