@@ -30,12 +30,13 @@ _INNER = 60
 
 
 class Found(NamedTuple):
-    """Where the iteration ended: x (v, 3), the norm of the residual, and solves with the factor."""
+    """Where the iteration ended: x (v, 3), the norm of the residual, solves with the factor, whether it is solved."""
 
     x: Field
     norm: float
     solves: int
     rounds: int
+    settled: bool
 
 
 def _direction(
@@ -98,8 +99,12 @@ def descend(
     wanted: float,
     most: int,
     limit: Callable[[Field], float],
+    little: float,
 ) -> Found:
     """Iterate from x (v, 3) until the norm of the residual is at most `wanted`, or `most` solves are used up.
+
+    A step that promises less than `little` [J] is the last, too: what is stiff and light, as the end of a splinter, has
+    a large residual where next to nothing is wrong.
 
     residual: gradient (v, 3) [N], zero where held. stiffness: the product with the second derivatives where residual
     was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that
@@ -107,8 +112,8 @@ def descend(
     """
     r = residual(x)
     norm = float(np.linalg.norm(r))
-    solves, rounds, share, turned = 0, 0, _LOOSE, np.inf
-    while norm > wanted and solves < most and np.isfinite(norm):
+    solves, rounds, share, turned, settled = 0, 0, _LOOSE, np.inf, False
+    while norm > wanted and not settled and solves < most and np.isfinite(norm):
         aim = max(share, 0.5 * wanted / norm)
         positive = norm > turned
         p, spent, bent = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves))
@@ -121,7 +126,8 @@ def descend(
         slope = float(np.vdot(r, p))
         if not slope < 0:
             break
+        settled = -slope < little
         x, r = _searched(residual, x, p, slope, limit(p))
         last, norm = norm, float(np.linalg.norm(r))
         share = min(_LOOSE, max(_TIGHT, (norm / last) ** 2))
-    return Found(x, norm, solves, rounds)
+    return Found(x, norm, solves, rounds, settled or norm <= wanted)

@@ -11,7 +11,7 @@ import numpy as np
 from ..contract import NotConverged
 from .contact import RUBBING, contacts
 from .elements import apply, elements
-from .explicit import forces
+from .explicit import CONTACT, forces
 from .hessian import Stiffness
 from .moment import State, strength
 from .newton import descend
@@ -99,6 +99,8 @@ class Solver:
         x = guesses[int(np.nanargmin(norms))]
         scale = max(norms[0], _LEAST * strength(wood, p), least)
         wanted = rough * self.tolerance * scale
+        # energies go with the square of forces
+        little = rough * self.tolerance**2 * float(state.books[: CONTACT + 1].sum())
         contact = 0.2 * float(wood.bodies.half[:, 0].min()) if len(wood.bodies.kind) else np.inf
         first, second = wood.rods.a, wood.rods.b
         turned = _TURN * wood.rods.rest
@@ -138,13 +140,13 @@ class Solver:
             while (root >= old).any():
                 root = np.where(root >= old, wood.parent[root], root)
             factor = self._factor
-            found = descend(residual, stiffness, x, partial(factor.solve, root=root), wanted, most, limit)
+            found = descend(residual, stiffness, x, partial(factor.solve, root=root), wanted, most, limit, little)
             self.solves += found.solves
             x, norm = found.x, found.norm
             if not self._fresh:
                 self._fresh = found.solves + 1
             self._excess += max(found.solves - self._fresh, 0)
-            if norm <= wanted:
+            if found.settled:
                 residual(x)
                 return norm / scale, scale
         raise NotConverged(
