@@ -21,6 +21,8 @@ _LOOSE, _TIGHT = 0.1, 1e-2
 #: A step is accepted when the slope along it is below this part of the slope at its start.
 _ENOUGH = 0.5
 _TRIALS = 8
+#: What a step that is still steep at its end is lengthened by.
+_FURTHER = 3.0
 #: What the residual falls to before negative second derivatives are tried again.
 _AGAIN = 0.1
 #: Solves in one inner iteration.
@@ -28,12 +30,13 @@ _INNER = 60
 
 
 class Found(NamedTuple):
-    """Where the iteration ended: x (v, 3), the norm of the residual, and solves with the factor."""
+    """Where the iteration ended: x (v, 3), the norm of the residual, solves with the factor, whether it is solved."""
 
     x: Field
     norm: float
     solves: int
     rounds: int
+    settled: bool
 
 
 def _direction(
@@ -62,19 +65,27 @@ def _direction(
     return p, most, False
 
 
-def _searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, a: float) -> tuple[Field, Field]:
-    """Return x + a p and the residual there, a shortened until the slope has not turned uphill by much."""
-    low, at, high, beyond = 0.0, slope, np.inf, 0.0
+def _searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, most: float) -> tuple[Field, Field]:
+    """Return x + a p and the residual there, with a from 0 to `most` where the slope is less than half of what it was.
+
+    The first trial is 1, or `most` if that is less. A direction of which what is negative was left out is too short:
+    where the slope is still steep, a grows.
+    """
+    low, at, high, beyond, a = 0.0, slope, np.inf, 0.0, min(1.0, most)
     for _ in range(_TRIALS):
         r = residual(x + a * p)
         along = float(np.vdot(r, p))
-        if np.isfinite(along) and along <= _ENOUGH * abs(slope) and (high == np.inf or along >= _ENOUGH * slope):
+        steep = along < _ENOUGH * slope
+        if np.isfinite(along) and along <= _ENOUGH * abs(slope) and (not steep or a >= most):
             break
         if np.isfinite(along) and along < 0:
             # Illinois: the end that stays counts half
             low, at, beyond = a, along, beyond / 2
         else:
             high, beyond, at = a, along if np.isfinite(along) else -9 * at, at if high == np.inf else at / 2
+        if high == np.inf:
+            a = min(_FURTHER * a, most)
+            continue
         share = at / (at - beyond)
         a = low + (high - low) * min(max(share, 0.1), 0.9)
     return x + a * p, r
@@ -88,8 +99,12 @@ def descend(
     wanted: float,
     most: int,
     limit: Callable[[Field], float],
+    little: float,
 ) -> Found:
     """Iterate from x (v, 3) until the norm of the residual is at most `wanted`, or `most` solves are used up.
+
+    A step that promises less than `little` [J] is the last, too: what is stiff and light, as the end of a splinter, has
+    a large residual where next to nothing is wrong.
 
     residual: gradient (v, 3) [N], zero where held. stiffness: the product with the second derivatives where residual
     was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that
@@ -97,8 +112,8 @@ def descend(
     """
     r = residual(x)
     norm = float(np.linalg.norm(r))
-    solves, rounds, share, turned = 0, 0, _LOOSE, np.inf
-    while norm > wanted and solves < most and np.isfinite(norm):
+    solves, rounds, share, turned, settled = 0, 0, _LOOSE, np.inf, False
+    while norm > wanted and not settled and solves < most and np.isfinite(norm):
         aim = max(share, 0.5 * wanted / norm)
         positive = norm > turned
         p, spent, bent = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves))
@@ -111,7 +126,8 @@ def descend(
         slope = float(np.vdot(r, p))
         if not slope < 0:
             break
-        x, r = _searched(residual, x, p, slope, min(1.0, limit(p)))
+        settled = -slope < little
+        x, r = _searched(residual, x, p, slope, limit(p))
         last, norm = norm, float(np.linalg.norm(r))
         share = min(_LOOSE, max(_TIGHT, (norm / last) ** 2))
-    return Found(x, norm, solves, rounds)
+    return Found(x, norm, solves, rounds, settled or norm <= wanted)

@@ -11,7 +11,7 @@ import numpy as np
 from ..contract import NotConverged
 from .contact import RUBBING, contacts
 from .elements import apply, elements
-from .explicit import forces
+from .explicit import CONTACT, forces
 from .hessian import Stiffness
 from .moment import State, strength
 from .newton import descend
@@ -22,6 +22,8 @@ __all__ = ["Solver", "Step"]
 
 #: Solves before a stale factor is given up, and factors before a step is.
 _SOLVES, _FACTORS = 60, 5
+#: Solves with a fresh factor over those with a stale one: a piece that swings on one bond takes many short steps.
+_PATIENCE = 4
 #: A factor is renewed when it has cost this many solves more than a fresh one would have: about what a new one costs.
 _EXCESS = 40
 #: The least residual that is asked for: this share of the tolerance, of the load that the bundle bears.
@@ -69,8 +71,12 @@ class Solver:
         forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, state.scratch, False, time, dt, RUBBING, state.books)
         return state.scratch.f
 
-    def solve(self, state: State, step: Step, guesses: tuple[np.ndarray, ...], least: float) -> tuple[float, float]:
-        """Find x and v of the step in place, from the better of the guesses (v, 3); return the relative residual.
+    def solve(
+        self, state: State, step: Step, guesses: tuple[np.ndarray, ...], least: float, rough: float = 1.0
+    ) -> tuple[float, float]:
+        """Find x and v of the step in place, from the better of the guesses (v, 3), `rough` times the tolerance off.
+
+        Returns the relative residual and what it is relative to, at least `least` [N].
 
         Raises:
             NotConverged: it is not found.
@@ -92,7 +98,9 @@ class Solver:
         norms = [float(np.linalg.norm(residual(x))) for x in guesses]
         x = guesses[int(np.nanargmin(norms))]
         scale = max(norms[0], _LEAST * strength(wood, p), least)
-        wanted = self.tolerance * scale
+        wanted = rough * self.tolerance * scale
+        # energies go with the square of forces
+        little = rough * self.tolerance**2 * float(state.books[: CONTACT + 1].sum())
         contact = 0.2 * float(wood.bodies.half[:, 0].min()) if len(wood.bodies.kind) else np.inf
         first, second = wood.rods.a, wood.rods.b
         turned = _TURN * wood.rods.rest
@@ -127,17 +135,18 @@ class Solver:
                 residual(x)
                 self._renew(state, step.bdt)
             assert self._factor is not None
+            most = _SOLVES * (_PATIENCE if attempt else 1)
             old = len(self._factor.free)
             while (root >= old).any():
                 root = np.where(root >= old, wood.parent[root], root)
             factor = self._factor
-            found = descend(residual, stiffness, x, partial(factor.solve, root=root), wanted, _SOLVES, limit)
+            found = descend(residual, stiffness, x, partial(factor.solve, root=root), wanted, most, limit, little)
             self.solves += found.solves
             x, norm = found.x, found.norm
             if not self._fresh:
                 self._fresh = found.solves + 1
             self._excess += max(found.solves - self._fresh, 0)
-            if norm <= wanted:
+            if found.settled:
                 residual(x)
                 return norm / scale, scale
         raise NotConverged(

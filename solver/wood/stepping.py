@@ -22,8 +22,11 @@ _LOOK, _FEWEST, _MOST = 6000, 4, 32
 _BATCH = 500_000
 
 
-def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
-    """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost."""
+def broken(state: State, params: WoodParams, time: float, dt: float, share: float = 1.0) -> State:
+    """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost.
+
+    share: of the elastic energy that a pass may release, over `cascade`.
+    """
     wood, scratch = state.wood, state.scratch
     ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
     m = wood.motion
@@ -43,7 +46,7 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     if top <= 1 and not (scratch.each > wood.bonds.limit).any():
         return state
     before = state.books[: CONTACT + 1].sum()
-    allowed = params.cascade * float(state.books[[STRETCH, BENDING, BONDS]].sum())
+    allowed = min(share * params.cascade, 1.0) * float(state.books[[STRETCH, BENDING, BONDS]].sum())
     wood, rods, bonds = break_worst(wood, ratio, place, scratch.each, allowed)
     scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books

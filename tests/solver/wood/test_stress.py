@@ -2,9 +2,22 @@
 
 import pytest
 
+from benchmarks.wood_rest import fragments
 from benchmarks.wood_stress import CASES, tried
+from solver.wood import SOLVER
+from solver.wood.bundle import lay
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_try_at_breaking_it_ends_well(name):
     assert tried(name)
+
+
+def test_fragments_are_what_edges_and_bonds_join():
+    wood = lay(SOLVER.parse({"rods": 9, "vertices": 8}), 8)
+    assert fragments(wood).max() == 0
+    wood.bonds.on[:] = 0
+    assert fragments(wood).max() + 1 == len(wood.grid)
+    # an edge cut inside, its rod's sixth
+    wood.rods.alive[5] = 0
+    assert fragments(wood).max() == len(wood.grid)
