@@ -145,7 +145,7 @@ class DecayParams(Fruit):
     neighbours: tuple[Neighbour, ...] = Field(
         (),
         max_length=64,
-        description="Round fruits beside this one, which a body that moves leans on as on rigid balls",
+        description="Round fruits beside this one, which a body that moves leans on",
         json_schema_extra={"units": "1"},
     )
     mesh: Mesh | None = Field(

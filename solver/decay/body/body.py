@@ -38,6 +38,8 @@ _FLOOR = 30.0
 _TETHER, _CORE = 0.1, 0.5
 #: Neighbours farther from the fresh skin than this are never met; one may stand so deep in it [r1].
 _REACH, _DEEP = 1.0, 0.3
+#: Radius of a ball that stands for a plane [r1].
+_PLANE = 1e4
 
 
 class Body:
@@ -139,7 +141,7 @@ class Body:
 
 
 def _balls(params: DecayParams) -> Array:
-    """Return centres and radii (b, 4) of the neighbours that the fruit can meet."""
+    """Return centres and radii (b, 4) of the balls that the fruit can meet in place of its neighbours."""
     found = []
     for number, other in enumerate(params.neighbours):
         away = gap(params, other)
@@ -148,7 +150,12 @@ def _balls(params: DecayParams) -> Array:
                 f"neighbour {number} stands {-away:.2f} r1 deep in the fruit.",
                 advice=f"Move it away until no more than {_DEEP:g} r1 overlap, or take body=none.",
             )
-        if away < _REACH:
+        if other.gives:
+            # a plane is a ball so large that it does not bend
+            towards = np.array(other.position) / np.linalg.norm(other.position)
+            midway = float(np.linalg.norm(other.position)) - other.radius - away / 2
+            found.append((*((midway + _PLANE) * towards), _PLANE))
+        elif away < _REACH:
             found.append((*other.position, other.radius))
     return np.array(found).reshape(-1, 4)
 

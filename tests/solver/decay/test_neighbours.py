@@ -87,10 +87,26 @@ def test_neighbours_on_both_sides_push_alike_and_flatten():
     assert 0 < below(balance.points, loads).max() < 0.02
 
 
+def test_fruits_in_a_row_that_all_give_way_meet_in_planes():
+    """One of a row pressed by 0.14 a gap: it is flat where its neighbours' mirror images are, and stays on its side."""
+    row = [{"position": (x, 0.0, 0.0), "radius": OUTER, "gives": True} for x in (1.94, -1.94)]
+    body, balance, _ = settled(orange(neighbours=row, firmness=5.0, wounds=()), water=0.0)
+    along = balance.points[body.solid.skin, 0]
+    for side in (1.0, -1.0):
+        face = np.sort(side * along)[-5:]
+        assert np.ptp(face) < 5e-3
+        assert face == pytest.approx(0.97, abs=5e-3)
+    assert balance.pushes[:, 0] == pytest.approx([-balance.pushes[1, 0], -balance.pushes[0, 0]], rel=0.02)
+    rigid = [{**n, "gives": False} for n in row]
+    _, stiff, _ = settled(orange(neighbours=rigid, firmness=5.0, wounds=()), water=0.0)
+    # a rigid ball takes the whole depth for itself
+    assert np.ptp(stiff.points[:, 0]) < np.ptp(along) - 0.02
+
+
 def test_what_touches_nothing_changes_no_byte():
     need = Need(fields=("displacement", "rot"), stages=(3.0,), quality="preview", resolution=16)
     alone = SOLVER.solve(orange(growth_rate=60.0), need)
-    far = [{"position": (0.0, 2.3, 0.0)}, {"position": (2.2, 0.3, 0.0)}, {"position": (0.0, 0.0, -30.0)}]
+    far = [{"position": (0.0, 2.3, 0.0)}, {"position": (2.2, 0.3, 0.0)}, {"position": (0.0, 0.0, -30.0), "gives": True}]
     beside = SOLVER.solve(orange(growth_rate=60.0, neighbours=far), need)
     assert np.array_equal(alone.displacement, beside.displacement)
     assert np.array_equal(alone.body_steps, beside.body_steps)
