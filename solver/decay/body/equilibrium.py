@@ -22,6 +22,8 @@ Index = NDArray[np.int64]
 _STEPS, _HALVINGS, _ITERATIONS = 200, 40, 400
 #: Changes of which points touch, in one direction.
 _CONTACTS = 20
+#: Least part of a direction that is tried for the model.
+_LEAST = 1e-3
 #: Points this near a neighbour may come to touch it in one step [r1].
 _NEAR = 0.3
 #: Strains below this count as none: a body at rest has no forces to measure its residual by.
@@ -151,7 +153,7 @@ def _carried(
 
     own: the diagonal blocks of `a`, which are written to it with the contacts' stiffness.
     """
-    d = np.zeros_like(x)
+    d, bent = np.zeros_like(x), np.zeros_like(x)
     touching, leaning = below(x, loads) > 0, near.depth > 0
     first = 0.0
     for _ in range(_CONTACTS):
@@ -172,9 +174,18 @@ def _carried(
         more, _, upwards = solve(
             pattern.start, pattern.near, pattern.own, a, right, min(asked * first / size, 0.3), _ITERATIONS
         )
-        d += more
         if not upwards:
-            return d, False
+            return d + more, False
+        # contacts that change to and fro would go on for ever: the model itself must fall
+        straight = times(pattern.start, pattern.near, a, more)
+        straight[:, 1] -= stiff * more[:, 1]
+        np.subtract.at(straight, point, np.einsum("ki,ki->k", out, more[point])[:, None] * hard)
+        gain, bend = float(np.sum((g + bent) * more)), float(np.sum(more * straight)) / 2
+        part, held = 1.0, _pressed(x, d, loads, near)
+        while part > _LEAST and _pressed(x, d + part * more, loads, near) + part * (gain + part * bend) > held:
+            part /= 2
+        d += part * more
+        bent += part * straight
         before = np.concatenate([touching, leaning])
         touching = below(x + d, loads) > 0
         leaning = near.depth > np.einsum("ki,ki->k", near.out, d[near.point])
@@ -182,6 +193,13 @@ def _carried(
         if not now.any() or bool((now == before).all()):
             break
     return d, True
+
+
+def _pressed(x: Array, d: Array, loads: Loads, near: Touch) -> float:
+    """Return the model's potential of floor and neighbours after a move d (p, 3)."""
+    deep = np.maximum(near.depth - np.einsum("ki,ki->k", near.out, d[near.point]), 0.0)
+    floor = np.sum(loads.contact * below(x + d, loads) ** 2)
+    return float(floor + np.sum(loads.contact[near.point] * deep**2)) / 2
 
 
 def _potential(x: Array, rest: Rest, loads: Loads) -> float:

@@ -103,6 +103,16 @@ def test_fruits_in_a_row_that_all_give_way_meet_in_planes():
     assert np.ptp(stiff.points[:, 0]) < np.ptp(along) - 0.02
 
 
+def test_contacts_that_change_to_and_fro_do_not_hold_a_soft_fruit_up():
+    """Without a fall of the model in each direction these take 9 and 22 steps, and rotten ones never end."""
+    beside = [{"position": (1.9, 0.0, 0.0)}, {"position": (-0.95, 0.0, 1.6454)}]
+    for neighbours, most in (((), 6), (beside, 14)):
+        _, balance, weight = settled(orange(neighbours=neighbours, firmness=3.0, stone=(0, 0)), water=0.02)
+        assert balance.residual <= 1e-3
+        assert balance.reaction == pytest.approx(weight, rel=1e-6)
+        assert balance.steps <= most
+
+
 def test_what_touches_nothing_changes_no_byte():
     need = Need(fields=("displacement", "rot"), stages=(3.0,), quality="preview", resolution=16)
     alone = SOLVER.solve(orange(growth_rate=60.0), need)
