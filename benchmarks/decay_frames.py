@@ -41,7 +41,7 @@ def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: in
         balance = body.settled(body.state(water_lost(params, extent(params), reached.day), rot), balance)
         moved = time.process_time() - begun
         begun = time.process_time()
-        folds, _, _ = skin.at(balance, folds)
+        folds = skin.at(balance, folds)
         wrinkled = time.process_time() - begun
         if k >= 2:
             for name, seconds in zip(spent, (fields, moved, wrinkled), strict=True):

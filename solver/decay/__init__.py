@@ -32,7 +32,7 @@ _SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutri
 
 SOLVER = Solver(
     name="decay",
-    version="2",
+    version="3",
     title="Decay of fruits: rot and mould",
     params=DecayParams,
     fields=(

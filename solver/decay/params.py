@@ -143,7 +143,10 @@ class DecayParams(Fruit):
         json_schema_extra={"units": "1"},
     )
     neighbours: tuple[Neighbour, ...] = Field(
-        (), max_length=64, description="Round fruits beside this one", json_schema_extra={"units": "1"}
+        (),
+        max_length=64,
+        description="Round fruits beside this one, which a body that moves leans on",
+        json_schema_extra={"units": "1"},
     )
     mesh: Mesh | None = Field(
         None,

@@ -92,6 +92,11 @@ class Neighbour(BaseModel):
 
     position: tuple[float, float, float] = Field(description="Its centre, from this fruit's [r1]")
     radius: float = Field(1.0, gt=0, le=100, description="Its radius [r1]")
+    gives: bool = Field(
+        False,
+        description="Whether it gives way as this fruit does: bodies then meet in the plane midway between "
+        "their skins, as two alike do; else it is a rigid ball",
+    )
 
 
 def painted(rows: tuple[tuple[float, ...], ...], rays: Array) -> Array:

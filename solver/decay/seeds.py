@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .params import DecayParams, Wound
+from .places import Neighbour
 
-__all__ = ["seeds"]
+__all__ = ["carried", "gap", "seeds"]
 
 #: Gap at which two fruits touch [r1]: their skins give way by about as much.
 _GAP = 0.05
@@ -20,10 +21,23 @@ def seeds(params: DecayParams) -> tuple[Wound, ...]:
     """Return the wounds of a run: the given ones, or stem, floor and touching neighbours in their place."""
     if params.seeds == "wounds":
         return params.wounds
-    touching = _touching(params)
     # a fruit that lies on another one does not reach the floor
-    carried = any(wound.colatitude > _ABOVE for wound in touching)
-    return (Wound(colatitude=0), *([] if carried else _resting(params)), *touching)
+    return (Wound(colatitude=0), *([] if carried(params) else _resting(params)), *_touching(params))
+
+
+def carried(params: DecayParams) -> bool:
+    """Return whether the fruit lies on a neighbour that it touches, and not on the floor."""
+    return any(wound.colatitude > _ABOVE for wound in _touching(params))
+
+
+def gap(params: DecayParams, other: Neighbour) -> float:
+    """Return how far the fresh skin is from a neighbour [r1], on the line between the centres."""
+    far = float(np.linalg.norm(other.position))
+    if far == 0:
+        return -other.radius - 1
+    towards = _towards(other)
+    theta, phi = np.radians([towards.colatitude, towards.azimuth])
+    return far - float(np.linalg.norm(params.surface(theta, phi))) - other.radius
 
 
 def _resting(params: DecayParams) -> list[Wound]:
@@ -37,13 +51,8 @@ def _resting(params: DecayParams) -> list[Wound]:
 
 
 def _touching(params: DecayParams) -> list[Wound]:
-    found = []
-    for other in params.neighbours:
-        far = float(np.linalg.norm(other.position))
-        if far == 0:
-            continue
-        wound = Wound.model_validate({"position": other.position})
-        theta, phi = np.radians([wound.colatitude, wound.azimuth])
-        if far - float(np.linalg.norm(params.surface(theta, phi))) - other.radius <= _GAP:
-            found.append(wound)
-    return found
+    return [_towards(other) for other in params.neighbours if any(other.position) and gap(params, other) <= _GAP]
+
+
+def _towards(other: Neighbour) -> Wound:
+    return Wound.model_validate({"position": other.position})

@@ -19,6 +19,7 @@ from .system import laid
 
 if TYPE_CHECKING:
     from .body.equilibrium import Balance
+    from .body.skin import Settled
 
 __all__ = ["Shape"]
 
@@ -26,10 +27,10 @@ Array = NDArray[np.float64]
 
 
 class _Settled(NamedTuple):
-    """A body and how far its skin stands off (v, 3)."""
+    """A body and how far its skin stands off from it."""
 
     balance: Balance | None
-    folds: Array | None
+    folds: Settled | None
 
 
 class Shape:
@@ -111,7 +112,7 @@ class Shape:
             if self._dries:
                 gone = self._dried(day, need.resolution, context)
             if self._wrinkles and folds is not None:
-                gone = gone + self._wrinkles.on_lattice(folds, need.resolution)
+                gone = gone + self._wrinkles.on_lattice(folds.points, need.resolution)
             for name, values in (("position", fresh + gone), ("displacement", gone)):
                 if name in wanted:
                     row[name] = values[inside].astype(need.dtype)
@@ -121,7 +122,7 @@ class Shape:
             if self._body and balance:
                 points = points + self._body.on_surface(balance)
             if self._wrinkles and folds is not None:
-                points = points + self._wrinkles.on_surface(folds)
+                points = points + self._wrinkles.on_surface(folds.points)
             if self._rays is not None:
                 points = points + dried.at_rays(self._dried(day, dried.ROWS, context), self._rays)
             if "mesh_position" in wanted:
@@ -150,7 +151,8 @@ class Shape:
         row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
         folds = None
         if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:
-            folds, row["skin_residual"], row["skin_steps"] = self._wrinkles.at(balance, before.folds, watch)
+            folds = self._wrinkles.at(balance, before.folds, watch)
+            row["skin_residual"], row["skin_steps"] = folds.residual, folds.steps
         return _Settled(balance, folds), row
 
     def _dried(self, day: float, resolution: int, context: Context) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -23,6 +24,7 @@ from openapi_spec_validator import validate
 from service.app import create_app
 from service.settings import Settings
 from solver import registry
+from solver.contract import Need
 from solver.meshes import frame
 from store.queue import Queue
 from store.store import Store
@@ -254,6 +256,43 @@ def test_every_solver_s_job_comes_back_as_glb_and_as_fields(
     assert np.array_equal(values.reshape(own.shape), own)
     checked(queue_only.get(result, params={"format": "json", "fields": "beauty"}), 422, "invalid-query")
     checked(queue_only.get(result, params={"format": "json", "fields": "stage", "stage": 77}), 422, "invalid-query")
+
+
+def test_a_peach_that_dries_by_the_table_comes_back_as_glb(store: Store, queue_only: httpx.Client) -> None:
+    params = {"body": "table", "growth_rate": 60.0}
+    need = {"stages": [0.0, 2.0], "quality": "preview", "resolution": 32, "fields": ["position", "rot", "mould"]}
+    order = {"solver": "decay", "preset": "peach", "params": params, "need": need}
+    asked = queue_only.post("/v1/jobs", json=order)
+    assert asked.status_code == 202, asked.text
+    assert drain(store) == 1
+    result = f"{asked.json()['links']['self']}/result"
+    solids, colours = [], []
+    for day in need["stages"]:
+        answer = queue_only.get(result, params={"format": "glb", "stage": day})
+        assert answer.headers["content-type"] == "model/gltf-binary"
+        mesh: Any = trimesh.load(io.BytesIO(answer.content), file_type="glb", force="mesh")
+        assert np.isfinite(mesh.vertices).all()
+        # poles and seam have a vertex per colour and normal; in space they are one
+        solids.append(trimesh.Trimesh(mesh.vertices, mesh.faces))
+        document, binary = parsed(answer.content)
+        colours.append(accessor(document, binary, document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]))
+    assert all(solid.is_watertight for solid in solids)
+    # the shape is the table's, at the shrinkage that the water lost by Eq. 10 leaves
+    peach = registry.get("decay").parse(params, "peach")
+    lost = registry.get("decay").solve(peach, Need(fields=("water_lost",), stages=(2.0,))).water_lost.values[0]
+    assert solids[0].volume == pytest.approx(4 / 3 * np.pi * 1.04**3, rel=5e-3)
+    fresh_less_water = solids[0].volume * (1 - lost)
+    assert solids[1].volume == pytest.approx(fresh_less_water, rel=0.1)
+    # mould spreads over what was fresh skin
+    assert np.mean(np.abs(colours[1] - colours[0]).max(axis=1) > 0.1) > 0.05
+    # what the table does not hold is a typed error, with what to change
+    wrong = {**order, "preset": "orange"}
+    missing = queue_only.post("/v1/jobs", json=wrong)
+    assert missing.status_code == 202
+    drain(store)
+    end = queue_only.get(missing.headers["location"]).json()
+    assert end["state"] == "failed"
+    assert "table" in json.dumps(end)
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...contract import InvalidInput
 from ...fruit import directions, lattice
 from ..environment import reference_radius
 from ..params import DecayParams
+from ..seeds import carried, gap
 from ..surface import Surface, extent, geodesic, shares_at
-from .equilibrium import Balance, Loads, rested, settle
+from .equilibrium import Balance, rested, settle
 from .flesh import Softened, softened
+from .loads import Loads
 from .material import blocks
 from .pressure import pressed
 from .solid import ball, fill
@@ -33,10 +36,19 @@ _DENSITY = 1000.0
 _FLOOR = 30.0
 #: Stiffness per volume of the springs that keep the core from sliding, over the fresh modulus; how far the core goes.
 _TETHER, _CORE = 0.1, 0.5
+#: Neighbours farther from the fresh skin than this are never met; one may stand so deep in it [r1].
+_REACH, _DEEP = 1.0, 0.3
+#: Radius of a ball that stands for a plane [r1].
+_PLANE = 1e4
 
 
 class Body:
-    """Tetrahedra of one fruit under a surface of so many `cells`; tolerance: of the out-of-balance force."""
+    """Tetrahedra of one fruit under a surface of so many `cells`; tolerance: of the out-of-balance force.
+
+    Raises:
+        InvalidInput: a neighbour stands in the fruit.
+
+    """
 
     def __init__(self, params: DecayParams, surface: Surface, cells: int, layers: int, tolerance: float) -> None:
         self._params = params
@@ -46,6 +58,7 @@ class Body:
         self._tolerance = tolerance
         self._pattern = blocks(self.solid.tets, len(self.solid.points))
         r1 = reference_radius(params, extent(params))
+        self._balls, self._carried = _balls(params), carried(params)
         self._pressure, self._inertia = _DENSITY * params.flesh.gravity * r1, _DENSITY * r1**2
 
     def state(self, water: float, rot: Array | None) -> Softened:
@@ -96,7 +109,9 @@ class Body:
         core = np.linalg.norm(solid.points, axis=1) < _CORE
         volume = np.bincount(solid.tets.ravel(), shared, count)
         tether = np.where(core, _TETHER * fresh * volume, 0.0)
-        return Loads(self._pressure * mass, float(solid.points[:, 1].min()), contact, tether, start)
+        # a fruit that lies on another one does not reach the floor
+        floor = None if self._carried else float(solid.points[:, 1].min())
+        return Loads(self._pressure * mass, floor, contact, tether, start, self._balls)
 
     def on_lattice(self, balance: Balance, resolution: int) -> Array:
         """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""
@@ -123,6 +138,26 @@ class Body:
         about = fresh - fresh.mean(axis=0)
         even = float(np.sum(about * moved) / np.sum(about * about))
         return even, moved - even * fresh
+
+
+def _balls(params: DecayParams) -> Array:
+    """Return centres and radii (b, 4) of the balls that the fruit can meet in place of its neighbours."""
+    found = []
+    for number, other in enumerate(params.neighbours):
+        away = gap(params, other)
+        if away < -_DEEP:
+            raise InvalidInput(
+                f"neighbour {number} stands {-away:.2f} r1 deep in the fruit.",
+                advice=f"Move it away until no more than {_DEEP:g} r1 overlap, or take body=none.",
+            )
+        if other.gives:
+            # a plane is a ball so large that it does not bend
+            towards = np.array(other.position) / np.linalg.norm(other.position)
+            midway = float(np.linalg.norm(other.position)) - other.radius - away / 2
+            found.append((*((midway + _PLANE) * towards), _PLANE))
+        elif away < _REACH:
+            found.append((*other.position, other.radius))
+    return np.array(found).reshape(-1, 4)
 
 
 def _skin(layers: int) -> tuple[Array, NDArray[np.int64]]:

@@ -1,8 +1,4 @@
-"""The shape a body settles to under its weight on a floor: Newton's method with conjugate gradients.
-
-The floor is the plane y = `floor`, without friction: a one-sided quadratic penalty. A fruit alone on such a plane would
-slide and roll away at a touch, so its core is held by weak springs, sideways only: the floor carries all the weight.
-"""
+"""The shape a body settles to under its loads: Newton's method with conjugate gradients."""
 
 from __future__ import annotations
 
@@ -13,18 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...contract import NotConverged
+from .loads import Loads, Touch, below, drop, pushes, touches
 from .material import Blocks, energy, forces, hessian, inverse_edges
 from .sparse import solve, times
 
-__all__ = ["Balance", "Loads", "Rest", "rested", "settle"]
+__all__ = ["Balance", "Rest", "rested", "settle"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 #: Newton steps and halvings of a step before giving up; iterations of the linear solver in one step.
 _STEPS, _HALVINGS, _ITERATIONS = 200, 40, 400
-#: Changes of which points touch the floor, in one direction.
+#: Changes of which points touch, in one direction.
 _CONTACTS = 20
+#: Least part of a direction that is tried for the model.
+_LEAST = 1e-3
+#: Points this near a neighbour may come to touch it in one step [r1].
+_NEAR = 0.3
 #: Strains below this count as none: a body at rest has no forces to measure its residual by.
 _NOTHING = 1e-6
 #: Round-off of the energy, over the energy of a strain of 1.
@@ -41,22 +42,10 @@ class Rest(NamedTuple):
     lam: Array
 
 
-class Loads(NamedTuple):
-    """What acts on the points: weight (p) [Pa r1^2]; a floor at a height with the contact's stiffness (p) [Pa r1].
-
-    tether (p) [Pa r1]: springs that hold points sideways to the places `held` (p, 3). Without a floor: None.
-    """
-
-    weight: Array
-    floor: float | None
-    contact: Array
-    tether: Array
-    held: Array
-
-
 class Balance(NamedTuple):
-    """A settled shape: points, out-of-balance force over the forces in it, Newton steps, least J, floor's force.
+    """A settled shape: points, out-of-balance force over the forces in it, Newton steps, least J, what carries it.
 
+    reaction: upward force of floor and neighbours [Pa r1^2]; pushes (b, 3): force of each neighbour.
     even: length of a cube as large as the rest shape, over the fresh one.
     """
 
@@ -66,6 +55,7 @@ class Balance(NamedTuple):
     least_jacobian: float
     reaction: float
     even: float = 1.0
+    pushes: Array = np.empty((0, 3))
 
 
 def rested(points: Array, tets: Index, shrinkage: Array, young: Array, poisson: float) -> Rest:
@@ -94,7 +84,7 @@ def settle(
 
     """
     x = start.copy()
-    x[:, 1] += _drop(x, loads)
+    x[:, 1] += drop(x, loads)
     nothing = _NOTHING * float(np.mean(rest.mu)) * float(np.mean(rest.volume)) ** (2 / 3) * len(x) ** 0.5
     slack = _ROUND_OFF * float(np.sum(rest.mu * rest.volume))
     now = _potential(x, rest, loads)
@@ -105,12 +95,12 @@ def settle(
         watch()
         g, scale, least, reaction = _slope(x, rest, loads)
         before, residual = residual, float(np.linalg.norm(g) / (np.linalg.norm(scale) + nothing))
-        if loads.floor is not None:
+        if loads.carries:
             # stresses within a body can dwarf its weight, which must be carried all the same
             weight = float(np.sum(loads.weight))
             residual = max(residual, abs(weight - reaction) / weight)
         if residual <= tolerance:
-            return Balance(x, residual, step, least, reaction)
+            return Balance(x, residual, step, least, reaction, pushes=pushes(x, loads))
         # a rough direction is enough far from the end (Eisenstat and Walker)
         asked = min(0.1, max(0.5 * residual / max(before, residual), 0.3 * tolerance / residual, 1e-6))
         d = _direction(x, rest, loads, pattern, asked)
@@ -125,8 +115,8 @@ def settle(
         else:
             break
         x += share * d
-        # the best height is known, and a body that has left the floor knows no other way back
-        x[:, 1] += _drop(x, loads)
+        # the best height is known, and a body that has left what carries it knows no other way back
+        x[:, 1] += drop(x, loads)
         now = _potential(x, rest, loads)
     raise NotConverged(
         f"the body stopped at a residual of {residual:.1e}.",
@@ -138,9 +128,11 @@ def settle(
 def _direction(x: Array, rest: Rest, loads: Loads, pattern: Blocks, asked: float) -> Array:
     """Return Newton's direction (p, 3); that of the cut Hessian where the exact one does not curve upwards.
 
-    The floor is no part of the quadratic model but kept as it is: which points it carries is found in each direction
-    by solves that start from the last one. A model of today's contacts alone would take a new one in each step.
+    The floor is no part of the quadratic model but kept as it is, and neighbours as the planes that they are near a
+    point: which points they carry is found in each direction by solves that start from the last one. A model of today's
+    contacts alone would take a new one in each step.
     """
+    near = touches(x, loads, _NEAR)
     g, *_ = _slope(x, rest, loads._replace(contact=np.zeros_like(loads.contact)))
     for cut in (False, True):
         a = np.zeros((len(pattern.near), 3, 3))
@@ -148,21 +140,21 @@ def _direction(x: Array, rest: Rest, loads: Loads, pattern: Blocks, asked: float
         own = a[pattern.own]
         own[:, 0, 0] += loads.tether
         own[:, 2, 2] += loads.tether
-        d, upwards = _carried(x, g, a, own, loads, pattern, asked)
+        d, upwards = _carried(x, g, a, own, loads, near, pattern, asked)
         if upwards:
             break
     return d
 
 
 def _carried(
-    x: Array, g: Array, a: Array, own: Array, loads: Loads, pattern: Blocks, asked: float
+    x: Array, g: Array, a: Array, own: Array, loads: Loads, near: Touch, pattern: Blocks, asked: float
 ) -> tuple[Array, bool]:
-    """Return the least of the model g.d + d.a d / 2 and the floor's potential, and whether `a` curved upwards.
+    """Return the least of the model g.d + d.a d / 2 and the contacts' potential, and whether `a` curved upwards.
 
     own: the diagonal blocks of `a`, which are written to it with the contacts' stiffness.
     """
-    d = np.zeros_like(x)
-    touching = _below(x, loads) > 0
+    d, bent = np.zeros_like(x), np.zeros_like(x)
+    touching, leaning = below(x, loads) > 0, near.depth > 0
     first = 0.0
     for _ in range(_CONTACTS):
         stiff = np.where(touching, loads.contact, 0.0)
@@ -170,6 +162,10 @@ def _carried(
         a[pattern.own, 1, 1] += stiff
         right = -g
         right[:, 1] += stiff * ((0.0 if loads.floor is None else loads.floor) - x[:, 1])
+        point, out = near.point[leaning], near.out[leaning]
+        hard = loads.contact[point][:, None] * out
+        np.add.at(a, pattern.own[point], hard[:, :, None] * out[:, None, :])
+        np.add.at(right, point, near.depth[leaning][:, None] * hard)
         right -= times(pattern.start, pattern.near, a, d)
         size = float(np.linalg.norm(right))
         first = first or size
@@ -178,48 +174,55 @@ def _carried(
         more, _, upwards = solve(
             pattern.start, pattern.near, pattern.own, a, right, min(asked * first / size, 0.3), _ITERATIONS
         )
-        d += more
         if not upwards:
-            return d, False
-        before, touching = touching, _below(x + d, loads) > 0
-        if loads.floor is None or not touching.any() or bool((touching == before).all()):
+            return d + more, False
+        # contacts that change to and fro would go on for ever: the model itself must fall
+        straight = times(pattern.start, pattern.near, a, more)
+        straight[:, 1] -= stiff * more[:, 1]
+        np.subtract.at(straight, point, np.einsum("ki,ki->k", out, more[point])[:, None] * hard)
+        gain, bend = float(np.sum((g + bent) * more)), float(np.sum(more * straight)) / 2
+        part, held = 1.0, _pressed(x, d, loads, near)
+        while part > _LEAST and _pressed(x, d + part * more, loads, near) + part * (gain + part * bend) > held:
+            part /= 2
+        d += part * more
+        bent += part * straight
+        before = np.concatenate([touching, leaning])
+        touching = below(x + d, loads) > 0
+        leaning = near.depth > np.einsum("ki,ki->k", near.out, d[near.point])
+        now = np.concatenate([touching, leaning])
+        if not now.any() or bool((now == before).all()):
             break
     return d, True
 
 
-def _drop(x: Array, loads: Loads) -> float:
-    """Return how far to lift points so that the floor carries a rigid body of their shape: then some always touch."""
-    if loads.floor is None:
-        return 0.0
-    weight = float(loads.weight.sum())
-    high = loads.floor - float(x[loads.contact > 0, 1].min())
-    low = high - weight / float(loads.contact[loads.contact > 0].min())
-    for _ in range(60):
-        middle = (low + high) / 2
-        depth = np.maximum(loads.floor - x[:, 1] - middle, 0.0)
-        low, high = (middle, high) if float(np.sum(loads.contact * depth)) > weight else (low, middle)
-    return (low + high) / 2
-
-
-def _below(x: Array, loads: Loads) -> Array:
-    return np.zeros(len(x)) if loads.floor is None else np.maximum(loads.floor - x[:, 1], 0.0)
+def _pressed(x: Array, d: Array, loads: Loads, near: Touch) -> float:
+    """Return the model's potential of floor and neighbours after a move d (p, 3)."""
+    deep = np.maximum(near.depth - np.einsum("ki,ki->k", near.out, d[near.point]), 0.0)
+    floor = np.sum(loads.contact * below(x + d, loads) ** 2)
+    return float(floor + np.sum(loads.contact[near.point] * deep**2)) / 2
 
 
 def _potential(x: Array, rest: Rest, loads: Loads) -> float:
-    aside = (x - loads.held)[:, ::2]
+    aside, near = (x - loads.held)[:, ::2], touches(x, loads)
     return (
         energy(x, *rest)
         + float(np.sum(loads.weight * x[:, 1]))
-        + float(np.sum(loads.contact * _below(x, loads) ** 2)) / 2
+        + float(np.sum(loads.contact * below(x, loads) ** 2)) / 2
+        + float(np.sum(loads.contact[near.point] * near.depth**2)) / 2
         + float(np.sum(loads.tether[:, None] * aside**2)) / 2
     )
 
 
 def _slope(x: Array, rest: Rest, loads: Loads) -> tuple[Array, Array, float, float]:
-    """Return gradient (p, 3), sizes of the forces in it (p), least J and the floor's force."""
+    """Return gradient (p, 3), sizes of the forces in it (p), least J and the upward force of what carries it."""
     g, scale = np.zeros_like(x), np.zeros(len(x))
     least = forces(x, *rest, g, scale)
-    up = loads.contact * _below(x, loads)
+    up = loads.contact * below(x, loads)
     g[:, 1] += loads.weight - up
     g[:, ::2] += loads.tether[:, None] * (x - loads.held)[:, ::2]
-    return g, scale + loads.weight + up, float(least), float(np.sum(up))
+    scale += loads.weight + up
+    near = touches(x, loads)
+    push = loads.contact[near.point] * near.depth
+    np.subtract.at(g, near.point, push[:, None] * near.out)
+    np.add.at(scale, near.point, push)
+    return g, scale, float(least), float(np.sum(up) + np.sum(push * near.out[:, 1]))

@@ -9,6 +9,8 @@ the wavelength 2 pi (D/k)^(1/4). Energies in units of the skin's shear modulus t
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,28 +28,43 @@ from ...shell import (
     pattern,
     topology,
 )
+from ...shell.dissection import Fronts
+from ...shell.inverse import Inverse, fronts_of, inverse_of, normals
 from .flesh import Skin
-from .sparse import solve
 
-__all__ = ["Shell"]
+__all__ = ["Model", "Settled", "Shell"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_STEPS, _HALVINGS, _ITERATIONS, _MEMORY = 1500, 30, 200, 20
-#: Steps that one tangent serves.
-_STALE = 10
-#: Tolerance of the linear solves.
-_LOOSE = 0.3
+_STEPS, _HALVINGS, _MEMORY = 1500, 30, 20
+#: Steps that one inverse serves.
+_STALE = 20
 #: Random height that a flat skin starts from, over its thickness: without one it would stay flat.
 _UNEVEN = 1e-2
+
+
+class Model(NamedTuple):
+    """What L-BFGS knows of the energy's curvature: an inverse, and the last moves with the slope's changes (v, 3)."""
+
+    inverse: Inverse
+    moves: tuple[tuple[Array, Array], ...]
+
+
+class Settled(NamedTuple):
+    """Points (v, 3) of a skin, residual, steps, and what the last of them knew of the curvature."""
+
+    points: Array
+    residual: float
+    steps: int
+    model: Model
 
 
 class Shell:
     """A skin on fresh points (v, 3) with faces (f, 3), of one thickness [r1]; area: of each vertex (v) [r1^2]."""
 
     def __init__(self, points: Array, faces: Index, area: Array, skin: Skin, thickness: float) -> None:
-        self._faces = faces
+        self._points, self._faces = points, faces
         self._material = Material(thickness)
         self._mesh = topology(faces, len(points))
         self._pattern = pattern(self._mesh)
@@ -63,11 +80,13 @@ class Shell:
         share: float,
         start: Array,
         tolerance: float,
+        model: Model | None = None,
         watch: Callable[[], None] = lambda: None,
-    ) -> tuple[Array, float, int]:
-        """Return points (v, 3) of the skin, residual and steps, where the body carries it to `carried` (v, 3).
+    ) -> Settled:
+        """Return the skin where the body carries it to `carried` (v, 3).
 
-        share: the skin's lengths over its fresh ones. start (v, 3): from where it settles; see `uneven`.
+        share: the skin's lengths over its fresh ones. start (v, 3): from where it settles; see `uneven`. model: of
+        a skin that lay about there; None starts from the fresh one's.
 
         Raises:
             NotConverged: there were too many steps.
@@ -78,8 +97,7 @@ class Shell:
         x = start.copy()
         slope, now = self._slope(x, carried, g, stiffness)
         residual = np.inf
-        moves: list[tuple[Array, Array]] = []
-        blocks = np.empty(0)
+        inverse, moves = model or Model(self._fresh, ())
         for step in range(_STEPS):
             watch()
             pull = self._hold[:, None] * (x - carried)
@@ -87,10 +105,10 @@ class Shell:
             scale = np.linalg.norm(pull) + np.linalg.norm(slope - pull) + 1e-6 * len(x) ** -0.5
             residual = float(np.linalg.norm(slope) / scale)
             if residual <= tolerance:
-                return x, residual, step
-            if step % _STALE == 0:
-                blocks = self._tangent(x, g, stiffness)
-            d = self._direction(slope, blocks, moves)
+                return Settled(x, residual, step, Model(inverse, moves))
+            if step and step % _STALE == 0:
+                inverse = self._inverse(x, g, stiffness)
+            d = _direction(slope, inverse, moves)
             down, part = float(np.sum(slope * d)), 1.0
             for _ in range(_HALVINGS):
                 found, then = self._slope(x + part * d, carried, g, stiffness)
@@ -99,7 +117,7 @@ class Shell:
                 part /= 2
             else:
                 break
-            moves = [*moves[1 - _MEMORY :], (part * d, found - slope)]
+            moves = (*moves[1 - _MEMORY :], (part * d, found - slope))
             x, slope, now = x + part * d, found, then
         raise NotConverged(
             f"the skin stopped at a residual of {residual:.1e}.",
@@ -111,28 +129,29 @@ class Shell:
         """Return a small random height (v, 3) along normals (v, 3), without which a flat skin would stay flat."""
         return _UNEVEN * self._material.thickness * generator.standard_normal((len(normals), 1)) * normals
 
-    def _tangent(self, x: Array, g: Array, stiffness: Array) -> Array:
+    @cached_property
+    def _fresh(self) -> Inverse:
+        """The inverse at the fresh shape: good enough to begin with, and the same for every frame."""
+        return self._inverse(
+            self._points, self._metric, hinge_stiffness(self._metric, self._mesh, self._material.flexural)
+        )
+
+    @cached_property
+    def _fronts(self) -> Fronts:
+        return fronts_of(self._mesh, self._points)
+
+    def _inverse(self, x: Array, g: Array, stiffness: Array) -> Inverse:
+        """Return an approximate inverse of the tangent at x."""
         blocks = np.zeros((self._pattern.blocks, 3, 3))
         membrane_tangent(x, self._faces, g, self._material.lame, self._pattern.of_triangles, blocks)
         bending_tangent(x, self._mesh.hinges, stiffness, self._pattern.of_hinges, blocks)
         blocks[self._pattern.diagonal] += self._hold[:, None, None] * np.eye(3)
-        return blocks
-
-    def _direction(self, slope: Array, blocks: Array, moves: list[tuple[Array, Array]]) -> Array:
-        """Return the direction (v, 3) of L-BFGS that starts from the tangent in place of a multiple of one.
-
-        The tangent leaves compression out: alone it is too stiff for buckles, which past moves teach it.
-        """
-        order, q, parts = self._pattern, -slope, []
-        kept = [(s, y, float(np.sum(s * y))) for s, y in moves]
-        kept = [(s, y, sy) for s, y, sy in kept if sy > 0]
-        for s, y, sy in reversed(kept):
-            parts.append(float(np.sum(s * q)) / sy)
-            q = q - parts[-1] * y
-        d, _, _ = solve(order.indptr, order.indices, order.diagonal, blocks, q, _LOOSE, _ITERATIONS)
-        for (s, y, sy), part in zip(kept, reversed(parts), strict=True):
-            d = d + (part - float(np.sum(y * d)) / sy) * s
-        return d if float(np.sum(slope * d)) < 0 else -slope
+        pieces = inverse_of(self._fronts, self._pattern, blocks, normals(x, self._faces), np.zeros(len(x), np.bool_))
+        while True:
+            try:
+                next(pieces)
+            except StopIteration as end:
+                return cast(Inverse, end.value)
 
     def _slope(self, x: Array, carried: Array, g: Array, stiffness: Array) -> tuple[Array, float]:
         gradient = self._hold[:, None] * (x - carried)
@@ -140,3 +159,25 @@ class Shell:
         total += membrane(x, self._faces, g, self._material.lame, gradient)
         total += bending(x, self._mesh.hinges, self._angles, stiffness, gradient)
         return gradient, total
+
+
+def _direction(slope: Array, inverse: Inverse, moves: tuple[tuple[Array, Array], ...]) -> Array:
+    """Return the direction (v, 3) of L-BFGS that starts from an inverse in place of a multiple of one.
+
+    The tangent leaves compression out: alone it is too stiff for buckles, which past moves teach it.
+    """
+    q, parts = -slope, []
+    kept = [(s, y, _dot(s, y)) for s, y in moves]
+    kept = [(s, y, sy) for s, y, sy in kept if sy > 0]
+    for s, y, sy in reversed(kept):
+        parts.append(_dot(s, q) / sy)
+        q = q - parts[-1] * y
+    d = inverse.apply(q)
+    for (s, y, sy), part in zip(kept, reversed(parts), strict=True):
+        d = d + (part - _dot(y, d) / sy) * s
+    return d if _dot(slope, d) < 0 else -slope
+
+
+def _dot(a: Array, b: Array) -> float:
+    # no BLAS, whose sums depend on its threads
+    return float(np.einsum("vi,vi->", a, b))

@@ -19,8 +19,9 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 from ...contract import Unstable
-from .equilibrium import Balance, Loads
+from .equilibrium import Balance
 from .flesh import Softened, Swing
+from .loads import Loads, pushes
 from .solid import Solid, volumes
 
 __all__ = ["Network", "knit", "longest_step", "swing", "swung"]
@@ -72,6 +73,8 @@ def longest_step(x: Array, network: Network, loads: Loads) -> float:
     own[:, 1, 1] += loads.contact
     own[:, 0, 0] += loads.tether
     own[:, 2, 2] += loads.tether
+    if len(loads.balls):
+        own += loads.contact[:, None, None] * np.eye(3)  # from any side
     every = np.arange(len(x))
     rows, columns = np.concatenate([every, i, j]), np.concatenate([every, j, i])
     values = np.concatenate([own, -block, -block])
@@ -116,7 +119,8 @@ def swung(
     pull, size = np.zeros_like(x), np.zeros(len(x))
     up = _pull(x, *_arrays(network, loads), pull, size)
     residual = float(np.linalg.norm(pull)) / max(float(np.linalg.norm(size)), 1e-300)
-    return Balance(x, residual, steps, float((volumes(x, solid.tets) / solid.volume).min()), up)
+    least = float((volumes(x, solid.tets) / solid.volume).min())
+    return Balance(x, residual, steps, least, up, pushes=pushes(x, loads))
 
 
 def swing(x: Array, v: Array, network: Network, loads: Loads, step: float, damping: float, count: int) -> None:
@@ -124,11 +128,11 @@ def swing(x: Array, v: Array, network: Network, loads: Loads, step: float, dampi
     _march(x, v, *_arrays(network, loads), network.mass, step, damping, count)
 
 
-def _arrays(network: Network, loads: Loads) -> tuple[Index, Array, Array, Array, float, Array, Array, Array]:
+def _arrays(network: Network, loads: Loads) -> tuple[Index, Array, Array, Array, float, Array, Array, Array, Array]:
     floor = -np.inf if loads.floor is None else loads.floor
     return (
         *(network.ends, network.length, network.stiffness),
-        *(loads.weight, floor, loads.contact, loads.tether, loads.held),
+        *(loads.weight, floor, loads.contact, loads.tether, loads.held, loads.balls),
     )
 
 
@@ -143,10 +147,11 @@ def _pull(
     contact: Array,
     tether: Array,
     held: Array,
+    balls: Array,
     pull: Array,
     size: Array,
 ) -> float:
-    """Write the forces on points x to pull (p, 3), add the sizes of their shares to size (p); return the floor's."""
+    """Write the forces on points x to pull (p, 3), add the sizes of their shares to size (p); return what carries."""
     total = 0.0
     for i in range(len(x)):
         up = contact[i] * (floor - x[i, 1]) if x[i, 1] < floor else 0.0
@@ -155,6 +160,19 @@ def _pull(
         pull[i, 2] = -tether[i] * (x[i, 2] - held[i, 2])
         size[i] += up + weight[i]
         total += up
+        if contact[i] == 0:
+            continue
+        for b in range(len(balls)):
+            ox, oy, oz = x[i, 0] - balls[b, 0], x[i, 1] - balls[b, 1], x[i, 2] - balls[b, 2]
+            far = np.sqrt(ox * ox + oy * oy + oz * oz)
+            if far >= balls[b, 3] or far == 0:
+                continue
+            push = contact[i] * (balls[b, 3] - far)
+            pull[i, 0] += push / far * ox
+            pull[i, 1] += push / far * oy
+            pull[i, 2] += push / far * oz
+            size[i] += push
+            total += push / far * oy
     for e in range(len(ends)):
         i, j = ends[e, 0], ends[e, 1]
         a, b, c = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
@@ -184,6 +202,7 @@ def _march(
     contact: Array,
     tether: Array,
     held: Array,
+    balls: Array,
     mass: Array,
     step: float,
     damping: float,
@@ -199,7 +218,7 @@ def _march(
         way[:] = 0.0
         gain[:] = 0.0
         for stage in range(4):
-            _pull(at, ends, length, stiffness, weight, floor, contact, tether, held, pull, size)
+            _pull(at, ends, length, stiffness, weight, floor, contact, tether, held, balls, pull, size)
             weighs = 1.0 if stage == 0 or stage == 3 else 2.0
             ahead = step if stage == 2 else step / 2
             for i in range(many):

@@ -14,7 +14,7 @@ from ..surface import geodesic, lay, sampler, shares_at
 from .body import Body
 from .equilibrium import Balance
 from .flesh import Skin
-from .skin import Shell
+from .skin import Settled, Shell
 
 __all__ = ["Wrinkles"]
 
@@ -32,12 +32,10 @@ class Wrinkles:
         self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
         self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness)
 
-    def at(
-        self, balance: Balance, folds: Array | None = None, watch: Callable[[], None] = lambda: None
-    ) -> tuple[Array, float, int]:
-        """Return how far the skin stands off (v, 3) from the settled body, residual and steps.
+    def at(self, balance: Balance, near: Settled | None = None, watch: Callable[[], None] = lambda: None) -> Settled:
+        """Return how far the skin stands off (v, 3) from the settled body, in place of its points.
 
-        folds (v, 3): how far it stood off in the stage to start from; None starts from a slightly uneven skin.
+        near: what `at` found in the stage to start from; None starts from a slightly uneven skin.
 
         Raises:
             NotConverged: the skin found no equilibrium.
@@ -46,10 +44,10 @@ class Wrinkles:
         even, rest = self._body.parted(balance)
         carried = (1 + even) * self._points + self._body.onto(self._cells) @ rest
         share = 1 + self._skin.shrinkage * even
-        if folds is None:
-            folds = self._shell.uneven(self._normals, Context.generator(self._seed))
-        found, residual, steps = self._shell.wrinkled(carried, share, carried + folds, self._tolerance, watch)
-        return found - carried, residual, steps
+        folds = near.points if near else self._shell.uneven(self._normals, Context.generator(self._seed))
+        model = near.model if near else None
+        found = self._shell.wrinkled(carried, share, carried + folds, self._tolerance, model, watch)
+        return found._replace(points=found.points - carried)
 
     def on_lattice(self, folds: Array, resolution: int) -> Array:
         """Return what `at` found on the common lattice (n, 2 n, 3)."""

@@ -7,8 +7,9 @@ from scipy.sparse import bsr_array
 from solver.contract import Need, NotConverged
 from solver.decay import SOLVER
 from solver.decay.body.body import Body
-from solver.decay.body.equilibrium import Loads, rested, settle
+from solver.decay.body.equilibrium import rested, settle
 from solver.decay.body.flesh import Flesh, softened
+from solver.decay.body.loads import Loads
 from solver.decay.body.material import blocks, energy, forces, hessian
 from solver.decay.body.solid import fill, volumes
 from solver.decay.surface import extent, geodesic, lay

@@ -38,7 +38,7 @@ def heights(sphere, shrinkage):
     shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
     outward = sphere.points / RADIUS
     carried = (1 - shrinkage) * sphere.points
-    found, residual, _ = shell.wrinkled(carried, 1.0, carried + shell.uneven(outward, Context.generator(0)), 1e-5)
+    found, residual, *_ = shell.wrinkled(carried, 1.0, carried + shell.uneven(outward, Context.generator(0)), 1e-5)
     assert residual <= 1e-5
     h = np.einsum("vi,vi->v", found - carried, outward)
     h -= sphere.mean(h)
@@ -58,10 +58,31 @@ def test_a_skin_wrinkles_past_the_critical_shrinkage_with_the_width_of_theory(sp
 def test_a_skin_that_shrinks_with_its_body_stays_on_it(sphere):
     shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
     carried = 0.7 * sphere.points
-    found, _, _ = shell.wrinkled(
-        carried, 0.7, carried + shell.uneven(sphere.points / RADIUS, Context.generator(0)), 1e-6
-    )
+    found, *_ = shell.wrinkled(carried, 0.7, carried + shell.uneven(sphere.points / RADIUS, Context.generator(0)), 1e-6)
     assert found == pytest.approx(carried, abs=1e-6)
+
+
+def test_what_frames_learnt_saves_the_next_ones_steps_and_changes_no_balance(sphere):
+    critical, _ = onset()
+    shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
+    height = shell.uneven(sphere.points / RADIUS, Context.generator(0))
+
+    def frames(learning):
+        carried = (1 - 1.5 * critical) * sphere.points
+        found = shell.wrinkled(carried, 1.0, carried + height, 1e-4)
+        steps = 0
+        for k in range(1, 7):
+            then = (1 - (1.5 + 0.002 * k) * critical) * sphere.points
+            model = found.model if learning else None
+            found = shell.wrinkled(then, 1.0, then + found.points - carried, 1e-4, model)
+            carried = then
+            steps += found.steps
+            assert found.residual <= 1e-4
+        return found.points - carried, steps
+
+    (known, quick), (fresh, slow) = frames(True), frames(False)
+    assert quick < 0.7 * slow
+    assert np.abs(known - fresh).max() < 0.02 * np.abs(fresh).max()
 
 
 def test_a_march_settles_each_stage_alike_whatever_else_is_asked_for():

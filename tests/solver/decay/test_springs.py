@@ -5,8 +5,8 @@ import pytest
 
 from solver.contract import Context, Need, Unstable
 from solver.decay import SOLVER
-from solver.decay.body.equilibrium import Loads
 from solver.decay.body.flesh import Softened
+from solver.decay.body.loads import Loads
 from solver.decay.body.solid import fill
 from solver.decay.body.springs import Network, knit, longest_step, swing
 from solver.fruit import Fruit
