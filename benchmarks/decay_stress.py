@@ -6,13 +6,13 @@ Each case returns what was found; what must not happen ends in `Broken`. A typed
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.tries import Broken, show
 from solver.contract import Context, InvalidGeometry, Need
 from solver.decay import SOLVER, DecayParams
 from solver.decay.layer import Layer
@@ -22,13 +22,12 @@ from solver.decay.stepping import march
 from solver.decay.surface import Surface, geodesic, triangulated
 from solver.decay.system import System
 
-__all__ = ["CASES", "SLOW", "Broken"]
+__all__ = [
+    "CASES",
+    "SLOW",
+]
 
 Array = NDArray[np.float64]
-
-
-class Broken(AssertionError):
-    """A case ended as none may."""
 
 
 def _demand(fine: bool, what: str) -> None:
@@ -154,14 +153,5 @@ CASES: dict[str, Callable[[], str]] = {
 SLOW = ("1 000 000 vertices",)
 
 
-def main(chosen: list[str]) -> None:
-    print("| try | end | CPU s |\n|---|---|---|")
-    for name, case in CASES.items():
-        if chosen and not any(word in name for word in chosen):
-            continue
-        begun = time.process_time()
-        print(f"| {name} | {case()} | {time.process_time() - begun:.1f} |", flush=True)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    show(CASES, sys.argv[1:])

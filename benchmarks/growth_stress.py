@@ -7,26 +7,25 @@ and leaves the last equilibrium standing.
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from benchmarks.crossings import crossings
+from benchmarks.tries import Broken, show
 from solver import shell
 from solver.contract import InvalidGeometry, NotConverged
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.tools import HotSpot
 
-__all__ = ["CASES", "SLOW", "Broken"]
+__all__ = [
+    "CASES",
+    "SLOW",
+]
 
 _RESIDUAL = 1e-3
-
-
-class Broken(AssertionError):
-    """A case ended as none may."""
 
 
 def _demand(fine: bool, what: str) -> None:
@@ -183,18 +182,5 @@ CASES: dict[str, Callable[[], str]] = {
 SLOW = ("a leaf of 40 000 vertices",)
 
 
-def main(chosen: list[str]) -> None:
-    print("| try | end | CPU s |\n|---|---|---|")
-    for name, case in CASES.items():
-        if chosen and not any(word in name for word in chosen):
-            continue
-        begun = time.process_time()
-        try:
-            end = case()
-        except Broken as error:
-            end = f"BROKEN: {error}"
-        print(f"| {name} | {end} | {time.process_time() - begun:.1f} |", flush=True)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    show(CASES, sys.argv[1:])

@@ -6,23 +6,20 @@ Each case returns what was found; what must not happen ends in `Broken`. A typed
 from __future__ import annotations
 
 import sys
-import time
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.tries import Broken, show
 from solver.contract import Need, SolverError
 from solver.wood import SOLVER
 
-__all__ = ["CASES", "Broken", "tried"]
+__all__ = ["CASES", "tried"]
 
 _PLAIN: dict[str, Any] = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 _ROD: dict[str, Any] = {"rods": 1, "radius": 0.002, "vertices": 16, **_PLAIN}
 _FEW: dict[str, Any] = {"rods": 9, "vertices": 8}
-
-
-class Broken(AssertionError):
-    """A case ended as none may."""
 
 
 class Case(NamedTuple):
@@ -120,14 +117,5 @@ def tried(name: str) -> str:
     return f"{said} {broken[0]} breaks, {broken[1]} bonds; balance {float(found.residual.max()):.0e}".strip()
 
 
-def main(chosen: list[str]) -> None:
-    print("| try | end | CPU s |\n|---|---|---|")
-    for name in CASES:
-        if chosen and not any(word in name for word in chosen):
-            continue
-        begun = time.process_time()
-        print(f"| {name} | {tried(name)} | {time.process_time() - begun:.1f} |", flush=True)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    show({name: partial(tried, name) for name in CASES}, sys.argv[1:])

@@ -141,18 +141,21 @@ def _named(values: object) -> Mapping[str, Any]:
 
 def _say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     """Put pydantic's findings into one sentence per field, with the nearest name for a misspelt one."""
-    parts = []
+    parts, strange = [], False
     for item in error.errors():
         where = ".".join(str(p) for p in item["loc"])
         if item["type"] == "extra_forbidden":
-            near = difflib.get_close_matches(where, list(fields), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(sorted(fields))}"
-            parts.append(f"unknown name {_SHORT.repr(where)}{hint}")
+            # a name within a group is none of the fields, so that none of them is what was meant
+            near = difflib.get_close_matches(where, list(fields), n=1) if len(item["loc"]) == 1 else []
+            strange |= not near and len(item["loc"]) == 1
+            parts.append(f"unknown name {_SHORT.repr(where)}" + (f"; did you mean {near[0]!r}?" if near else ""))
         else:
             message = item["msg"].removeprefix("Value error, ")
             got = item.get("input")
             shown = f" (got {_SHORT.repr(got)})" if where and not isinstance(got, dict) else ""
             parts.append(f"{where + ': ' if where else ''}{message}{shown}")
+    if strange:
+        parts.append(f"known: {', '.join(sorted(fields))}")
     return "; ".join(parts)
 
 

@@ -23,6 +23,8 @@ def read(path: Path) -> dict[str, Any]:
     """
     if path.suffix.lower() not in KINDS:
         raise InvalidOption(f"{path.name!r} is no mesh.", f"Known: {', '.join(KINDS)}.")
+    if not path.is_file():
+        raise InvalidOption(f"there is no file {path}.", "Name a mesh file.")
     try:
         import trimesh
     except ImportError:

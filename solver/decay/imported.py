@@ -31,6 +31,13 @@ class Mesh(BaseModel):
         min_length=1, max_length=800_000, description="Triangles, as numbers of vertices from 0"
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, values: object) -> object:
+        if isinstance(values, str):
+            raise ValueError("expected points and faces; on the command line, --set mesh=@FILE reads them from a file")
+        return values
+
     @model_validator(mode="after")
     def _within(self) -> Self:
         numbers = np.array(self.faces)
