@@ -109,3 +109,17 @@ def test_what_a_mesh_does_not_have_is_refused():
     with pytest.raises(InvalidGeometry, match="no triangle of positive area"):
         grown(mesh(np.concatenate([points, [[9.0, 9, 9]]]), faces))
     assert Mesh.model_validate(mesh(points, faces)).faces[0] == tuple(faces[0])
+
+
+def test_a_file_name_in_place_of_a_mesh_is_told_how_to_be_read():
+    with pytest.raises(InvalidInput, match="mesh=@FILE"):
+        SOLVER.parse({"mesh": "fruit.obj"})
+
+
+def test_known_names_are_said_once_and_never_for_a_group():
+    with pytest.raises(InvalidInput) as all_strange:
+        SOLVER.parse({"qqqq": 1, "xxxx": 2})
+    assert str(all_strange.value).count("known:") == 1
+    with pytest.raises(InvalidInput) as nested:
+        SOLVER.parse({"neighbours": [{"centre": [0, 0, 3], "radius": 1}]})
+    assert "did you mean" not in str(nested.value)
