@@ -12,11 +12,10 @@ from ..contract import NotConverged
 from .contact import RUBBING, contacts
 from .elements import apply, elements
 from .explicit import CONTACT, forces
-from .hessian import Stiffness
 from .moment import State, strength
 from .newton import descend
 from .params import WoodParams
-from .precondition import Preconditioner, preconditioner
+from .precondition import Pattern, Preconditioner, preconditioner
 
 __all__ = ["Solver", "Step"]
 
@@ -24,10 +23,12 @@ __all__ = ["Solver", "Step"]
 _SOLVES, _FACTORS = 60, 5
 #: Solves with a fresh factor over those with a stale one: a piece that swings on one bond takes many short steps.
 _PATIENCE = 4
-#: A factor is renewed when it has cost this many solves more than a fresh one would have: about what a new one costs.
-_EXCESS = 40
+#: Solves that a round takes with a fresh factor. A factor is renewed when it has cost so many more than a new one does.
+_FRESH, _EXCESS = 3, 40
 #: The least residual that is asked for: this share of the tolerance, of the load that the bundle bears.
 _LEAST = 1e-4
+#: What a solve between two breaks may leave of the residual that the last break made.
+_KICK = 0.25
 #: How far an edge's ends move against each other in one step of Newton's, over its length.
 _TURN = 0.3
 
@@ -47,9 +48,9 @@ class Solver:
     def __init__(self, params: WoodParams, tolerance: float) -> None:
         self.params, self.tolerance = params, tolerance
         self._factor: Preconditioner | None = None
-        self._pattern: Stiffness | None = None
+        self._pattern: Pattern | None = None
         self._key: tuple[int, ...] = ()
-        self._bdt, self._fresh, self._excess = 0.0, 0, 0
+        self._bdt, self._excess = 0.0, 0
         self.factors, self.solves = 0, 0
 
     def _renew(self, state: State, bdt: float) -> None:
@@ -62,7 +63,7 @@ class Solver:
         self._factor, self._pattern = preconditioner(
             m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(state, bdt, True), pattern
         )
-        self._key, self._bdt, self._fresh, self._excess = key, bdt, 0, 0
+        self._key, self._bdt, self._excess = key, bdt, 0
         self.factors += 1
 
     def forces(self, state: State, time: float, dt: float) -> np.ndarray:
@@ -99,6 +100,8 @@ class Solver:
         x = guesses[int(np.nanargmin(norms))]
         scale = max(norms[0], _LEAST * strength(wood, p), least)
         wanted = rough * self.tolerance * scale
+        if rough > 1:
+            wanted = max(wanted, _KICK * norms[0])
         # energies go with the square of forces
         little = rough * self.tolerance**2 * float(state.books[: CONTACT + 1].sum())
         contact = 0.2 * float(wood.bodies.half[:, 0].min()) if len(wood.bodies.kind) else np.inf
@@ -143,9 +146,7 @@ class Solver:
             found = descend(residual, stiffness, x, partial(factor.solve, root=root), wanted, most, limit, little)
             self.solves += found.solves
             x, norm = found.x, found.norm
-            if not self._fresh:
-                self._fresh = found.solves + 1
-            self._excess += max(found.solves - self._fresh, 0)
+            self._excess += max(found.solves - _FRESH * found.rounds, 0)
             if found.settled:
                 residual(x)
                 return norm / scale, scale
