@@ -13,6 +13,7 @@ import numpy as np
 
 from ..multifrontal import Analysis
 from .arrays import Bonds, Rods
+from .contact import Touching
 from .dissection import dissected
 from .elements import elements
 from .fronts import Fronts, factored, solved
@@ -81,10 +82,10 @@ def preconditioner(
     bonds: Bonds,
     free: np.ndarray,
     inertia: np.ndarray,
-    contacts: np.ndarray | None,
+    contacts: Touching | None,
     known: Pattern | None = None,
 ) -> tuple[Preconditioner, Pattern]:
-    """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts (v, 3, 3) [N/m].
+    """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts.
 
     known: the pattern, where it still holds. Returns the factor and the pattern.
     """
@@ -95,7 +96,7 @@ def preconditioner(
         for c in range(3):
             blocks[stiffness.diagonal, c, c] += inertia[free]
         if contacts is not None:
-            blocks[stiffness.diagonal] += contacts[free]
+            contacts.spread(stiffness.place, blocks)
         diagonal = blocks[stiffness.diagonal]
         own = np.einsum("vii->vi", diagonal)
         if (own <= 0).any():
