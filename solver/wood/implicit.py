@@ -14,11 +14,12 @@ import numpy as np
 
 from ..contract import Context, NotConverged
 from .contact import lag
+from .equations import Step, filled
 from .explicit import CONTACT, LOST, WORK
 from .moment import Reached, State, balanced, begin, copied, floor, kinetic
 from .params import WoodParams
 from .settings import Settings
-from .solving import Solver, Step
+from .solving import Solver
 from .state import Wood
 from .stepping import broken
 
@@ -82,7 +83,7 @@ def _step(
         for count in range(_PASSES + 1):
             error, scale = solver.solve(state, to, guesses, scale, rough if count < _PASSES else 1.0)
             span = (time + dt if count else time, time + dt)
-            along, given = _along(solver, state, (here, v_here, f0), span, to.bdt)
+            along, given = _along(state, (here, v_here, f0), span, to.bdt)
             done, pushed = done + along, pushed + given
             found = state
             if params.fracture != "none" and count < _PASSES:
@@ -94,7 +95,7 @@ def _step(
             state = found
             here, v_here, parent = state.wood.motion.x.copy(), state.wood.motion.v.copy(), state.wood.parent
             lag(state)
-            f0 = solver.forces(state, time + dt, share * dt).copy()
+            f0 = filled(state, time + dt, share * dt).copy()
             to = to._replace(xh=_grown(to.xh, parent), vh=_grown(to.vh, parent))
             guesses = (here,)
     except NotConverged:
@@ -114,7 +115,6 @@ def _step(
 
 
 def _along(
-    solver: Solver,
     state: State,
     start: tuple[np.ndarray, np.ndarray, np.ndarray],
     times: tuple[float, float],
@@ -137,7 +137,7 @@ def _along(
     def at(s: float) -> np.ndarray:
         m.x[:] = start[0] + s * (end[0] - start[0])
         m.v[:] = start[1] + s * (end[1] - start[1])
-        return both(solver.forces(state, times[0] + s * span, bdt))
+        return both(filled(state, times[0] + s * span, bdt))
 
     last = both(scratch.f)
     m.v[:] = start[1]
@@ -154,7 +154,7 @@ def _along(
         if float(np.abs(fine - near).max()) <= max(small, _SMALL * float(np.abs(fine).max())):
             break
     m.x[:], m.v[:] = end
-    solver.forces(state, times[1], bdt)
+    filled(state, times[1], bdt)
     return float(fine[0]), float(fine[1])
 
 
