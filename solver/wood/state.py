@@ -8,6 +8,7 @@ import numpy as np
 
 from .arrays import Bodies, Bonds, Rods, Turns
 from .explicit import Motion, Scratch
+from .plan import plan_for
 from .rubbing import none
 
 __all__ = ["Wood", "scratch_for"]
@@ -41,7 +42,8 @@ class Wood:
 
 
 def scratch_for(wood: Wood) -> Scratch:
-    """Return work arrays that fit."""
+    """Return work arrays that fit, and the plan of what is whole."""
+    plan = plan_for(wood.rods, wood.bonds)
     v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
     return Scratch(
         np.zeros((v, 3)),
@@ -55,5 +57,7 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros(2),
         np.zeros((r, v)),
         np.zeros((r, v)),
+        np.zeros((len(plan.part) - 1, 3)),
         none(),
+        plan,
     )
