@@ -53,7 +53,7 @@ class Scratch(NamedTuple):
     power: np.ndarray
     normals: np.ndarray
     lagged: np.ndarray
-    energy: np.ndarray  # of the plan's parts (p, 3) [J]
+    found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
     rubbing: Rubbing
     plan: Plan
 
@@ -111,12 +111,12 @@ def _fill(
         scratch.t,
         scratch.inverse,
         scratch.each,
-        scratch.energy,
+        scratch.found,
     )
     if look:
-        books[STRETCH] = scratch.energy[:, 0].sum()
-        books[BENDING] = scratch.energy[:, 1].sum()
-        books[BONDS] = scratch.energy[:, 2].sum()
+        books[STRETCH] = scratch.found[:, 0].sum()
+        books[BENDING] = scratch.found[:, 1].sum()
+        books[BONDS] = scratch.found[:, 2].sum()
     if turning:
         scratch.torque[:] = 0.0
         carry(motion.d, motion.old, scratch.t, rods)

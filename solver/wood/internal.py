@@ -7,7 +7,7 @@ from numba import njit
 
 from .bonds import bind, bound, gather
 from .plan import Plan
-from .rods import ROWS, bend, bending, place, stretch, stretching
+from .rods import ROWS, bend, bending, place, strain, stretch, stretching
 
 __all__ = ["internal"]
 
@@ -63,12 +63,12 @@ def internal(
     t: np.ndarray,
     inverse: np.ndarray,
     each: np.ndarray,
-    energy: np.ndarray,
+    found: np.ndarray,
 ) -> None:
     """Add the forces of the parts from `first` to `last` to f (v, 3) [N]; fill tangents t (e, 3) and 1/|e| (e,).
 
-    With `turning`, bending is left to `twist.turn`. With `look`, the energies (p, 3) [J] of stretching, bending and
-    bonds are written for each part, and that of each bond (b,) [J].
+    With `turning`, bending is left to `twist.turn`. With `look`, each part's energies [J] of stretching, bending and
+    bonds and its bound of `rods.strain` are written (p, 4), and the energy of each bond (b,) [J].
     """
     wide = plan.vertex.shape[1]
     edge = np.empty((ROWS, plan.edge.shape[2]))
@@ -97,11 +97,12 @@ def internal(
         bind(bonds, plan.law[p], bond, force)
         _add(f, a, b, plan.vertex[p], lane, edge, force)
         if look:
-            energy[p, 0] = stretching(count, plan.edge[p], edge)
-            energy[p, 1] = 0.0 if turning else bending(count, plan.edge[p], edge)
-            energy[p, 2] = 0.0
+            found[p, 0] = stretching(count, plan.edge[p], edge)
+            found[p, 1] = 0.0 if turning else bending(count, plan.edge[p], edge)
+            found[p, 2] = 0.0
+            found[p, 3] = strain(count, plan.edge[p], edge)
             row = force[0]
             bound(bonds, plan.law[p], bond, row)
             for n in range(bonds):
                 each[plan.origin[p, n]] = row[n]
-                energy[p, 2] += row[n]
+                found[p, 2] += row[n]

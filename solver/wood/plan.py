@@ -13,7 +13,25 @@ from numba import njit
 
 from .arrays import Bonds, Rods
 
-__all__ = ["COSINE", "RATE", "SHARE", "SHEAR", "SPRING", "Plan", "plan_for"]
+__all__ = [
+    "BOW",
+    "COSINE",
+    "RADIUS",
+    "RATE",
+    "REST",
+    "SHARE",
+    "SHEAR",
+    "SPRING",
+    "STIFF",
+    "TENSION",
+    "WEAK",
+    "Plan",
+    "plan_for",
+]
+
+#: Rows of a part's edges: rest length [m]; k [N], 0 if it is dead; 4 alpha / span [N m] and 4 / span [1/m] of the hinge
+#: behind an edge, 0 where none is whole; radius [m]; 1 / the least strain that it bears.
+REST, TENSION, STIFF, BOW, RADIUS, WEAK = range(6)
 
 #: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S [J]; cosine at rest.
 SHARE, RATE, SPRING, SHEAR, COSINE = range(5)
@@ -29,7 +47,7 @@ class Plan(NamedTuple):
     part: np.ndarray  # (p + 1,) uint32 first edge
     a: np.ndarray  # (e,) uint32 first vertex
     b: np.ndarray  # (e,) uint32 second vertex
-    edge: np.ndarray  # (p, 3, m) rest length [m]; k [N], 0 of a dead edge; 4 alpha / span of the hinge behind it [N m]
+    edge: np.ndarray  # (p, 6, m) what an edge is made of, in the rows above
     lane: np.ndarray  # (e + p,) uint32 first lane of an edge's bonds; a part has one entry more, its end
     vertex: np.ndarray  # (p, w) uint32 vertex of a bond
     law: np.ndarray  # (p, 5, w) what a bond is made of, in the rows above
@@ -54,8 +72,8 @@ def _parts(rods: Rods) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def plan_for(rods: Rods, bonds: Bonds) -> Plan:
-    """Return the plan of what is whole."""
+def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
+    """Return the plan of what is whole; strength (e, samples): strain that each place bears."""
     edges = len(rods.a)
     part = _parts(rods)
     parts = len(part) - 1
@@ -72,20 +90,25 @@ def plan_for(rods: Rods, bonds: Bonds) -> Plan:
         wide = max(wide, first[part[p + 1]] - first[part[p]])
     most = (most + _LINE - 1) // _LINE * _LINE
     wide = (wide + _LINE - 1) // _LINE * _LINE
-    edge = np.zeros((parts, 3, most))
+    edge = np.zeros((parts, 6, most))
     lane = np.zeros(edges + parts, np.uint32)
     own = np.zeros(edges, np.int64)
     for p in range(parts):
         for e in range(part[p], part[p + 1]):
             own[e] = p
-            edge[p, 0, e - part[p]] = rods.rest[e]
-            edge[p, 1, e - part[p]] = rods.k[e] if rods.alive[e] == 1 else 0.0
+            m = e - part[p]
+            edge[p, REST, m] = rods.rest[e]
+            edge[p, RADIUS, m] = rods.radius[e]
+            if rods.alive[e] == 1 and rods.k[e] > 0.0:
+                edge[p, TENSION, m] = rods.k[e]
+                edge[p, WEAK, m] = 1.0 / strength[e].min()
             lane[e + p] = first[e] - first[part[p]]
         lane[part[p + 1] + p] = first[part[p + 1]] - first[part[p]]
     for h in range(len(rods.before)):
         if rods.whole[h] == 1:
             e = rods.before[h]
-            edge[own[e], 2, e - part[own[e]]] = 4.0 * rods.alpha[h] / rods.span[h]
+            edge[own[e], STIFF, e - part[own[e]]] = 4.0 * rods.alpha[h] / rods.span[h]
+            edge[own[e], BOW, e - part[own[e]]] = 4.0 / rods.span[h]
     vertex = np.zeros((parts, wide), np.uint32)
     origin = np.zeros((parts, wide), np.uint32)
     law = np.zeros((parts, 5, wide))

@@ -14,11 +14,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["ALONG", "FORCE", "HINGE", "INVERSE", "LENGTH", "ROWS", "bend", "bending", "place", "stretch", "stretching"]
+from .plan import BOW, RADIUS, REST, STIFF, TENSION, WEAK
 
-#: Rows of a part's edges: ends (6) [m], tangent (3), length [m], 1 / length, -dE/de (3) [N], its parts by the hinges
-#: behind and before an edge (6) [N].
-ALONG, LENGTH, INVERSE, FORCE, HINGE, ROWS = 6, 9, 10, 11, 14, 20
+__all__ = ["ROWS", "bend", "bending", "place", "strain", "stretch", "stretching"]
+
+#: Rows of a part's edges: 0 first end, 3 second end [m], 6 tangent, 9 length [m], 10 its inverse, 11 -dE/de [N], 14 and
+#: 17 its parts by the hinges behind and before the edge [N].
+ROWS = 20
 #: Keeps an edge of no length, and a hinge folded flat, finite.
 _TINY = 1e-30
 _FLAT = 1e-9
@@ -40,7 +42,7 @@ def place(x: np.ndarray, a: np.ndarray, b: np.ndarray, row: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def stretch(count: int, law: np.ndarray, row: np.ndarray) -> None:
-    """Fill tangents, lengths and forces of `count` edges from their ends; law (3, m) as `Plan.edge` has it."""
+    """Fill tangents, lengths and forces of `count` edges from their ends; law (6, m) as `Plan.edge` has it."""
     for q in range(count):
         ex = row[3, q] - row[0, q]
         ey = row[4, q] - row[1, q]
@@ -50,7 +52,7 @@ def stretch(count: int, law: np.ndarray, row: np.ndarray) -> None:
         ex *= il
         ey *= il
         ez *= il
-        pull = law[1, q] * (length / law[0, q] - 1.0)
+        pull = law[TENSION, q] * (length / law[REST, q] - 1.0)
         row[6, q] = ex
         row[7, q] = ey
         row[8, q] = ez
@@ -63,7 +65,7 @@ def stretch(count: int, law: np.ndarray, row: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def bend(count: int, law: np.ndarray, row: np.ndarray) -> None:
-    """Add the forces of the hinges between neighbours of `count` edges; law (3, m) as `Plan.edge` has it."""
+    """Add the forces of the hinges between neighbours of `count` edges; law (6, m) as `Plan.edge` has it."""
     for c in range(3):
         row[14 + c, count - 1] = 0.0
         row[17 + c, 0] = 0.0
@@ -79,7 +81,7 @@ def bend(count: int, law: np.ndarray, row: np.ndarray) -> None:
         dz = wz - uz
         less = 0.5 * (dx * dx + dy * dy + dz * dz)  # 1 - c
         more = max(2.0 - less, _FLAT)  # 1 + c
-        g = 2.0 * law[2, q] / (more * more)
+        g = 2.0 * law[STIFF, q] / (more * more)
         gp = g * row[10, q]
         gq = g * row[10, q + 1]
         # -dE/de of both edges: the parts of the other tangent across one's own
@@ -99,8 +101,8 @@ def stretching(count: int, law: np.ndarray, row: np.ndarray) -> float:
     """Return the energy [J] of stretching."""
     energy = 0.0
     for q in range(count):
-        strain = row[9, q] / law[0, q] - 1.0
-        energy += 0.5 * law[1, q] * strain * strain * law[0, q]
+        strain = row[9, q] / law[REST, q] - 1.0
+        energy += 0.5 * law[TENSION, q] * strain * strain * law[REST, q]
     return energy
 
 
@@ -113,5 +115,37 @@ def bending(count: int, law: np.ndarray, row: np.ndarray) -> float:
         dy = row[7, q + 1] - row[7, q]
         dz = row[8, q + 1] - row[8, q]
         less = 0.5 * (dx * dx + dy * dy + dz * dz)
-        energy += law[2, q] * less / max(2.0 - less, _FLAT)
+        energy += law[STIFF, q] * less / max(2.0 - less, _FLAT)
     return energy
+
+
+@njit(cache=True, error_model="numpy")
+def strain(count: int, law: np.ndarray, row: np.ndarray) -> float:
+    """Return a bound of what `fracture.overstress` finds in `count` edges: strain over strength where it is highest.
+
+    It holds without twist, and for breaks anywhere: the strain along an edge lies between those of its neighbours.
+    """
+    top = 0.0
+    before = -1.0  # the larger strain and the curvature at the joint before
+    bow = 0.0
+    own = row[9, 0] / law[REST, 0] - 1.0 if law[TENSION, 0] > 0.0 else -1.0
+    for q in range(count):
+        after = -1.0
+        curved = 0.0
+        following = -1.0
+        if q + 1 < count:
+            if law[TENSION, q + 1] > 0.0:
+                following = row[9, q + 1] / law[REST, q + 1] - 1.0
+            if law[BOW, q] > 0.0:
+                dx = row[6, q + 1] - row[6, q]
+                dy = row[7, q + 1] - row[7, q]
+                dz = row[8, q + 1] - row[8, q]
+                less = 0.5 * (dx * dx + dy * dy + dz * dz)
+                curved = law[BOW, q] * np.sqrt(less / max(2.0 - less, _FLAT))
+                after = max(own, following)
+        most = max(own, max(before, after)) + law[RADIUS, q] * max(bow, curved)
+        top = max(top, most * law[WEAK, q])
+        own = following
+        before = after
+        bow = curved
+    return top

@@ -43,7 +43,7 @@ class Wood:
 
 def scratch_for(wood: Wood) -> Scratch:
     """Return work arrays that fit, and the plan of what is whole."""
-    plan = plan_for(wood.rods, wood.bonds)
+    plan = plan_for(wood.rods, wood.bonds, wood.strength)
     v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
     return Scratch(
         np.zeros((v, 3)),
@@ -57,7 +57,7 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros(2),
         np.zeros((r, v)),
         np.zeros((r, v)),
-        np.zeros((len(plan.part) - 1, 3)),
+        np.zeros((len(plan.part) - 1, 4)),
         none(),
         plan,
     )

@@ -8,7 +8,7 @@ import pytest
 from solver.wood import SOLVER
 from solver.wood.bundle import lay
 from solver.wood.explicit import march
-from solver.wood.fracture import break_worst
+from solver.wood.fracture import break_worst, overstress
 from solver.wood.moment import State, begin, copied
 from solver.wood.plan import plan_for
 from solver.wood.state import Wood
@@ -81,7 +81,7 @@ def test_forces_are_those_of_plain_numpy(values):
 
 def test_a_plan_lists_every_whole_bond_once_and_by_its_edge():
     wood = broken(rods=40)
-    plan, b = plan_for(wood.rods, wood.bonds), wood.bonds
+    plan, b = plan_for(wood.rods, wood.bonds, wood.strength), wood.bonds
     found = []
     for p in range(len(plan.part) - 1):
         lanes = plan.lane[plan.part[p] + p : plan.part[p + 1] + p + 1].astype(int)
@@ -135,3 +135,16 @@ def test_numbers_of_bonds_do_not_matter_to_the_forces():
     scale = np.abs(one.scratch.f).max()
     np.testing.assert_allclose(one.scratch.f, two.scratch.f, rtol=0, atol=1e-13 * scale)
     np.testing.assert_allclose(one.scratch.each[order], two.scratch.each, rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_bound_of_strain_is_above_what_it_bounds_and_near(seed):
+    wood = broken(rods=12, clamp=("none", "start", "both")[seed % 3], seed=seed)
+    state, count = begin(wood), len(wood.rods.a)
+    ratio, place, m = np.zeros(count), np.zeros(count), wood.motion
+    t, inverse = state.scratch.t, state.scratch.inverse
+    top = overstress(wood.rods, t, inverse, wood.strength, m.theta, m.reference, False, True, ratio, place)
+    assert top <= state.scratch.found[:, 3].max() * (1 + 1e-6) < 1.5 * top
+    for p in range(len(state.scratch.found)):
+        own = ratio[state.scratch.plan.part[p] : state.scratch.plan.part[p + 1]]
+        assert own.max() <= state.scratch.found[p, 3] * (1 + 1e-6)
