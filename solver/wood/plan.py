@@ -36,7 +36,7 @@ REST, TENSION, STIFF, BOW, RADIUS, WEAK = range(6)
 #: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S [J]; cosine at rest.
 SHARE, RATE, SPRING, SHEAR, COSINE = range(5)
 #: The fewest edges of a part, but for the last.
-_PART = 64
+_PART = 128
 #: Numbers in a line of the cache: rows of parts begin on one.
 _LINE = 8
 
