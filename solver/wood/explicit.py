@@ -16,6 +16,7 @@ from .bodies import pose, press
 from .internal import internal
 from .plan import Plan
 from .rubbing import Rubbing, rub
+from .scaling import Fragments, push, rigid, saved, steady
 from .twist import carry, turn, twists
 
 __all__ = ["BENDING", "BONDS", "CONTACT", "LOST", "STRETCH", "WORK", "Motion", "Scratch", "forces", "march"]
@@ -55,6 +56,7 @@ class Scratch(NamedTuple):
     found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
     rubbing: Rubbing
     plan: Plan
+    fragments: Fragments
 
 
 @njit(cache=True, error_model="numpy")
@@ -231,10 +233,16 @@ def march(
     keep = np.full(len(x), slow)
     keep[held] = 1.0
     scratch.each[:] = 0.0
+    whole = scratch.fragments
+    books[LOST] -= saved(x, v, motion.mass, whole)
+    steady(x, rods, bodies, scratch.centre, whole)
+    books[LOST] += saved(x, v, motion.mass, whole)
+    rigid(x, v, f, motion.mass, whole)
     for n in range(steps):
         power = _grip(held, v, f) + scratch.power[0]
         rubbed = scratch.power[1]
         _kick(v, f, weight)
+        push(x, v, whole, half)
         work = _drift(x, v, motion.load, dt)
         if turning:
             for e in range(len(motion.theta)):
@@ -246,7 +254,9 @@ def march(
                 impulse[r, c] += half * scratch.push[r, c]
         look = n == steps - 1
         _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books, look)
+        rigid(x, v, f, motion.mass, whole)
         _kick(v, f, weight)
+        push(x, v, whole, half)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -257,6 +267,7 @@ def march(
         books[WORK] += work + half * (power + _grip(held, v, f) + scratch.power[0])
         books[LOST] += half * (rubbed + scratch.power[1])
         if damping > 0.0:
+            books[LOST] -= saved(x, v, motion.mass, whole) * (1.0 - slow * slow)
             books[LOST] += _slow(v, keep, motion.mass)
             if turning:
                 for e in range(len(motion.spin)):
