@@ -16,7 +16,7 @@ from .bodies import pose, press
 from .internal import internal
 from .plan import Plan
 from .rubbing import Rubbing, rub
-from .scaling import Fragments, push, rigid, saved, steady
+from .scaling import Fragments, push, rigid, steady
 from .twist import carry, turn, twists
 
 __all__ = ["BENDING", "BONDS", "CONTACT", "LOST", "STRETCH", "WORK", "Motion", "Scratch", "forces", "march"]
@@ -234,10 +234,9 @@ def march(
     keep[held] = 1.0
     scratch.each[:] = 0.0
     whole = scratch.fragments
-    books[LOST] -= saved(x, v, motion.mass, whole)
+    books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
     steady(x, rods, bodies, scratch.centre, whole)
-    books[LOST] += saved(x, v, motion.mass, whole)
-    rigid(x, v, f, motion.mass, whole)
+    books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
     for n in range(steps):
         power = _grip(held, v, f) + scratch.power[0]
         rubbed = scratch.power[1]
@@ -254,7 +253,7 @@ def march(
                 impulse[r, c] += half * scratch.push[r, c]
         look = n == steps - 1
         _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books, look)
-        rigid(x, v, f, motion.mass, whole)
+        less = rigid(x, v, f, motion.mass, whole, half)
         _kick(v, f, weight)
         push(x, v, whole, half)
         if turning:
@@ -267,7 +266,7 @@ def march(
         books[WORK] += work + half * (power + _grip(held, v, f) + scratch.power[0])
         books[LOST] += half * (rubbed + scratch.power[1])
         if damping > 0.0:
-            books[LOST] -= saved(x, v, motion.mass, whole) * (1.0 - slow * slow)
+            books[LOST] -= less * (1.0 - slow * slow)
             books[LOST] += _slow(v, keep, motion.mass)
             if turning:
                 for e in range(len(motion.spin)):
