@@ -6,9 +6,9 @@ E = k/2 (|d|/rest - 1)^2 rest + S (C - C0)^2. Sutherland 2012, Eqs. 3.11-3.23, p
 
 The bonds of a part are rows of numbers, one lane a bond: what they read is copied to rows, the forces are computed from
 rows to rows, which is vectorised, and the rows are added up. Measured (ns of CPU per bond, 200 rods; 2000): bond after
-bond, straight to the vertices, 17.3; 18.3. `gather` 2.3; 2.9, `bind` 1.9; 3.2, adding up 1.8; 3.5; a look at energies 3.0;
-3.9 more. What did not help: one loop with gathers in it (13: it is not vectorised), forces kept by bond and added up
-vertex by vertex (1 more; 4 to 9 more), rods numbered along a curve of Hilbert's (within 5 %), fused multiplication.
+bond, straight to the vertices, 17.3; 18.3. `gather` 2.3; 2.9, `bind` 1.9; 3.2, adding up 1.8; 3.5; a look at energies
+3.0; 3.9 more. What did not help: one loop with gathers in it (13: it is not vectorised), forces kept by bond and added
+up vertex by vertex (1 more; 4 to 9 more), rods numbered along a curve of Hilbert's (within 5 %), fused multiplication.
 """
 
 from __future__ import annotations
