@@ -5,7 +5,10 @@ E = k/2 (|d|/rest - 1)^2 rest + S (C - C0)^2. Sutherland 2012, Eqs. 3.11-3.23, p
 3.17 squares the energy, and 3.19-3.23 hold c fixed, which loses momentum. Here nothing is 0/0 at the rest angle.
 
 The bonds of a part are rows of numbers, one lane a bond: what they read is copied to rows, the forces are computed from
-rows to rows, which is vectorised, and the rows are added up.
+rows to rows, which is vectorised, and the rows are added up. Measured (ns of CPU per bond, 200 rods; 2000): bond after
+bond, straight to the vertices, 17.3; 18.3. `gather` 2.3; 2.9, `bind` 1.9; 3.2, adding up 1.8; 3.5; a look at energies
+3.0; 3.9 more. What did not help: one loop with gathers in it (13: it is not vectorised), forces kept by bond and added
+up vertex by vertex (1 more; 4 to 9 more), rods numbered along a curve of Hilbert's (within 5 %), fused multiplication.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ def _spread(row: np.ndarray, value: float) -> None:
 
 @njit(cache=True, error_model="numpy")
 def gather(x: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray, row: np.ndarray) -> None:
-    """Fill the rows (11, w + 8) of bonds: their vertices' places, first ends, tangents, lengths and inverses.
+    """Fill the rows (11, w + 8) of bonds: their vertices' places, first ends, tangents, lengths and their inverses.
 
     vertex (w,), lane (m + 1,): as in `Plan`; edge: rows of the part's edges.
     """
@@ -59,7 +62,8 @@ def gather(x: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray
 def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
     """Write the forces (6, w) [N] of `count` bonds: on their vertices, and on the second ends of their edges.
 
-    law (5, w): as in `Plan`; row: as `gather` leaves it. The first ends bear what is left.
+    law (5, w): as in `Plan`; row: as `gather` leaves it. The first ends bear what is left. No two arguments may be
+    slices with steps: the loop would not be vectorised (12 ns instead of 2).
     """
     for n in range(count):
         tx = row[6, n]

@@ -18,6 +18,7 @@ from .plan import Plan
 from .rubbing import Rubbing, rub
 from .scaling import Fragments, push, rigid, steady
 from .twist import carry, turn, twists
+from .verlet import drift, grip, kick, slowed
 
 __all__ = ["BENDING", "BONDS", "CONTACT", "LOST", "STRETCH", "WORK", "Motion", "Scratch", "forces", "march"]
 
@@ -77,7 +78,6 @@ def forces(
 
     scratch.plan must be that of rods and bonds; see `state.scratch_for`.
     """
-    scratch.each[:] = 0.0
     _fill(motion, rods, turns, bodies, scratch, turning, time, dt, rubbing, books, True)
 
 
@@ -156,53 +156,6 @@ def _fill(
 
 
 @njit(cache=True, error_model="numpy")
-def _grip(held: np.ndarray, v: np.ndarray, f: np.ndarray) -> float:
-    """Return the power [W] that the holders of the vertices `held` put in."""
-    power = 0.0
-    for n in range(len(held)):
-        i = held[n]
-        for c in range(3):
-            power -= f[i, c] * v[i, c]
-    return power
-
-
-@njit(cache=True, error_model="numpy", fastmath={"reassoc"})
-def _kick(v: np.ndarray, f: np.ndarray, weight: np.ndarray) -> None:
-    """Add weight (v,) times f (v, 3) to v (v, 3)."""
-    for i in range(len(v)):
-        w = weight[i]
-        v[i, 0] += w * f[i, 0]
-        v[i, 1] += w * f[i, 1]
-        v[i, 2] += w * f[i, 2]
-
-
-@njit(cache=True, error_model="numpy", fastmath={"reassoc"})
-def _drift(x: np.ndarray, v: np.ndarray, load: np.ndarray, dt: float) -> float:
-    """Move x by v for dt [s]; return the work [J] of dead loads and weights: load times way, without error."""
-    power = 0.0
-    for i in range(len(x)):
-        power += load[i, 0] * v[i, 0] + load[i, 1] * v[i, 1] + load[i, 2] * v[i, 2]
-        x[i, 0] += dt * v[i, 0]
-        x[i, 1] += dt * v[i, 1]
-        x[i, 2] += dt * v[i, 2]
-    return dt * power
-
-
-@njit(cache=True, error_model="numpy", fastmath={"reassoc"})
-def _slow(v: np.ndarray, keep: np.ndarray, mass: np.ndarray) -> float:
-    """Take `keep` (v,) of every velocity; return the energy [J] that this takes."""
-    lost = 0.0
-    for i in range(len(v)):
-        k = keep[i]
-        was = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2]
-        lost += 0.5 * mass[i] * was * (1.0 - k * k)
-        v[i, 0] *= k
-        v[i, 1] *= k
-        v[i, 2] *= k
-    return lost
-
-
-@njit(cache=True, error_model="numpy")
 def march(
     motion: Motion,
     rods: Rods,
@@ -232,17 +185,16 @@ def march(
     weight[held] = 0.0
     keep = np.full(len(x), slow)
     keep[held] = 1.0
-    scratch.each[:] = 0.0
     whole = scratch.fragments
     books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
     steady(x, rods, bodies, scratch.centre, whole)
     books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
     for n in range(steps):
-        power = _grip(held, v, f) + scratch.power[0]
+        power = grip(held, v, f) + scratch.power[0]
         rubbed = scratch.power[1]
-        _kick(v, f, weight)
+        kick(v, f, weight)
         push(x, v, whole, half)
-        work = _drift(x, v, motion.load, dt)
+        work = drift(x, v, motion.load, dt)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -254,7 +206,7 @@ def march(
         look = n == steps - 1
         _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books, look)
         less = rigid(x, v, f, motion.mass, whole, half)
-        _kick(v, f, weight)
+        kick(v, f, weight)
         push(x, v, whole, half)
         if turning:
             for e in range(len(motion.theta)):
@@ -263,11 +215,11 @@ def march(
         for r in range(len(bodies.kind)):
             for c in range(3):
                 impulse[r, c] += half * scratch.push[r, c]
-        books[WORK] += work + half * (power + _grip(held, v, f) + scratch.power[0])
+        books[WORK] += work + half * (power + grip(held, v, f) + scratch.power[0])
         books[LOST] += half * (rubbed + scratch.power[1])
         if damping > 0.0:
             books[LOST] -= less * (1.0 - slow * slow)
-            books[LOST] += _slow(v, keep, motion.mass)
+            books[LOST] += slowed(v, keep, motion.mass)
             if turning:
                 for e in range(len(motion.spin)):
                     books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)
