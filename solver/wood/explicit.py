@@ -187,7 +187,7 @@ def march(
     keep[held] = 1.0
     whole = scratch.fragments
     books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
-    steady(x, rods, bodies, scratch.centre, whole)
+    steady(x, v, rods, bodies, scratch.centre, scratch.speed, whole, dt * steps)
     books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
     for n in range(steps):
         power = grip(held, v, f) + scratch.power[0]

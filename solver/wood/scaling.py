@@ -104,17 +104,32 @@ def fragments(rods: Rods, bonds: Bonds, held: np.ndarray, mass: np.ndarray, scal
 
 
 @njit(cache=True, error_model="numpy")
-def steady(x: np.ndarray, rods: Rods, bodies: Bodies, centre: np.ndarray, parts: Fragments) -> None:
-    """Set every g by the edges that touch bodies at `centre` (r, 3) [m]."""
+def steady(
+    x: np.ndarray,
+    v: np.ndarray,
+    rods: Rods,
+    bodies: Bodies,
+    centre: np.ndarray,
+    speed: np.ndarray,
+    parts: Fragments,
+    span: float,
+) -> None:
+    """Set every g by the edges that may touch bodies, at `centre` (r, 3) [m] with `speed` [m/s], within `span` [s]."""
     if len(parts.gain) == 0:
         return
+    fast = 0.0
+    for i in range(len(v)):
+        fast = max(fast, v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
+    way = np.sqrt(fast)
+    for r in range(len(speed)):
+        way = max(way, np.sqrt(fast) + np.sqrt(speed[r, 0] ** 2 + speed[r, 1] ** 2 + speed[r, 2] ** 2))
     touching = np.zeros(len(parts.gain))
     for e in range(len(rods.a)):
         if rods.k[e] == 0.0:
             continue
         a = rods.a[e]
         b = rods.b[e]
-        near = _NEAR * rods.rest[e]
+        near = _NEAR * rods.rest[e] + way * span
         for r in range(len(bodies.kind)):
             found = True
             for c in range(3):

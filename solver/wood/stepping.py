@@ -108,7 +108,9 @@ def explicit(
     start = real(state) + float(state.books[: CONTACT + 1].sum())
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking = params.fracture != "none"
-    chunk = look if breaking or params.rod_contact else max(_BATCH // len(wood.motion.x) // look, 1) * look
+    # scaled masses follow what touches, at times that do not depend on which are wanted
+    often = breaking or params.rod_contact or wood.scaling > 1
+    chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
     scale, since, listing = floor(wood, params), 0, Listing(wood, params)
     for wanted in times:
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
