@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contract import Context, NotConverged, Unstable
-from ..shell.inverse import normals
+from ..shell.normals import normals
 from .active import Habit, Settled, settle
 from .energy import StepEnergy, ahead
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
