@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numba import get_num_threads, njit, prange, set_num_threads
 
-from solver.dehydration.contact import ACTIVE, HITS, PAIRS, SEARCHES, find_pairs, grow, make_contact, push_apart
-from solver.dehydration.contact_data import OPPOSED
+from solver.dehydration.contact import push_apart
+from solver.dehydration.contact_data import ACTIVE, HITS, OPPOSED, PAIRS, SEARCHES, grow, make_contact
+from solver.dehydration.contact_search import find_pairs
 from solver.dehydration.penetration import penetration, penetration_depths
 
 SINGLE = np.float32

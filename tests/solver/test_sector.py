@@ -10,7 +10,7 @@ import pytest
 from solver import registry
 from solver.contract import Context, InvalidGeometry
 from solver.dehydration import motion
-from solver.dehydration.contact import HITS
+from solver.dehydration.contact_data import HITS
 from solver.dehydration.imperfection import heights
 from solver.dehydration.kernel import build_layout, make_skin, march, new_state, positions
 from solver.dehydration.mesh import build_mesh
