@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numba
 import numpy as np
 import pytest
 
@@ -28,14 +27,9 @@ from solver.dehydration.kernel.reload import reload
 from solver.dehydration.loading import Loading
 from solver.dehydration.mesh import build_mesh, cubed_sphere, layer_fractions
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 SOLVER = registry.get("dehydration")
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
 
 
 def parse(preset="sphere", **values):

@@ -6,7 +6,6 @@ import json
 from itertools import pairwise
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
@@ -26,20 +25,14 @@ from solver.dehydration.kernel import (
 from solver.dehydration.mesh import build_mesh
 from solver.dehydration.params import DehydrationParams
 
-from .implicit_twin import block, rotation
-from .radial_reference import radial_reference
-from .test_kernel import block_mesh
+from ._implicit_twin import block, rotation
+from ._kernel_twin import block_mesh
+from ._radial_reference import radial_reference
+
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 FRUIT = DehydrationParams.parse({"te": 0.1})
 THETA = 0.95
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    """Meshes are small and machines busy: waiting for a second thread would take most of the time."""
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
 
 
 # ---------------------------------------------------------------------------------------------------------- patch
