@@ -11,12 +11,13 @@ import httpx
 import pytest
 from pydantic import BaseModel
 
-from service import errors, problems
+from service import errors
 from service.app import create_app
 from service.settings import Settings
 from solver import contract
 from store import errors as stored
 
+from ._asking import checked
 from .conftest import served
 
 EXPECTED: dict[type[Exception], int] = {
@@ -103,17 +104,6 @@ def faulty(built: Path) -> Iterator[httpx.Client]:
 
     with served(app) as client:
         yield client
-
-
-def checked(answer: httpx.Response, status: int, code: str) -> dict:
-    assert answer.status_code == status
-    assert answer.headers["content-type"] == "application/problem+json"
-    problem = answer.json()
-    problems.Problem.model_validate(problem)
-    assert (problem["status"], problem["type"]) == (status, f"urn:wizen:problem:{code}")
-    assert problem["request_id"] == answer.headers["x-request-id"]
-    assert "Traceback" not in answer.text
-    return problem
 
 
 @pytest.mark.parametrize(("kind", "status"), EXPECTED.items(), ids=lambda v: getattr(v, "__name__", str(v)))

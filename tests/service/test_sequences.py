@@ -21,38 +21,12 @@ from scipy.special import sph_harm_y
 from service.errors import InvalidQuery, UnfitFormat
 from service.sequences import EXPORTS, STILLS, Options, Sequence, of_run, prepared, write
 from service.sequences.bake import baked
-from solver import meshes, registry
-from solver.fruit import directions, lattice
+from solver import registry
+from solver.fruit import lattice
 from sweeps import colours
 
-STAGES = (0.0, 2.0, 5.0)
-
-
-def shrinking(n: int = 8, **fields: np.ndarray) -> xr.Dataset:
-    ball = directions(*lattice(n))
-    position = np.stack([(1 - 0.1 * k) * ball + [0.3 * k, 0, 0] for k in range(len(STAGES))])
-    data = {"position": (("stage", "colatitude", "azimuth", "component"), position.astype("f4"))}
-    data |= {name: (("stage", "colatitude", "azimuth"), values) for name, values in fields.items()}
-    return xr.Dataset(data, {"stage": list(STAGES)}, {"solver": "decay"})
-
-
-def rotting(n: int = 8) -> xr.Dataset:
-    """An orange whose rot falls from pole to pole and grows by stage."""
-    theta, _ = lattice(n)
-    rot = np.stack([k / 2 * (1 + np.cos(theta)) / 2 for k in range(3)]).astype("f4")
-    run = shrinking(n, rot=rot, mould=rot / 2, mould_active=rot / 4)
-    run.attrs["params"] = registry.get("decay").parse({}, "orange").model_dump_json()
-    return run
-
-
-def splitting(metres: float = 0.01) -> xr.Dataset:
-    """A box that becomes a ball: triangles change."""
-    solids = [trimesh.creation.box(), trimesh.creation.icosphere(2), trimesh.creation.icosphere(1)]
-    frames = [
-        meshes.Frame(np.array(s.vertices, "f4"), np.array(s.faces), {"heat": np.array(s.vertices[:, 1], "f4")})
-        for s in solids
-    ]
-    return xr.Dataset(meshes.changing(frames), {"stage": list(STAGES)}, {"metres_per_unit": metres, "solver": "growth"})
+from ._gltf import accessor, parsed
+from ._runs import STAGES, rotting, shrinking, splitting
 
 
 def made(run: xr.Dataset, name: str, stage: float | None = None, **options: object) -> bytes:
@@ -143,19 +117,6 @@ def test_usd_samples_triangles_that_change_and_knows_the_metre(tmp_path: Path) -
 
 
 # --- animated glTF, by trimesh and by its JSON --------------------------------------------------------------------
-
-
-def parsed(data: bytes) -> tuple[dict, bytes]:
-    length = struct.unpack_from("<I", data, 12)[0]
-    return json.loads(data[20 : 20 + length]), data[28 + length :]
-
-
-def accessor(document: dict, binary: bytes, index: int) -> np.ndarray:
-    found = document["accessors"][index]
-    view = document["bufferViews"][found["bufferView"]]
-    kind = {5126: "<f4", 5123: "<u2", 5125: "<u4"}[found["componentType"]]
-    values = np.frombuffer(binary[view["byteOffset"] :][: view["byteLength"]], kind)
-    return values.reshape(found["count"], -1)
 
 
 def test_a_moving_shape_is_one_mesh_with_morph_targets() -> None:

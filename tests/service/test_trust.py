@@ -27,9 +27,9 @@ from store.store import Store
 from store.tokens import Tokens
 
 from ..store.conftest import answer, fill
+from ._asking import checked
+from ._shapes import points
 from .conftest import QUERY, SHAPE, build, client_of
-from .test_problems import checked
-from .test_viewer import points
 
 POINT = {"te": 0.03, "gamma": 7.0}
 
