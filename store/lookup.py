@@ -76,7 +76,7 @@ class Shape:
     expected_error: Mapping[str, float] | None = None
     method: str = ""
 
-    @property
+    @cached_property
     def normals(self) -> Array:
         """Outward unit normals (n, 2n, 3), computed when first asked for.
 
@@ -84,20 +84,6 @@ class Shape:
             OutsideTable: the positions were not asked for.
 
         """
-        return self._normals[0]
-
-    @property
-    def pole_normals(self) -> Array:
-        """Outward unit normals (2, 3) at the poles, computed when first asked for.
-
-        Raises:
-            OutsideTable: the positions were not asked for.
-
-        """
-        return self._normals[1]
-
-    @cached_property
-    def _normals(self) -> tuple[Array, Array]:
         if self.position is None:
             raise OutsideTable("normals follow from positions.", "Ask for the field 'position'.")
         if self.poles is None or self.poles.shape[1] != 3:

@@ -233,11 +233,6 @@ class InternalForce(NamedTuple):
     scale: float
     """root of the sum, over all elements, of their squared nodal forces at free nodes"""
 
-    @property
-    def relative_residual(self) -> float:
-        """Norm over scale; 0 in a state without any stress."""
-        return self.norm / self.scale if self.scale > 0 else 0.0
-
 
 @njit(cache=True, error_model="numpy")
 def _sum_rows(row_start: State, rows: State, forces: Singles, squares: Singles, nodal: Floats, total: Floats) -> None:
