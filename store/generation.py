@@ -213,7 +213,7 @@ def _rounded(values: NDArray[Any]) -> NDArray[Any]:
 def left_out(opened: Mapping[str, Column]) -> tuple[NDArray[Any], str] | None:
     """Return the measures (sample, stage, measure) of samples predicted from the others, and by which method.
 
-    None for a table of one sample, of no fruits, or built before they were stored.
+    None for a table that holds none: of one sample, or of no fruits.
     """
     names = [f"left_out_{name}" for name in Measures._fields]
     if names[0] not in opened:
