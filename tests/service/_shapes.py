@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from service.formats import About
 from service.formats.points import MAGIC
 from solver.fruit import azimuths, colatitudes, directions, lattice
-from store.lookup import Shape
+from store.shape import Shape
 
 HALF_AXES = np.array([1.0, 1.4, 0.7])
 ABOUT = About("dehydration", "main", {"gamma": 10.0}, "s", {"te": "r1"})
