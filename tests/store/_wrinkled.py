@@ -10,6 +10,7 @@ from solver.contract import finish
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes, directions, lattice
 from store import harmonics
+from store.methods.weights import Samples
 from store.store import Store
 
 from .conftest import GAMMA, STAGES, TE, _spec, question
@@ -48,3 +49,9 @@ def wrinkled(store: Store, onset: float = 0.0) -> dict[tuple[float, float], np.n
             store.ledger.done(job.key, store.put(job.key, result), 1.0)
             fields[te, gamma] = u
     return fields
+
+
+def grid() -> Samples:
+    """Samples of three te by two gamma."""
+    te, gamma = np.meshgrid([0.02, 0.04, 0.08], [10.0, 100.0], indexing="ij")
+    return Samples(np.stack([te.ravel(), gamma.ravel()], axis=-1))
