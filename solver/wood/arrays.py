@@ -59,8 +59,10 @@ class Bodies(NamedTuple):
     kind: np.ndarray  # (r,) int32: 0 box, 1 cylinder
     axis: np.ndarray  # (r,) int32: of a cylinder
     half: np.ndarray  # (r, 3) half sides of a box [m]; radius, half length, 0 of a cylinder
+    box: np.ndarray  # (r, 3) half sides of the box about it [m]
     friction: np.ndarray  # (r,)
     times: np.ndarray  # (r, w) [s], rising
     points: np.ndarray  # (r, w, 3) centre at these times [m]
-    k: np.ndarray  # (r,) contact stiffness of a vertex [N/m]
+    k: np.ndarray  # (r,) contact stiffness per length of rod [N/m2]
     ease: np.ndarray  # (r,) depth over which it grows to this [m]
+    first: np.ndarray  # (e + 1,) int32: where the numbers of each edge's points begin

@@ -184,7 +184,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         rods_,
         bonds,
         turns,
-        bodied(params, k, _EASE * float(np.median(rods_.radius))),
+        bodied(params, k, _EASE * float(np.median(rods_.radius)), length),
         turning,
         strength,
         rod,

@@ -40,7 +40,7 @@ class Motion(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3), contacts (r, v); pairs of edges."""
+    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3), contacts (r, n); pairs of edges."""
 
     f: np.ndarray
     t: np.ndarray
@@ -51,7 +51,6 @@ class Scratch(NamedTuple):
     speed: np.ndarray
     push: np.ndarray
     power: np.ndarray
-    normals: np.ndarray
     lagged: np.ndarray
     rubbing: Rubbing
 
@@ -102,7 +101,7 @@ def forces(
             motion.v,
             f,
             motion.mass,
-            motion.held,
+            rods,
             bodies,
             scratch.centre,
             scratch.speed,
@@ -110,7 +109,6 @@ def forces(
             rubbing,
             scratch.push,
             scratch.power,
-            scratch.normals,
             scratch.lagged,
         )
     if len(scratch.rubbing.pair) > 0:

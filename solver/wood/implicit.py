@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contract import Context, NotConverged
+from .contact import lag
 from .explicit import CONTACT, LOST, WORK
 from .moment import Reached, State, balanced, begin, copied, floor, kinetic
 from .params import WoodParams
@@ -75,7 +76,7 @@ def _step(
     moved = np.where(m.held[:, None] == 1, x0 + dt * v0, x0)
     guesses: tuple[np.ndarray, ...] = (moved, x0 + dt * v0)
     to, done = Step(xh, vh, share * dt, time + dt), 0.0
-    state.scratch.lagged[:] = state.scratch.normals
+    lag(state)
     rough, pushed = 1.0, 0.0
     try:
         for count in range(_PASSES + 1):
@@ -92,7 +93,7 @@ def _step(
             # the force jumps where something breaks: the way is taken in pieces
             state = found
             here, v_here, parent = state.wood.motion.x.copy(), state.wood.motion.v.copy(), state.wood.parent
-            state.scratch.lagged[:] = state.scratch.normals
+            lag(state)
             f0 = solver.forces(state, time + dt, share * dt).copy()
             to = to._replace(xh=_grown(to.xh, parent), vh=_grown(to.vh, parent))
             guesses = (here,)

@@ -8,17 +8,31 @@ from scipy.spatial import cKDTree
 from ..contract import InvalidGeometry
 from .arrays import Bodies, Bonds
 from .grain import Field
-from .params import WoodParams
+from .params import Body, WoodParams
 
 __all__ = ["bodied", "bonded"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
 _NET = 3.0
+#: Points of contact on what is as long as the narrowest body is wide; the fewest and the most on an edge. Under a
+#: cylinder pressed in by a sixth of its radius, 8 make the force uneven by 1 %, 4 by 5 %.
+_POINTS, _FEWEST, _MOST = 8, 4, 256
 
 
-def bodied(params: WoodParams, k: float, ease: float) -> Bodies:
-    """Return the bodies with contact stiffness k [N/m], gained over the depth `ease` [m]."""
+def _wide(body: Body) -> tuple[float, float]:
+    """Return how wide a body is along x and along y [m]: a cylinder, round, about its radius where it touches."""
+    if body.shape == "box":
+        return body.size[0], body.size[1]
+    across, along = body.size[0] / 2, body.size[1]
+    return (along if body.axis == "x" else across), (along if body.axis == "y" else across)
+
+
+def bodied(params: WoodParams, k: float, ease: float, rest: np.ndarray) -> Bodies:
+    """Return the bodies with a contact stiffness that is gained over the depth `ease` [m].
+
+    k [N/m]: of the mean edge of lengths rest (e,) [m], or of as much of a rod as a narrower body covers.
+    """
     found, width = params.bodies, max((len(b.path) for b in params.bodies), default=1)
     times = np.zeros((len(found), width))
     points = np.zeros((len(found), width, 3))
@@ -33,15 +47,24 @@ def bodied(params: WoodParams, k: float, ease: float) -> Bodies:
         half[r] = np.array(body.size) / 2
         if body.shape == "cylinder":
             half[r, 2] = 0.0
+    widths, mean = [_wide(b) for b in found], float(rest.mean())
+    least = min((min(wide) for wide in widths), default=np.inf)
+    number = np.clip(np.ceil(_POINTS * rest / least), _FEWEST, _MOST)
+    box = half.copy()
+    for r, body in enumerate(found):
+        if body.shape == "cylinder":
+            box[r] = np.where(np.arange(3) == "xyz".index(body.axis), half[r, 1], half[r, 0])
     return Bodies(
         np.array([b.shape == "cylinder" for b in found], np.int32),
         np.array(["xyz".index(b.axis) for b in found], np.int32),
         half,
+        box,
         np.array([b.friction for b in found], float),
         times,
         points,
-        np.full(len(found), k),
+        k / np.array([min(mean, wide[0]) for wide in widths]),
         np.full(len(found), ease),
+        np.concatenate([[0], np.cumsum(number)]).astype(np.int32),
     )
 
 

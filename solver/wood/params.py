@@ -192,7 +192,8 @@ class WoodParams(Params):
         None,
         gt=0,
         le=1e12,
-        description="Stiffness of a vertex's contact; by default a tenth of an edge's",
+        description="Stiffness of the contact of a mean edge, or of as much of a rod as a narrower body covers; "
+        "by default a tenth of an edge's in tension",
         json_schema_extra={"units": "N/m"},
     )
     rod_contact: bool = Field(

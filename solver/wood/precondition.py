@@ -15,6 +15,7 @@ from scipy.linalg import lapack
 
 from ..multifrontal import Factor, factorise
 from .arrays import Bonds, Rods
+from .contact import Touching
 from .dissection import dissected
 from .elements import elements
 from .hessian import Stiffness
@@ -120,10 +121,10 @@ def preconditioner(
     bonds: Bonds,
     free: np.ndarray,
     inertia: np.ndarray,
-    contacts: np.ndarray | None,
+    contacts: Touching | None,
     known: Stiffness | None = None,
 ) -> tuple[Preconditioner, Stiffness]:
-    """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts (v, 3, 3) [N/m].
+    """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts.
 
     known: the pattern, where it still holds. Returns the factor and the pattern.
     """
@@ -134,7 +135,7 @@ def preconditioner(
         for c in range(3):
             blocks[pattern.diagonal, c, c] += inertia[free]
         if contacts is not None:
-            blocks[pattern.diagonal] += contacts[free]
+            contacts.spread(pattern.place, blocks)
         factor = factorise(analysis, blocks)
         if all(b.signs is None for b in factor.blocks):
             break

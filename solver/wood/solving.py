@@ -121,7 +121,7 @@ class Solver:
                 out: np.ndarray = inertia * way
                 apply(parts, way, out)
                 if touching is not None:
-                    out += np.einsum("vij,vj->vi", touching, way)
+                    touching.add(way, out)
                 out[held] = 0.0
                 return out
 

@@ -50,7 +50,10 @@ def longest_step(wood: Wood, contact: float = 0.0) -> float:
             break
         last = highest
     if len(wood.bodies.k):
-        highest += float((wood.bodies.k.sum() / motion.mass[free]).max())
+        solid = np.where(wood.rods.k > 0, wood.rods.rest, 0.0)
+        # each vertex bears the contact of half its edges
+        borne = np.bincount(wood.rods.a, solid / 2, len(free)) + np.bincount(wood.rods.b, solid / 2, len(free))
+        highest += float((wood.bodies.k.sum() * borne[free] / motion.mass[free]).max())
     highest += 4 * contact / float(motion.mass[free].min())
     if wood.turning:
         tight = 2 * wood.turns.beta / wood.rods.span

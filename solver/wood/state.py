@@ -53,7 +53,6 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((r, 3)),
         np.zeros((r, 3)),
         np.zeros(2),
-        np.zeros((r, v)),
-        np.zeros((r, v)),
+        np.zeros((r, wood.bodies.first[-1] if r else 0)),
         none(),
     )

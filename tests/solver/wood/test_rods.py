@@ -1,7 +1,5 @@
 """Rods and bonds against differences, plain numpy, closed forms and conservation laws."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.integrate import simpson, solve_bvp
@@ -10,9 +8,7 @@ from scipy.optimize import brentq
 
 from solver.contract import Context, Need
 from solver.wood import SOLVER
-from solver.wood.arrays import Bodies
 from solver.wood.bundle import lay
-from solver.wood.contact import RUBBING, contacts
 from solver.wood.elements import apply, elements
 from solver.wood.explicit import forces
 from solver.wood.hessian import Stiffness
@@ -116,33 +112,6 @@ def test_products_by_elements_are_the_matrix_s_and_positive_ones_are_positive():
     kept = elements(m.x, wood.rods, wood.bonds, positive=True)
     lowest, highest = np.linalg.eigvalsh(kept.h).T[[0, -1]]
     assert (lowest >= -1e-12 * highest.max()).all()
-
-
-def test_the_stiffness_of_contacts_is_the_force_s_difference():
-    bodies = [
-        {"shape": "cylinder", "size": (0.05, 0.2, 0), "path": [{"time": 0, "position": (0.07, 0, -0.024)}]},
-        {"size": (0.03, 0.1, 0.05), "path": [{"time": 0, "position": (0.01, 0, 0.024)}]},
-    ]
-    wood = lay(SOLVER.parse({"rods": 12, "vertices": 10, "bodies": bodies, "clamp": "none"}), 10)
-    state, m, dt = begin(wood), wood.motion, 1e-3
-    bare = begin(replace(wood, bodies=Bodies(*(a[:0] for a in wood.bodies))))
-    generator = np.random.default_rng(4)
-    x, way = m.x.copy(), generator.normal(size=m.x.shape)
-    v = 4e-4 * generator.normal(size=m.x.shape)
-    state.scratch.lagged[:] = generator.uniform(0, 1, state.scratch.lagged.shape)
-    found, h = [], 1e-9
-    for sign in (1, -1, 0):
-        m.x[:], m.v[:] = x + sign * h * way, v + sign * h / dt * way
-        for one in (state, bare):
-            w = one.wood
-            forces(m, w.rods, w.bonds, w.turns, w.bodies, one.scratch, False, 0.0, dt, RUBBING, one.books)
-        found.append(state.scratch.f - bare.scratch.f)
-    assert (found[2] != 0).any(1).sum() > 4
-    expected = (found[1] - found[0]) / (2 * h)
-    got = np.einsum("vij,vj->vi", contacts(state, dt, False), way)
-    # the turning of the plane of friction with the point of contact is left out
-    assert np.linalg.norm(got - expected) < 1e-3 * np.linalg.norm(expected)
-    assert np.linalg.eigvalsh(contacts(state, dt, True)).min() > -1e-9
 
 
 @pytest.mark.parametrize("twist", [False, True])

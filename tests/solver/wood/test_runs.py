@@ -5,8 +5,6 @@ import pytest
 
 from solver.contract import InvalidGeometry, InvalidInput, Need, SolverError
 from solver.wood import SOLVER
-from solver.wood.arrays import Bodies
-from solver.wood.bodies import press
 from solver.wood.bonds import bind
 from solver.wood.bundle import lay
 from solver.wood.fracture import break_worst
@@ -110,42 +108,6 @@ def test_what_a_body_receives_is_what_the_rods_lose():
     assert gained == pytest.approx(-mass * 9.81 * 0.05, rel=1e-2)
     assert np.abs(found.impulse.values[:, :2]).max() < 1e-3 * abs(gained)
     assert found.residual.values.max() < 1e-2
-
-
-def test_friction_is_coulomb_s():
-    one = np.zeros((1, 3))
-    for kind in (0, 1):
-        half = np.array([[1.0, 1.0, 1.0]])
-        body = Bodies(
-            np.array([kind], np.int32),
-            np.array([1], np.int32),
-            half,
-            np.array([0.4]),
-            one[:, :1],
-            one[:, None],
-            np.array([1e3]),
-            np.zeros(1),
-        )
-        f, push, power = np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(2)
-        x, v = np.array([[0.0, 0.1, 0.99]]), np.array([[2.0, 0.0, 0.0]])
-        args = (
-            np.array([1.0]),
-            np.zeros(1, np.uint8),
-            body,
-            np.zeros((1, 3)),
-            np.zeros((1, 3)),
-            1e-3,
-            0.0,
-            push,
-            power,
-            np.zeros((1, 1)),
-            np.zeros((1, 1)),
-        )
-        energy = press(x, v, f, *args)
-        assert f[0] == pytest.approx([-4.0, 0, 10.0])
-        assert push[0] == pytest.approx([4.0, 0, -10.0])
-        assert power == pytest.approx([0, 8.0])
-        assert energy == pytest.approx(0.05)
 
 
 def test_bdf2_is_of_second_order_and_agrees_with_the_explicit_scheme():
