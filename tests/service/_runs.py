@@ -6,6 +6,7 @@ import numpy as np
 import trimesh
 import xarray as xr
 
+from service.sequences import EXPORTS, Options, prepared, write
 from solver import meshes, registry
 from solver.fruit import directions, lattice
 
@@ -37,3 +38,8 @@ def splitting(metres: float = 0.01) -> xr.Dataset:
         for s in solids
     ]
     return xr.Dataset(meshes.changing(frames), {"stage": list(STAGES)}, {"metres_per_unit": metres, "solver": "growth"})
+
+
+def made(run: xr.Dataset, name: str, stage: float | None = None, **options: object) -> bytes:
+    chosen, asked = EXPORTS[name], Options.parse(dict(options))
+    return write(prepared(run, asked, stage, chosen.single), chosen, asked)
