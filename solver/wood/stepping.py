@@ -10,7 +10,7 @@ from ..contract import Context, Unstable
 from .explicit import BENDING, BONDS, CONTACT, LOST, STRETCH, forces, march
 from .fracture import break_worst, overstress
 from .listing import Listing
-from .moment import Reached, State, balanced, begin, copied, floor, kinetic, largest
+from .moment import Reached, State, balanced, begin, copied, floor, largest, real
 from .params import WoodParams
 from .state import Wood, scratch_for
 
@@ -20,6 +20,8 @@ __all__ = ["broken", "explicit"]
 _LOOK, _FEWEST, _MOST = 6000, 4, 32
 #: Seconds of wall time between looks at the context, about, as steps times vertices.
 _BATCH = 500_000
+#: Of the bound of strain over strength, below which nothing breaks: it is rounded otherwise than what it bounds.
+_BELOW = 0.999
 
 
 def broken(state: State, params: WoodParams, time: float, dt: float, share: float = 1.0) -> State:
@@ -28,9 +30,13 @@ def broken(state: State, params: WoodParams, time: float, dt: float, share: floa
     share: of the elastic energy that a pass may release, over `cascade`.
     """
     wood, scratch = state.wood, state.scratch
+    anywhere = params.fracture == "stress"
+    hard = (scratch.each > wood.bonds.limit).any()
+    # most looks find nothing: a bound says so for less
+    if anywhere and not wood.turning and not hard and float(scratch.found[:, 3].max()) < _BELOW:
+        return state
     ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
     m = wood.motion
-    anywhere = params.fracture == "stress"
     top = overstress(
         wood.rods,
         scratch.t,
@@ -43,16 +49,18 @@ def broken(state: State, params: WoodParams, time: float, dt: float, share: floa
         ratio,
         place,
     )
-    if top <= 1 and not (scratch.each > wood.bonds.limit).any():
+    if top <= 1 and not hard:
         return state
-    before = state.books[: CONTACT + 1].sum()
+    before = state.books[: CONTACT + 1].sum() + real(state)
     allowed = min(share * params.cascade, 1.0) * float(state.books[[STRETCH, BENDING, BONDS]].sum())
     wood, rods, bonds = break_worst(wood, ratio, place, scratch.each, allowed)
     scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, 0.0, books)
-    books[LOST] += before - books[: CONTACT + 1].sum()
-    return state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds)
+    found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds)
+    # what fragments that come off no longer have by their scaled mass is lost, too
+    books[LOST] += before - books[: CONTACT + 1].sum() - real(found)
+    return found
 
 
 def _advance(state: State, params: WoodParams, time: float, dt: float, steps: int) -> State:
@@ -97,10 +105,12 @@ def explicit(
 
     """
     state = begin(wood)
-    start = kinetic(wood) + float(state.books[: CONTACT + 1].sum())
+    start = real(state) + float(state.books[: CONTACT + 1].sum())
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking = params.fracture != "none"
-    chunk = look if breaking or params.rod_contact else max(_BATCH // len(wood.motion.x) // look, 1) * look
+    # scaled masses follow what touches, at times that do not depend on which are wanted
+    often = breaking or params.rod_contact or wood.scaling > 1
+    chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
     scale, since, listing = floor(wood, params), 0, Listing(wood, params)
     for wanted in times:
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
