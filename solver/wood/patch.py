@@ -126,6 +126,7 @@ def cut_out(state: State, inside: np.ndarray) -> Patch:
         bonds=ties,
         bodies=bodies._replace(first=first),
         turns=wood.turns._replace(inertia=wood.turns.inertia[edges]),
+        strength=wood.strength[edges],
         parent=np.arange(len(vertices), dtype=np.int32),
     )
     scratch = scratch_for(small)
