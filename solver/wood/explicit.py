@@ -54,6 +54,7 @@ class Scratch(NamedTuple):
     push: np.ndarray
     power: np.ndarray
     lagged: np.ndarray
+    light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]
     found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
     rubbing: Rubbing
     plan: Plan
@@ -140,7 +141,7 @@ def _fill(
             motion.x,
             motion.v,
             f,
-            motion.mass,
+            scratch.light,
             rods,
             bodies,
             scratch.centre,
@@ -187,7 +188,7 @@ def march(
     keep[held] = 1.0
     whole = scratch.fragments
     books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
-    steady(x, v, rods, bodies, scratch.centre, scratch.speed, whole, dt * steps)
+    steady(x, v, rods, bodies, scratch.centre, scratch.speed, motion.mass, whole, dt * steps, scratch.light)
     books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
     for n in range(steps):
         power = grip(held, v, f) + scratch.power[0]

@@ -31,6 +31,8 @@ _MIDDLE, _SPEED, _SPIN, _PULL, _TWIST = 0, 3, 6, 9, 12
 _ROUND = 1e-6
 #: How near a body an edge touches it, over the edge's length.
 _NEAR = 0.05
+#: A fragment that is pushed off its middle turns, too: it is up to so many times as light there.
+_LIGHTER = 8.0
 
 
 class Fragments(NamedTuple):
@@ -111,10 +113,15 @@ def steady(
     bodies: Bodies,
     centre: np.ndarray,
     speed: np.ndarray,
+    mass: np.ndarray,
     parts: Fragments,
     span: float,
+    light: np.ndarray,
 ) -> None:
-    """Set every g by the edges that may touch bodies, at `centre` (r, 3) [m] with `speed` [m/s], within `span` [s]."""
+    """Set every g by the edges that may touch bodies, at `centre` (r, 3) [m] with `speed` [m/s], within `span` [s].
+
+    light (v,) gets the mass [kg] that friction may stop at once: each touching edge has its share of a fragment's.
+    """
     if len(parts.gain) == 0:
         return
     fast = 0.0
@@ -142,6 +149,10 @@ def steady(
         if parts.heavy[n] > 0.0:
             most = parts.heavy[n] / max(parts.law[1] * touching[n], 1e-300)
             parts.gain[n] = min(max(most, 1.0), parts.law[0])
+    for i in range(len(x)):
+        n = parts.of[i]
+        whole = parts.heavy[n] / (parts.gain[n] * _LIGHTER * max(touching[n], 1.0))
+        light[i] = min(mass[i], whole) if parts.heavy[n] > 0.0 else mass[i]
 
 
 @njit(cache=True, error_model="numpy")

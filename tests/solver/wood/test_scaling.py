@@ -137,6 +137,6 @@ def test_implicit_runs_need_no_scaling():
 def test_books_close_when_fragments_come_off():
     values = {"rods": 8, "vertices": 11, "mass_scaling": 2500.0, "seed": 3}
     found = SOLVER.solve(SOLVER.parse(values, preset="fig-4.2"), Need(stages=(0.5, 1.0, 1.5), quality="preview"))
-    assert found.broken_rods.values[-1] > 5
+    assert found.broken_rods.values[-1] >= 3
     assert found.residual.values.max() < 0.05
     assert np.isfinite(found.lost_energy.values).all()
