@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contract import Context, NotConverged
-from .contact import lag
 from .explicit import CONTACT, LOST, WORK
+from .listing import Listing
 from .moment import Reached, State, balanced, begin, copied, floor, kinetic
 from .params import WoodParams
 from .settings import Settings
@@ -76,11 +76,12 @@ def _step(
     moved = np.where(m.held[:, None] == 1, x0 + dt * v0, x0)
     guesses: tuple[np.ndarray, ...] = (moved, x0 + dt * v0)
     to, done = Step(xh, vh, share * dt, time + dt), 0.0
-    lag(state)
+    solver.lag(state)
     rough, pushed = 1.0, 0.0
     try:
         for count in range(_PASSES + 1):
             error, scale = solver.solve(state, to, guesses, scale, rough if count < _PASSES else 1.0)
+            state = solver.listing.fitted(state)
             span = (time + dt if count else time, time + dt)
             along, given = _along(solver, state, (here, v_here, f0), span, to.bdt)
             done, pushed = done + along, pushed + given
@@ -93,8 +94,7 @@ def _step(
             # the force jumps where something breaks: the way is taken in pieces
             state = found
             here, v_here, parent = state.wood.motion.x.copy(), state.wood.motion.v.copy(), state.wood.parent
-            lag(state)
-            f0 = solver.forces(state, time + dt, share * dt).copy()
+            f0 = solver.again(state, time + dt, share * dt)
             to = to._replace(xh=_grown(to.xh, parent), vh=_grown(to.vh, parent))
             guesses = (here,)
     except NotConverged:
@@ -177,7 +177,8 @@ def implicit(
     """
     state, past, dt = begin(wood), None, settings.step
     start = kinetic(wood) + float(state.books[: CONTACT + 1].sum())
-    solver, done = Solver(params, settings.tolerance), 0
+    listing = Listing(wood, params)
+    solver, done = Solver(params, settings.tolerance, listing), 0
     for wanted in times:
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
         while done < ahead:
@@ -189,5 +190,5 @@ def implicit(
         rest = wanted - ahead * dt
         if rest > 1e-9 * dt:
             # on a factor of its own: later steps must not know of this one
-            shown, _, _ = _step(Solver(params, settings.tolerance), copied(state), past, ahead * dt, rest)
+            shown, _, _ = _step(Solver(params, settings.tolerance, listing), copied(state), past, ahead * dt, rest)
         yield balanced(copied(shown), wanted, start, floor(wood, params), balance)

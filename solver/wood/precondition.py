@@ -15,7 +15,7 @@ from scipy.linalg import lapack
 
 from ..multifrontal import Factor, factorise
 from .arrays import Bonds, Rods
-from .contact import Touching
+from .contact import Contacts
 from .dissection import dissected
 from .elements import elements
 from .hessian import Stiffness
@@ -121,7 +121,7 @@ def preconditioner(
     bonds: Bonds,
     free: np.ndarray,
     inertia: np.ndarray,
-    contacts: Touching | None,
+    contacts: Contacts,
     known: Stiffness | None = None,
 ) -> tuple[Preconditioner, Stiffness]:
     """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts.
@@ -134,8 +134,7 @@ def preconditioner(
         blocks = pattern.summed(elements(x, rods, bonds, positive=not full))
         for c in range(3):
             blocks[pattern.diagonal, c, c] += inertia[free]
-        if contacts is not None:
-            contacts.spread(pattern.place, blocks)
+        contacts.spread(pattern.place, blocks)
         factor = factorise(analysis, blocks)
         if all(b.signs is None for b in factor.blocks):
             break

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contract import NotConverged
-from .contact import RUBBING, contacts
+from .contact import RUBBING, contacts, lag
 from .elements import apply, elements
-from .explicit import CONTACT, forces
+from .explicit import CONTACT, LOST, forces
 from .hessian import Stiffness
+from .listing import Listing
 from .moment import State, strength
 from .newton import descend
 from .params import WoodParams
@@ -44,8 +45,8 @@ class Step(NamedTuple):
 class Solver:
     """The iteration with its factor, over one run."""
 
-    def __init__(self, params: WoodParams, tolerance: float) -> None:
-        self.params, self.tolerance = params, tolerance
+    def __init__(self, params: WoodParams, tolerance: float, listing: Listing) -> None:
+        self.params, self.tolerance, self.listing = params, tolerance, listing
         self._factor: Preconditioner | None = None
         self._pattern: Stiffness | None = None
         self._key: tuple[int, ...] = ()
@@ -60,16 +61,29 @@ class Solver:
         pattern = self._pattern if self._key == key else None
         inertia = m.mass * (1 / bdt + self.params.damping) / bdt
         self._factor, self._pattern = preconditioner(
-            m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(state, bdt, True), pattern
+            m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(self.listing.fitted(state), bdt, True), pattern
         )
         self._key, self._bdt, self._fresh, self._excess = key, bdt, 0, 0
         self.factors += 1
 
     def forces(self, state: State, time: float, dt: float) -> np.ndarray:
         """Fill the state's forces for its x and v at `time`; return them (v, 3) [N]."""
-        w = state.wood
-        forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, state.scratch, False, time, dt, RUBBING, state.books)
+        w, s = state.wood, self.listing.fitted(state).scratch
+        forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, s, False, time, dt, RUBBING, state.books)
         return state.scratch.f
+
+    def lag(self, state: State) -> None:
+        """Take the normal forces where the state is as those that friction follows."""
+        lag(state)
+        self.listing.lag(state)
+
+    def again(self, state: State, time: float, dt: float) -> np.ndarray:
+        """Return the forces (v, 3) [N] after breaks; what rods freed to touch have at once is booked as lost."""
+        before = float(state.books[: CONTACT + 1].sum())
+        self.lag(state)
+        f = self.forces(state, time, dt).copy()
+        state.books[LOST] += before - float(state.books[: CONTACT + 1].sum())
+        return f
 
     def solve(
         self, state: State, step: Step, guesses: tuple[np.ndarray, ...], least: float, rough: float = 1.0
@@ -95,6 +109,7 @@ class Solver:
             r[held] = 0.0
             return r
 
+        guesses = tuple(self.listing.near(state, x) for x in guesses)
         norms = [float(np.linalg.norm(residual(x))) for x in guesses]
         x = guesses[int(np.nanargmin(norms))]
         scale = max(norms[0], _LEAST * strength(wood, p), least)
@@ -109,19 +124,19 @@ class Solver:
             """Return the share of a step that turns and stretches no edge by much, and passes through no body."""
             apart = np.linalg.norm(way[second] - way[first], axis=1)
             share = 1.0 / max(float((apart / turned).max()), 1e-300)
-            return min(share, contact / max(float(np.abs(way).max()), 1e-300))
+            share = min(share, contact / max(float(np.abs(way).max()), 1e-300))
+            return self.listing.allowed(state, way, share)
 
         inertia = (m.mass * (1 / step.bdt + p.damping) / step.bdt)[:, None]
 
         def stiffness(positive: bool) -> Callable[[np.ndarray], np.ndarray]:
             parts = elements(m.x, wood.rods, wood.bonds, positive)
-            touching = contacts(state, step.bdt, positive)
+            touching = contacts(self.listing.fitted(state), step.bdt, positive)
 
             def times(way: np.ndarray) -> np.ndarray:
                 out: np.ndarray = inertia * way
                 apply(parts, way, out)
-                if touching is not None:
-                    touching.add(way, out)
+                touching.add(way, out)
                 out[held] = 0.0
                 return out
 
