@@ -212,8 +212,9 @@ def test_pressed_rods_rest_where_the_penalty_bears_the_load():
         assert middle[1] - middle[0] == pytest.approx(thick - depth, rel=0.03)
         bow = x[:, 5, 2] - (x[:, 0, 2] + x[:, -1, 2]) / 2
         ends.append([*bow, middle[1] - middle[0], found.state.books[3]])
-    # the rods bow alike (they may rock, balanced as they are), lie as deep in each other, and press as hard
-    assert ends[0] == pytest.approx(ends[1], rel=0.01)
+    # they lie as deep in each other and press as hard; they bow alike as far as they rock alike, balanced as they are
+    assert ends[0][2:] == pytest.approx(ends[1][2:], rel=1e-3)
+    assert ends[0][:2] == pytest.approx(ends[1][:2], rel=0.05)
 
 
 def test_a_long_implicit_step_passes_no_rod_through_another():
