@@ -10,6 +10,7 @@ from numba import njit
 from .arrays import Bodies, Rods
 from .bodies import apart, eased, points, touch
 from .crossing import Crossing, crossings
+from .hessian import Stiffness
 from .moment import State
 
 __all__ = ["RUBBING", "Contacts", "Touching", "contacts", "lag"]
@@ -161,10 +162,10 @@ class Touching(NamedTuple):
         """Add the product with `way` to out, both (v, 3)."""
         _times(self.a, self.b, self.h, way, out)
 
-    def spread(self, at: np.ndarray, out: np.ndarray) -> None:
-        """Add to the blocks out (nnz, 3, 3); at (e, 3, 3): where those of an edge's ends are, -1 where one is held."""
+    def spread(self, pattern: Stiffness, out: np.ndarray) -> None:
+        """Add to the pattern's blocks out (nnz, 3, 3)."""
         for p, q, n in ((0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 2)):
-            to = at[self.edge, p, q]
+            to = pattern.place[self.edge, p, q]
             np.add.at(out, to[to >= 0], self.h[to >= 0, n])
 
 
@@ -178,10 +179,16 @@ class Contacts(NamedTuple):
         for part in self.parts:
             part.add(way, out)
 
-    def spread(self, at: np.ndarray, out: np.ndarray) -> None:
-        """Add to the blocks out (nnz, 3, 3) what has a place there; at (e, 3, 3): where those of an edge's ends are."""
+    def spread(self, pattern: Stiffness, out: np.ndarray) -> None:
+        """Add to the pattern's blocks out (nnz, 3, 3) what has a place there."""
         for part in self.parts:
-            part.spread(at, out)
+            part.spread(pattern, out)
+
+    def couples(self) -> np.ndarray:
+        """Return the vertices (m, 2) that contacts couple and no edge does."""
+        return np.concatenate(
+            [np.zeros((0, 2), np.int64), *(p.couples() for p in self.parts if isinstance(p, Crossing))]
+        )
 
 
 def contacts(state: State, dt: float, positive: bool) -> Contacts:

@@ -14,6 +14,7 @@ from numba import njit
 
 from .arrays import Rods
 from .bodies import eased
+from .hessian import Stiffness
 from .rubbing import MIDDLE, Rubbing, crossed
 
 __all__ = ["Crossing", "crossings"]
@@ -62,11 +63,10 @@ def _crossings(
     dt: float,
     slow: float,
     positive: bool,
-    which: np.ndarray,
     vertices: np.ndarray,
     h: np.ndarray,
 ) -> int:
-    """Write pairs that touch, their vertices (n, 4) and their stiffness (n, 12, 12); return their number."""
+    """Write the vertices (n, 4) of pairs that touch and their stiffness (n, 12, 12); return their number."""
     thick, stiff, friction, ease = rubbing.law[0], rubbing.law[1], rubbing.law[2], rubbing.law[3]
     n = np.zeros(3)
     slide = np.zeros(3)
@@ -81,7 +81,6 @@ def _crossings(
         square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
         if gap <= 0.0 or square == 0.0:
             continue
-        which[number] = m
         _, normal, second = eased(gap, stiff, ease)
         along = 0.0
         for c in range(3):
@@ -138,7 +137,6 @@ def _times(vertices: np.ndarray, h: np.ndarray, way: np.ndarray, out: np.ndarray
 class Crossing(NamedTuple):
     """The stiffness of contacts between rods, pair by pair."""
 
-    pair: np.ndarray  # (n, 2) int32 edges
     vertices: np.ndarray  # (n, 4) int64
     h: np.ndarray  # (n, 12, 12) [N/m]
 
@@ -146,13 +144,17 @@ class Crossing(NamedTuple):
         """Add the product with `way` to out, both (v, 3)."""
         _times(self.vertices, self.h, way, out)
 
-    def spread(self, at: np.ndarray, out: np.ndarray) -> None:
-        """Add each edge's own blocks to out (nnz, 3, 3) at (e, 3, 3); what couples two edges has no place there."""
-        for side in (0, 1):
-            for p in (0, 1):
-                for q in (0, 1):
-                    to, k, j = at[self.pair[:, side], p, q], 3 * (2 * side + p), 3 * (2 * side + q)
-                    np.add.at(out, to[to >= 0], self.h[to >= 0, k : k + 3, j : j + 3])
+    def spread(self, pattern: Stiffness, out: np.ndarray) -> None:
+        """Add to the pattern's blocks out (nnz, 3, 3) what has a place there."""
+        for p in range(4):
+            for q in range(4):
+                to = pattern.at(self.vertices[:, p], self.vertices[:, q])
+                np.add.at(out, to[to >= 0], self.h[to >= 0, 3 * p : 3 * p + 3, 3 * q : 3 * q + 3])
+
+    def couples(self) -> np.ndarray:
+        """Return the vertices (m, 2) of different edges that it couples."""
+        one = self.vertices[:, [0, 0, 1, 1]].ravel()
+        return np.unique(np.column_stack([one, self.vertices[:, [2, 3, 2, 3]].ravel()]), axis=0)
 
 
 def crossings(
@@ -163,6 +165,6 @@ def crossings(
     slow [m/s]: slip at which friction has its full size; positive: as the factor needs it.
     """
     count = len(rubbing.pair)
-    which, vertices, h = np.empty(count, np.int64), np.zeros((count + 1, 4), np.int64), np.empty((count, 12, 12))
-    number = _crossings(x, v, rods, rubbing, dt, slow, positive, which, vertices, h)
-    return Crossing(rubbing.pair[which[:number]], vertices[:number], h[:number])
+    vertices, h = np.zeros((count + 1, 4), np.int64), np.empty((count, 12, 12))
+    number = _crossings(x, v, rods, rubbing, dt, slow, positive, vertices, h)
+    return Crossing(vertices[:number], h[:number])

@@ -128,13 +128,13 @@ def preconditioner(
 
     known: the pattern, where it still holds. Returns the factor and the pattern.
     """
-    pattern = known or Stiffness(rods, bonds, free)
+    pattern = known or Stiffness(rods, bonds, free, contacts.couples())
     analysis = dissected(x[free], pattern.indptr, pattern.indices)
     for full in (True, False):
         blocks = pattern.summed(elements(x, rods, bonds, positive=not full))
         for c in range(3):
             blocks[pattern.diagonal, c, c] += inertia[free]
-        contacts.spread(pattern.place, blocks)
+        contacts.spread(pattern, blocks)
         factor = factorise(analysis, blocks)
         if all(b.signs is None for b in factor.blocks):
             break

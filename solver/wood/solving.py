@@ -49,7 +49,7 @@ class Solver:
         self.params, self.tolerance, self.listing = params, tolerance, listing
         self._factor: Preconditioner | None = None
         self._pattern: Stiffness | None = None
-        self._key: tuple[int, ...] = ()
+        self._key: tuple[int, int, bytes] | None = None
         self._bdt, self._fresh, self._excess = 0.0, 0, 0
         self.factors, self.solves = 0, 0
 
@@ -57,11 +57,12 @@ class Solver:
         wood = state.wood
         m = wood.motion
         # bonds change hands and vertices are added only by breaks of rods
-        key = (len(m.x), state.rods)
+        touching = contacts(self.listing.fitted(state), bdt, True)
+        key = (len(m.x), state.rods, touching.couples().tobytes())
         pattern = self._pattern if self._key == key else None
         inertia = m.mass * (1 / bdt + self.params.damping) / bdt
         self._factor, self._pattern = preconditioner(
-            m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(self.listing.fitted(state), bdt, True), pattern
+            m.x, wood.rods, wood.bonds, m.held == 0, inertia, touching, pattern
         )
         self._key, self._bdt, self._fresh, self._excess = key, bdt, 0, 0
         self.factors += 1

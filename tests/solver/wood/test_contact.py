@@ -150,7 +150,7 @@ def test_the_stiffness_couples_the_ends_of_edges():
     # in the factor's blocks it is the same matrix
     pattern = Stiffness(wood.rods, wood.bonds, m.held == 0)
     blocks = np.zeros((len(pattern.indices), 3, 3))
-    touching.spread(pattern.place, blocks)
+    touching.spread(pattern, blocks)
     row = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
     again = np.zeros_like(way)
     np.add.at(again, row, np.einsum("nij,nj->ni", blocks, way[pattern.indices]))
