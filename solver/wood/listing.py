@@ -11,12 +11,12 @@ from scipy.spatial import cKDTree
 from .arrays import Rods
 from .explicit import LOST, forces
 from .moment import State
-from .pairs import approach, pairs
+from .pairs import approach, distances, pairs
 from .params import WoodParams
 from .rubbing import Rubbing, none, normals
 from .state import Wood
 
-__all__ = ["Listing", "law"]
+__all__ = ["Listing", "Near", "law"]
 
 #: Thickness over the least distance of rods as laid, and the list's margin over the thickness.
 _THICK, _MARGIN = 0.8, 0.5
@@ -40,37 +40,50 @@ def law(wood: Wood, params: WoodParams) -> np.ndarray:
     return np.array([thick, stiff, params.rod_friction, _EASE * thick])
 
 
+class Near:
+    """Pairs that were within the thickness and some slack when they were listed."""
+
+    def __init__(self, wood: Wood, thick: float, slack: float, among: np.ndarray | None = None) -> None:
+        """List all such pairs, or those `among` (p, 2)."""
+        self._x, self._whole = wood.motion.x.copy(), (wood.bonds.on.copy(), wood.rods.alive.copy(), wood.parent)
+        self._slack = slack
+        if among is None:
+            self.pair = pairs(self._x, wood.rods, wood.bonds, wood.rod, thick + slack)
+        else:
+            self.pair = among[distances(self._x, wood.rods, among) < thick + slack]
+
+    def left(self, wood: Wood) -> float:
+        """Return the slack that is left [m]; negative if a bond or an edge has broken since."""
+        now = wood.bonds.on, wood.rods.alive, wood.parent
+        if not all(map(np.array_equal, now, self._whole)):
+            return -1.0
+        return self._slack - 2 * float(np.sqrt(((wood.motion.x - self._x) ** 2).sum(1).max()))
+
+
 class Listing:
     """The listed pairs of one run; without contact of rods, always none."""
 
     def __init__(self, wood: Wood, params: WoodParams) -> None:
         self._law = law(wood, params)
-        self.on = params.rod_contact and bool(self._law[0] > 0)
-        self._x = wood.motion.x
-        self._whole: tuple[np.ndarray, ...] = ()
-        self._slack, self._rubbing = 0.0, none()
+        self._thick, self._margin = float(self._law[0]), _MARGIN * float(self._law[0])
+        self.on = params.rod_contact and self._thick > 0
+        self._rubbing = none()
+        self._near: Near | None = None
+        self._wide: Near | None = None
 
-    def _same(self, wood: Wood) -> bool:
-        """Return whether no bond and no edge has broken since pairs were listed."""
-        now = wood.bonds.on, wood.rods.alive, wood.parent
-        return bool(self._whole) and all(map(np.array_equal, now, self._whole))
-
-    def _listed(self, wood: Wood, ahead: float, more: float) -> Rubbing:
-        """Return pairs that hold until a vertex has moved by `ahead` [m]; new lists for half of `more` [m] besides."""
-        x = wood.motion.x
-        if self._same(wood):
-            moved = float(np.sqrt(((x - self._x) ** 2).sum(1).max()))
-            if 2 * (moved + ahead) < self._slack:
-                return self._rubbing
-        self._slack = more + 2 * ahead
-        found = pairs(x, wood.rods, wood.bonds, wood.rod, self._law[0] + self._slack)
-        old, count = self._rubbing, len(wood.rods.a)
+    def _listed(self, wood: Wood, ahead: float) -> Rubbing:
+        """Return pairs that hold until a vertex has moved by `ahead` [m]."""
+        if self._near is not None and self._near.left(wood) > 2 * ahead:
+            return self._rubbing
+        slack = self._margin + 2 * ahead
+        wide = self._wide.pair if self._wide is not None and self._wide.left(wood) >= slack else None
+        self._near = Near(wood, self._thick, slack, wide)
+        old, found, count = self._rubbing, self._near.pair, len(wood.rods.a)
         lagged = np.zeros(len(found))
         if len(old.pair):
             known, wanted = (p[:, 0].astype(np.int64) * count + p[:, 1] for p in (old.pair, found))
             at = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
             lagged = np.where(known[at] == wanted, old.lagged[at], 0.0)
-        self._x, self._whole = x.copy(), (wood.bonds.on.copy(), wood.rods.alive.copy(), wood.parent)
         self._rubbing = Rubbing(found, self._law, lagged)
         return self._rubbing
 
@@ -78,7 +91,7 @@ class Listing:
         """Return the state with pairs that hold where it is, and until a vertex has moved by `ahead` [m]."""
         if not self.on:
             return state
-        rubbing = self._listed(state.wood, ahead, _MARGIN * float(self._law[0]))
+        rubbing = self._listed(state.wood, ahead)
         if rubbing is state.scratch.rubbing:
             return state
         return state._replace(scratch=state.scratch._replace(rubbing=rubbing))
@@ -113,9 +126,10 @@ class Listing:
         """Return the share, up to `most`, of the step `way` (v, 3) [m] that passes no rod through another."""
         if not self.on:
             return most
-        far = min(most, 1.0) * float(np.sqrt((way**2).sum(1).max()))
-        thick = float(self._law[0])
-        far = min(far, _FAR * thick)
-        most = min(most, far / max(float(np.sqrt((way**2).sum(1).max())), 1e-300))
-        pair = self.fitted(state, far).scratch.rubbing.pair
-        return min(most, float(approach(state.wood.motion.x, way, state.wood.rods, pair, thick)))
+        wood, longest = state.wood, max(float(np.sqrt((way**2).sum(1).max())), 1e-300)
+        most = min(most, _FAR * self._thick / longest)
+        far = 2 * min(most, 1.0) * longest
+        if self._wide is None or self._wide.left(wood) < far:
+            self._wide = Near(wood, self._thick, self._margin + far)
+        most = min(most, self._wide.left(wood) / (2 * longest))
+        return min(most, float(approach(wood.motion.x, way, wood.rods, self._wide.pair, self._thick)))

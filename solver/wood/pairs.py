@@ -8,7 +8,7 @@ from numba import njit
 from .arrays import Bonds, Rods
 from .rubbing import closest
 
-__all__ = ["approach", "pairs"]
+__all__ = ["approach", "distances", "pairs"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -76,6 +76,22 @@ def pairs(x: np.ndarray, rods: Rods, bonds: Bonds, rod: np.ndarray, reach: float
     codes = found[:, 0].astype(np.int64) * count + found[:, 1]
     kept: np.ndarray = found[~np.isin(codes, joined)]
     return kept[np.lexsort(kept.T[::-1])]
+
+
+@njit(cache=True, error_model="numpy")
+def distances(x: np.ndarray, rods: Rods, pair: np.ndarray) -> np.ndarray:
+    """Return how far apart the edges of each pair (p, 2) are [m]."""
+    out = np.empty(len(pair))
+    for m in range(len(pair)):
+        a, b = rods.a[pair[m, 0]], rods.b[pair[m, 0]]
+        c, d = rods.a[pair[m, 1]], rods.b[pair[m, 1]]
+        s, t = closest(x, a, b, c, d, 0.0)
+        apart = 0.0
+        for k in range(3):
+            g = (1.0 - s) * x[a, k] + s * x[b, k] - (1.0 - t) * x[c, k] - t * x[d, k]
+            apart += g * g
+        out[m] = np.sqrt(apart)
+    return out
 
 
 @njit(cache=True, error_model="numpy")
