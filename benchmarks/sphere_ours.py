@@ -27,7 +27,7 @@ import numpy as np
 from solver.dehydration.closed_form import sphere_radius
 from solver.dehydration.implicit import base_state
 from solver.dehydration.params import DehydrationParams
-from tests.solver.radial_reference import radial_reference
+from tests.solver._radial_reference import radial_reference
 
 FRUIT = DehydrationParams()
 KAPPA_RATIO = 1000.0

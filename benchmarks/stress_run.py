@@ -92,7 +92,7 @@ class _Watched(Path):
 
     def _settle(self, state: Any, *rest: Any, **named: Any) -> State:
         found = super()._settle(state, *rest, **named)
-        layout = self._drive.loaded(self._layout, found.shrinkage)
+        layout = self.motion.drive.loaded(self.motion.layout, found.shrinkage)
         ratio = element_report(layout, state, 1 - found.shrinkage).least_ratio.min()
         self.settled.append((found.shrinkage, float(ratio)))
         return found
@@ -190,7 +190,7 @@ def _complaint(row: Row, data: xr.Dataset, stages: tuple[float, ...]) -> tuple[s
     row.last, row.least = found[-1], min(row.ratios)
     row.residual = float(data["residual"].max())
     if "penetration" in data:
-        row.penetration = float(data["penetration"].max()) / _Watched.made._params.exocarp_thickness
+        row.penetration = float(data["penetration"].max()) / _Watched.made.motion.params.exocarp_thickness
     for name, variable in data.variables.items():
         if variable.dtype.kind == "f" and not np.isfinite(variable.values).all():
             return "not finite", str(name)

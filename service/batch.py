@@ -14,7 +14,8 @@ from starlette.responses import Response, StreamingResponse
 
 from solver.contract import SolverError
 from store.errors import StoreError, TooUncertain
-from store.lookup import Shape, ShapeTable
+from store.lookup import ShapeTable
+from store.shape import Shape
 
 from . import batch_formats, problems, vocabulary
 from . import detail as level

@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from store.lookup import Shape, ShapeTable
+from store.lookup import ShapeTable
+from store.shape import Shape
 from store.window import Window
 
 from .formats import FORMATS, About, Format, best

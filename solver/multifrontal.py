@@ -126,16 +126,11 @@ def _negatives(pivot: Floats, signs: Any) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """L D L^T of a symmetric matrix. negative: number of negative eigenvalues. nonzeros: of L."""
+    """L D L^T of a symmetric matrix. negative: number of negative eigenvalues."""
 
     analysis: Analysis
     blocks: tuple[_Block, ...]
     negative: int
-
-    @property
-    def nonzeros(self) -> int:
-        """Numbers held."""
-        return sum(block.pivot.size + block.below.size for block in self.blocks)
 
     def solve(self, right: Floats) -> Floats:
         """Return x of A x = right, both (size,)."""

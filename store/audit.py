@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from solver import quantities
 
-from . import generation, seal
+from . import generate, generation, seal
 from .errors import CorruptShard, CorruptTable, MixedSamples, UnknownJob
 from .measures import UNITS
 from .store import Store
@@ -147,7 +147,7 @@ def _result(store: Store, table: TableInfo, key: str, noted: str | None, block: 
         result = store.get(key)
         if block is None:
             return
-        waves = generation.spectra_of(result, key, table.need, table.resolution)
+        waves = generate.spectra_of(result, key, table.need, table.resolution)
     except UnknownJob:
         yield "the result is gone: the table could not be rebuilt without it. Run the sweep again."
         return

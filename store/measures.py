@@ -66,7 +66,7 @@ class Surface:
         self.wrinkles = spectra.synthesize(harmonics.without_low(waves), n)
         self.power = harmonics.power(harmonics.degrees(waves))[: n + 1]
         self.power[: harmonics.LOWEST] = 0
-        self.normals = surface.normals(np.asarray(fresh, float) + u)[0]
+        self.normals = surface.normals(np.asarray(fresh, float) + u)
         cosine = np.clip(np.einsum("tpi,tpi->tp", self.normals, rays), -1, 1)
         self.slope = np.degrees(np.arccos(cosine))
         self.patchiness = _patchiness(np.radians(self.slope) ** 2, self.area)

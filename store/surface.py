@@ -72,20 +72,14 @@ def _circle(n: int) -> tuple[Array, Array]:
     return np.cos(phi), np.sin(phi)
 
 
-def normals(position: Array) -> tuple[Array, Array]:
-    """Return outward unit normals (n, 2n, 3) of a surface on the lattice, and those at its two poles (2, 3).
+def normals(position: Array) -> Array:
+    """Return outward unit normals (n, 2n, 3) of a surface on the lattice.
 
     Derivatives are those of the surface's double Fourier series: exact for every wave that the lattice holds. Where
     the surface has no tangent plane, the normal is zero.
     """
-    n = position.shape[0]
-    waves = spectra.spectrum(position)
-    southward, eastward = spectra.gradient(waves, n)
-    # at a pole, one step away in direction phi leads to 2 Re(slope exp(i phi)), the slope of the waves m = 1
-    k = np.arange(n + 1, dtype=position.dtype)[:, None]
-    north, south = (waves[1] * k).sum(0), (waves[1] * k * (1 - 2 * (k % 2))).sum(0)
-    poles = np.stack([np.cross(north.real, north.imag), np.cross(south.imag, south.real)])
-    return _unit(_cross(eastward, southward)), _unit(poles)
+    southward, eastward = spectra.gradient(spectra.spectrum(position), position.shape[0])
+    return _unit(_cross(eastward, southward))
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from . import generation, seal
+from . import generate, generation, seal
 from .errors import EmptyTable
 from .manifest import TableInfo, directory, read_manifest, write_manifest
 from .samples import Axes, collect
@@ -63,7 +63,7 @@ def build(
     if band < 4:
         raise EmptyTable(f"a band of {band} waves holds no shape.", "Ask for a resolution of at least 4.")
     with seal.scratch(home / "next.h5") as temporary:
-        written = generation.write(temporary, store, samples, solver, band, dtype, units or {})
+        written = generate.write(temporary, store, samples, solver, band, dtype, units or {})
         seal.seal(temporary)
         file = f"{written.digest[:16]}.h5"
         seal.adopt(temporary, home / file)

@@ -13,7 +13,7 @@ import typer
 
 from solver import __version__
 
-from . import cli_onset, cli_queue, cli_refine, cli_tables
+from . import cli_onset, cli_queue, cli_refine, cli_shapes, cli_tables
 from .console import Root, emit, grid, note
 from .errors import InvalidOption
 from .options import (
@@ -274,3 +274,4 @@ cli_refine.add_to(app)
 cli_onset.add_to(app)
 cli_queue.add_to(app)
 cli_tables.add_to(app)
+cli_shapes.add_to(app)

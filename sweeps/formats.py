@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["Encoder", "Made", "added", "extend"]
 

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from store import seal, shards, spectra
-from store.lookup import Shape
+from store.shape import Shape
 
 from .colours import MESH_LAYERS
 from .errors import InvalidOption

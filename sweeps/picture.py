@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .render import BACKGROUND, View, render, render_triangles
+from .render import View, render, render_triangles
+from .shading import BACKGROUND
 
 __all__ = ["Panel", "sheet"]
 

@@ -1,7 +1,6 @@
 """A small software renderer for surfaces of triangles: no window, no GPU, only numpy.
 
-Lattices are resampled through their spectrum, other triangles are cut in four until they cover few pixels. Then every
-triangle tests the few pixels of its bounding box, all triangles at a time, and the nearest fragment wins.
+Lattices are resampled through their spectrum, other triangles are cut in four until they cover few pixels.
 """
 
 from __future__ import annotations
@@ -15,24 +14,12 @@ from scipy import ndimage
 
 from store import spectra
 
-__all__ = ["BACKGROUND", "View", "mesh", "render", "render_triangles"]
+from .raster import finer, normals, rasterise
+from .shading import floor_shadow, relief, shade
+
+__all__ = ["View", "mesh", "render", "render_triangles"]
 
 Array = NDArray[Any]
-
-#: Paper-white behind the fruits; linear light, 0 to 1.
-BACKGROUND = np.array([0.93, 0.91, 0.88])
-
-#: Colours of a dried jujube: on the ridges, and in the depth of the wrinkles.
-_RIDGE = np.array([0.53, 0.105, 0.05])
-_VALLEY = np.array([0.13, 0.016, 0.014])
-
-#: Directions towards the lights in the camera's frame (right, up, towards the eye), and their colours.
-_KEY = np.array([-0.62, 0.62, 0.48])
-_FILL = np.array([0.85, 0.10, 0.52])
-_TO_EYE = np.array([0.0, 0.0, 1.0])
-_KEY_COLOUR = np.array([1.25, 1.18, 1.08])
-_FILL_COLOUR = np.array([0.20, 0.24, 0.32])
-_AMBIENT = np.array([0.20, 0.19, 0.19])
 
 _SUPERSAMPLES = 2
 #: Resolution at which surfaces are drawn: one lattice cell of it covers about a pixel of a large picture.
@@ -120,41 +107,25 @@ def _draw(
 ) -> Array:
     side = pixels * _SUPERSAMPLES
     scale = side / 2 / view.extent
-    normals = _normals(vertices, faces)
+    upright = normals(vertices, faces)
     if open_:
-        values = np.concatenate([vertices, normals, np.asarray(paint, float)], axis=1)
-        values, faces = _finer(values, faces, _COARSEST / scale)
-        vertices, normals, paint = values[:, :3], values[:, 3:6], values[:, 6:]
-    seen, turned = vertices @ frame.T, normals @ frame.T
+        values = np.concatenate([vertices, upright, np.asarray(paint, float)], axis=1)
+        values, faces = finer(values, faces, _COARSEST / scale)
+        vertices, upright, paint = values[:, :3], values[:, 3:6], values[:, 6:]
+    seen, turned = vertices @ frame.T, upright @ frame.T
     points = np.stack([side / 2 + scale * seen[:, 0], side / 2 - scale * seen[:, 1]], axis=-1)
-    index, face, weights, back = _rasterise(points, seen[:, 2], faces, side, open_)
+    index, face, weights, back = rasterise(points, seen[:, 2], faces, side, open_)
     corners = faces[face]
     depth = np.full(side * side, -np.inf)
     depth[index] = np.einsum("fk,fk->f", weights, seen[corners, 2])
     normal = np.einsum("fk,fkc->fc", weights, turned[corners])
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
     normal[back] *= -1
-    image = _floor_shadow(side, view, seen, scale)
+    image = floor_shadow(side, view.elevation, seen, scale)
     skin = None if paint is None else np.einsum("fk,fkc->fc", weights, paint[corners])
-    image.reshape(-1, 3)[index] = _shade(normal, _relief(depth.reshape(side, side)).ravel()[index], skin)
+    image.reshape(-1, 3)[index] = shade(normal, relief(depth.reshape(side, side)).ravel()[index], skin)
     small = image.reshape(pixels, _SUPERSAMPLES, pixels, _SUPERSAMPLES, 3).mean(axis=(1, 3))
     return (255 * np.clip(small, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
-
-
-def _finer(values: Array, faces: Array, longest: float) -> tuple[Array, Array]:
-    """Cut triangles with an edge above `longest` in four, until there are none; values (v, k) begin with places."""
-    done = []
-    while True:
-        p = values[faces, :3]
-        long = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1) > longest
-        done.append(faces[~long])
-        if not long.any() or len(values) > 4_000_000:
-            return values, np.concatenate([*done, faces[long]])
-        a, b, c = faces[long].T
-        middles = [0.5 * (values[i] + values[j]) for i, j in ((a, b), (b, c), (c, a))]
-        ab, bc, ca = (len(values) + k * len(a) + np.arange(len(a)) for k in range(3))
-        values = np.concatenate([values, *middles])
-        faces = np.concatenate([np.stack(t, -1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
 
 
 def _frame(view: View) -> Array:
@@ -163,70 +134,6 @@ def _frame(view: View) -> Array:
     eye = np.array([np.cos(tilt) * np.cos(turn), np.sin(tilt), np.cos(tilt) * np.sin(turn)])
     right = np.array([np.sin(turn), 0.0, -np.cos(turn)])
     return np.stack([right, np.cross(eye, right), eye])
-
-
-def _normals(vertices: Array, faces: Array) -> Array:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    areas = np.cross(b - a, c - a)
-    total = np.zeros_like(vertices)
-    for axis in range(3):
-        for corner in range(3):
-            total[:, axis] += np.bincount(faces[:, corner], areas[:, axis], len(vertices))
-    return total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-300)
-
-
-def _rasterise(
-    points: Array, depth: Array, faces: Array, side: int, both: bool
-) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return (pixel index, face, barycentric weights, seen from behind) of what is nearest to the eye in each pixel.
-
-    both: triangles that turn away from the eye are drawn too.
-    """
-    corners = points[faces]
-    edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = edge1[:, 0] * edge2[:, 1] - edge1[:, 1] * edge2[:, 0]
-    # the picture's second axis points down
-    front = np.flatnonzero(np.abs(area) > 1e-12) if both else np.flatnonzero(area < -1e-12)
-    behind = area > 0
-    corners, edge1, edge2, area = corners[front], edge1[front], edge2[front], area[front]
-    low = np.floor(corners.min(axis=1)).astype(int)
-    span = np.ceil(corners.max(axis=1)).astype(int) - low
-    found = []
-    for dy in range(int(span[:, 1].max(initial=0)) + 1):
-        for dx in range(int(span[:, 0].max(initial=0)) + 1):
-            near = np.flatnonzero((span[:, 0] >= dx) & (span[:, 1] >= dy))
-            pixel = low[near] + [dx, dy]
-            offset = pixel + 0.5 - corners[near, 0]
-            u = (offset[:, 0] * edge2[near, 1] - offset[:, 1] * edge2[near, 0]) / area[near]
-            v = (edge1[near, 0] * offset[:, 1] - edge1[near, 1] * offset[:, 0]) / area[near]
-            inside = (u >= 0) & (v >= 0) & (u + v <= 1) & ((pixel >= 0) & (pixel < side)).all(axis=1)
-            u, v = u[inside], v[inside]
-            found.append(
-                (pixel[inside, 1] * side + pixel[inside, 0], front[near[inside]], np.stack([1 - u - v, u, v], -1))
-            )
-    index, face, weights = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    near_last = np.argsort(np.einsum("fk,fk->f", weights, depth[faces[face]]), kind="stable")
-    winner = np.full(side * side, -1)
-    winner[index[near_last]] = near_last
-    kept = winner[winner >= 0]
-    return index[kept], face[kept], weights[kept], behind[face[kept]]
-
-
-def _relief(depth: Array) -> Array:
-    """Return how far each pixel lies behind its surroundings, -1 to 1: valleys are positive.
-
-    The difference to a blurred depth buffer (Luft, Colditz and Deussen 2006) at two widths; it stands for the light
-    that a valley's walls keep out. Pixels outside the surface do not count.
-    """
-    inside = np.isfinite(depth)
-    filled, weight = np.where(inside, depth, 0.0), inside.astype(float)
-    relief = np.zeros_like(filled)
-    for width, strength in ((len(depth) / 110, 0.5), (len(depth) / 38, 0.5)):
-        blurred = ndimage.gaussian_filter(filled, width, truncate=3)
-        share = ndimage.gaussian_filter(weight, width, truncate=3)
-        behind = np.where(share > 0.5, blurred / np.maximum(share, 1e-6) - filled, 0.0)
-        relief += strength * np.tanh(behind * len(depth) / width / 5)
-    return np.where(inside, relief, 0.0)
 
 
 def _paint(colour: Array, resolution: int) -> Array:
@@ -241,30 +148,3 @@ def _paint(colour: Array, resolution: int) -> Array:
         [ndimage.map_coordinates(rows[..., k], grid, order=1, mode="grid-wrap").ravel() for k in range(3)], axis=-1
     )
     return np.concatenate([fine, colour[:1].mean(axis=1), colour[-1:].mean(axis=1)])
-
-
-def _shade(normal: Array, relief: Array, paint: Array | None = None) -> Array:
-    key, fill = _KEY / np.linalg.norm(_KEY), _FILL / np.linalg.norm(_FILL)
-    depth = np.clip(0.5 + 0.5 * relief, 0, 1)[:, None]
-    colour = _RIDGE + (_VALLEY - _RIDGE) * depth if paint is None else paint
-    open_sky = 1 - 0.62 * np.clip(relief, 0, 1)[:, None]
-    lit = np.clip(normal @ key, 0, None)[:, None]
-    half = key + _TO_EYE
-    shine = np.clip(normal @ (half / np.linalg.norm(half)), 0, None)[:, None] ** 28
-    rim = (1 - np.clip(normal[:, 2:], 0, 1)) ** 3
-    light = lit * _KEY_COLOUR + np.clip(normal @ fill, 0, None)[:, None] * _FILL_COLOUR
-    light = light + _AMBIENT * (0.6 + 0.4 * normal[:, 1:2])
-    return open_sky * (colour * light + 0.22 * shine * lit * (1 - 0.7 * depth)) + 0.05 * rim * _FILL_COLOUR
-
-
-def _floor_shadow(side: int, view: View, seen: Array, scale: float) -> Array:
-    """Return the background with a soft shadow below the surface."""
-    tilt = np.sin(np.radians(view.elevation))
-    reach = 0.82 * np.abs(seen[:, 0]).max() * scale
-    bottom = side / 2 - scale * seen[:, 1].min()
-    y, x = np.mgrid[:side, :side] + 0.5
-    centre = bottom - 0.75 * reach * tilt
-    shadow = np.exp(
-        -1.6 * (((x - side / 2) / reach) ** 2 + ((y - centre) / (reach * max(tilt, 0.15) * 1.15)) ** 2) ** 2
-    )
-    return BACKGROUND * (1 - 0.45 * shadow[..., None])

@@ -19,7 +19,8 @@ from solver.fruit import Fruit
 
 from . import colours
 from .errors import InvalidOption
-from .render import BACKGROUND, mesh
+from .render import mesh
+from .shading import BACKGROUND
 
 __all__ = ["Plane", "cut", "picture", "plane"]
 

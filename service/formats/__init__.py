@@ -17,7 +17,7 @@ from . import glb, metadata, npz, obj, points
 from .about import About
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["FORMATS", "About", "Format", "best", "negotiate", "write"]
 

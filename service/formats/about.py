@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from solver import __version__
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["GENERATOR", "LENGTH_UNIT", "About", "extras"]
 

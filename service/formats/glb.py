@@ -9,7 +9,7 @@ from .about import GENERATOR, About, extras
 from .gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["encode"]
 

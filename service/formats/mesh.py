@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["normals", "seam", "seam_triangles", "surface", "texture", "triangles", "vertices"]
 

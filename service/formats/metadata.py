@@ -11,7 +11,7 @@ from solver.quantities import QUANTITIES
 from .about import About, extras
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["encode"]
 

@@ -11,7 +11,7 @@ import numpy as np
 from .about import About, extras
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["encode"]
 

@@ -17,7 +17,7 @@ from . import mesh
 from .about import LENGTH_UNIT, About, extras
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["encode"]
 

@@ -16,7 +16,7 @@ from . import mesh, metadata
 from .about import About
 
 if TYPE_CHECKING:
-    from store.lookup import Shape
+    from store.shape import Shape
 
 __all__ = ["MAGIC", "encode"]
 

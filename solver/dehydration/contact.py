@@ -11,10 +11,7 @@ The turning of the normals stays explicit.
 phi is 0 without lack, quadratic up to half the clearance and linear beyond, so a contact that begins does not jolt; it
 ends at a limit that leads out, rather than throws, what began deep inside. A contact takes its closing speed out.
 
-What touches is continuous as well, or a settled stage would chatter: a node counts all quads nearly as close as the
-closest, and walls on its other side (see `_weight`); next to its own quads the clearance begins at the shared edge; at
-the mouth of a sulcus, where skin does not face skin yet, shallow contact counts all the same. Each of the three alone
-left out-of-balance forces of 1e-2 to 1e-1 of the internal ones at s = 0.3 (preview, te = 0.04), together 1e-3.
+What touches is continuous as well (`contact_touch`).
 
 The eigenvalues of M^-1 B k B^T stay within [0, STIFFNESS], clear of what the masses leave to the step: with
 
@@ -33,216 +30,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.dehydration.contact_data import (
-    ACTIVE,
-    ASKEW,
-    HITS,
-    NEEDED,
-    OPTIONS,
-    PAIRS,
-    SEARCHES,
-    Contact,
-    Single,
-    Singles,
-    grow,
-    make_contact,
-)
-from solver.dehydration.contact_search import find_pairs
+from solver.dehydration.contact_data import ACTIVE, HITS, OPTIONS, PAIRS, Contact, Single, Singles
+from solver.dehydration.contact_touch import SLACK, collect
 
-__all__ = [
-    "ACTIVE",
-    "HITS",
-    "NEEDED",
-    "PAIRS",
-    "SEARCHES",
-    "Contact",
-    "closest",
-    "find_pairs",
-    "grow",
-    "make_contact",
-    "push_apart",
-]
+__all__ = ["push_apart"]
 
 STIFFNESS = np.float32(1.0)
 """Of the 4 that a unit step carries, the masses leave 2 to contact."""
 DAMPING = np.float32(1.0)
 """Share of a contact's closing speed that each step takes out; 0.3 let walls pulled together cross by 0.15 edges."""
-NEARLY = np.float32(0.25)
-"""Of the clearance: how much farther than the closest quad another one still counts."""
-OPENING = np.float32(0.3)
-"""Least slope between a quad and the next that contact keeps open, where they share an edge."""
-SLACK = np.float32(0.25)
-"""Of the margin: how far beyond the clearance a quad begins to share the load."""
-SQUARELY = np.float32(0.7)
-"""Least cosine between a penetrated quad's normal and the line to its closest point."""
-
-
-@njit(**OPTIONS)
-def closest(
-    x: Singles, step: Singles, row: int, a: int, b: int, c: int, d: int, u: Single, v: Single, exact: Single
-) -> tuple[Single, Single, Single, Single, Single, Single, Single, Single, Single]:
-    """Closest point of a bilinear quad to a node, from a first guess u, v (the last result, if there is one).
-
-    Positions are x - step, both (nn, >= 3) float32; row of the node, a, b, c, d of the corners. A projected Newton
-    method in the square [-1, 1]^2 down to a squared slope `exact` (length squared); it needs no step at all while
-    nothing moves. Returns u, v, the foot minus the node (3), its squared length and the quad's normal at the foot, not
-    normalised (3).
-    """
-    zero, one, quarter = np.float32(0), np.float32(1), np.float32(0.25)
-    px, py, pz = x[row, 0] - step[row, 0], x[row, 1] - step[row, 1], x[row, 2] - step[row, 2]
-    # foot - node = m + u s + v t + u v w; corners relative to the node keep float32's digits
-    ax, ay, az = x[a, 0] - step[a, 0] - px, x[a, 1] - step[a, 1] - py, x[a, 2] - step[a, 2] - pz
-    bx, by, bz = x[b, 0] - step[b, 0] - px, x[b, 1] - step[b, 1] - py, x[b, 2] - step[b, 2] - pz
-    cx, cy, cz = x[c, 0] - step[c, 0] - px, x[c, 1] - step[c, 1] - py, x[c, 2] - step[c, 2] - pz
-    dx, dy, dz = x[d, 0] - step[d, 0] - px, x[d, 1] - step[d, 1] - py, x[d, 2] - step[d, 2] - pz
-    mx, my, mz = quarter * (ax + bx + cx + dx), quarter * (ay + by + cy + dy), quarter * (az + bz + cz + dz)
-    sx, sy, sz = quarter * (bx + cx - ax - dx), quarter * (by + cy - ay - dy), quarter * (bz + cz - az - dz)
-    tx, ty, tz = quarter * (cx + dx - ax - bx), quarter * (cy + dy - ay - by), quarter * (cz + dz - az - bz)
-    wx, wy, wz = quarter * (ax + cx - bx - dx), quarter * (ay + cy - by - dy), quarter * (az + cz - bz - dz)
-    for _ in range(8):
-        ux, uy, uz = sx + v * wx, sy + v * wy, sz + v * wz
-        vx, vy, vz = tx + u * wx, ty + u * wy, tz + u * wz
-        ex, ey, ez = mx + u * sx + v * vx, my + u * sy + v * vy, mz + u * sz + v * vz
-        uu, vv = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz
-        gu, gv = ex * ux + ey * uy + ez * uz, ex * vx + ey * vy + ez * vz
-        square = ex * ex + ey * ey + ez * ez
-        # at a border the slope that points out of the square does not count
-        free_u = abs(u) < one or gu * u > zero
-        free_v = abs(v) < one or gv * v > zero
-        done_u = not free_u or gu * gu < exact * uu
-        done_v = not free_v or gv * gv < exact * vv
-        if done_u and done_v:
-            break
-        if free_u and free_v:
-            uv = ux * vx + uy * vy + uz * vz
-            mixed = uv + ex * wx + ey * wy + ez * wz
-            if mixed * mixed > np.float32(0.9) * uu * vv:
-                mixed = uv
-            inverse = one / (uu * vv - mixed * mixed + np.float32(1e-30))
-            u -= (gu * vv - gv * mixed) * inverse
-            v -= (gv * uu - gu * mixed) * inverse
-        elif free_u:
-            u -= gu / uu
-        else:
-            v -= gv / vv
-        u, v = min(max(u, -one), one), min(max(v, -one), one)
-    return u, v, ex, ey, ez, square, uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-
-
-@njit(**OPTIONS)
-def _touches(gap: Single, height: Single, clearance: Single, depth: Single, on_skin: Single) -> bool:
-    """Whether a node's nearest quad is touched: closer than the clearance, or penetrated but not through a part.
-
-    Behind a quad only where it is seen squarely: a node past a ridge is nearest to its edge, and behind the plane of
-    the far flank without being inside.
-    """
-    if gap >= clearance or gap < -depth:
-        return False
-    return bool(gap >= -on_skin or height > -SQUARELY * gap)
-
-
-@njit(**OPTIONS)
-def _near_quads(contact: Contact, x: Singles, v: Singles, first: int) -> tuple[int, int]:
-    """Closest points of all quads paired with the node of pair `first`, into `near`.
-
-    Returns how many are in reach, and the first pair of the next node.
-    """
-    near, one, quarter = contact.near, np.float32(1), np.float32(0.25)
-    on_skin = np.float32(1e-3) * contact.size
-    exact = np.float32(1e-7) * contact.size * contact.size
-    reach = max(contact.clearance + SLACK * contact.margin, contact.depth) ** 2
-    node, found, pair = contact.pair_nodes[first], 0, first
-    row = contact.surface_nodes[node]
-    while pair < contact.counts[PAIRS] and contact.pair_nodes[pair] == node:
-        quad = contact.pair_quads[pair]
-        a, b, c, d = (
-            contact.quad_nodes[quad, 0], contact.quad_nodes[quad, 1],
-            contact.quad_nodes[quad, 2], contact.quad_nodes[quad, 3],
-        )  # fmt: skip
-        s, t, ex, ey, ez, square, nx, ny, nz = closest(
-            x, v, row, a, b, c, d, contact.feet[pair, 0], contact.feet[pair, 1], exact
-        )
-        contact.feet[pair, 0], contact.feet[pair, 1] = s, t
-        own = contact.pair_own[pair]
-        pair += 1
-        if not square < reach or found == near.shape[0]:
-            continue
-        distance = np.sqrt(square)
-        inverse = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-30))
-        nx, ny, nz = nx * inverse, ny * inverse, nz * inverse
-        height = -(ex * nx + ey * ny + ez * nz)
-        gap = distance if height >= 0 else -distance
-        # along the line from foot to node no torque is left over; on the skin itself that line has no direction
-        if distance > on_skin:
-            nx, ny, nz = -ex / gap, -ey / gap, -ez / gap
-        near[found, 0], near[found, 1] = quarter * (one - s) * (one - t), quarter * (one + s) * (one - t)
-        near[found, 2], near[found, 3] = quarter * (one + s) * (one + t), quarter * (one - s) * (one + t)
-        near[found, 4], near[found, 5], near[found, 6], near[found, 7] = nx, ny, nz, gap
-        # next to its own quads a node is near for no fault of its own: let the clearance begin at the shared edge
-        far = np.float32(0)
-        for k in range(4):
-            if not own >> k & 1:
-                far += near[found, k]
-        near[found, 10] = min(contact.clearance, OPENING * far * contact.size)
-        near[found, 11] = abs(height)
-        near[found, 12] = contact.shallow if own & ASKEW else contact.depth
-        near[found, 13] = np.float32(quad)
-        found += 1
-    return found, pair
-
-
-@njit(**OPTIONS)
-def _nearest(contact: Contact, found: int) -> int:
-    """Place in `near` of the closest quad."""
-    near, same, best = contact.near, np.float32(1e-4) * contact.size, 0
-    for i in range(1, found):
-        nearer = abs(near[i, 7]) - abs(near[best, 7])
-        # quads that share the closest edge are equally far: the one seen most squarely knows the side
-        if abs(nearer) < same and (near[i, 7] >= 0) != (near[best, 7] >= 0):
-            if near[i, 11] > near[best, 11]:
-                best = i
-        elif nearer < 0:
-            best = i
-    return best
-
-
-@njit(**OPTIONS)
-def _weight(contact: Contact, i: int, best: int) -> Single:
-    """How much quad i of `near` counts beside the closest one, 0 to 1, continuous as the node moves.
-
-    Quads nearly as close count nearly as much: with the closest alone a node in a valley, or between two walls, is
-    thrown from one to the other. A wall on the other side of the node counts fully.
-    """
-    near, zero, one = contact.near, np.float32(0), np.float32(1)
-    along = near[i, 4] * near[best, 4] + near[i, 5] * near[best, 5] + near[i, 6] * near[best, 6]
-    if near[i, 7] < 0:
-        return zero
-    close = one - (near[i, 7] - abs(near[best, 7])) / (NEARLY * contact.clearance)
-    return min(max(close, np.float32(-2) * along, zero), one)
-
-
-@njit(**OPTIONS)
-def _collect(contact: Contact, x: Singles, v: Singles) -> int:
-    """Quads within reach of each node, seen as the step began, into `hits`; returns how many."""
-    clearance = contact.clearance + SLACK * contact.margin
-    on_skin = np.float32(1e-3) * contact.size
-    near, pair, hits = contact.near, 0, 0
-    while pair < contact.counts[PAIRS]:
-        node = contact.pair_nodes[pair]
-        found, pair = _near_quads(contact, x, v, pair)
-        if not found:
-            continue
-        best = _nearest(contact, found)
-        if not _touches(near[best, 7], near[best, 11], clearance, near[best, 12], on_skin):
-            continue
-        for i in range(found):
-            weight = np.float32(1) if i == best else _weight(contact, i, best)
-            if weight > 0 and near[i, 7] < clearance and hits < contact.hits.shape[0]:
-                contact.hits[hits, 0], contact.hits[hits, 1] = node, np.int32(near[i, 13])
-                contact.hit_values[hits, :11] = near[i, :11]
-                contact.hit_values[hits, 11] = weight
-                hits += 1
-    return hits
 
 
 @njit(**OPTIONS)
@@ -278,7 +74,7 @@ def push_apart(contact: Contact, x: Singles, v: Singles, minv: Singles) -> tuple
     counts[ACTIVE] = 0
     if counts[PAIRS] == 0:
         return deepest, energy
-    counts[HITS] = _collect(contact, x, v)
+    counts[HITS] = collect(contact, x, v)
     _share_load(contact, counts[HITS], minv)
     rows, hits, values, corners = contact.surface_nodes, contact.hits, contact.hit_values, contact.quad_nodes
     zero, half = np.float32(0), np.float32(0.5)

@@ -18,7 +18,7 @@ from ..contract import InvalidGeometry
 from ..fruit import Fruit, directions, lattice
 
 if TYPE_CHECKING:
-    import skfem
+    pass
 
 __all__ = [
     "CubedSphere",
@@ -117,18 +117,6 @@ class FruitMesh:
     def fixed(self) -> NDArray[np.bool_]:
         """(nn,) nodes that sit on the rigid stone, or on the ball that follows the loading (`loading.Loading.held`)."""
         return np.tile(np.arange(self.levels) == 0, len(self.rays))
-
-    def to_skfem(self) -> skfem.MeshHex:
-        """Return the same mesh as a scikit-fem object, for bases, mappings, integration and independent checks."""
-        import skfem
-
-        # scikit-fem counts corners of the unit cube in its own order; match them by place instead of by memory
-        ours = np.array([[c >> 2 & 1, c >> 1 & 1, c & 1] for c in range(8)], dtype=float)
-        theirs = skfem.MeshHex.init_refdom().p.T
-        order = [int(np.flatnonzero((ours == corner).all(axis=1))[0]) for corner in theirs]
-        return skfem.MeshHex(
-            np.ascontiguousarray(self.positions.T), np.ascontiguousarray(self.connectivity[:, order].T), sort_t=False
-        )
 
 
 def layer_fractions(flesh: float, first: float, growth: float) -> Array:

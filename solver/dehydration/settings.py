@@ -27,9 +27,9 @@ class Settings:
     kappa_ratio: bulk over shear modulus; march_kappa_ratio: the one that is marched with (see `kernel.bulk`).
     start: shrinkage below which the fruit is still smooth, where the march begins. pace: shrinkage per step of the
     march. copies: mirror images that make up the whole fruit. damping: per step, while marching; swing_damping and
-    calm_damping: while a stage settles (see `path.Path`). residual, drift: at which a stage counts as settled (see
-    `path.State`). swing_steps, calm_steps: longest turn of each way of settling. settle_steps: after which a stage does
-    not settle. clearance: gap that self-contact keeps, in exocarp thicknesses.
+    calm_damping: while a stage settles (see `settle.settle`). residual, drift: at which a stage counts as settled (see
+    `settle.State`). swing_steps, calm_steps: longest turn of each way of settling. settle_steps: after which a stage
+    does not settle. clearance: gap that self-contact keeps, in exocarp thicknesses.
     """
 
     n: int

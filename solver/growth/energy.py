@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from .. import shell
 from ..shell.dissection import Fronts
-from ..shell.inverse import Inverse, fronts_of, inverse_of, normals
+from ..shell.inverse import Inverse, fronts_of, inverse_of
+from ..shell.normals import normals
 from .params import Bending, Plane, SolidBall
 from .state import State
 

@@ -12,33 +12,26 @@ from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import shell
-from ..contract import Context, NotConverged, Unstable
-from ..shell.inverse import normals
-from .active import Habit, settle
-from .energy import StepEnergy, Tangent, ahead
-from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
+from ..contract import Context
+from .active import Habit
+from .energy import StepEnergy, Tangent
+from .equilibrium import balanced, begun
+from .fresh import fresh
 from .params import GrowthParams
-from .places import share
-from .placing import border, branched, started
+from .placing import branched, started
 from .plastic import forgotten
 from .rates import grown, rates
 from .remesh import remesh
-from .shapes import Mesh, start
+from .shapes import start
 from .state import State
 from .tools import Tool
 
 __all__ = ["Engine"]
 
-Floats = NDArray[np.float64]
-
-_WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
 #: Steps that can be undone so that the same way on gives the same bytes; beyond, the same to the residual.
 _EXACT = 30
-#: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
-_NUDGE, _WAVES = 0.2, (1, 2, 4)
 #: A mesh does not grow beyond this many times its first vertices.
 _MOST = 20
 
@@ -63,7 +56,7 @@ class Engine:
         self._keeps = history
         self._history: list[tuple[State, int, Tangent, Habit]] = []
         self._work: Generator[None, None, None] | None = None
-        self.state = _begin(params, start(params.shape, vertices, params.aspect))
+        self.state = fresh(params, start(params.shape, vertices, params.aspect))
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
         self._tangent, self._habit = Tangent(self.state.mesh), Habit()
@@ -156,45 +149,14 @@ class Engine:
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         yield
         state = replace(state, g=g, rest=rest, time=state.time + dt)
-        point, spent = Point(state.x, 0.0, np.inf), 0
         p = self.params
         tangent = self._tangent
         energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         yield
-        if p.active and p.imperfection and not p.contact:
-            now, last = g.T, before.g.T
-            changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])
-            if rest is not before.rest:
-                changed[state.mesh.hinge_faces[rest != before.rest]] = True
-            settled = yield from settle(energy, changed, goal, dt, self._habit.copy(), _WAYS[p.solver])
-            begin, spent, self._habit = settled.x, settled.spent, settled.habit
-        else:
-            begin = ahead(energy, state, dt)
-        nudges = 0 if p.imperfection else 1
-        while True:
-            for nearer in _WAYS[self.params.solver](energy, begin):
-                spent += nearer.x is not point.x
-                point = nearer
-                if point.gradient <= goal or point.stuck:
-                    break
-                if not np.isfinite(point.gradient):
-                    raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=before.time)
-                if spent > self._most:
-                    break
-                yield
-            begin = _nudged(energy, point.x, point.energy, self.params.seed) if nudges else point.x
-            nudges -= 1
-            if begin is point.x:
-                break
-        # a goal below what the digits hold is met where rounding is
-        if not (point.gradient <= goal or point.gradient <= energy.rounding(point.x)):
-            raise NotConverged(
-                f"no equilibrium at growth time {state.time:g}: residual {point.gradient / state.length:.1e}.",
-                advice="Take a shorter step or a thicker sheet.",
-                last_stage=before.time,
-                residual=point.gradient / state.length,
-            )
+        settled = yield from begun(energy, before, dt, goal, p, self._habit)
+        self._habit = settled.habit
+        point, spent = yield from balanced(energy, settled.x, settled.spent, goal, self._most, p, before.time)
         forces = point.gradient / state.length
         drift = (point.x - state.x) / dt if dt else None
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
@@ -223,47 +185,3 @@ class Engine:
             state, tools, old, _ = self._history[-_EXACT - 1]
             old.inverse = None
             self._history[-_EXACT - 1] = (state, tools, old, Habit())
-
-
-def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
-    """Return x with small waves if that lowers the energy, else x itself.
-
-    A perfect shape sits on its symmetry, in balance but not at rest: only so it finds the way out.
-    """
-    found, generator = x, Context.generator(seed)
-    normal = np.where(energy.free, normals(x, energy.state.mesh.triangles), 0.0)
-    for waves in _WAVES:
-        ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(x, axis=0).max()))
-        height = np.cos(x @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
-        trial = x + (_NUDGE * energy.material.thickness * height)[:, None] * normal
-        value = energy(trial)[0]
-        if value < least:
-            found, least = trial, value
-    return found
-
-
-def _begin(params: GrowthParams, mesh: Mesh) -> State:
-    """Return the start: rest state of the perfect shape, shape with its imperfection."""
-    top = shell.topology(mesh.triangles, len(mesh.x))
-    p = mesh.x[mesh.triangles]
-    normals = np.zeros_like(mesh.x)
-    np.add.at(normals, mesh.triangles, np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, None, :])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
-    held = np.zeros(mesh.x.shape, bool)
-    for attachment in params.attached:
-        inside = share(attachment.where, mesh, border(top), params.seed) >= 0.5
-        held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
-    angles = shell.angles(mesh.x, top.hinges)
-    x = mesh.x + np.where(held, 0.0, offset[:, None] * normals)
-    return State(
-        time=0.0,
-        x=x,
-        mesh=top,
-        g=shell.metric(mesh.x, mesh.triangles),
-        rest=angles if params.curved else np.zeros_like(angles),
-        shares={},
-        held=held,
-        spots={},
-        curves={},
-    )

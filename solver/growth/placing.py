@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from .. import shell
 from ..contract import Context, InvalidInput
+from .anchors import Anchors, place
 from .places import share
 from .shapes import Mesh
-from .state import Anchors, Spot, State, place
+from .state import Spot, State
 from .tools import Apex, HotCurve, HotSpot, HotSurface, Tool
 
 __all__ = ["border", "branched", "started"]

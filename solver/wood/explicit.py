@@ -13,10 +13,11 @@ from numba import njit
 
 from .arrays import Bodies, Bonds, Rods, Turns
 from .bodies import pose, press
-from .bonds import bind
-from .rods import bend, stretch
+from .internal import internal
+from .plan import Plan
 from .rubbing import Rubbing, rub
 from .twist import carry, turn, twists
+from .verlet import drift, grip, kick, slowed
 
 __all__ = ["BENDING", "BONDS", "CONTACT", "LOST", "STRETCH", "WORK", "Motion", "Scratch", "forces", "march"]
 
@@ -52,7 +53,9 @@ class Scratch(NamedTuple):
     push: np.ndarray
     power: np.ndarray
     lagged: np.ndarray
+    found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
     rubbing: Rubbing
+    plan: Plan
 
 
 @njit(cache=True, error_model="numpy")
@@ -69,12 +72,50 @@ def forces(
     rubbing: float,
     books: np.ndarray,
 ) -> None:
-    """Fill scratch.f with all forces [N], loads and contacts included, and the first four books with energies [J]."""
+    """Fill scratch.f with all forces [N], loads and contacts included, and the first four books with energies [J].
+
+    scratch.plan must be that of rods and bonds; see `state.scratch_for`.
+    """
+    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, rubbing, books, True)
+
+
+@njit(cache=True, error_model="numpy")
+def _fill(
+    motion: Motion,
+    rods: Rods,
+    turns: Turns,
+    bodies: Bodies,
+    scratch: Scratch,
+    turning: bool,
+    time: float,
+    dt: float,
+    rubbing: float,
+    books: np.ndarray,
+    look: bool,
+) -> None:
+    """Do what `forces` does; energies of rods and bonds only with `look`."""
     f = scratch.f
+    plan = scratch.plan
     f[:] = motion.load
     scratch.push[:] = 0.0
     scratch.power[:] = 0.0
-    books[STRETCH] = stretch(motion.x, f, rods, scratch.t, scratch.inverse)
+    internal(
+        motion.x,
+        f,
+        plan,
+        0,
+        len(plan.part) - 1,
+        turning,
+        look,
+        scratch.t,
+        scratch.inverse,
+        scratch.each,
+        scratch.found,
+    )
+    if look:
+        books[STRETCH] = scratch.found[:, 0].sum()
+        books[BENDING] = scratch.found[:, 1].sum()
+        books[BONDS] = scratch.found[:, 2].sum()
     if turning:
         scratch.torque[:] = 0.0
         carry(motion.d, motion.old, scratch.t, rods)
@@ -90,9 +131,6 @@ def forces(
             motion.theta,
             motion.reference,
         )
-    else:
-        books[BENDING] = bend(f, rods, scratch.t, scratch.inverse)
-    books[BONDS] = bind(motion.x, f, rods, bonds, scratch.t, scratch.inverse, scratch.each)
     books[CONTACT] = 0.0
     if len(bodies.kind) > 0:
         pose(bodies, time, scratch.centre, scratch.speed)
@@ -113,27 +151,6 @@ def forces(
         )
     if len(scratch.rubbing.pair) > 0:
         books[CONTACT] += rub(motion.x, motion.v, f, motion.mass, rods, scratch.rubbing, dt, rubbing, scratch.power)
-
-
-@njit(cache=True, error_model="numpy")
-def _grip(motion: Motion, f: np.ndarray) -> float:
-    """Return the power [W] that the holders of held vertices put in."""
-    power = 0.0
-    for i in range(len(f)):
-        if motion.held[i] == 1:
-            for c in range(3):
-                power -= f[i, c] * motion.v[i, c]
-    return power
-
-
-@njit(cache=True, error_model="numpy")
-def _dead(motion: Motion) -> float:
-    """Return the power [W] of dead loads and weights."""
-    power = 0.0
-    for i in range(len(motion.x)):
-        for c in range(3):
-            power += motion.load[i, c] * motion.v[i, c]
-    return power
 
 
 @njit(cache=True, error_model="numpy")
@@ -161,21 +178,16 @@ def march(
     f = scratch.f
     slow = np.exp(-damping * dt)
     half = 0.5 * dt
+    held = np.flatnonzero(motion.held)
+    weight = half / motion.mass
+    weight[held] = 0.0
+    keep = np.full(len(x), slow)
+    keep[held] = 1.0
     for n in range(steps):
-        power = _grip(motion, f) + scratch.power[0]
+        power = grip(held, v, f) + scratch.power[0]
         rubbed = scratch.power[1]
-        work = 0.0
-        for i in range(len(x)):
-            if motion.held[i] == 0:
-                w = half / motion.mass[i]
-                v[i, 0] += w * f[i, 0]
-                v[i, 1] += w * f[i, 1]
-                v[i, 2] += w * f[i, 2]
-            x[i, 0] += dt * v[i, 0]
-            x[i, 1] += dt * v[i, 1]
-            x[i, 2] += dt * v[i, 2]
-        # dead loads: their work is load times way, without error
-        work += dt * _dead(motion)
+        kick(v, f, weight)
+        work = drift(x, v, motion.load, dt)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -184,13 +196,9 @@ def march(
         for r in range(len(bodies.kind)):
             for c in range(3):
                 impulse[r, c] += half * scratch.push[r, c]
-        forces(motion, rods, bonds, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books)
-        for i in range(len(x)):
-            if motion.held[i] == 0:
-                w = half / motion.mass[i]
-                v[i, 0] += w * f[i, 0]
-                v[i, 1] += w * f[i, 1]
-                v[i, 2] += w * f[i, 2]
+        look = n == steps - 1
+        _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books, look)
+        kick(v, f, weight)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -198,18 +206,13 @@ def march(
         for r in range(len(bodies.kind)):
             for c in range(3):
                 impulse[r, c] += half * scratch.push[r, c]
-        books[WORK] += work + half * (power + _grip(motion, f) + scratch.power[0])
+        books[WORK] += work + half * (power + grip(held, v, f) + scratch.power[0])
         books[LOST] += half * (rubbed + scratch.power[1])
         if damping > 0.0:
-            for i in range(len(x)):
-                if motion.held[i] == 0:
-                    was = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2]
-                    books[LOST] += 0.5 * motion.mass[i] * was * (1.0 - slow * slow)
-                    v[i, 0] *= slow
-                    v[i, 1] *= slow
-                    v[i, 2] *= slow
-            for e in range(len(motion.spin)):
-                books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)
-                motion.spin[e] *= slow
+            books[LOST] += slowed(v, keep, motion.mass)
+            if turning:
+                for e in range(len(motion.spin)):
+                    books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)
+                    motion.spin[e] *= slow
     total = books[STRETCH] + books[BENDING] + books[BONDS]
     return np.isfinite(total) and np.isfinite(v).all()

@@ -91,8 +91,10 @@ def begin(wood: Wood) -> State:
 
 
 def _again(scratch: Scratch) -> Scratch:
-    fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name != "rubbing"}
-    return Scratch(**fresh, rubbing=scratch.rubbing)
+    """Return a copy; pairs and plan are never written to."""
+    kept = ("rubbing", "plan")
+    fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
+    return scratch._replace(**fresh)
 
 
 def copied(state: State) -> State:

@@ -29,7 +29,7 @@ _QUALITIES: dict[Quality, tuple[float, float, float, float]] = {
     "fine": (2.0, 0.2, 1 / 1920, 1e-4),
 }
 #: Measured on one busy core: seconds per vertex and explicit step, and per vertex and implicit step.
-_EXPLICIT, _IMPLICIT = 1.5e-7, 4e-5
+_EXPLICIT, _IMPLICIT = 8e-8, 4e-5
 #: Bytes of all arrays per vertex, bonds included; explicit, and with the implicit scheme's factors.
 _BYTES, _FACTORS = 3000, 30_000
 _FEWEST = 3

@@ -8,6 +8,7 @@ import numpy as np
 
 from .arrays import Bodies, Bonds, Rods, Turns
 from .explicit import Motion, Scratch
+from .plan import plan_for
 from .rubbing import none
 
 __all__ = ["Wood", "scratch_for"]
@@ -41,7 +42,8 @@ class Wood:
 
 
 def scratch_for(wood: Wood) -> Scratch:
-    """Return work arrays that fit."""
+    """Return work arrays that fit, and the plan of what is whole."""
+    plan = plan_for(wood.rods, wood.bonds, wood.strength)
     v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
     return Scratch(
         np.zeros((v, 3)),
@@ -54,5 +56,7 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((r, 3)),
         np.zeros(2),
         np.zeros((r, wood.bodies.first[-1] if r else 0)),
+        np.zeros((len(plan.part) - 1, 4)),
         none(),
+        plan,
     )

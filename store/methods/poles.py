@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["highest_degree", "keep_off", "multiply"]
+__all__ = ["highest_degree", "multiply"]
 
 Array = NDArray[np.generic]
 
@@ -29,20 +29,12 @@ def highest_degree(power: NDArray[np.floating]) -> int:
     return int((below < 1 - _REST).sum(axis=-1).max()) + 1
 
 
-def keep_off(waves: Array, degree: int) -> Array:
-    """Return waves (c, m, k) of fields with nothing at latitudes where waves m of degrees up to `degree` cannot be."""
-    kept = np.zeros_like(waves)
-    _add(kept, waves, np.ones(waves.shape[1:], waves.real.dtype), degree)
-    return kept
-
-
 def multiply(waves: Array, factor: Array, degree: int) -> None:
-    """Multiply waves (c, m, k) by a factor (m, k), in place, and keep what that adds off the poles."""
-    _add(waves, waves, (factor - 1).astype(factor.dtype), degree)
+    """Multiply waves (c, m, k) by a factor (m, k), in place, and keep what that adds off the poles.
 
-
-def _add(target: Array, waves: Array, factor: Array, degree: int) -> None:
-    """Add to `target` the waves times a factor (m, k), kept off the poles; both (c, m, k) may be the same."""
+    Nothing is added at latitudes where waves m of degrees up to `degree` cannot be.
+    """
+    gain = (factor - 1).astype(factor.dtype)
     count, band = len(waves), waves.shape[1] - 1
     real = waves.real.dtype
     parts = waves.view(real).reshape(count, band + 1, band + 1, 2)
@@ -50,11 +42,11 @@ def _add(target: Array, waves: Array, factor: Array, degree: int) -> None:
     for first, windows in enumerate(_windows(band, degree, real.str)):
         kept = len(windows)
         rows = np.empty((kept, count, 2, windows.shape[-1]), real)
-        by = factor[:kept, None, None, first::2]
+        by = gain[:kept, None, None, first::2]
         np.multiply(parts[:, :kept, first::2].transpose(1, 0, 3, 2), by, out=rows)
         lines = (rows.reshape(kept, 2 * count, -1) @ windows).reshape(rows.shape)
         # part by part: numpy's innermost loop is otherwise two numbers long
-        for i, sums in enumerate((target.real, target.imag)):
+        for i, sums in enumerate((waves.real, waves.imag)):
             sums[:, :kept, first::2] += lines[:, :, i].transpose(1, 0, 2)
 
 

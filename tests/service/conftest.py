@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import threading
 import time
@@ -17,11 +18,14 @@ from fastapi import FastAPI
 
 from service.app import create_app
 from service.settings import Settings
+from solver import registry
 from solver.dehydration import SOLVER
 from store import tables
 from store.store import Store
 
 from ..store.conftest import fill
+from ._asking import ROOT
+from ._jobs import bearer
 
 AXES = {"te": [0.02, 0.06], "gamma": [5.0, 20.0]}
 SHAPE = "/v1/shapes/dehydration"
@@ -71,4 +75,43 @@ def own(built: Path, tmp_path: Path) -> Store:
 @pytest.fixture(scope="session")
 def client(built: Path) -> Iterator[httpx.Client]:
     with client_of(built) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def shrinking(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Install the solver `shrinking` the way any third one is, here and in the workers."""
+    info = tmp_path_factory.mktemp("site") / "shrinking-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: shrinking\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[wizen.solvers]\nshrinking = shrinking:SOLVER\n")
+    paths = [str(ROOT / "tests" / "sweeps"), str(info.parent), str(ROOT)]
+    with pytest.MonkeyPatch.context() as patch:
+        for path in paths[:2]:
+            patch.syspath_prepend(path)
+        patch.setenv("PYTHONPATH", os.pathsep.join(paths))
+        for found in (registry._places, registry.get):
+            found.cache_clear()
+        yield
+    for found in (registry._places, registry.get):
+        found.cache_clear()
+
+
+@pytest.fixture
+def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A file with a line per solve, in whichever process."""
+    monkeypatch.setenv("SHRINKING_LOG", str(tmp_path / "solves.log"))
+    return tmp_path / "solves.log"
+
+
+@pytest.fixture
+def store(tmp_path: Path, log: Path) -> Store:
+    return Store.open(tmp_path / "store", create=True)
+
+
+@pytest.fixture
+def queue_only(store: Store) -> Iterator[httpx.Client]:
+    """A service that leaves its jobs to others, asked by somebody who may."""
+    with client_of(store.root, jobs_workers=0, max_jobs=4, max_jobs_per_token=3) as client:
+        client.headers.update(bearer(store))
         yield client

@@ -8,8 +8,8 @@ import pytest
 from service.answers import Answer, Answers
 from store.store import Store
 
+from ._asking import until
 from .conftest import QUERY, SHAPE, build, client_of
-from .test_reload import until
 
 KEPT = "kept;desc=answered-before"
 

@@ -12,7 +12,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ("/v1/shapes/dehydration?te=0.03&gamma=7&s=0.2&format=glb", "/v1/solvers/dehydration", "/openapi.json")
 HEAVY = {
-    "skfem",
     "numba",
     "matplotlib",
     "distributed",

@@ -13,15 +13,17 @@ import pytest
 
 from store.store import Store
 
-from .test_jobs import ROOT, _answers, _shrinking, bearer, body, log, store, until  # noqa: F401 - fixtures
+from ._asking import ROOT, answers, until
+from ._jobs import bearer, body
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.usefixtures("shrinking"),
     pytest.mark.filterwarnings("ignore::DeprecationWarning:distributed", "ignore::ResourceWarning"),
 ]
 
 
-def test_jobs_run_on_a_dask_cluster(store: Store, log: Path) -> None:  # noqa: F811
+def test_jobs_run_on_a_dask_cluster(store: Store, log: Path) -> None:
     distributed = pytest.importorskip("distributed")
     # its workers are processes of their own, which take the environment as it is now
     with distributed.LocalCluster(
@@ -35,7 +37,7 @@ def test_jobs_run_on_a_dask_cluster(store: Store, log: Path) -> None:  # noqa: F
             assert running.stderr is not None
             address = running.stderr.readline().split()[-1]
             with httpx.Client(base_url=address, headers=bearer(store), timeout=20) as client:
-                until(lambda: _answers(client))
+                until(lambda: answers(client))
                 asked = [client.post("/v1/jobs", json=body(0.02 + 0.01 * i)) for i in range(4)]
                 assert {answer.status_code for answer in asked} == {202}
                 bad = client.post("/v1/jobs", json=body(0.08, trouble="refuses"))

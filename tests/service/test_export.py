@@ -19,9 +19,9 @@ from store import shards
 from store.store import Store
 from sweeps.plan import job
 
+from ._asking import checked
+from ._runs import splitting
 from .conftest import client_of
-from .test_problems import checked
-from .test_sequences import splitting
 
 
 @pytest.fixture(scope="module")

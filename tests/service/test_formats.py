@@ -10,45 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
 from service.errors import InvalidQuery, NotAcceptable
-from service.formats import FORMATS, About, negotiate, write
+from service.formats import FORMATS, negotiate, write
 from service.formats import mesh as topology
-from solver.fruit import azimuths, colatitudes, directions, lattice
-from store.lookup import Shape
 
-HALF_AXES = np.array([1.0, 1.4, 0.7])
-ABOUT = About("dehydration", "main", {"gamma": 10.0}, "s", {"te": "r1"})
-
-
-def ellipsoid(n: int, half_axes: NDArray[np.float64] = HALF_AXES) -> Shape:
-    points = directions(*lattice(n)) * half_axes
-    poles = np.array([[0, 1, 0], [0, -1, 0]]) * half_axes
-    return Shape(
-        colatitude=colatitudes(n),
-        azimuth=azimuths(n),
-        position=points.astype("f4"),
-        displacement=(0.1 * points).astype("f4"),
-        poles=poles.astype("f4"),
-        stage=0.25,
-        parameters={"te": 0.04},
-        descriptors={"roughness": 0.01},
-        weights={"ab": 0.75, "cd": 0.25},
-        nearest=0.5,
-        exact=False,
-        converged=True,
-        table="abc",
-        units={"roughness": "1"},
-    )
-
-
-def polyhedron_volume(n: int) -> float:
-    """Volume of the unit sphere's mesh, summed over its rings: independent of any triangle list."""
-    theta = np.concatenate([[0.0], colatitudes(n), [np.pi]])
-    y, area = np.cos(theta), n * np.sin(np.pi / n) * np.sin(theta) ** 2  # a regular 2n-gon at each height
-    mixed = n * np.sin(np.pi / n) * np.sin(theta[1:]) * np.sin(theta[:-1])
-    return float(np.sum((y[:-1] - y[1:]) * (area[:-1] + area[1:] + mixed) / 3))
+from ._shapes import ABOUT, HALF_AXES, ellipsoid, polyhedron_volume
 
 
 def load(data: bytes, kind: str) -> trimesh.Trimesh:

@@ -11,12 +11,13 @@ import httpx
 import pytest
 from pydantic import BaseModel
 
-from service import errors, problems
+from service import errors
 from service.app import create_app
 from service.settings import Settings
 from solver import contract
 from store import errors as stored
 
+from ._asking import checked
 from .conftest import served
 
 EXPECTED: dict[type[Exception], int] = {
@@ -105,17 +106,6 @@ def faulty(built: Path) -> Iterator[httpx.Client]:
         yield client
 
 
-def checked(answer: httpx.Response, status: int, code: str) -> dict:
-    assert answer.status_code == status
-    assert answer.headers["content-type"] == "application/problem+json"
-    problem = answer.json()
-    problems.Problem.model_validate(problem)
-    assert (problem["status"], problem["type"]) == (status, f"urn:wizen:problem:{code}")
-    assert problem["request_id"] == answer.headers["x-request-id"]
-    assert "Traceback" not in answer.text
-    return problem
-
-
 @pytest.mark.parametrize(("kind", "status"), EXPECTED.items(), ids=lambda v: getattr(v, "__name__", str(v)))
 def test_every_error_has_its_status(faulty: httpx.Client, kind: type[Exception], status: int) -> None:
     problem = checked(faulty.get(f"/fail/{kind.__name__}"), status, kind.code)  # type: ignore[attr-defined]
@@ -126,7 +116,7 @@ def test_every_error_has_its_status(faulty: httpx.Client, kind: type[Exception],
 
 def test_no_error_is_forgotten() -> None:
     ours = descendants(contract.SolverError) | descendants(stored.StoreError) | descendants(errors.ServiceError)
-    ours = {kind for kind in ours if kind.__module__ in (contract.__name__, stored.__name__, errors.__name__)}
+    ours = {kind for kind in ours if kind.__module__ in (contract.errors.__name__, stored.__name__, errors.__name__)}
     assert ours == set(EXPECTED)
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import httpx
@@ -17,14 +15,8 @@ from store.errors import UnknownTable
 from store.store import Store
 
 from ..store.conftest import fill
+from ._asking import until
 from .conftest import QUERY, SHAPE, build, client_of
-
-
-def until(condition: Callable[[], bool], seconds: float = 5.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it never happened"
-        time.sleep(0.02)
 
 
 def test_no_request_is_lost_while_tables_change(own: Store) -> None:

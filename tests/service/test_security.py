@@ -18,8 +18,8 @@ from store.store import Store
 from store.tokens import Tokens
 from sweeps.cli import app
 
+from ._asking import checked
 from .conftest import QUERY, SHAPE, client_of
-from .test_problems import checked
 
 ASKED: dict[str, Any] = {"solver": "dehydration", "need": {"stages": [0.05], "quality": "preview"}}
 

@@ -9,55 +9,19 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-import OpenEXR
-import png
 import pytest
 import trimesh
 import xarray as xr
-from PIL import Image
 from pxr import Usd, UsdGeom
-from scipy.special import sph_harm_y
 
 from service.errors import InvalidQuery, UnfitFormat
-from service.sequences import EXPORTS, STILLS, Options, Sequence, of_run, prepared, write
-from service.sequences.bake import baked
-from solver import meshes, registry
-from solver.fruit import directions, lattice
+from service.sequences import STILLS, Options, Sequence, of_run, prepared
+from solver import registry
+from solver.fruit import lattice
 from sweeps import colours
 
-STAGES = (0.0, 2.0, 5.0)
-
-
-def shrinking(n: int = 8, **fields: np.ndarray) -> xr.Dataset:
-    ball = directions(*lattice(n))
-    position = np.stack([(1 - 0.1 * k) * ball + [0.3 * k, 0, 0] for k in range(len(STAGES))])
-    data = {"position": (("stage", "colatitude", "azimuth", "component"), position.astype("f4"))}
-    data |= {name: (("stage", "colatitude", "azimuth"), values) for name, values in fields.items()}
-    return xr.Dataset(data, {"stage": list(STAGES)}, {"solver": "decay"})
-
-
-def rotting(n: int = 8) -> xr.Dataset:
-    """An orange whose rot falls from pole to pole and grows by stage."""
-    theta, _ = lattice(n)
-    rot = np.stack([k / 2 * (1 + np.cos(theta)) / 2 for k in range(3)]).astype("f4")
-    run = shrinking(n, rot=rot, mould=rot / 2, mould_active=rot / 4)
-    run.attrs["params"] = registry.get("decay").parse({}, "orange").model_dump_json()
-    return run
-
-
-def splitting(metres: float = 0.01) -> xr.Dataset:
-    """A box that becomes a ball: triangles change."""
-    solids = [trimesh.creation.box(), trimesh.creation.icosphere(2), trimesh.creation.icosphere(1)]
-    frames = [
-        meshes.Frame(np.array(s.vertices, "f4"), np.array(s.faces), {"heat": np.array(s.vertices[:, 1], "f4")})
-        for s in solids
-    ]
-    return xr.Dataset(meshes.changing(frames), {"stage": list(STAGES)}, {"metres_per_unit": metres, "solver": "growth"})
-
-
-def made(run: xr.Dataset, name: str, stage: float | None = None, **options: object) -> bytes:
-    chosen, asked = EXPORTS[name], Options.parse(dict(options))
-    return write(prepared(run, asked, stage, chosen.single), chosen, asked)
+from ._gltf import accessor, parsed
+from ._runs import STAGES, made, rotting, shrinking, splitting
 
 
 def vertices(run: xr.Dataset) -> list[np.ndarray]:
@@ -143,19 +107,6 @@ def test_usd_samples_triangles_that_change_and_knows_the_metre(tmp_path: Path) -
 
 
 # --- animated glTF, by trimesh and by its JSON --------------------------------------------------------------------
-
-
-def parsed(data: bytes) -> tuple[dict, bytes]:
-    length = struct.unpack_from("<I", data, 12)[0]
-    return json.loads(data[20 : 20 + length]), data[28 + length :]
-
-
-def accessor(document: dict, binary: bytes, index: int) -> np.ndarray:
-    found = document["accessors"][index]
-    view = document["bufferViews"][found["bufferView"]]
-    kind = {5126: "<f4", 5123: "<u2", 5125: "<u4"}[found["componentType"]]
-    values = np.frombuffer(binary[view["byteOffset"] :][: view["byteLength"]], kind)
-    return values.reshape(found["count"], -1)
 
 
 def test_a_moving_shape_is_one_mesh_with_morph_targets() -> None:
@@ -254,53 +205,6 @@ def test_obj_gives_the_order_of_a_cache() -> None:
     read = np.float32([w[1:] for w in words if w[0] == "v"])
     assert np.array_equal(read[:, :3], vertices(rotting())[0])
     assert np.allclose(read[:, 3:], colours.encoded(next(iter(sequence)).colour) / 255)
-
-
-# --- maps --------------------------------------------------------------------------------------------------------
-
-
-def test_a_map_lies_where_its_field_lies() -> None:
-    """Real spherical harmonics have a value everywhere: bilinear reaches it in second order, over poles and seam."""
-    size, errors = 96, []
-    theta, phi = np.meshgrid(*((np.arange(size) + 0.5) / size * top for top in (np.pi, 2 * np.pi)), indexing="ij")
-    for n in (16, 32, 64):
-        field = sph_harm_y(5, 3, *lattice(n)).real
-        errors.append(np.abs(baked(field, size) - sph_harm_y(5, 3, theta, phi).real).max())
-    assert errors[-1] < 3e-3
-    assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2, abs=0.3)
-
-
-def test_png_is_sixteen_bits_and_says_its_range() -> None:
-    data = made(rotting(16), "png", map="rot", size=40)
-    width, height, rows, info = png.Reader(bytes=data).read()
-    assert (width, height, info["bitdepth"], info["greyscale"]) == (40, 40, 16, True)
-    levels = np.vstack([np.frombuffer(row, np.uint16) for row in map(bytes, rows)])
-    assert np.abs(levels / 65535 - baked(rotting(16)["rot"].values[2], 40)).max() < 1e-5
-    said = json.loads(Image.open(io.BytesIO(data)).text["wizen"])
-    assert (said["low"], said["high"], said["field"], said["stage"]) == (0, 1, "rot", 5.0)
-    other = made(rotting(16), "png", map="rot", size=40, low=0.5, high=0.75)
-    assert np.asarray(Image.open(io.BytesIO(other))).max() == 65535
-    with pytest.raises(InvalidQuery, match="not above"):
-        made(rotting(16), "png", low=1, high=0)
-    with pytest.raises(InvalidQuery, match="no field"):
-        made(rotting(16), "png", map="moss")
-
-
-def test_exr_holds_the_values_themselves(tmp_path: Path) -> None:
-    path = tmp_path / "maps.exr"
-    path.write_bytes(made(rotting(16), "exr", size=48, stage=2.0))
-    with OpenEXR.File(str(path)) as file:
-        channels = file.channels()
-        assert set(channels) == {"rot", "mould", "mould_active"}
-        assert np.array_equal(channels["rot"].pixels, baked(rotting(16)["rot"].values[1], 48))
-
-
-@pytest.mark.parametrize("name", ["png", "exr"])
-def test_maps_need_texture_coordinates_and_a_field(name: str) -> None:
-    with pytest.raises(UnfitFormat, match="texture coordinates"):
-        made(splitting(), name)
-    with pytest.raises(UnfitFormat, match="no field"):
-        made(shrinking(), name)
 
 
 # --- the view ----------------------------------------------------------------------------------------------------

@@ -27,9 +27,9 @@ from store.store import Store
 from store.tokens import Tokens
 
 from ..store.conftest import answer, fill
+from ._asking import checked
+from ._shapes import points
 from .conftest import QUERY, SHAPE, build, client_of
-from .test_problems import checked
-from .test_viewer import points
 
 POINT = {"te": 0.03, "gamma": 7.0}
 
@@ -145,11 +145,10 @@ def test_of_which_method_the_errors_are_known(client: httpx.Client) -> None:
     assert f"Take the method {methods.DEFAULT}" in problem["advice"]
 
 
-def test_an_old_table_is_to_be_rebuilt(tmp_path: Path) -> None:
+def test_a_table_without_errors_is_to_be_rebuilt(tmp_path: Path) -> None:
     old = Store.open(shutil.copytree(STARTER, tmp_path / "old"))
     path = tables.path_of(old, tables.info(old))
     whole = xr.load_dataset(path, engine="h5netcdf")
-    # as they were before errors were stored with a table
     judged = [name for name in whole if str(name).startswith("left_out_")]
     assert judged
     whole.drop_vars(judged).to_netcdf(path, engine="h5netcdf", encoding={n: {"_FillValue": None} for n in whole.coords})

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-import struct
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,10 +12,9 @@ import pytest
 
 from service import page
 from service.formats import mesh, write
-from service.formats.points import MAGIC
 
+from ._shapes import ABOUT, HALF_AXES, ellipsoid, points, polyhedron_volume
 from .conftest import QUERY, SHAPE, client_of
-from .test_formats import ABOUT, HALF_AXES, ellipsoid, polyhedron_volume
 
 BROWSER = {"Accept": "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,image/webp,*/*;q=0.8"}
 SOURCES = Path(page.__file__).parent / "viewer"
@@ -111,14 +108,6 @@ def test_sources_name_no_other_host_and_no_inline_code() -> None:
     assert scripts
     for script in scripts:
         assert not re.search(r"https?://|innerHTML|\beval\(", script.read_text()), script
-
-
-def points(data: bytes) -> tuple[dict, np.ndarray]:
-    magic, version, n, length = struct.unpack_from("<4sIII", data)
-    assert (magic, version, length % 4) == (MAGIC, 1, 0)
-    found = np.frombuffer(data, "<f4", offset=16 + length).reshape(-1, 3)
-    assert len(found) == 2 * n * n + 2
-    return json.loads(data[16 : 16 + length]), found
 
 
 def test_points_are_the_vertices_of_the_closed_mesh() -> None:

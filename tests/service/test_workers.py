@@ -10,8 +10,8 @@ from pathlib import Path
 import httpx
 import pytest
 
+from ._asking import ROOT, answers, until
 from .conftest import QUERY, SHAPE
-from .test_jobs import ROOT, _answers, until
 
 
 @pytest.mark.slow
@@ -22,7 +22,7 @@ def test_several_processes_answer_alike(built: Path) -> None:
         assert running.stderr is not None
         address = running.stderr.readline().split()[-1]
         with httpx.Client(base_url=address, timeout=20) as client:
-            until(lambda: _answers(client))
+            until(lambda: answers(client))
         bodies = set()
         for _ in range(40):  # each on a connection of its own, which any of them may take
             answer = httpx.get(f"{address}{SHAPE}", params={**QUERY, "format": "npz"}, timeout=20)

@@ -13,7 +13,7 @@ from solver.dehydration.implicit.hexahedron import NODES, POINTS, PRESSURE, SHAP
 from solver.dehydration.implicit.newton import masked
 from solver.dehydration.params import DehydrationParams
 
-from .implicit_twin import block, twin_energy, twin_force
+from ._implicit_twin import block, twin_energy, twin_force
 
 FRUIT = DehydrationParams.parse({"te": 0.1})
 PLUM = DehydrationParams(radii=(1, 0.98, 0.93, 0.9, 0.93, 0.98, 1, 0.63), stone=(0.3, 0.3), exocarp_thickness=0.1)

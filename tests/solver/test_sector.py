@@ -9,8 +9,8 @@ import pytest
 
 from solver import registry
 from solver.contract import Context, InvalidGeometry
-from solver.dehydration import path as paths
-from solver.dehydration.contact import HITS
+from solver.dehydration import motion
+from solver.dehydration.contact_data import HITS
 from solver.dehydration.imperfection import heights
 from solver.dehydration.kernel import build_layout, make_skin, march, new_state, positions
 from solver.dehydration.mesh import build_mesh
@@ -110,7 +110,7 @@ def test_a_buckled_part_is_the_symmetric_whole(monkeypatch):
         whole = build_mesh(params[""], settings.n, settings.core)
         return evened(heights(*given, **more), cut(whole, "xyz"))
 
-    monkeypatch.setattr(paths, "heights", even)
+    monkeypatch.setattr(motion, "heights", even)
     whole = Path(params[""], replace(settings, copies=1), Context())
     assert whole.elements == 8 * part.elements
     large = whole.stage(0.13, 0.13)

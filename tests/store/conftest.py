@@ -17,8 +17,10 @@ from scipy.special import sph_harm_y
 from solver.contract import Need, finish
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes, directions, lattice
+from store import tables
 from store.keys import key
 from store.ledger import JobSpec
+from store.lookup import ShapeTable
 from store.store import Store
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -132,3 +134,14 @@ def _filled_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def filled(tmp_path: Path, _filled_once: Path) -> Store:
     """Return a store of its own with the results of the grid TE x GAMMA."""
     return Store.open(shutil.copytree(_filled_once, tmp_path / "filled"))
+
+
+@pytest.fixture(scope="module")
+def rough(tmp_path_factory: pytest.TempPathFactory) -> ShapeTable:
+    """Return the table of `_wrinkled`; do not change it."""
+    from ._wrinkled import wrinkled  # which asks what this module asks
+
+    store = Store.open(tmp_path_factory.mktemp("rough"), create=True)
+    wrinkled(store)
+    tables.build(store, axes=DehydrationParams.axes)
+    return ShapeTable.open(store)

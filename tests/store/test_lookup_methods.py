@@ -7,65 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
-from scipy.special import sph_harm_y
 
-from solver.contract import finish
-from solver.dehydration import SOLVER, DehydrationParams
-from solver.fruit import azimuths, colatitudes, directions, lattice
+from solver.fruit import directions, lattice
 from store import harmonics, methods, spectra, starter, tables
 from store.errors import OutsideTable, TooUncertain
 from store.lookup import ShapeTable
 from store.measures import Measures
 from store.methods.bands import Bands, Targets, add_up, multiplier
-from store.methods.weights import Samples
 from store.store import Store
 
-from .conftest import GAMMA, STAGES, TE, _spec, fill, question
+from ._wrinkled import AXES, N, grid, pattern, wrinkled
+from .conftest import GAMMA, STAGES, TE, fill
 
-AXES = DehydrationParams.axes
-N = 32
 CORRECTED = ("linear+LL", "linear+env", "linear+LL+env", "idw+LL+env", "scattered+LL+env")
-
-
-def pattern(seed: int, middle: float, rms: float) -> np.ndarray:
-    """Return radial wrinkles (N, 2N) of random phases around a degree."""
-    rng = np.random.default_rng(seed)
-    theta, phi = lattice(N)
-    field = np.zeros_like(theta)
-    for degree in range(4, 18):
-        size = np.exp(-(((degree - middle) / 2) ** 2))
-        for order in range(degree + 1):
-            turn = rng.uniform(0, 2 * np.pi)
-            field += size * rng.standard_normal() * sph_harm_y(degree, order, theta, phi + turn).real
-    return field * rms / np.sqrt((harmonics.area(N) * field**2).sum())
-
-
-def wrinkled(store: Store, onset: float = 0.0) -> dict[tuple[float, float], np.ndarray]:
-    """Fill a store with patterns that have nothing in common but how rough and how fine they are."""
-    theta, phi = lattice(N)
-    fields = {}
-    for i, te in enumerate(TE):
-        for j, gamma in enumerate(GAMMA):
-            radial = pattern(10 * i + j, 0.3 / te, 0.9 * te)
-            u = np.stack([(max(s - onset, 0) * radial - 0.5 * s)[..., None] * directions(theta, phi) for s in STAGES])
-            params, need = question(te=te, gamma=gamma, resolution=N)
-            coords = {"stage": list(STAGES), "colatitude": colatitudes(N), "azimuth": azimuths(N)}
-            data = {"displacement": (("stage", "colatitude", "azimuth", "component"), u.astype(np.float32))}
-            result = finish(xr.Dataset(data, {**coords, "component": ["x", "y", "z"]}), SOLVER, params, need)
-            job = _spec(params, need)
-            store.ledger.want([job])
-            store.ledger.done(job.key, store.put(job.key, result), 1.0)
-            fields[te, gamma] = u
-    return fields
-
-
-@pytest.fixture(scope="module")
-def rough(tmp_path_factory: pytest.TempPathFactory) -> ShapeTable:
-    store = Store.open(tmp_path_factory.mktemp("rough"), create=True)
-    wrinkled(store)
-    tables.build(store, axes=AXES)
-    return ShapeTable.open(store)
 
 
 def found(table: ShapeTable, te: float, gamma: float, stage: float, method: str, n: int = N) -> np.ndarray:
@@ -82,73 +36,7 @@ def radial_power(u: np.ndarray) -> np.ndarray:
     return power
 
 
-# --- weights ----------------------------------------------------------------------------------------------------
-
-
-def grid() -> Samples:
-    te, gamma = np.meshgrid([0.02, 0.04, 0.08], [10.0, 100.0], indexing="ij")
-    return Samples(np.stack([te.ravel(), gamma.ravel()], axis=-1))
-
-
-def test_linear_is_linear_in_the_logarithms() -> None:
-    samples = grid()
-    assert samples.is_grid
-    for te, gamma in ((0.025, 17.0), (0.05, 90.0), (0.08, 33.0)):
-        near = samples.weigh("linear", np.array([te, gamma]), 6, 2.0)
-        assert near.weights.sum() == pytest.approx(1)
-        assert (near.weights > 0).all()
-        logs = near.weights @ np.log(samples.values[near.samples])
-        np.testing.assert_allclose(np.exp(logs), [te, gamma], rtol=1e-12)
-
-
-def test_every_weighting_hits_its_samples() -> None:
-    samples = grid()
-    for i, value in enumerate(samples.values):
-        for weighting in methods.WEIGHTINGS:
-            near = samples.weigh(weighting, value, 6, 2.0)
-            assert (near.samples.tolist(), near.weights.tolist(), near.nearest) == ([i], [1.0], 0.0)
-
-
-def test_scattered_weights_have_no_jumps() -> None:
-    rng = np.random.default_rng(1)
-    samples = Samples(rng.uniform(1, 2, (40, 2)))
-    assert not samples.is_grid
-
-    def dense(weighting: str, x: float) -> np.ndarray:
-        near = samples.weigh(weighting, np.array([x, 1.5]), 6, 2.0)
-        return np.bincount(near.samples, near.weights, 40)
-
-    def largest(weighting: str, steps: int) -> float:
-        rows = np.array([dense(weighting, x) for x in np.linspace(1.1, 1.9, steps)])
-        return float(np.abs(np.diff(rows, axis=0)).max())
-
-    assert largest("linear", 4001) < 0.3 * largest("linear", 1001)  # falls with the step
-    assert largest("idw", 4001) > 0.5 * largest("idw", 1001)  # the paper's does not
-
-
-def test_an_axis_through_zero_is_not_taken_by_logarithm() -> None:
-    samples = Samples(np.array([[-1.0, 0.0], [1.0, 0.0], [-1.0, 2.0], [1.0, 2.0]]))
-    near = samples.weigh("linear", np.array([0.0, 0.5]), 6, 2.0)
-    np.testing.assert_allclose(near.weights @ samples.values[near.samples], [0, 0.5])
-
-
-def test_the_hull_of_scattered_samples() -> None:
-    samples = Samples(np.exp(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])))
-    assert samples.contains(np.exp([0.3, 0.3]))
-    assert samples.contains(np.exp([0.5, 0.5]))
-    assert not samples.contains(np.exp([0.6, 0.6]))
-
-
-def test_left_out_from_both_sides() -> None:
-    samples = grid()
-    middle = int(np.flatnonzero((samples.values == [0.04, 10.0]).all(axis=1))[0])
-    near = samples.without(middle)
-    np.testing.assert_allclose(samples.values[near.samples], [[0.02, 10], [0.08, 10]])
-    np.testing.assert_allclose(near.weights, 0.5)
-    corner = samples.without(0)
-    assert 0 not in corner.samples
-    assert corner.weights.sum() == pytest.approx(1)
-    assert len(samples.adjacent()) == 3 + 4
+# --- names ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["liner", "idw+LLL", "linear+env+env", "", "LL"])

@@ -13,8 +13,6 @@ from store.blend import complex_view
 from store.lookup import ShapeTable
 from store.methods import bands, cells, envelope, poles
 
-from .test_lookup_methods import rough  # noqa: F401 - a fixture
-
 QUERY, STAGE = {"te": 0.033, "gamma": 14.0}, 0.17
 TERMS = 8  # four corners at two stages
 
@@ -60,7 +58,7 @@ def plain(table: ShapeTable, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("n", [8, 12, 32, 64, 90])
-def test_the_default_is_what_it_is_said_to_be(rough: ShapeTable, n: int) -> None:  # noqa: F811
+def test_the_default_is_what_it_is_said_to_be(rough: ShapeTable, n: int) -> None:
     shape = rough.at(QUERY, STAGE, resolution=n)
     position, ends = plain(rough, n)
     assert shape.method == methods.DEFAULT

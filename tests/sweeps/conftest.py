@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from _command import wizen
 
 from solver import registry
 from store.store import Store
@@ -75,3 +76,13 @@ def write_plan(tmp_path: Path) -> Callable[..., Path]:
         return write(tmp_path / f"{name}.toml", *values, **more)
 
     return here
+
+
+@pytest.fixture(scope="module")
+def table(site: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store with a table of shrinking spheres over te and gamma, which no test changes."""
+    folder = tmp_path_factory.mktemp("table")
+    store = folder / "store"
+    assert wizen("sweep", write(folder / "six.toml"), "--store", store).exit_code == 0
+    assert wizen("table", "build", "--store", store, "--solver", "shrinking").exit_code == 0
+    return store

@@ -29,7 +29,8 @@ from ...shell import (
     topology,
 )
 from ...shell.dissection import Fronts
-from ...shell.inverse import Inverse, fronts_of, inverse_of, normals
+from ...shell.inverse import Inverse, fronts_of, inverse_of
+from ...shell.normals import normals
 from .flesh import Skin
 
 __all__ = ["Model", "Settled", "Shell"]

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit, prange, typeof, types
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from solver.dehydration.contact import make_contact
+from solver.dehydration.contact_data import make_contact
 from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
@@ -232,11 +232,6 @@ class InternalForce(NamedTuple):
     """Euclidean norm over the free nodes"""
     scale: float
     """root of the sum, over all elements, of their squared nodal forces at free nodes"""
-
-    @property
-    def relative_residual(self) -> float:
-        """Norm over scale; 0 in a state without any stress."""
-        return self.norm / self.scale if self.scale > 0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")

@@ -19,7 +19,6 @@ Floats = NDArray[np.float64]
 
 LEAST_VOLUME = 0.05
 """Elements whose corner Jacobian falls below this share of the largest keep their fresh bound: it has no inverse."""
-CORNER_BITS = np.array([[c >> 2 & 1, c >> 1 & 1, c & 1] for c in range(8)])
 
 
 def _sound(corners: Floats) -> NDArray[np.bool_]:

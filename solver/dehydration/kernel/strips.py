@@ -19,8 +19,6 @@ Ints: TypeAlias = NDArray[np.int64]
 LANES = 16
 BOTTOM, TOP = [0, 2, 4, 6], [1, 3, 5, 7]
 """Local nodes of the faces zeta = -1 and zeta = +1; corner c of a face is local node 2c or 2c + 1."""
-FIRST_FACE, FIRST_CORE, CORE_COUNT, FIRST_EXOCARP, EXOCARP_COUNT = range(5)
-"""Columns of the table of strips."""
 
 
 class Strips(NamedTuple):

@@ -9,11 +9,12 @@ from scipy.sparse.csgraph import dijkstra
 
 from solver import shell
 from solver.growth import active, reach
+from solver.growth.anchors import corners_of
 from solver.growth.energy import StepEnergy, Tangent, elastic
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.rest import edge_squares, flat_hinges
-from solver.growth.state import State, corners_of
+from solver.growth.state import State
 
 SPOT = {"kind": "spot", "at": (0.3, 0.2, 1.0), "radius": 0.4, "stretch": (1.01, 1.01), "duration": 100}
 BALL = {"shape": "sphere", "thickness": 0.02, "step": 1.0, "tools": [SPOT]}

@@ -10,7 +10,7 @@ from solver.growth.energy import StepEnergy, Tangent
 from solver.growth.engine import Engine
 from solver.growth.minimise import quasi_newton
 from solver.growth.params import GrowthParams
-from tests.solver.shell.meshes import sheet
+from tests.solver.shell._meshes import sheet
 
 DISTANCE = 0.1
 

@@ -7,11 +7,11 @@ import pytest
 
 from solver import registry, shell
 from solver.contract import InvalidInput, Need, NotConverged, SolverError
+from solver.growth.cuts import cut
 from solver.growth.energy import StepEnergy, Tangent
 from solver.growth.engine import Engine
 from solver.growth.minimise import conjugate_gradients, lbfgs, quasi_newton
 from solver.growth.params import GrowthParams
-from solver.growth.remesh import split
 from solver.growth.tools import HotSpot
 
 EVERYWHERE = {"kind": "everywhere"}
@@ -131,7 +131,7 @@ def test_splitting_keeps_membrane_energy_places_and_anchors():
     def membrane(s):
         return shell.membrane(s.x, s.mesh.triangles, s.g, 1.0, np.zeros_like(s.x))
 
-    finer = split(state, 1.05 * state.length)
+    finer = cut(state, 1.05 * state.length)[0]
     assert len(finer.x) > len(state.x) + 10
     assert membrane(finer) == pytest.approx(membrane(state), rel=1e-12)
     assert np.array_equal(finer.x[: len(state.x)], state.x)
@@ -144,7 +144,7 @@ def test_splitting_keeps_the_rest_curvature_of_a_sphere():
     """Total mean curvature, half the sum of length times angle, is 4 pi on the unit sphere (Steiner)."""
     state = Engine(GrowthParams(imperfection=0), 600).state
     while len(state.x) < 5000:
-        state = split(state, 0.6 * state.length)
+        state = cut(state, 0.6 * state.length)[0]
         edges = state.mesh.edges[state.mesh.hinge_edges]
         lengths = np.linalg.norm(state.x[edges[:, 0]] - state.x[edges[:, 1]], axis=1)
         assert 0.5 * lengths @ state.rest == pytest.approx(4 * np.pi, rel=0.02)
@@ -153,7 +153,7 @@ def test_splitting_keeps_the_rest_curvature_of_a_sphere():
 def test_splitting_again_and_again_leaves_no_slivers():
     state = grow(200, 0.1, step=0.1, remesh=0, tools=[surface(stretch=(1.0, 1.0))]).state
     for _ in range(4):
-        state = split(state, 0.7 * state.length)
+        state = cut(state, 0.7 * state.length)[0]
     p = state.x[state.mesh.triangles]
     edges = np.stack([p[:, (k + 2) % 3] - p[:, (k + 1) % 3] for k in range(3)], 1)
     size = np.linalg.norm(edges, axis=-1)

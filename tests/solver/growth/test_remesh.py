@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from solver import shell
+from solver.growth.anchors import place
+from solver.growth.collapses import collapse
 from solver.growth.engine import Engine
-from solver.growth.flips import collapse, flip
+from solver.growth.flips import flip
 from solver.growth.params import GrowthParams
-from solver.growth.state import place
 
 MATERIAL = shell.Material(0.05)
 

@@ -7,7 +7,7 @@ from solver import shell
 from solver.contract import InvalidGeometry
 from solver.shell import Material
 
-from .meshes import angle_twin, ball, membrane_twin, sheet
+from ._meshes import angle_twin, ball, membrane_twin, sheet
 
 LAME = Material(0.1, 0.3).lame
 

@@ -5,9 +5,9 @@ import pytest
 
 from solver.contract import InvalidGeometry, InvalidInput, Need, SolverError
 from solver.wood import SOLVER
-from solver.wood.bonds import bind
 from solver.wood.bundle import lay
 from solver.wood.fracture import break_worst
+from solver.wood.moment import begin
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 ROD = {"rods": 1, "radius": 0.002, "vertices": 16, **PLAIN}
@@ -152,10 +152,10 @@ def test_a_bond_of_no_length_stays_finite():
     wood = lay(SOLVER.parse({"rods": 9, "vertices": 6}), 6)
     b = wood.bonds
     wood.motion.x[b.i[0]] = wood.motion.x[wood.rods.a[b.j[0]]]
-    f, each = np.zeros_like(wood.motion.x), np.zeros(len(b.i))
-    inverse = 1 / wood.rods.rest
-    assert np.isfinite(bind(wood.motion.x, f, wood.rods, b, wood.motion.old, inverse, each))
-    assert np.isfinite(f).all()
+    state = begin(wood)
+    assert np.isfinite(state.books).all()
+    assert np.isfinite(state.scratch.each).all()
+    assert np.isfinite(state.scratch.f).all()
 
 
 def test_the_sampling_keeps_its_distance_and_the_disk_s_moments():

@@ -1,0 +1,90 @@
+"""A run's surroundings: progress, cancellation, randomness, and results of others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import Cancelled, InvalidInput
+from .words import SHORT
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Context"]
+
+
+class Context:
+    """Progress, cancellation and randomness of one run. Bars, logs and event streams are observers of it."""
+
+    def __init__(
+        self,
+        observe: Callable[[float, str], None] | None = None,
+        cancelled: Callable[[], bool] | None = None,
+        library: Callable[[str], xr.Dataset | None] | None = None,
+        dried: Callable[[Mapping[str, float], float, int], np.ndarray] | None = None,
+    ) -> None:
+        self._observe = observe
+        self._cancelled = cancelled
+        self._library = library
+        self._dried = dried
+        self._fraction = 0.0
+
+    def report(self, fraction: float, message: str = "") -> None:
+        """Tell the observer how far the run is, 0 to 1; never goes backwards."""
+        self._fraction = max(self._fraction, min(1.0, float(fraction)))
+        if self._observe is not None:
+            self._observe(self._fraction, message)
+
+    def check_cancelled(self) -> None:
+        """Raise `Cancelled` if the observer asked to stop. Solvers call this at least twice a second.
+
+        Raises:
+            Cancelled: always with no partial result; the solver attaches what it has.
+
+        """
+        if self._cancelled is not None and self._cancelled():
+            raise Cancelled("the run was cancelled.")
+
+    def dried(self, fruit: Mapping[str, float], shrinkage: float, resolution: int) -> np.ndarray:
+        """Return the displacement (n, 2 n, 3) [r1] of a dried fruit, for runs that want its shape and no more.
+
+        fruit: by the names of the dehydration solver's axes. shrinkage: its s, the share of each length that is lost.
+
+        Raises:
+            InvalidInput: nobody here knows dried shapes, or none of this fruit.
+
+        """
+        if self._dried is None:
+            raise InvalidInput(
+                "the shape comes from a table of dried fruits, and there is none here.",
+                advice="Run it by `wizen solve`, by a sweep or as a job, or give Context(dried=sweeps.dried.dried).",
+            )
+        return self._dried(fruit, shrinkage, resolution)
+
+    def result(self, key: str) -> xr.Dataset:
+        """Return an earlier result by its key, for runs that start from one.
+
+        Raises:
+            InvalidInput: there is none, or this run is not tied to a store.
+
+        """
+        if self._library is None:
+            raise InvalidInput(
+                f"the run starts from the stored result {SHORT.repr(key)}, and there is no store here.",
+                advice="Run it by a sweep or as a job, beside that result.",
+            )
+        found = self._library(key)
+        if found is None:
+            raise InvalidInput(
+                f"the run starts from the stored result {SHORT.repr(key)}, which is not in the store.",
+                advice="Run that one first.",
+            )
+        return found
+
+    @staticmethod
+    def generator(seed: int) -> np.random.Generator:
+        """Return the only source of randomness a solver may use."""
+        return np.random.default_rng(seed)

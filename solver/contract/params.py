@@ -1,0 +1,72 @@
+"""What is simulated: one frozen value with validated fields."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .errors import InvalidGeometry, InvalidInput
+from .words import named, say
+
+__all__ = ["Params"]
+
+
+class Params(BaseModel):
+    """Base of every solver's parameters: frozen, finite, nothing unknown, every field with units and meaning.
+
+    `axes` names the scalars that may be swept, set and queried: name -> (field, index or None).
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+
+    axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {}
+
+    seed: int = Field(
+        0,
+        ge=0,
+        lt=2**63,
+        description="Seed of everything random in the run",
+        json_schema_extra={"units": "1"},
+    )
+
+    @classmethod
+    def parse(cls, values: Mapping[str, Any]) -> Self:
+        """Validate `values`: full field names, and scalar axis names that override single entries.
+
+        Raises:
+            InvalidInput: with one sentence per wrong value.
+            InvalidGeometry: when the values contradict each other.
+
+        """
+        values = named(values)
+        plain = {k: v for k, v in values.items() if k not in cls.axes}
+        known = {**cls.model_fields, **dict.fromkeys(cls.axes)}
+        try:
+            unknown = [k for k in plain if k not in known]
+            if unknown:
+                cls.model_validate({**plain})
+            for name, (field, index) in cls.axes.items():
+                if name not in values:
+                    continue
+                if index is None:
+                    plain[field] = values[name]
+                    continue
+                whole = plain.get(field, cls.model_fields[field].default)
+                items = list(whole) if isinstance(whole, list | tuple) else whole
+                if isinstance(items, list) and index < len(items):
+                    items[index] = values[name]
+                    plain[field] = items
+            return cls.model_validate(plain)
+        except ValidationError as error:
+            # findings without a place are those of the whole: valid numbers, impossible shape
+            whole_only = all(not item["loc"] for item in error.errors())
+            kind = InvalidGeometry if whole_only else InvalidInput
+            raise kind(f"{say(error, known)}.") from None
+
+    def axis(self, name: str) -> float:
+        """Return the scalar behind an axis name, e.g. `axis("te")`."""
+        field, index = self.axes[name]
+        value = getattr(self, field)
+        return float(value if index is None else value[index])

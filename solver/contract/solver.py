@@ -1,0 +1,162 @@
+"""A solver as a value, and what leaves it: named, finite, with units and provenance."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .. import quantities
+from .context import Context
+from .errors import InvalidInput, Unstable
+from .need import Need, Quality
+from .params import Params
+from .words import named
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Cost", "Solver", "StageAxis", "finish"]
+
+
+class StageAxis(NamedTuple):
+    """The axis along which a run advances: shrinkage for fruits, time for rot."""
+
+    symbol: str
+    long_name: str
+    units: str
+    lowest: float
+    highest: float
+    default: tuple[float, ...]
+
+
+class Cost(NamedTuple):
+    """What a run is expected to take."""
+
+    seconds: float
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Solver:
+    """One system of equations as a value: name, version, parameters, fields, run and cost.
+
+    `version` changes whenever the numbers change, so that stored results of the old numbers are not reused.
+    `run` is called with a settled need only.
+    """
+
+    name: str
+    version: str
+    title: str
+    params: type[Params]
+    fields: tuple[str, ...]
+    default_fields: tuple[str, ...]
+    stages: StageAxis
+    default_resolution: Mapping[str, int]
+    tolerances: Mapping[str, float]
+    presets: Mapping[str, Mapping[str, Any]]
+    run: Callable[[Any, Need, Context], xr.Dataset]
+    cost: Callable[[Any, Need], Cost]
+
+    def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
+        """Return validated parameters from a preset overlaid with `values`.
+
+        Raises:
+            InvalidInput: unknown preset, unknown name, value out of range, impossible shape.
+
+        """
+        base: Mapping[str, Any] = {}
+        if preset is not None:
+            if preset not in self.presets:
+                near = difflib.get_close_matches(preset, list(self.presets), n=1)
+                hint = f"did you mean {near[0]!r}? " if near else ""
+                raise InvalidInput(
+                    f"{self.name} has no preset {preset!r}.",
+                    advice=f"{hint}Known: {', '.join(sorted(self.presets))}.",
+                )
+            base = self.presets[preset]
+        # a whole field given by hand replaces the preset's; a scalar axis replaces one entry of it
+        return self.params.parse({**base, **named(values)})
+
+    def settle(self, need: Need) -> Need:
+        """Fill in the defaults of `need` and refuse what this solver cannot give, before any work.
+
+        Raises:
+            InvalidInput: unknown field, stage off the axis, a tolerance finer than the measured table.
+
+        """
+        unknown = [f for f in need.fields if f not in self.fields]
+        if unknown:
+            near = difflib.get_close_matches(unknown[0], self.fields, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise InvalidInput(
+                f"{self.name} has no field {unknown[0]!r}.", advice=f"{hint}Known: {', '.join(self.fields)}."
+            )
+        axis = self.stages
+        stages = need.stages or axis.default
+        for stage in stages:
+            if not axis.lowest <= stage <= axis.highest:
+                raise InvalidInput(
+                    f"stage {stage:g} lies outside {axis.symbol} = {axis.lowest:g} to {axis.highest:g}.",
+                    advice=f"Ask for stages ({axis.long_name}) in that range.",
+                )
+        quality: Quality = need.quality
+        if need.tolerance is not None:
+            fit = [
+                q
+                for q in ("preview", "default", "fine")
+                if q in self.tolerances and self.tolerances[q] <= need.tolerance
+            ]
+            if not fit:
+                best = min(self.tolerances.values())
+                raise InvalidInput(
+                    f"a relative error of {need.tolerance:g} is finer than what {self.name} was measured to reach.",
+                    advice=f"The finest setting was measured at {best:g}.",
+                )
+            quality = fit[0]  # type: ignore[assignment]
+        return need.model_copy(
+            update={
+                "fields": tuple(sorted(need.fields or self.default_fields)),
+                "stages": tuple(sorted(set(stages))),
+                "quality": quality,
+                "tolerance": None,
+                "resolution": need.resolution or self.default_resolution[quality],
+            }
+        )
+
+    def solve(self, params: Params, need: Need | None = None, context: Context | None = None) -> xr.Dataset:
+        """Settle the need, run, and check what leaves: named, finite, with units.
+
+        Raises:
+            SolverError: typed, with the converged stages attached where there are any.
+
+        """
+        settled = self.settle(need or Need())
+        result = self.run(params, settled, context or Context())
+        return finish(result, self, params, settled)
+
+
+def finish(result: xr.Dataset, solver: Solver, params: Params, need: Need) -> xr.Dataset:
+    """Attach units and provenance to a result, and refuse one that is not finite.
+
+    Raises:
+        Unstable: a NaN or an infinity in any variable.
+
+    """
+    for name in result.variables:
+        values = result[name].values
+        if np.issubdtype(values.dtype, np.floating) and not np.isfinite(values).all():
+            raise Unstable(f"{solver.name} produced a value that is not finite in {name}.")
+        result[name].attrs.update(quantities.attrs(str(name)))
+    result["stage"].attrs.update(units=solver.stages.units, long_name=solver.stages.long_name)
+    result.attrs.update(
+        solver=solver.name,
+        solver_version=solver.version,
+        params=params.model_dump_json(),
+        need=need.model_dump_json(),
+        Conventions="CF-1.11",
+    )
+    return result

@@ -1,0 +1,42 @@
+"""The state before any growth: the perfect shape at rest, and a shape that is a little off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import shell
+from ..contract import Context
+from .params import GrowthParams
+from .places import share
+from .placing import border
+from .shapes import Mesh
+from .state import State
+
+__all__ = ["fresh"]
+
+
+def fresh(params: GrowthParams, mesh: Mesh) -> State:
+    """Return the start: rest state of the perfect shape, shape with its imperfection."""
+    top = shell.topology(mesh.triangles, len(mesh.x))
+    p = mesh.x[mesh.triangles]
+    normals = np.zeros_like(mesh.x)
+    np.add.at(normals, mesh.triangles, np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, None, :])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
+    held = np.zeros(mesh.x.shape, bool)
+    for attachment in params.attached:
+        inside = share(attachment.where, mesh, border(top), params.seed) >= 0.5
+        held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
+    angles = shell.angles(mesh.x, top.hinges)
+    x = mesh.x + np.where(held, 0.0, offset[:, None] * normals)
+    return State(
+        time=0.0,
+        x=x,
+        mesh=top,
+        g=shell.metric(mesh.x, mesh.triangles),
+        rest=angles if params.curved else np.zeros_like(angles),
+        shares={},
+        held=held,
+        spots={},
+        curves={},
+    )

@@ -1,0 +1,151 @@
+"""Multifrontal Cholesky factor L L^T of a semidefinite matrix with one number per pair of vertices.
+
+It is found in pieces of bounded work, so that whoever waits for it can look up in between. Duff and Reid 1983.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .dissection import Fronts
+from .pattern import Pattern
+
+__all__ = ["factor"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Multiplications of one piece of a factorisation: some milliseconds.
+_PIECE = 5_000_000
+#: Pivots below are taken for 1 [mu].
+_FLOOR = 1e-8
+
+
+def factor(fronts: Fronts, pattern: Pattern, data: Floats) -> Generator[None, None, NDArray[np.float32]]:
+    """Factor the matrix with entries `data` (nnz,) on a pattern; the generator's value is the columns, end to end.
+
+    Raises:
+        numpy.linalg.LinAlgError: it is not finite.
+
+    """
+    total = fronts.starts[-1]
+    values = np.empty(total[1], np.float32)
+    complements = np.empty(total[2])
+    place = np.full(len(pattern.diagonal), -1)
+    size, own = np.diff(fronts.starts[:, 0]), fronts.own
+    # sum over the eliminated columns of what is left, squared
+    work = np.cumsum((size**3 - (size - own) ** 3) / 3 + size**2)
+    at = 0
+    while at < fronts.count:
+        done = work[at - 1] if at else 0.0
+        end = max(at + 1, int(np.searchsorted(work, done + _PIECE)))
+        good = _eliminate(
+            at,
+            end,
+            fronts.nodes,
+            fronts.starts,
+            own,
+            fronts.children,
+            pattern.indptr,
+            pattern.indices,
+            data,
+            place,
+            complements,
+            values,
+        )
+        if not good:
+            raise np.linalg.LinAlgError("the tangent is not finite")
+        at = end
+        yield
+    return values
+
+
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+def _eliminate(
+    first: int,
+    last: int,
+    nodes: Ints,
+    starts: Ints,
+    own: Ints,
+    children: Ints,
+    indptr: Ints,
+    indices: Ints,
+    data: Floats,
+    place: Ints,
+    complements: Floats,
+    values: NDArray[np.float32],
+) -> bool:
+    """Eliminate fronts first to last - 1; returns whether all pivots were finite. place (n,): -1 on entry and exit.
+
+    Fronts are symmetric; row c of w holds column c from the diagonal on.
+    """
+    for f in range(first, last):
+        begin, pivots = starts[f, 0], own[f]
+        size = starts[f + 1, 0] - begin
+        if size == 0:
+            continue
+        w = np.zeros((size, size))
+        for r in range(size):
+            place[nodes[begin + r]] = r
+        for c in range(pivots):
+            node = nodes[begin + c]
+            for at in range(indptr[node], indptr[node + 1]):
+                r = place[indices[at]]
+                if r >= c:
+                    w[c, r] += data[at]
+        for child in children[f]:
+            if child < 0:
+                continue
+            lead = starts[child, 0] + own[child]
+            wide = starts[child + 1, 0] - lead
+            at = starts[child, 2]
+            for c in range(wide):
+                column = place[nodes[lead + c]]
+                for r in range(c, wide):
+                    row = place[nodes[lead + r]]
+                    w[min(row, column), max(row, column)] += complements[at + c * wide + r]
+        for r in range(size):
+            place[nodes[begin + r]] = -1
+        # four columns at a time, so that the rest of the front is read and written a fourth as often
+        for p in range(0, pivots, 4):
+            q = min(p + 4, pivots)
+            for c in range(p, q):
+                if np.isnan(w[c, c]):
+                    return False
+                # the matrices are semidefinite: what is below is rounding, of slivers mostly
+                if w[c, c] < _FLOOR:
+                    w[c, c:] = 0.0
+                    w[c, c] = 1.0
+                column = w[c, c:]
+                column /= np.sqrt(w[c, c])
+                for e in range(c + 1, q):
+                    a, row, tail = w[c, e], w[e, e:], w[c, e:]
+                    for r in range(len(row)):
+                        row[r] -= a * tail[r]
+            if q - p == 4:
+                for e in range(q, size):
+                    row, w0, w1, w2, w3 = w[e, e:], w[p, e:], w[p + 1, e:], w[p + 2, e:], w[p + 3, e:]
+                    a0, a1, a2, a3 = w0[0], w1[0], w2[0], w3[0]
+                    for r in range(len(row)):
+                        row[r] -= a0 * w0[r] + a1 * w1[r] + a2 * w2[r] + a3 * w3[r]
+            else:
+                for c in range(p, q):
+                    for e in range(q, size):
+                        a, row, tail = w[c, e], w[e, e:], w[c, e:]
+                        for r in range(len(row)):
+                            row[r] -= a * tail[r]
+        at = starts[f, 1]
+        for c in range(pivots):
+            for r in range(c, size):
+                values[at] = w[c, r]
+                at += 1
+        at = starts[f, 2]
+        wide = size - pivots
+        for c in range(wide):
+            for r in range(c, wide):
+                complements[at + c * wide + r] = w[pivots + c, pivots + r]
+    return True

@@ -1,0 +1,140 @@
+"""The order in which the explicit kernels read edges and bonds: whole rods in parts, bonds sorted by their edges.
+
+A part is a few whole rods, so that what its edges and bonds read and write stays in the first caches, and the bonds of
+an edge follow each other. What is broken is left out. Nothing here depends on positions: a plan holds until a break.
+Making one takes as long as a step or two.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from .arrays import Bonds, Rods
+
+__all__ = [
+    "BOW",
+    "COSINE",
+    "RADIUS",
+    "RATE",
+    "REST",
+    "SHARE",
+    "SHEAR",
+    "SPRING",
+    "STIFF",
+    "TENSION",
+    "WEAK",
+    "Plan",
+    "plan_for",
+]
+
+#: Rows of a part's edges: rest length [m]; k [N], 0 if it is dead; 4 alpha / span [N m] and 4 / span [1/m] of the hinge
+#: behind an edge, 0 where none is whole; radius [m]; 1 / the least strain that it bears.
+REST, TENSION, STIFF, BOW, RADIUS, WEAK = range(6)
+
+#: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S [J]; cosine at rest.
+SHARE, RATE, SPRING, SHEAR, COSINE = range(5)
+#: The fewest edges of a part, but for the last: 64 cost a tenth more, 256 as much.
+_PART = 128
+#: Numbers in a line of the cache: rows of parts begin on one.
+_LINE = 8
+
+
+class Plan(NamedTuple):
+    """Parts (p,) of at most m edges and w bonds. Lanes count the bonds of a part."""
+
+    part: np.ndarray  # (p + 1,) uint32 first edge
+    a: np.ndarray  # (e,) uint32 first vertex
+    b: np.ndarray  # (e,) uint32 second vertex
+    edge: np.ndarray  # (p, 6, m) what an edge is made of, in the rows above
+    lane: np.ndarray  # (e + p,) uint32 first lane of an edge's bonds; a part has one entry more, its end
+    vertex: np.ndarray  # (p, w) uint32 vertex of a bond
+    law: np.ndarray  # (p, 5, w) what a bond is made of, in the rows above
+    origin: np.ndarray  # (p, w) uint32 the bond's number
+
+
+@njit(cache=True, error_model="numpy")
+def _parts(rods: Rods) -> np.ndarray:
+    """Return the first edges of parts. Rods are chains of edges with neighbouring numbers, joined by hinges."""
+    count = len(rods.a)
+    inside = np.zeros(count, np.uint8)
+    for h in range(len(rods.after)):
+        inside[rods.after[h]] = 1
+    found = np.zeros(count + 1, np.int64)
+    parts = 0
+    for e in range(count):
+        if inside[e] == 0 and e - found[parts] >= _PART:
+            parts += 1
+            found[parts] = e
+    found[parts + 1] = count
+    return found[: parts + 2].copy()
+
+
+@njit(cache=True, error_model="numpy")
+def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
+    """Return the plan of what is whole; strength (e, samples): strain that each place bears."""
+    edges = len(rods.a)
+    part = _parts(rods)
+    parts = len(part) - 1
+    # a counting sort: stable, so that the order does not depend on what was broken before
+    first = np.zeros(edges + 1, np.int64)
+    for n in range(len(bonds.j)):
+        if bonds.on[n] == 1:
+            first[bonds.j[n] + 1] += 1
+    for e in range(edges):
+        first[e + 1] += first[e]
+    most, wide = 1, 1
+    for p in range(parts):
+        most = max(most, part[p + 1] - part[p])
+        wide = max(wide, first[part[p + 1]] - first[part[p]])
+    most = (most + _LINE - 1) // _LINE * _LINE
+    wide = (wide + _LINE - 1) // _LINE * _LINE
+    edge = np.zeros((parts, 6, most))
+    lane = np.zeros(edges + parts, np.uint32)
+    own = np.zeros(edges, np.int64)
+    for p in range(parts):
+        for e in range(part[p], part[p + 1]):
+            own[e] = p
+            m = e - part[p]
+            edge[p, REST, m] = rods.rest[e]
+            edge[p, RADIUS, m] = rods.radius[e]
+            if rods.alive[e] == 1 and rods.k[e] > 0.0:
+                edge[p, TENSION, m] = rods.k[e]
+                edge[p, WEAK, m] = 1.0 / strength[e].min()
+            lane[e + p] = first[e] - first[part[p]]
+        lane[part[p + 1] + p] = first[part[p + 1]] - first[part[p]]
+    for h in range(len(rods.before)):
+        if rods.whole[h] == 1:
+            e = rods.before[h]
+            edge[own[e], STIFF, e - part[own[e]]] = 4.0 * rods.alpha[h] / rods.span[h]
+            edge[own[e], BOW, e - part[own[e]]] = 4.0 / rods.span[h]
+    vertex = np.zeros((parts, wide), np.uint32)
+    origin = np.zeros((parts, wide), np.uint32)
+    law = np.zeros((parts, 5, wide))
+    free = first[:edges].copy()
+    for n in range(len(bonds.j)):
+        if bonds.on[n] == 0:
+            continue
+        j = bonds.j[n]
+        p = own[j]
+        m = free[j] - first[part[p]]
+        free[j] += 1
+        vertex[p, m] = bonds.i[n]
+        origin[p, m] = n
+        law[p, SHARE, m] = bonds.share[n]
+        law[p, RATE, m] = 1.0 / bonds.rest[n]
+        law[p, SPRING, m] = bonds.k[n]
+        law[p, SHEAR, m] = -2.0 * bonds.s[n]
+        law[p, COSINE, m] = bonds.cosine[n]
+    return Plan(
+        part.astype(np.uint32),
+        rods.a.astype(np.uint32),
+        rods.b.astype(np.uint32),
+        edge,
+        lane,
+        vertex,
+        law,
+        origin,
+    )

@@ -1,0 +1,63 @@
+"""A looked-up shape: the surface, what it was made of, and how far to trust it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from numpy.typing import NDArray
+
+from . import surface
+from .errors import OutsideTable
+
+__all__ = ["Shape"]
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """An interpolated surface on the lattice. What was not asked for is None.
+
+    `position` and `displacement` are (n, 2n, 3), `poles` (2, 3) the positions at colatitude 0 and pi, all in units of
+    r1 and in the table's precision. Of a window there are only its rows, columns and components, and no poles but with
+    the whole lattice. `weights` says which results it was made of, `nearest` how far (scaled) the nearest one is,
+    `inside` whether the query lies in the samples' convex hull, and `exact` that it is a stored result at a stored
+    stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
+    `expected_error` says by measure (`store.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape may be off
+    the true one; None where the table does not know, as for any method but the one it was built for.
+    """
+
+    colatitude: Array = field(repr=False)
+    azimuth: Array = field(repr=False)
+    position: Array | None = field(repr=False)
+    displacement: Array | None = field(repr=False)
+    poles: Array | None = field(repr=False)
+    stage: float
+    parameters: Mapping[str, float]
+    descriptors: Mapping[str, float]
+    weights: Mapping[str, float] = field(repr=False)
+    nearest: float
+    exact: bool
+    converged: bool
+    table: str
+    units: Mapping[str, str] = field(repr=False, default_factory=dict)
+    inside: bool = True
+    expected_error: Mapping[str, float] | None = None
+    method: str = ""
+
+    @cached_property
+    def normals(self) -> Array:
+        """Outward unit normals (n, 2n, 3), computed when first asked for.
+
+        Raises:
+            OutsideTable: the positions were not asked for.
+
+        """
+        if self.position is None:
+            raise OutsideTable("normals follow from positions.", "Ask for the field 'position'.")
+        if self.poles is None or self.poles.shape[1] != 3:
+            raise OutsideTable("normals follow from the whole surface.", "Ask for it without a window.")
+        return surface.normals(self.position)

@@ -1,0 +1,64 @@
+"""Maps of a result's fields, read back by readers that are not ours."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import png
+import pytest
+from PIL import Image
+from scipy.special import sph_harm_y
+
+from service.errors import InvalidQuery, UnfitFormat
+from service.sequences.bake import baked
+from solver.fruit import lattice
+
+from ._runs import made, rotting, shrinking, splitting
+
+
+def test_a_map_lies_where_its_field_lies() -> None:
+    """Real spherical harmonics have a value everywhere: bilinear reaches it in second order, over poles and seam."""
+    size, errors = 96, []
+    theta, phi = np.meshgrid(*((np.arange(size) + 0.5) / size * top for top in (np.pi, 2 * np.pi)), indexing="ij")
+    for n in (16, 32, 64):
+        field = sph_harm_y(5, 3, *lattice(n)).real
+        errors.append(np.abs(baked(field, size) - sph_harm_y(5, 3, theta, phi).real).max())
+    assert errors[-1] < 3e-3
+    assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2, abs=0.3)
+
+
+def test_png_is_sixteen_bits_and_says_its_range() -> None:
+    data = made(rotting(16), "png", map="rot", size=40)
+    width, height, rows, info = png.Reader(bytes=data).read()
+    assert (width, height, info["bitdepth"], info["greyscale"]) == (40, 40, 16, True)
+    levels = np.vstack([np.frombuffer(row, np.uint16) for row in map(bytes, rows)])
+    assert np.abs(levels / 65535 - baked(rotting(16)["rot"].values[2], 40)).max() < 1e-5
+    said = json.loads(Image.open(io.BytesIO(data)).text["wizen"])
+    assert (said["low"], said["high"], said["field"], said["stage"]) == (0, 1, "rot", 5.0)
+    other = made(rotting(16), "png", map="rot", size=40, low=0.5, high=0.75)
+    assert np.asarray(Image.open(io.BytesIO(other))).max() == 65535
+    with pytest.raises(InvalidQuery, match="not above"):
+        made(rotting(16), "png", low=1, high=0)
+    with pytest.raises(InvalidQuery, match="no field"):
+        made(rotting(16), "png", map="moss")
+
+
+def test_exr_holds_the_values_themselves(tmp_path: Path) -> None:
+    path = tmp_path / "maps.exr"
+    path.write_bytes(made(rotting(16), "exr", size=48, stage=2.0))
+    with OpenEXR.File(str(path)) as file:
+        channels = file.channels()
+        assert set(channels) == {"rot", "mould", "mould_active"}
+        assert np.array_equal(channels["rot"].pixels, baked(rotting(16)["rot"].values[1], 48))
+
+
+@pytest.mark.parametrize("name", ["png", "exr"])
+def test_maps_need_texture_coordinates_and_a_field(name: str) -> None:
+    with pytest.raises(UnfitFormat, match="texture coordinates"):
+        made(splitting(), name)
+    with pytest.raises(UnfitFormat, match="no field"):
+        made(shrinking(), name)

@@ -1,0 +1,73 @@
+"""The scaled masses of the explicit kernel: a unit step is stable, and energy stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.dehydration.kernel import build_layout, kinetic_energy, march, positions, strain_energy
+from solver.dehydration.kernel.masses import largest_stiffness
+
+from ._kernel_twin import KINDS, algebra_forces, block_mesh, deformed, random_hex
+
+pytestmark = pytest.mark.usefixtures("one_thread")
+
+
+def stiffness(fresh, kind, mu, kappa):
+    """Tangent at rest (24, 24), by central differences of the forces proved above."""
+    steps = 1e-5 * np.concatenate([np.eye(24), -np.eye(24)]).reshape(48, 8, 3)
+    forces = algebra_forces(kind, np.repeat(fresh[None], 48, axis=0), fresh + steps, mu, kappa, 1.0)
+    return (forces[:24] - forces[24:]).reshape(24, 24) / 2e-5
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kappa", [1.0, 30.0, 1000.0])
+def test_stiffness_bound_is_safe_and_tight(kind, kappa):
+    rng = np.random.default_rng(10)
+    for flat in (1.0, 0.1):
+        fresh = random_hex(rng) @ np.diag([1, 1, flat])
+        bound = largest_stiffness(fresh[None], np.ones(1), np.full(1, kappa), kind == "exocarp")[0]
+        exact = np.linalg.eigvalsh(stiffness(fresh, kind, 1.0, kappa))[-1]
+        assert exact <= bound * (1 + 1e-6)
+        assert bound <= exact * (1.06 if kappa >= 30 else 3.0)
+
+
+def test_unit_step_is_stable_and_much_less_mass_is_not():
+    rng = np.random.default_rng(11)
+    layout = build_layout(**block_mesh(rng, (5, 5), distort=0.25))
+    start, _ = deformed(layout, rng, 1e-4, 1.0)
+    ends = []
+    for lighter in (1.0, 2.5):
+        layout.inverse_mass[:] *= np.float32(lighter)
+        state, velocity = start.copy(), np.zeros(start.shape, np.float32)
+        march(layout, state, velocity, 2000, theta=(1.0, 1.0), damping=0.0)
+        ends.append(np.max(np.abs(positions(state) - positions(layout.fresh))))
+    assert ends[0] < 1e-2
+    assert not ends[1] < 0.1
+
+
+def test_undamped_march_keeps_its_energy():
+    rng = np.random.default_rng(12)
+    layout = build_layout(**block_mesh(rng, (4, 4)))
+    state, velocity = deformed(layout, rng, 1e-3, 1.0)
+    # A softer step resolves the fastest modes, whose energy a unit step only bounds.
+    layout.inverse_mass[:] /= np.float32(100)
+    mass = layout.mass * 100
+    totals = []
+    for _ in range(20):
+        before = velocity.copy()
+        march(layout, state, velocity, 5, theta=(1.0, 1.0), damping=0.0)
+        ahead, next_velocity = state.copy(), velocity.copy()
+        march(layout, ahead, next_velocity, 1, theta=(1.0, 1.0), damping=0.0)
+        middle = (velocity[:, :3].astype(float) + next_velocity[:, :3]) / 2
+        totals.append(
+            strain_energy(layout, state, 1.0) + 0.5 * np.sum(layout.free[:, None] * mass[:, None] * middle**2)
+        )
+        assert not np.array_equal(before, velocity)
+    assert np.ptp(totals) < 2e-3 * totals[0]
+
+
+def test_kinetic_energy_counts_free_nodes():
+    layout = build_layout(**block_mesh(np.random.default_rng(13), (2, 2)))
+    velocity = np.full((layout.nodes, 4), 0.5, dtype=np.float32)
+    assert kinetic_energy(layout, velocity) == pytest.approx(0.5 * 0.75 * layout.mass[layout.free].sum())

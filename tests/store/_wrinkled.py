@@ -1,0 +1,57 @@
+"""A table's worth of wrinkles that have nothing in common from one sample to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from scipy.special import sph_harm_y
+
+from solver.contract import finish
+from solver.dehydration import SOLVER, DehydrationParams
+from solver.fruit import azimuths, colatitudes, directions, lattice
+from store import harmonics
+from store.methods.weights import Samples
+from store.store import Store
+
+from .conftest import GAMMA, STAGES, TE, _spec, question
+
+AXES = DehydrationParams.axes
+N = 32
+
+
+def pattern(seed: int, middle: float, rms: float) -> np.ndarray:
+    """Return radial wrinkles (N, 2N) of random phases around a degree."""
+    rng = np.random.default_rng(seed)
+    theta, phi = lattice(N)
+    field = np.zeros_like(theta)
+    for degree in range(4, 18):
+        size = np.exp(-(((degree - middle) / 2) ** 2))
+        for order in range(degree + 1):
+            turn = rng.uniform(0, 2 * np.pi)
+            field += size * rng.standard_normal() * sph_harm_y(degree, order, theta, phi + turn).real
+    return field * rms / np.sqrt((harmonics.area(N) * field**2).sum())
+
+
+def wrinkled(store: Store, onset: float = 0.0) -> dict[tuple[float, float], np.ndarray]:
+    """Fill a store with patterns that have nothing in common but how rough and how fine they are."""
+    theta, phi = lattice(N)
+    fields = {}
+    for i, te in enumerate(TE):
+        for j, gamma in enumerate(GAMMA):
+            radial = pattern(10 * i + j, 0.3 / te, 0.9 * te)
+            u = np.stack([(max(s - onset, 0) * radial - 0.5 * s)[..., None] * directions(theta, phi) for s in STAGES])
+            params, need = question(te=te, gamma=gamma, resolution=N)
+            coords = {"stage": list(STAGES), "colatitude": colatitudes(N), "azimuth": azimuths(N)}
+            data = {"displacement": (("stage", "colatitude", "azimuth", "component"), u.astype(np.float32))}
+            result = finish(xr.Dataset(data, {**coords, "component": ["x", "y", "z"]}), SOLVER, params, need)
+            job = _spec(params, need)
+            store.ledger.want([job])
+            store.ledger.done(job.key, store.put(job.key, result), 1.0)
+            fields[te, gamma] = u
+    return fields
+
+
+def grid() -> Samples:
+    """Samples of three te by two gamma."""
+    te, gamma = np.meshgrid([0.02, 0.04, 0.08], [10.0, 100.0], indexing="ij")
+    return Samples(np.stack([te.ravel(), gamma.ravel()], axis=-1))

@@ -1,0 +1,119 @@
+"""The commands about tables, maps and queries."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from _command import document, wizen
+from conftest import write
+
+from store.store import Store
+
+
+def test_table_commands(table: Path, tmp_path: Path) -> None:
+    said = document(wizen("table", "info", "--store", table, "--json"))
+    assert said["samples"] == 6
+    assert set(said["axes"]) == {"te", "gamma"}
+    assert "0.02 to 0.04" in wizen("table", "info", "--store", table).stdout
+    assert document(wizen("table", "verify", "--store", table, "--json"))["sound"]
+    copy = shutil.copytree(table, tmp_path / "copy")
+    file = copy / Path(said["path"]).relative_to(table)
+    file.write_bytes(file.read_bytes()[:-9] + b"damaged!!")
+    result = wizen("table", "verify", "--store", copy)
+    assert result.exit_code == 1
+    assert "damaged" in result.stdout
+    result = wizen("table", "rebuild", "--store", copy, "--json")
+    assert document(result)["after"]["digest"] == said["digest"]
+    assert wizen("table", "verify", "--store", copy).exit_code == 0
+
+
+def test_runs_of_a_table_solved_again(table: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(table, tmp_path / "copy")
+    result = wizen("table", "verify", "--store", copy, "--recompute", 2, "--json")
+    assert result.exit_code == 0
+    assert [spot["same"] for spot in document(result)["recomputed"]] == [True, True]
+    # results that another machine computed a little otherwise, and stored well
+    store = Store.open(copy)
+    for job in store.ledger.jobs("done"):
+        moved = store.get(job.key)
+        store.shard_path(job.key).unlink()
+        digest = store.put(job.key, moved.assign(displacement=moved["displacement"] * 1.0001))
+        store.ledger.done(job.key, digest, 1.0)
+    assert wizen("table", "rebuild", "--store", copy).exit_code == 0
+    result = wizen("table", "verify", "--store", copy, "--recompute", 2)
+    assert result.exit_code == 1
+    assert "solved again" in result.stdout
+    assert wizen("table", "verify", "--store", copy, "--recompute", 2, "--tolerance", 1e-3).exit_code == 0
+
+
+def test_rebuild_and_compare(table: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(table, tmp_path / "copy")
+    said = document(wizen("table", "rebuild", "--store", copy, "--resolution", 5, "--precision", "float64", "--json"))
+    assert said["changed"]
+    assert (said["after"]["resolution"], said["after"]["precision"]) == (5, "float64")
+    # a shrinking sphere has few waves, so that hardly more than single precision's round-off is lost
+    assert [row["rms"] < 1e-7 for row in said["after"]["truncation"]] == [True, True]
+    found = document(wizen("table", "compare", table, copy, "--json"))
+    assert (found["equal"], found["common"]) == (False, 6)
+    shown = wizen("table", "compare", "default", "default", "--store", copy).stdout
+    assert "the same content" in shown
+    assert wizen("table", "compare", "default", "default", "--store", copy, "--name", "x").exit_code == 0
+    assert wizen("table", "compare", "nothing.h5", copy).exit_code == 2
+
+
+def test_query(table: Path, tmp_path: Path) -> None:
+    out = tmp_path / "shape.npz"
+    point = ["--set", "te=0.025", "--set", "gamma=15"]
+    said = document(wizen("query", "--store", table, *point, "--stages", "0.15", "--out", out, "--json"))
+    assert said["parameters"]["te"] == 0.025
+    assert not said["stages"][0]["exact"]
+    # every sample is a sphere that shrinks by s, so what is between them is one, too, up to the fresh shape's skin
+    radius = np.linalg.norm(np.load(out)["position"], axis=-1)
+    np.testing.assert_allclose(radius, 1.025 * 0.85, rtol=2e-3)
+
+
+def test_query_by_a_method_within_an_error(table: Path) -> None:
+    query = ("query", "--store", table, "--set", "te=0.03", "--set", "gamma=20", "--stages", "0.15", "--json")
+    said = document(wizen(*query, "--method", "idw"))
+    assert said["method"] == "idw"
+    assert "there is no look-up method 'kriging'" in wizen(*query, "--method", "kriging").stderr
+    assert "limits no error" in wizen(*query, "--max-error", "rgh:little").stderr
+    refused = wizen(*query, "--method", "idw", "--max-error", "0.5")
+    assert refused.exit_code != 0
+    assert "does not say how far" in refused.stderr
+
+
+def test_query_swollen(site: None, tmp_path: Path) -> None:
+    store, out = tmp_path / "store", tmp_path / "shape.npz"
+    plan = write(tmp_path / "swollen.toml", gamma="[10]", stages="[-0.2, -0.1]")
+    assert wizen("sweep", plan, "--store", store).exit_code == 0
+    assert wizen("table", "build", "--store", store, "--solver", "shrinking").exit_code == 0
+    query = ("query", "--store", store, "--set", "te=0.03")
+    said = document(wizen(*query, "--stages", "-0.15,-0.05,0", "--out", out, "--json"))
+    assert [stage["stage"] for stage in said["stages"]] == [-0.15, -0.05, 0.0]
+    radius = np.linalg.norm(np.load(out)["position"], axis=-1)
+    for i, scale in enumerate((1.15, 1.05, 1.0)):
+        np.testing.assert_allclose(radius[i], 1.03 * scale, rtol=1e-5)
+    assert "stage -0.2 to 0" in wizen(*query, "--stages", "0.1").stderr
+    assert "stages -0.2 to 0." in wizen(*query).stderr
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb", ".png", ".json"])
+def test_query_formats(table: Path, tmp_path: Path, suffix: str) -> None:
+    out = tmp_path / f"shape{suffix}"
+    result = wizen("query", "--store", table, "--set", "te=0.02", "--set", "gamma=10", "--stages", "0.1", "--out", out)
+    assert result.exit_code == 0, result.output
+    assert out.stat().st_size > 100
+    assert "exact" in result.stdout
+
+
+def test_maps(table: Path, tmp_path: Path) -> None:
+    out = tmp_path / "map.png"
+    said = document(wizen("map", "--store", table, "--out", out, "--x", "gamma", "--pixels", 48, "--json"))
+    assert said["shapes"] == 6
+    assert out.read_bytes().startswith(b"\x89PNG")
+    result = wizen("map", "--store", table, "--out", out, "--stages", "0.1,0.2", "--set", "te=0.03", "--pixels", 48)
+    assert "4 shapes" in result.stdout
