@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .contact import RUBBING, Touching, contacts
+from .contact import RUBBING, Contacts, contacts
 from .elements import Elements, apply, elements
 from .explicit import forces
+from .listing import Listing
 from .moment import State
 from .params import WoodParams
 
@@ -29,9 +30,13 @@ class Step(NamedTuple):
     time: float
 
 
-def filled(state: State, time: float, bdt: float) -> np.ndarray:
+def _fitted(state: State, listing: Listing | None) -> State:
+    return state if listing is None else listing.fitted(state)
+
+
+def filled(state: State, time: float, bdt: float, listing: Listing | None) -> np.ndarray:
     """Fill the state's forces for its x and v at `time` [s]; return them (v, 3) [N]."""
-    w, s = state.wood, state.scratch
+    w, s = state.wood, _fitted(state, listing).scratch
     forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, s, False, time, bdt, RUBBING, state.books)
     return s.f
 
@@ -43,6 +48,8 @@ class Equations:
     state: State
     step: Step
     params: WoodParams
+    listing: Listing | None
+    """of rods that may touch; None: of no account"""
 
     @property
     def inertia(self) -> np.ndarray:
@@ -57,15 +64,15 @@ class Equations:
         v = (x - step.xh) / step.bdt
         v[held] = m.v[held]
         m.x[:], m.v[:] = x, v
-        f = filled(self.state, step.time, step.bdt)
+        f = filled(self.state, step.time, step.bdt, self.listing)
         r: np.ndarray = m.mass[:, None] * ((v - step.vh) / step.bdt + self.params.damping * v) - f
         r[held] = 0.0
         return r
 
-    def parts(self, positive: bool) -> tuple[Elements, Touching | None]:
+    def parts(self, positive: bool) -> tuple[Elements, Contacts]:
         """Return the second derivatives where the state is, or the positive ones among them."""
-        w = self.state.wood
-        return elements(w.motion.x, w.rods, w.bonds, positive), contacts(self.state, self.step.bdt, positive)
+        w, state = self.state.wood, _fitted(self.state, self.listing)
+        return elements(w.motion.x, w.rods, w.bonds, positive), contacts(state, self.step.bdt, positive)
 
     def stiffness(self, positive: bool) -> Callable[[np.ndarray], np.ndarray]:
         """Return the product with them and the inertia."""
@@ -75,8 +82,7 @@ class Equations:
         def times(way: np.ndarray) -> np.ndarray:
             out: np.ndarray = inertia * way
             apply(parts, way, out)
-            if touching is not None:
-                touching.add(way, out)
+            touching.add(way, out)
             out[held] = 0.0
             return out
 
@@ -88,4 +94,5 @@ class Equations:
         contact = 0.2 * float(bodies.half[:, 0].min()) if len(bodies.kind) else np.inf
         apart = np.linalg.norm(way[rods.b] - way[rods.a], axis=1)
         share = 1.0 / max(float((apart / (_TURN * rods.rest)).max(initial=0.0)), 1e-300)
-        return min(share, contact / max(float(np.abs(way).max()), 1e-300))
+        share = min(share, contact / max(float(np.abs(way).max()), 1e-300))
+        return share if self.listing is None else self.listing.allowed(self.state, way, share)

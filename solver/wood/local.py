@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from scipy.linalg import lapack
 
+from .contact import Touching
 from .elements import Elements
 from .equations import Equations
 from .newton import searched
@@ -51,10 +52,12 @@ def _dense(parts: Elements, at: np.ndarray, out: np.ndarray) -> None:
 
 def _matrix(equations: Equations, at: np.ndarray, count: int, positive: bool) -> np.ndarray:
     """Return the stiffness (3n, 3n) of what is free."""
-    parts, touching = equations.parts(positive)
+    parts, contacts = equations.parts(positive)
     out = np.zeros((3 * count, 3 * count))
     _dense(parts, at, out)
-    if touching is not None:
+    # rods that touch have no part in a patch
+    for touching in contacts.parts:
+        assert isinstance(touching, Touching)
         for a, b, h in zip(at[touching.a], at[touching.b], touching.h, strict=True):
             for row, column, block in ((a, a, h[0]), (a, b, h[1]), (b, a, h[1]), (b, b, h[2])):
                 if row >= 0 and column >= 0:
@@ -77,6 +80,12 @@ def _step(equations: Equations, at: np.ndarray, count: int, right: np.ndarray) -
     return None
 
 
+def _crossed(equations: Equations, inside: np.ndarray) -> bool:
+    """Return whether listed rods may touch among the vertices `inside` (v,) bool."""
+    rods, pair = equations.state.wood.rods, equations.state.scratch.rubbing.pair
+    return bool(inside[rods.a[pair]].any() or inside[rods.b[pair]].any())
+
+
 def relaxed(equations: Equations, x: np.ndarray, r: np.ndarray, wanted: float, little: float) -> np.ndarray | None:
     """Return x (v, 3) with the few vertices relaxed that have most of the residual r (v, 3); None if it is spread.
 
@@ -85,13 +94,12 @@ def relaxed(equations: Equations, x: np.ndarray, r: np.ndarray, wanted: float, l
     core = disturbed(r, max(0.5 * wanted, _ELSEWHERE * float(np.linalg.norm(r))), _CORE)
     tried = () if core is None else (surrounded(equations.state.wood, core, rings, _MOST) for rings in _RINGS)
     inside = next((mask for mask in tried if mask is not None), None)
-    if inside is None:
+    if inside is None or _crossed(equations, inside):
         return None
     patch = cut_out(equations.state, inside)
     step = equations.step
-    small = Equations(
-        patch.state, step._replace(xh=step.xh[patch.vertices], vh=step.vh[patch.vertices]), equations.params
-    )
+    start = step._replace(xh=step.xh[patch.vertices], vh=step.vh[patch.vertices])
+    small = Equations(patch.state, start, equations.params, None)
     count = len(patch.own)
     at = np.full(len(patch.vertices), -1)
     at[patch.own] = np.arange(count)

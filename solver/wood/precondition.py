@@ -13,7 +13,7 @@ import numpy as np
 
 from ..multifrontal import Analysis
 from .arrays import Bonds, Rods
-from .contact import Touching
+from .contact import Contacts
 from .dissection import dissected
 from .elements import elements
 from .fronts import Fronts, factored, solved
@@ -32,9 +32,9 @@ class Pattern:
     """(nnz,) row of each block"""
 
     @staticmethod
-    def of(x: np.ndarray, rods: Rods, bonds: Bonds, free: np.ndarray) -> Pattern:
-        """Return the pattern of the free vertices, dissected where they are at x (v, 3)."""
-        stiffness = Stiffness(rods, bonds, free)
+    def of(x: np.ndarray, rods: Rods, bonds: Bonds, free: np.ndarray, couples: np.ndarray) -> Pattern:
+        """Return the pattern of the free vertices and `couples` (m, 2), dissected where they are at x (v, 3)."""
+        stiffness = Stiffness(rods, bonds, free, couples)
         row = np.repeat(np.arange(stiffness.size), np.diff(stiffness.indptr))
         return Pattern(stiffness, dissected(x[free], stiffness.indptr, stiffness.indices), row)
 
@@ -82,21 +82,20 @@ def preconditioner(
     bonds: Bonds,
     free: np.ndarray,
     inertia: np.ndarray,
-    contacts: Touching | None,
+    contacts: Contacts,
     known: Pattern | None = None,
 ) -> tuple[Preconditioner, Pattern]:
     """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts.
 
     known: the pattern, where it still holds. Returns the factor and the pattern.
     """
-    pattern = known or Pattern.of(x, rods, bonds, free)
+    pattern = known or Pattern.of(x, rods, bonds, free, contacts.couples())
     stiffness = pattern.stiffness
     for positive, double in ((False, False), (True, False), (True, True)):
         blocks = stiffness.summed(elements(x, rods, bonds, positive=positive))
         for c in range(3):
             blocks[stiffness.diagonal, c, c] += inertia[free]
-        if contacts is not None:
-            contacts.spread(stiffness.place, blocks)
+        contacts.spread(stiffness, blocks)
         diagonal = blocks[stiffness.diagonal]
         own = np.einsum("vii->vi", diagonal)
         if (own <= 0).any():

@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 
 from ..contract import NotConverged
-from .contact import contacts
-from .equations import Equations, Step
-from .explicit import CONTACT
+from .contact import contacts, lag
+from .equations import Equations, Step, filled
+from .explicit import CONTACT, LOST
+from .listing import Listing
 from .local import relaxed
 from .moment import State, strength
 from .newton import descend
@@ -35,11 +36,11 @@ _KICK = 0.25
 class Solver:
     """The iteration with its factor, over one run."""
 
-    def __init__(self, params: WoodParams, tolerance: float) -> None:
-        self.params, self.tolerance = params, tolerance
+    def __init__(self, params: WoodParams, tolerance: float, listing: Listing) -> None:
+        self.params, self.tolerance, self.listing = params, tolerance, listing
         self._factor: Preconditioner | None = None
         self._pattern: Pattern | None = None
-        self._key: tuple[int, ...] = ()
+        self._key: tuple[int, int, bytes] | None = None
         self._bdt, self._excess = 0.0, 0
         self.factors, self.solves = 0, 0
 
@@ -47,14 +48,34 @@ class Solver:
         wood = state.wood
         m = wood.motion
         # bonds change hands and vertices are added only by breaks of rods
-        key = (len(m.x), state.rods)
+        touching = contacts(self.listing.fitted(state), bdt, True)
+        key = (len(m.x), state.rods, touching.couples().tobytes())
         pattern = self._pattern if self._key == key else None
         inertia = m.mass * (1 / bdt + self.params.damping) / bdt
         self._factor, self._pattern = preconditioner(
-            m.x, wood.rods, wood.bonds, m.held == 0, inertia, contacts(state, bdt, True), pattern
+            m.x, wood.rods, wood.bonds, m.held == 0, inertia, touching, pattern
         )
         self._key, self._bdt, self._excess = key, bdt, 0
         self.factors += 1
+
+    def twin(self) -> Solver:
+        """Return a solver that sets out with the same factor, and of which this one learns nothing."""
+        found = Solver(self.params, self.tolerance, self.listing)
+        found._factor, found._pattern, found._key, found._bdt = self._factor, self._pattern, self._key, self._bdt
+        return found
+
+    def lag(self, state: State) -> None:
+        """Take the normal forces where the state is as those that friction follows."""
+        lag(state)
+        self.listing.lag(state)
+
+    def again(self, state: State, time: float, dt: float) -> np.ndarray:
+        """Return the forces (v, 3) [N] after breaks; what rods freed to touch have at once is booked as lost."""
+        before = float(state.books[: CONTACT + 1].sum())
+        self.lag(state)
+        f = filled(state, time, dt, self.listing).copy()
+        state.books[LOST] += before - float(state.books[: CONTACT + 1].sum())
+        return f
 
     def _stale(self, vertices: int, bdt: float) -> bool:
         """Return whether the factor does not serve: too old, or of vertices that a step taken back had split."""
@@ -75,8 +96,9 @@ class Solver:
         """
         wood = state.wood
         m = wood.motion
-        equations = Equations(state, step, self.params)
+        equations = Equations(state, step, self.params, self.listing)
         residual = equations.residual
+        guesses = tuple(self.listing.near(state, x) for x in guesses)
         norms = [float(np.linalg.norm(residual(x))) for x in guesses]
         x = guesses[int(np.nanargmin(norms))]
         scale = max(norms[0], _LEAST * strength(wood, self.params), least)
