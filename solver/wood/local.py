@@ -121,4 +121,6 @@ def relaxed(equations: Equations, x: np.ndarray, r: np.ndarray, wanted: float, l
             break
     whole = x.copy()
     whole[patch.free] = here[patch.own]
-    return whole
+    listing = equations.listing
+    passes = listing is not None and listing.allowed(equations.state, whole - x, 1.0) < 1
+    return None if passes else whole
