@@ -8,6 +8,7 @@ from forces and velocities alone and is booked as dissipated, so that the balanc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -189,6 +190,7 @@ def implicit(
         shown = state
         rest = wanted - ahead * dt
         if rest > 1e-9 * dt:
-            # on a factor of its own: later steps must not know of this one
-            shown, _, _ = _step(Solver(params, settings.tolerance, listing), copied(state), past, ahead * dt, rest)
+            # on a factor and a list of its own: later steps must not know of this one
+            own = Solver(params, settings.tolerance, copy(listing))
+            shown, _, _ = _step(own, copied(state), past, ahead * dt, rest)
         yield balanced(copied(shown), wanted, start, floor(wood, params), balance)

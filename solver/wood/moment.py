@@ -91,7 +91,7 @@ def begin(wood: Wood) -> State:
 
 
 def _again(scratch: Scratch) -> Scratch:
-    """Return a copy; pairs and plan are never written to."""
+    """Return a copy; the plan is never written to, and what friction follows is written before it is read."""
     kept = ("rubbing", "plan")
     fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
     return scratch._replace(**fresh)
