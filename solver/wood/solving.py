@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import partial
 
 import numpy as np
@@ -60,7 +61,7 @@ class Solver:
 
     def twin(self) -> Solver:
         """Return a solver that sets out with the same factor, and of which this one learns nothing."""
-        found = Solver(self.params, self.tolerance, self.listing)
+        found = Solver(self.params, self.tolerance, copy(self.listing))
         found._factor, found._pattern, found._key, found._bdt = self._factor, self._pattern, self._key, self._bdt
         return found
 
