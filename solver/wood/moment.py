@@ -9,6 +9,7 @@ import numpy as np
 from ..contract import Unstable
 from .explicit import CONTACT, LOST, WORK, Scratch, forces
 from .params import WoodParams
+from .scaling import saved
 from .state import Wood, scratch_for
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "kinetic",
     "largest",
     "reached",
+    "real",
     "strength",
 ]
 
@@ -66,6 +68,12 @@ def kinetic(wood: Wood) -> float:
     return 0.5 * float((m.mass[free, None] * m.v[free] ** 2).sum()) + spin
 
 
+def real(state: State) -> float:
+    """Return the energy of motion [J], that of fragments as a whole by their real mass."""
+    m = state.wood.motion
+    return kinetic(state.wood) - saved(m.x, m.v, m.mass, state.scratch.fragments)
+
+
 def floor(wood: Wood, params: WoodParams) -> float:
     """Return a small energy [J] below which nothing counts: a billionth of what the rods bear before they break."""
     return 0.5e-9 * float(wood.rods.k @ wood.rods.rest) * params.strain_limit**2
@@ -91,8 +99,8 @@ def begin(wood: Wood) -> State:
 
 
 def _again(scratch: Scratch) -> Scratch:
-    """Return a copy; pairs and plan are never written to."""
-    kept = ("rubbing", "plan")
+    """Return a copy; pairs, plan and fragments are not written to, but for what a step finds anew."""
+    kept = ("rubbing", "plan", "fragments")
     fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
     return scratch._replace(**fresh)
 
@@ -122,7 +130,7 @@ def balanced(state: State, time: float, start: float, scale: float, tolerance: f
 
     """
     elastic = float(state.books[: CONTACT + 1].sum())
-    moving = kinetic(state.wood)
+    moving = real(state)
     energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), state.dissipated, start)
     error = abs(moving + elastic + energy[2] + energy[4] - energy[3] - start) / largest(energy, scale)
     if error > 0.5:

@@ -15,7 +15,7 @@ from .bundle import Wood, lay
 from .params import WoodParams
 from .render import Skin
 from .settings import choose
-from .stability import longest_step
+from .stability import longest_step, touchable
 from .stepping import Reached, explicit
 
 __all__ = ["run"]
@@ -58,6 +58,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     if params.mode == "explicit":
         longest = longest_step(wood)
         dt = min(settings.courant * longest, params.step or np.inf)
+        wood = touchable(wood, dt)
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context)
     elif params.mode == "implicit":
