@@ -85,6 +85,7 @@ CASES: dict[str, Case] = {
     "loose rods that part and touch": Case(
         {**_FEW, "clamp": "both", "pull": (5.0, 0, 0), "rod_contact": True, "strain_limit": 2e-3}, 5e-4
     ),
+    "rods that part and touch, implicitly": Case({**_press(9, 1 / 60), "rod_contact": True, "strain_limit": 2e-3}, 0.2),
 }
 
 

@@ -1,4 +1,4 @@
-"""The stiffness of contacts with rigid bodies for the implicit scheme, summed edge by edge."""
+"""The stiffness of contacts for the implicit scheme; those with rigid bodies summed edge by edge."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from numba import njit
 
 from .arrays import Bodies, Rods
 from .bodies import apart, eased, points, touch
+from .crossing import Crossing, crossings
+from .hessian import Stiffness
 from .moment import State
 
-__all__ = ["RUBBING", "Touching", "contacts", "lag"]
+__all__ = ["RUBBING", "Contacts", "Touching", "contacts", "lag"]
 
 #: Slip at which friction has its full size [m/s].
 RUBBING = 1e-3
@@ -160,21 +162,51 @@ class Touching(NamedTuple):
         """Add the product with `way` to out, both (v, 3)."""
         _times(self.a, self.b, self.h, way, out)
 
-    def spread(self, at: np.ndarray, out: np.ndarray) -> None:
-        """Add to the blocks out (nnz, 3, 3); at (e, 3, 3): where those of an edge's ends are, -1 where one is held."""
+    def spread(self, pattern: Stiffness, out: np.ndarray) -> None:
+        """Add to the pattern's blocks out (nnz, 3, 3)."""
         for p, q, n in ((0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 2)):
-            to = at[self.edge, p, q]
+            to = pattern.place[self.edge, p, q]
             np.add.at(out, to[to >= 0], self.h[to >= 0, n])
 
 
-def contacts(state: State, dt: float, positive: bool) -> Touching | None:
-    """Return the stiffness of the contacts at the state's x and v; None without bodies.
+class Contacts(NamedTuple):
+    """The stiffness of all contacts, those of bodies and those between rods."""
 
-    positive: as the factor needs it, without the body's curvature and the slope of friction.
+    parts: tuple[Touching | Crossing, ...]
+
+    def add(self, way: np.ndarray, out: np.ndarray) -> None:
+        """Add the product with `way` to out, both (v, 3)."""
+        for part in self.parts:
+            part.add(way, out)
+
+    def spread(self, pattern: Stiffness, out: np.ndarray) -> None:
+        """Add to the pattern's blocks out (nnz, 3, 3) what has a place there."""
+        for part in self.parts:
+            part.spread(pattern, out)
+
+    def couples(self) -> np.ndarray:
+        """Return the vertices (m, 2) that contacts couple and no edge does."""
+        return np.concatenate(
+            [np.zeros((0, 2), np.int64), *(p.couples() for p in self.parts if isinstance(p, Crossing))]
+        )
+
+
+def contacts(state: State, dt: float, positive: bool) -> Contacts:
+    """Return the stiffness of the contacts at the state's x and v.
+
+    positive: as the factor needs it, without curvature and the slope of friction.
     """
+    m, rubbing = state.wood.motion, state.scratch.rubbing
+    parts: list[Touching | Crossing] = []
+    if len(state.wood.bodies.kind):
+        parts.append(_touching(state, dt, positive))
+    if len(rubbing.pair):
+        parts.append(crossings(m.x, m.v, state.wood.rods, rubbing, dt, RUBBING, positive))
+    return Contacts(tuple(parts))
+
+
+def _touching(state: State, dt: float, positive: bool) -> Touching:
     w, s = state.wood, state.scratch
-    if not len(w.bodies.kind):
-        return None
     count = len(w.rods.a)
     edge, h = np.empty(count, np.int32), np.empty((count, 3, 3, 3))
     m = w.motion

@@ -153,7 +153,7 @@ def _fill(
             scratch.lagged,
         )
     if len(scratch.rubbing.pair) > 0:
-        books[CONTACT] += rub(motion.x, motion.v, f, motion.mass, rods, scratch.rubbing, dt, scratch.power)
+        books[CONTACT] += rub(motion.x, motion.v, f, motion.mass, rods, scratch.rubbing, dt, rubbing, scratch.power)
 
 
 @njit(cache=True, error_model="numpy")

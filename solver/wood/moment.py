@@ -99,7 +99,7 @@ def begin(wood: Wood) -> State:
 
 
 def _again(scratch: Scratch) -> Scratch:
-    """Return a copy; pairs, plan and fragments are not written to, but for what a step finds anew."""
+    """Return a copy; plan and fragments are not written to, but for what a step writes before it reads it."""
     kept = ("rubbing", "plan", "fragments")
     fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
     return scratch._replace(**fresh)

@@ -198,7 +198,7 @@ class WoodParams(Params):
     )
     rod_contact: bool = Field(
         False,
-        description="Whether rods that no bond joins touch each other (explicit only)",
+        description="Whether rods that no bond joins touch each other",
         json_schema_extra={"units": "1"},
     )
     rod_friction: float = Field(
@@ -237,8 +237,8 @@ class WoodParams(Params):
             raise ValueError("twist and curved axes need the explicit mode: set mode explicit")
         if self.mode != "explicit" and self.mass_scaling > 1:
             raise ValueError("mass scaling is for the explicit mode: set mode explicit, or mass_scaling 1")
-        if self.mode != "explicit" and self.rod_contact:
-            raise ValueError("contact of rods needs the explicit mode: set mode explicit, or rod_contact false")
+        if self.mode == "static" and self.rod_contact:
+            raise ValueError("equilibria know no contact of rods: set rod_contact false, or another mode")
         if self.mode == "static" and (self.clamp == "none" or self.bodies or any(self.pull)):
             raise ValueError("equilibria need a clamped end, no bodies and no pull: set clamp start, or another mode")
         if any(self.pull) and self.clamp != "both":

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
@@ -72,11 +73,13 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         marching = static(wood, params, need.stages, context)
     rows: list[dict[str, Any]] = []
     try:
-        for reached in marching:
-            if skin is not None:
-                frames.append(skin.frame(reached.state.wood))
-            rows.append(_row(reached, wood, need, time.perf_counter() - begun))
-            context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
+        # two threads take twice as long for fronts of some hundreds, and round otherwise
+        with threadpool_limits(1, user_api="blas"):
+            for reached in marching:
+                if skin is not None:
+                    frames.append(skin.frame(reached.state.wood))
+                rows.append(_row(reached, wood, need, time.perf_counter() - begun))
+                context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
             error.partial = _dataset(rows, frames, wood, need, attrs)

@@ -150,12 +150,12 @@ def test_the_stiffness_couples_the_ends_of_edges():
     # in the factor's blocks it is the same matrix
     pattern = Stiffness(wood.rods, wood.bonds, m.held == 0)
     blocks = np.zeros((len(pattern.indices), 3, 3))
-    touching.spread(pattern.place, blocks)
+    touching.spread(pattern, blocks)
     row = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
     again = np.zeros_like(way)
     np.add.at(again, row, np.einsum("nij,nj->ni", blocks, way[pattern.indices]))
     assert np.abs(again - got).max() < 1e-12 * np.abs(got).max()
-    h = contacts(state, dt, True).h
+    h = contacts(state, dt, True).parts[0].h
     both = np.block([[h[:, 0], h[:, 1]], [h[:, 1].swapaxes(1, 2), h[:, 2]]])
     assert np.linalg.eigvalsh(both).min() > -1e-9 * np.abs(both).max()
 

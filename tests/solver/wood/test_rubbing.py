@@ -1,14 +1,21 @@
 """Contact between rods: two that cross and collide, and the grid against all pairs."""
 
+from itertools import product
+
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from solver.contract import Context, InvalidInput, Need
 from solver.wood import SOLVER
 from solver.wood.bundle import lay
+from solver.wood.crossing import crossings
+from solver.wood.implicit import implicit
 from solver.wood.listing import law
 from solver.wood.moment import kinetic
-from solver.wood.rubbing import pairs
+from solver.wood.pairs import approach, pairs
+from solver.wood.rubbing import MIDDLE, Rubbing, normals, rub
+from solver.wood.settings import choose
 from solver.wood.stepping import explicit
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
@@ -87,9 +94,139 @@ def test_the_grid_finds_what_all_pairs_do():
 def test_a_bundle_at_rest_touches_nothing_and_one_that_parts_keeps_its_books():
     values = {"rods": 12, "vertices": 10, "length": 0.1, "radius": 0.005, "clamp": "both", "pull": (2.0, 0, 0)}
     with pytest.raises(InvalidInput):
-        SOLVER.parse({**values, "rod_contact": True, "mode": "implicit"})
+        SOLVER.parse({**values, "rod_contact": True, "mode": "static"})
     need = Need(stages=(2e-4, 1.5e-3))
     plain = SOLVER.solve(SOLVER.parse(values), need)
     found = SOLVER.solve(SOLVER.parse({**values, "rod_contact": True, "step": plain.attrs["step"]}), need)
     assert found.broken_rods[1] > 6
     assert found.residual.max() < 0.02
+
+
+#: Two rods of two edges: across, along and beside each other, askew, and end on.
+PLACES = {
+    "cross": ([0.004, 0.004, 0.004], [-0.012, -0.002, 0.008], [0.0018] * 3),
+    "along": ([0.003, 0.013, 0.023], [0.0] * 3, [0.0018] * 3),
+    "askew": ([0.003, 0.013, 0.023], [-0.001, 0.0, 0.001], [0.0017] * 3),
+    "end": ([0.003, 0.004, 0.005], [0.0] * 3, [0.0017, 0.0117, 0.0217]),
+}
+THICK = 2e-3
+
+
+def two(place, friction):
+    """Return x, v (6, 3), masses, rods and all pairs of two rods of two edges, nearly touching as named."""
+    wood = lay(SOLVER.parse({"rods": 2, "vertices": 3, "clamp": "none", "radius": 0.004, "length": 0.02}), 3)
+    generator = np.random.default_rng(0)
+    x = np.zeros((2, 3, 3))
+    x[0, :, 0] = [0, 0.01, 0.02]
+    x[1] = np.array(PLACES[place]).T
+    x = x.reshape(6, 3) + generator.normal(0, 1e-5, (6, 3))
+    pair = np.array(list(product([0, 1], [2, 3])), np.int32)
+    rubbing = Rubbing(pair, np.array([THICK, 1e5, friction, 1e-4]), np.zeros(4))
+    normals(x, wood.rods, rubbing)
+    return x, 3e-4 * generator.normal(size=x.shape), wood.motion.mass, wood.rods, rubbing
+
+
+def rubbed(x, v, mass, rods, rubbing):
+    f, power = np.zeros_like(x), np.zeros(2)
+    return rub(x, v, f, mass, rods, rubbing, 1e-3, 1e-3, power), f, power
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_energy_is_that_of_points_found_by_search(place):
+    x, v, mass, rods, rubbing = two(place, 0.0)
+    wanted = 0.0
+    for e, w in rubbing.pair:
+        a, b, c, d = (x[n] for n in (rods.a[e], rods.b[e], rods.a[w], rods.b[w]))
+
+        def square(y, a=a, b=b, c=c, d=d):
+            apart = a + y[0] * (b - a) - c - y[1] * (d - c)
+            return 1e6 * (apart @ apart + MIDDLE * THICK**2 * ((y[0] - 0.5) ** 2 + (y[1] - 0.5) ** 2))
+
+        starts = product([0.1, 0.9], repeat=2)
+        best = min(minimize(square, y, bounds=[(0, 1)] * 2, tol=1e-14).fun for y in starts)
+        gap = max(THICK - 1e-3 * np.sqrt(best), 0.0)
+        ease = 1e-4
+        wanted += 1e5 * (gap**3 / (6 * ease) if gap < ease else gap**2 / 2 - gap * ease / 2 + ease**2 / 6)
+    assert rubbed(x, v, mass, rods, rubbing)[0] == pytest.approx(wanted, rel=1e-5)
+    assert wanted > 0
+
+
+@pytest.mark.parametrize(("place", "friction"), list(product(PLACES, [0.0, 0.5])))
+def test_forces_and_stiffness_are_differences(place, friction):
+    x, v, *rest = two(place, friction)
+    way, h = np.random.default_rng(1).normal(size=x.shape), 1e-9
+    (up, high, _), (down, low, _) = (rubbed(x + s * h * way, v + s * h / 1e-3 * way, *rest) for s in (1, -1))
+    _, f, _ = rubbed(x, v, *rest)
+    assert np.abs(f.sum(0)).max() < 1e-14 * np.abs(f).max()
+    if not friction:
+        assert (f * way).sum() == pytest.approx((down - up) / (2 * h), rel=1e-7)
+    found = crossings(x, v, rest[1], rest[2], 1e-3, 1e-3, False)
+    got, expected = np.zeros_like(x), (low - high) / (2 * h)
+    found.add(way, got)
+    # the turning of the plane of friction is left out
+    assert np.linalg.norm(got - expected) < (1e-2 if friction else 1e-7) * np.linalg.norm(expected)
+    kept = crossings(x, v, rest[1], rest[2], 1e-3, 1e-3, True).h
+    assert np.linalg.eigvalsh(kept).min() > -1e-12 * np.abs(kept).max()
+
+
+def test_a_share_of_a_step_that_is_allowed_passes_nothing():
+    generator = np.random.default_rng(2)
+    for place in PLACES:
+        x, _, _, rods, rubbing = two(place, 0.0)
+        for _ in range(20):
+            way = generator.normal(0, 0.02, x.shape)
+            share = min(approach(x, way, rods, rubbing.pair, THICK), 1.0)
+            for e, w in rubbing.pair:
+                s = np.linspace(0, 1, 41)[:, None]
+                first = []
+                for part in np.linspace(0, share, 9):
+                    y = x + part * way
+                    p, q = (y[rods.a[n]] * (1 - s) + y[rods.b[n]] * s for n in (e, w))
+                    first.append(np.linalg.norm(p[:, None] - q[None], axis=-1).min())
+                assert min(first) > 0.49 * min(first[0], THICK)
+
+
+def test_pressed_rods_rest_where_the_penalty_bears_the_load():
+    """Both schemes, and the penalty's own depth."""
+    ends = []
+    for mode in ("explicit", "implicit"):
+        params, wood = crossed(0.3)
+        params = params.model_copy(update={"damping": 3000.0, "mode": mode})
+        m, load = wood.motion, 4.0
+        m.v[:] = 0.0
+        m.x.reshape(2, 11, 3)[1, :, 0] = 0.05
+        share = m.mass / m.mass.reshape(2, 11).sum(1).repeat(11)
+        m.load[:, 2] = load * share * np.where(np.arange(22) < 11, 1.0, -1.0)
+        if mode == "explicit":
+            (found,) = explicit(wood, params, (0.03,), 8e-7, 1.0, Context())
+        else:
+            settings = choose(params.model_copy(update={"step": 2e-4}), "fine")
+            (found,) = implicit(wood, params, (0.03,), settings, 1.0, Context())
+        thick, k, _, ease = law(wood, params)
+        depth = load / k + ease / 2 if load > k * ease / 2 else np.sqrt(2 * ease * load / k)
+        energy = k * (depth**2 / 2 - depth * ease / 2 + ease**2 / 6) if depth > ease else k * depth**3 / (6 * ease)
+        # the distance that counts is a little longer than the way between the points
+        assert found.state.books[3] == pytest.approx(energy, rel=0.03)
+        x = found.state.wood.motion.x.reshape(2, 11, 3)
+        middle = [np.interp(0.05, x[0, :, 0], x[0, :, 2]), np.interp(0.0, x[1, :, 1], x[1, :, 2])]
+        assert middle[1] - middle[0] == pytest.approx(thick - depth, rel=0.03)
+        bow = x[:, 5, 2] - (x[:, 0, 2] + x[:, -1, 2]) / 2
+        ends.append([*bow, middle[1] - middle[0], found.state.books[3]])
+    # they lie as deep in each other and press as hard; they bow alike as far as they rock alike, balanced as they are
+    assert ends[0][2:] == pytest.approx(ends[1][2:], rel=1e-3)
+    assert ends[0][:2] == pytest.approx(ends[1][:2], rel=0.05)
+
+
+def test_a_long_implicit_step_passes_no_rod_through_another():
+    params, wood = crossed(0.0)
+    settings = choose(params.model_copy(update={"step": 1 / 60}), "fine")
+    # the upper rod would go 17 mm in a step, several thicknesses
+    reached = list(implicit(wood, params, (1 / 60, 2 / 60), settings, 1.0, Context()))
+    start = crossed(0.0)[1].motion
+    momentum = start.mass @ start.v
+    for found in reached:
+        n = found.state.wood.motion
+        # as exactly as a step is solved
+        assert n.mass @ n.v == pytest.approx(momentum, abs=1e-3 * np.abs(momentum).max())
+    upper = reached[-1].state.wood.motion.x.reshape(2, 11, 3)
+    assert upper[1, 4:7, 2].mean() > upper[0, 4:7, 2].mean()
