@@ -133,9 +133,12 @@ def balanced(state: State, time: float, start: float, scale: float, tolerance: f
     moving = real(state)
     energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), state.dissipated, start)
     error = abs(moving + elastic + energy[2] + energy[4] - energy[3] - start) / largest(energy, scale)
-    if error > 0.5:
+    # what is not finite is not less, either
+    if not error <= 0.5:
+        lost = f"the energy balance is off by {100 * error:.0f} percent" if error > 0.5 else "energies are not finite"
         raise Unstable(
-            f"at t = {time:.4g} s the energy balance is off by {100 * error:.0f} percent.",
-            advice="Give a shorter step, or a lower contact_stiffness.",
+            f"at t = {time:.4g} s {lost}.",
+            advice="Give a shorter step, or a lower contact_stiffness"
+            + (", or less mass_scaling." if state.wood.scaling > 1 else "."),
         )
     return Reached(time, state, energy, error, error <= tolerance)
