@@ -21,7 +21,7 @@ _HEAD = (
     "         bonds  worst balance"
 )
 #: Masses over real ones in the runs on scaled masses.
-_SCALING = 2500.0
+_SCALING = 1e4
 
 
 def _run(values: dict[str, Any], until: float, quality: Any) -> str:

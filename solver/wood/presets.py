@@ -44,7 +44,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "bodies": [_block(0.02, -0.015), _block(0.13, -0.015), _block(0.075, 0.015, 0.03)],
         "gravity": 9.81,
         "damping": 50.0,
-        "mass_scaling": 2500.0,
+        "mass_scaling": 1e4,
     },
     # a bent branchlet, held at one end, hit near the other
     "twig": {
