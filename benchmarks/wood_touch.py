@@ -30,12 +30,11 @@ def overlap(found: xr.Dataset, wood: Wood, thick: float) -> float:
     """Return the largest overlap of two rods at any stage, over their thickness [m]."""
     real = wood.rods.k > 0
     number = np.arange(real.sum(), dtype=np.int32)
-    nobody = wood.bonds._replace(on=np.zeros_like(wood.bonds.on))
     rod, least = wood.rod[real], thick
     for ends, cut in zip(found.rod_position.values, found.rod_cut.values, strict=True):
         x = np.ascontiguousarray(ends, float).reshape(-1, 3)
         rods = wood.rods._replace(a=2 * number, b=2 * number + 1, k=wood.rods.k[real], alive=(cut < 0).astype(np.uint8))
-        near = pairs(x, rods, nobody, rod, thick)
+        near = pairs(x, rods, rod, thick)
         least = min(least, float(distances(x, rods, near).min(initial=thick)))
     return 1 - least / thick
 
