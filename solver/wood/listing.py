@@ -100,7 +100,7 @@ class Listing:
     def refreshed(self, state: State, ahead: float, time: float, dt: float) -> State:
         """Return the state with pairs that hold for `ahead` [s] from `time` [s], its energies booked.
 
-        A bond that broke frees its rods to touch; energy that they then have is booked as taken from what is lost.
+        What rods that touch at the start have is booked as taken from what is lost.
         """
         m = state.wood.motion
         fitted = self.fitted(state, ahead * float(np.sqrt((m.v**2).sum(1).max())) if self.on else 0.0)

@@ -11,7 +11,7 @@ import numpy as np
 from ..contract import NotConverged
 from .contact import RUBBING, contacts, lag
 from .elements import apply, elements
-from .explicit import CONTACT, LOST, forces
+from .explicit import CONTACT, forces
 from .hessian import Stiffness
 from .listing import Listing
 from .moment import State, strength
@@ -79,12 +79,9 @@ class Solver:
         self.listing.lag(state)
 
     def again(self, state: State, time: float, dt: float) -> np.ndarray:
-        """Return the forces (v, 3) [N] after breaks; what rods freed to touch have at once is booked as lost."""
-        before = float(state.books[: CONTACT + 1].sum())
+        """Return the forces (v, 3) [N] after breaks, friction following the normal forces there."""
         self.lag(state)
-        f = self.forces(state, time, dt).copy()
-        state.books[LOST] += before - float(state.books[: CONTACT + 1].sum())
-        return f
+        return self.forces(state, time, dt).copy()
 
     def solve(
         self, state: State, step: Step, guesses: tuple[np.ndarray, ...], least: float, rough: float = 1.0
