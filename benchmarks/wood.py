@@ -1,6 +1,6 @@
 """What wood costs and how well it keeps its energy: `python -m benchmarks.wood`; a minute or two on one core.
 
-`python -m benchmarks.wood --fig42` runs the thesis' splinters instead (--rods, --vertices, --seeds, --explicit).
+`python -m benchmarks.wood --fig42` runs the thesis' splinters instead (--rods, --vertices, --seeds, --modes).
 
 Times are CPU seconds, the least of ten.
 """
@@ -112,11 +112,11 @@ def _asked() -> None:
     parser.add_argument("--vertices", type=int, default=30)
     parser.add_argument("--until", type=float, default=3.0, help="seconds that are simulated")
     parser.add_argument("--seeds", type=int, nargs="*", default=[1])
-    parser.add_argument("--explicit", action="store_true", help="run each seed explicitly too")
+    parser.add_argument("--modes", nargs="+", choices=("scaled", "implicit", "explicit"), default=["scaled"])
     parser.add_argument("--no-elastic", action="store_true", help="leave the run without fracture out")
     asked = parser.parse_args()
     if asked.fig42:
-        splinters(asked.rods, asked.vertices, asked.seeds, asked.until, asked.explicit, not asked.no_elastic)
+        splinters(asked.rods, asked.vertices, asked.seeds, asked.until, asked.modes, not asked.no_elastic)
     else:
         main()
 

@@ -80,6 +80,25 @@ CASES: dict[str, Case] = {
     "three vertices": Case({"rods": 9, "vertices": 3, "bend": 0.05}, 1e-3),
     "a bundle of jelly": Case({**_FEW, "stiffness": 1e3, "transverse": 0.0, "shear": 0.0, "gravity": 9.81}, 0.1),
     "an explicit step 1000 times too long": Case({**_FEW, "bend": 0.02, "step": 1e-3}, 1e-3),
+    "masses scaled a million times, at 100 m/s": Case(
+        {
+            **_FEW,
+            "mass_scaling": 1e6,
+            "bodies": [_box((0.05, 0.05, 0.05), (0, 0.1, 0, 0.04), (1e-3, 0.1, 0, -0.06))],
+        },
+        2e-3,
+    ),
+    "loose chips that fall on a body, masses scaled": Case(
+        {
+            **_FEW,
+            "clamp": "none",
+            "reach": 0.0,
+            "mass_scaling": 2500.0,
+            "gravity": 9.81,
+            "bodies": [_box((0.4, 0.4, 0.02), (0, 0.05, 0, -0.025))],
+        },
+        0.3,
+    ),
     "an implicit step of 1/60 s, pressed until it breaks": Case(_press(9, 1 / 60), 0.2),
     "an implicit step ten times as long": Case(_press(9, 1 / 6), 0.2),
     "loose rods that part and touch": Case(

@@ -1,7 +1,7 @@
 """Draw Fig. 4.2's runs: three seeds of one branch under three blocks, a row each, blocks and all.
 
 python -m examples.wood.splinters OUT.png [--slow] [SEED ...]; writes OUT-SEED.glb, animated, beside it. The press of
-`splinter.toml` is fast and explicit; with --slow it is the thesis', in three seconds, implicit (`press.toml`).
+`splinter.toml` is fast and explicit; with --slow it is the thesis', in three seconds, on scaled masses (`press.toml`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sweeps.picture import Panel, sheet
 
 #: File, stages [s], quality.
 _FAST: tuple[str, tuple[float, ...], Quality] = ("splinter.toml", (0.015, 0.03, 0.045, 0.06), "preview")
-_SLOW: tuple[str, tuple[float, ...], Quality] = ("press.toml", (0.75, 1.5, 2.25, 3.0), "default")
+_SLOW: tuple[str, tuple[float, ...], Quality] = ("press.toml", (0.75, 1.5, 2.25, 3.0), "preview")
 _SEEDS = (1, 2, 3)
 _AROUND = 48
 _STEEL = (0.25, 0.28, 0.32)

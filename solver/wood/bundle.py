@@ -155,7 +155,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     motion = Motion(
         x,
         speed.reshape(-1, 3).copy(),
-        np.where(mass > 0, mass, 1.0),
+        np.where(mass > 0, params.mass_scaling * mass, 1.0),
         held.ravel(),
         loads,
         director,
@@ -171,7 +171,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         params.shear * hinge_area**2 / (2 * np.pi) * hinge_stiff,
         kappa,
         np.zeros(len(before)),
-        params.density * solid * section**2 / (2 * np.pi),
+        params.mass_scaling * params.density * solid * section**2 / (2 * np.pi),
     )
     places = straight[:, :-1, None] + SAMPLES[:, None] * (straight[:, 1:] - straight[:, :-1])[:, :, None]
     strength = np.where(real.ravel()[:, None], _strength(places, strong, params).reshape(len(a), -1), np.inf)
@@ -191,4 +191,5 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         grid,
         np.full(len(a), -1.0),
         number.ravel(),
+        params.mass_scaling,
     )

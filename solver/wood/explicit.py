@@ -16,6 +16,7 @@ from .bodies import pose, press
 from .internal import internal
 from .plan import Plan
 from .rubbing import Rubbing, rub
+from .scaling import Fragments, push, rigid, steady
 from .twist import carry, turn, twists
 from .verlet import drift, grip, kick, slowed
 
@@ -53,9 +54,11 @@ class Scratch(NamedTuple):
     push: np.ndarray
     power: np.ndarray
     lagged: np.ndarray
+    light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]
     found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
     rubbing: Rubbing
     plan: Plan
+    fragments: Fragments
 
 
 @njit(cache=True, error_model="numpy")
@@ -138,7 +141,7 @@ def _fill(
             motion.x,
             motion.v,
             f,
-            motion.mass,
+            scratch.light,
             rods,
             bodies,
             scratch.centre,
@@ -183,10 +186,15 @@ def march(
     weight[held] = 0.0
     keep = np.full(len(x), slow)
     keep[held] = 1.0
+    whole = scratch.fragments
+    books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
+    steady(x, v, rods, bodies, scratch.centre, scratch.speed, motion.mass, whole, dt * steps, scratch.light)
+    books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
     for n in range(steps):
         power = grip(held, v, f) + scratch.power[0]
         rubbed = scratch.power[1]
         kick(v, f, weight)
+        push(x, v, whole, half)
         work = drift(x, v, motion.load, dt)
         if turning:
             for e in range(len(motion.theta)):
@@ -198,7 +206,9 @@ def march(
                 impulse[r, c] += half * scratch.push[r, c]
         look = n == steps - 1
         _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books, look)
+        less = rigid(x, v, f, motion.mass, whole, half)
         kick(v, f, weight)
+        push(x, v, whole, half)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -209,6 +219,7 @@ def march(
         books[WORK] += work + half * (power + grip(held, v, f) + scratch.power[0])
         books[LOST] += half * (rubbed + scratch.power[1])
         if damping > 0.0:
+            books[LOST] -= less * (1.0 - slow * slow)
             books[LOST] += slowed(v, keep, motion.mass)
             if turning:
                 for e in range(len(motion.spin)):

@@ -8,18 +8,18 @@ from forces and velocities alone and is booked as dissipated, so that the balanc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from copy import copy
 from typing import NamedTuple
 
 import numpy as np
 
 from ..contract import Context, NotConverged
+from .equations import Step, filled
 from .explicit import CONTACT, LOST, WORK
 from .listing import Listing
 from .moment import Reached, State, balanced, begin, copied, floor, kinetic
 from .params import WoodParams
 from .settings import Settings
-from .solving import Solver, Step
+from .solving import Solver
 from .state import Wood
 from .stepping import broken
 
@@ -84,7 +84,7 @@ def _step(
             error, scale = solver.solve(state, to, guesses, scale, rough if count < _PASSES else 1.0)
             state = solver.listing.fitted(state)
             span = (time + dt if count else time, time + dt)
-            along, given = _along(solver, state, (here, v_here, f0), span, to.bdt)
+            along, given = _along(solver.listing, state, (here, v_here, f0), span, to.bdt)
             done, pushed = done + along, pushed + given
             found = state
             if params.fracture != "none" and count < _PASSES:
@@ -115,7 +115,7 @@ def _step(
 
 
 def _along(
-    solver: Solver,
+    listing: Listing,
     state: State,
     start: tuple[np.ndarray, np.ndarray, np.ndarray],
     times: tuple[float, float],
@@ -138,7 +138,7 @@ def _along(
     def at(s: float) -> np.ndarray:
         m.x[:] = start[0] + s * (end[0] - start[0])
         m.v[:] = start[1] + s * (end[1] - start[1])
-        return both(solver.forces(state, times[0] + s * span, bdt))
+        return both(filled(state, times[0] + s * span, bdt, listing))
 
     last = both(scratch.f)
     m.v[:] = start[1]
@@ -155,7 +155,7 @@ def _along(
         if float(np.abs(fine - near).max()) <= max(small, _SMALL * float(np.abs(fine).max())):
             break
     m.x[:], m.v[:] = end
-    solver.forces(state, times[1], bdt)
+    filled(state, times[1], bdt, listing)
     return float(fine[0]), float(fine[1])
 
 
@@ -178,8 +178,7 @@ def implicit(
     """
     state, past, dt = begin(wood), None, settings.step
     start = kinetic(wood) + float(state.books[: CONTACT + 1].sum())
-    listing = Listing(wood, params)
-    solver, done = Solver(params, settings.tolerance, listing), 0
+    solver, done = Solver(params, settings.tolerance, Listing(wood, params)), 0
     for wanted in times:
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
         while done < ahead:
@@ -190,7 +189,6 @@ def implicit(
         shown = state
         rest = wanted - ahead * dt
         if rest > 1e-9 * dt:
-            # on a factor and a list of its own: later steps must not know of this one
-            own = Solver(params, settings.tolerance, copy(listing))
-            shown, _, _ = _step(own, copied(state), past, ahead * dt, rest)
+            # later steps must not know of this one
+            shown, _, _ = _step(solver.twin(), copied(state), past, ahead * dt, rest)
         yield balanced(copied(shown), wanted, start, floor(wood, params), balance)

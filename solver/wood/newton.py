@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Found", "descend"]
+__all__ = ["Found", "descend", "searched"]
 
 Field = np.ndarray
 #: Residual of the inner iteration over that of the outer, at first and at least.
@@ -27,6 +27,10 @@ _FURTHER = 3.0
 _AGAIN = 0.1
 #: Solves in one inner iteration.
 _INNER = 60
+#: What mending leaves of a residual if it is worth while.
+_MENDED = 0.7
+#: How much further a step may go than the last one did.
+_WIDER = 3.0
 
 
 class Found(NamedTuple):
@@ -40,9 +44,12 @@ class Found(NamedTuple):
 
 
 def _direction(
-    r: Field, apply: Callable[[Field], Field], solve: Callable[[Field], Field], share: float, most: int
+    r: Field, apply: Callable[[Field], Field], solve: Callable[[Field], Field], share: float, most: int, reach: float
 ) -> tuple[Field, int, bool]:
-    """Return a step p with K p about -r, up to `share` of r, the solves it took, and whether K was not positive."""
+    """Return a step p with K p about -r, up to `share` of r, the solves it took, and whether K was not positive.
+
+    It ends, too, where p moves something further than `reach`: what is beyond would be cut off.
+    """
     p, rest = np.zeros_like(r), -r
     wanted = share * float(np.linalg.norm(r))
     z = solve(rest)
@@ -54,6 +61,8 @@ def _direction(
             return (way if count == 1 else p), count, True
         a = gain / curve
         p = p + a * way
+        if float(np.abs(p).max()) > reach:
+            return p, count, False
         less = rest - a * bent
         if float(np.linalg.norm(less)) <= wanted or count == most:
             return p, count, False
@@ -65,7 +74,7 @@ def _direction(
     return p, most, False
 
 
-def _searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, most: float) -> tuple[Field, Field]:
+def searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, most: float) -> tuple[Field, Field]:
     """Return x + a p and the residual there, with a from 0 to `most` where the slope is less than half of what it was.
 
     The first trial is 1, or `most` if that is less. A direction of which what is negative was left out is too short:
@@ -100,6 +109,7 @@ def descend(
     most: int,
     limit: Callable[[Field], float],
     little: float,
+    mend: Callable[[Field, Field], Field | None] = lambda x, r: None,
 ) -> Found:
     """Iterate from x (v, 3) until the norm of the residual is at most `wanted`, or `most` solves are used up.
 
@@ -108,26 +118,39 @@ def descend(
 
     residual: gradient (v, 3) [N], zero where held. stiffness: the product with the second derivatives where residual
     was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that
-    can be trusted.
+    can be trusted. mend: a better x than that with the residual r, if there is a cheap one.
     """
     r = residual(x)
     norm = float(np.linalg.norm(r))
     solves, rounds, share, turned, settled = 0, 0, _LOOSE, np.inf, False
+    mending, reach = True, np.inf
     while norm > wanted and not settled and solves < most and np.isfinite(norm):
+        better = mend(x, r) if mending else None
+        if better is not None:
+            less = residual(better)
+            if (after := float(np.linalg.norm(less))) < norm:
+                mending, x, r, norm = after < _MENDED * norm, better, less, after
+                continue
+            mending = False
+            r = residual(x)
         aim = max(share, 0.5 * wanted / norm)
         positive = norm > turned
-        p, spent, bent = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves))
+        p, spent, bent = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves), reach)
         solves, rounds = solves + spent, rounds + 1
         if bent and not positive:
             turned = _AGAIN * norm
             if solves < most:
-                p, spent, _ = _direction(r, stiffness(True), solve, aim, min(_INNER, most - solves))
+                p, spent, _ = _direction(r, stiffness(True), solve, aim, min(_INNER, most - solves), reach)
                 solves += spent
         slope = float(np.vdot(r, p))
         if not slope < 0:
             break
         settled = -slope < little
-        x, r = _searched(residual, x, p, slope, limit(p))
+        before, far = x, float(np.abs(p).max())
+        x, r = searched(residual, x, p, slope, limit(p))
+        went = float(np.abs(x - before).max())
+        # what a step was cut to, or more where it was not
+        reach = _WIDER * max(went, 1e-300) if went < 0.5 * far else max(reach, _WIDER * went)
         last, norm = norm, float(np.linalg.norm(r))
         share = min(_LOOSE, max(_TIGHT, (norm / last) ** 2))
     return Found(x, norm, solves, rounds, settled or norm <= wanted)

@@ -204,6 +204,14 @@ class WoodParams(Params):
     rod_friction: float = Field(
         0.3, ge=0, le=2, description="Coulomb friction between rods", json_schema_extra={"units": "1"}
     )
+    mass_scaling: float = Field(
+        1.0,
+        ge=1,
+        le=1e6,
+        description="Mass that resists bending and stretching over the real one, for slow loads: explicit steps are "
+        "sqrt of it longer; fragments as a whole keep their real mass",
+        json_schema_extra={"units": "1"},
+    )
     mode: Literal["explicit", "implicit", "static"] = Field(
         "explicit",
         description="Explicit (the truth), implicit (BDF2, for long runs), or equilibrium at every stage",
@@ -227,6 +235,8 @@ class WoodParams(Params):
             raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
         if self.mode != "explicit" and (self.twist or self.curvature):
             raise ValueError("twist and curved axes need the explicit mode: set mode explicit")
+        if self.mode != "explicit" and self.mass_scaling > 1:
+            raise ValueError("mass scaling is for the explicit mode: set mode explicit, or mass_scaling 1")
         if self.mode == "static" and self.rod_contact:
             raise ValueError("equilibria know no contact of rods: set rod_contact false, or another mode")
         if self.mode == "static" and (self.clamp == "none" or self.bodies or any(self.pull)):

@@ -37,6 +37,15 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "gravity": 9.81,
         "damping": 50.0,
     },
+    # the same slow press at an affordable price: on scaled masses
+    "press": {
+        "rods": 200,
+        "clamp": "none",
+        "bodies": [_block(0.02, -0.015), _block(0.13, -0.015), _block(0.075, 0.015, 0.03)],
+        "gravity": 9.81,
+        "damping": 50.0,
+        "mass_scaling": 2500.0,
+    },
     # a bent branchlet, held at one end, hit near the other
     "twig": {
         "rods": 19,

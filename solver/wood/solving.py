@@ -2,44 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from copy import copy
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from ..contract import NotConverged
-from .contact import RUBBING, contacts, lag
-from .elements import apply, elements
-from .explicit import CONTACT, forces
-from .hessian import Stiffness
+from .contact import contacts, lag
+from .equations import Equations, Step, filled
+from .explicit import CONTACT
 from .listing import Listing
+from .local import relaxed
 from .moment import State, strength
 from .newton import descend
 from .params import WoodParams
-from .precondition import Preconditioner, preconditioner
+from .precondition import Pattern, Preconditioner, preconditioner
 
-__all__ = ["Solver", "Step"]
+__all__ = ["Solver"]
 
 #: Solves before a stale factor is given up, and factors before a step is.
 _SOLVES, _FACTORS = 60, 5
 #: Solves with a fresh factor over those with a stale one: a piece that swings on one bond takes many short steps.
 _PATIENCE = 4
-#: A factor is renewed when it has cost this many solves more than a fresh one would have: about what a new one costs.
-_EXCESS = 40
+#: Solves that a round takes with a fresh factor. A factor is renewed when it has cost so many more than a new one does.
+_FRESH, _EXCESS = 3, 40
+#: What a step may be longer or shorter than that of the factor.
+_SAME = 3.0
 #: The least residual that is asked for: this share of the tolerance, of the load that the bundle bears.
 _LEAST = 1e-4
-#: How far an edge's ends move against each other in one step of Newton's, over its length.
-_TURN = 0.3
-
-
-class Step(NamedTuple):
-    """What a step sets out from: xh, vh (v, 3), b dt [s], its end [s]."""
-
-    xh: np.ndarray
-    vh: np.ndarray
-    bdt: float
-    time: float
+#: What a solve between two breaks may leave of the residual that the last break made.
+_KICK = 0.25
 
 
 class Solver:
@@ -48,9 +40,9 @@ class Solver:
     def __init__(self, params: WoodParams, tolerance: float, listing: Listing) -> None:
         self.params, self.tolerance, self.listing = params, tolerance, listing
         self._factor: Preconditioner | None = None
-        self._pattern: Stiffness | None = None
+        self._pattern: Pattern | None = None
         self._key: tuple[int, int, bytes] | None = None
-        self._bdt, self._fresh, self._excess = 0.0, 0, 0
+        self._bdt, self._excess = 0.0, 0
         self.factors, self.solves = 0, 0
 
     def _renew(self, state: State, bdt: float) -> None:
@@ -64,14 +56,14 @@ class Solver:
         self._factor, self._pattern = preconditioner(
             m.x, wood.rods, wood.bonds, m.held == 0, inertia, touching, pattern
         )
-        self._key, self._bdt, self._fresh, self._excess = key, bdt, 0, 0
+        self._key, self._bdt, self._excess = key, bdt, 0
         self.factors += 1
 
-    def forces(self, state: State, time: float, dt: float) -> np.ndarray:
-        """Fill the state's forces for its x and v at `time`; return them (v, 3) [N]."""
-        w, s = state.wood, self.listing.fitted(state).scratch
-        forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, s, False, time, dt, RUBBING, state.books)
-        return state.scratch.f
+    def twin(self) -> Solver:
+        """Return a solver that sets out with the same factor, and of which this one learns nothing."""
+        found = Solver(self.params, self.tolerance, copy(self.listing))
+        found._factor, found._pattern, found._key, found._bdt = self._factor, self._pattern, self._key, self._bdt
+        return found
 
     def lag(self, state: State) -> None:
         """Take the normal forces where the state is as those that friction follows."""
@@ -81,7 +73,13 @@ class Solver:
     def again(self, state: State, time: float, dt: float) -> np.ndarray:
         """Return the forces (v, 3) [N] after breaks, friction following the normal forces there."""
         self.lag(state)
-        return self.forces(state, time, dt).copy()
+        return filled(state, time, dt, self.listing).copy()
+
+    def _stale(self, vertices: int, bdt: float) -> bool:
+        """Return whether the factor does not serve: too old, or of vertices that a step taken back had split."""
+        if self._factor is None or len(self._factor.free) > vertices:
+            return True
+        return not 1 / _SAME < bdt / self._bdt < _SAME or self._excess > _EXCESS
 
     def solve(
         self, state: State, step: Step, guesses: tuple[np.ndarray, ...], least: float, rough: float = 1.0
@@ -94,57 +92,23 @@ class Solver:
             NotConverged: it is not found.
 
         """
-        wood, p = state.wood, self.params
+        wood = state.wood
         m = wood.motion
-        held = m.held == 1
-        free = ~held
-
-        def residual(x: np.ndarray) -> np.ndarray:
-            m.x[:] = x
-            m.v[free] = (x[free] - step.xh[free]) / step.bdt
-            f = self.forces(state, step.time, step.bdt)
-            r: np.ndarray = m.mass[:, None] * ((m.v - step.vh) / step.bdt + p.damping * m.v) - f
-            r[held] = 0.0
-            return r
-
+        equations = Equations(state, step, self.params, self.listing)
+        residual = equations.residual
         guesses = tuple(self.listing.near(state, x) for x in guesses)
         norms = [float(np.linalg.norm(residual(x))) for x in guesses]
         x = guesses[int(np.nanargmin(norms))]
-        scale = max(norms[0], _LEAST * strength(wood, p), least)
+        scale = max(norms[0], _LEAST * strength(wood, self.params), least)
         wanted = rough * self.tolerance * scale
+        if rough > 1:
+            wanted = max(wanted, _KICK * norms[0])
         # energies go with the square of forces
         little = rough * self.tolerance**2 * float(state.books[: CONTACT + 1].sum())
-        contact = 0.2 * float(wood.bodies.half[:, 0].min()) if len(wood.bodies.kind) else np.inf
-        first, second = wood.rods.a, wood.rods.b
-        turned = _TURN * wood.rods.rest
-
-        def limit(way: np.ndarray) -> float:
-            """Return the share of a step that turns and stretches no edge by much, and passes through no body."""
-            apart = np.linalg.norm(way[second] - way[first], axis=1)
-            share = 1.0 / max(float((apart / turned).max()), 1e-300)
-            share = min(share, contact / max(float(np.abs(way).max()), 1e-300))
-            return self.listing.allowed(state, way, share)
-
-        inertia = (m.mass * (1 / step.bdt + p.damping) / step.bdt)[:, None]
-
-        def stiffness(positive: bool) -> Callable[[np.ndarray], np.ndarray]:
-            parts = elements(m.x, wood.rods, wood.bonds, positive)
-            touching = contacts(self.listing.fitted(state), step.bdt, positive)
-
-            def times(way: np.ndarray) -> np.ndarray:
-                out: np.ndarray = inertia * way
-                apply(parts, way, out)
-                touching.add(way, out)
-                out[held] = 0.0
-                return out
-
-            return times
-
         root = np.arange(len(m.x))
         norm = min(norms)
         for attempt in range(_FACTORS):
-            stale = self._factor is None or self._bdt != step.bdt or self._excess > _EXCESS
-            if stale or attempt:
+            if attempt or self._stale(len(m.x), step.bdt):
                 residual(x)
                 self._renew(state, step.bdt)
             assert self._factor is not None
@@ -153,12 +117,20 @@ class Solver:
             while (root >= old).any():
                 root = np.where(root >= old, wood.parent[root], root)
             factor = self._factor
-            found = descend(residual, stiffness, x, partial(factor.solve, root=root), wanted, most, limit, little)
+            found = descend(
+                residual,
+                equations.stiffness,
+                x,
+                partial(factor.solve, root=root),
+                wanted,
+                most,
+                equations.limit,
+                little,
+                lambda x, r: relaxed(equations, x, r, wanted, little),
+            )
             self.solves += found.solves
             x, norm = found.x, found.norm
-            if not self._fresh:
-                self._fresh = found.solves + 1
-            self._excess += max(found.solves - self._fresh, 0)
+            self._excess += max(found.solves - _FRESH * found.rounds, 0)
             if found.settled:
                 residual(x)
                 return norm / scale, scale

@@ -10,6 +10,7 @@ from .arrays import Bodies, Bonds, Rods, Turns
 from .explicit import Motion, Scratch
 from .plan import plan_for
 from .rubbing import none
+from .scaling import fragments
 
 __all__ = ["Wood", "scratch_for"]
 
@@ -29,6 +30,8 @@ class Wood:
     grid: np.ndarray  # (rods, vertices) int32: vertex numbers as laid
     cut: np.ndarray  # (e,) where an edge is cut, 0 to 1; -1: it is not
     parent: np.ndarray  # (v,) int32 vertex that one was split from; itself as laid
+    scaling: float = 1.0  # masses over real ones, see `scaling`
+    least: float = 0.0  # real mass that an edge in contact needs to be stable [kg]
 
     def copied(self) -> Wood:
         """Return a copy that can be stepped without touching this one."""
@@ -56,7 +59,9 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((r, 3)),
         np.zeros(2),
         np.zeros((r, wood.bodies.first[-1] if r else 0)),
+        wood.motion.mass.copy(),
         np.zeros((len(plan.part) - 1, 4)),
         none(),
         plan,
+        fragments(wood.rods, wood.bonds, wood.motion.held, wood.motion.mass, wood.scaling, wood.least),
     )

@@ -10,7 +10,7 @@ from ..contract import Context, Unstable
 from .explicit import BENDING, BONDS, CONTACT, LOST, STRETCH, forces, march
 from .fracture import break_worst, overstress
 from .listing import Listing
-from .moment import Reached, State, balanced, begin, copied, floor, kinetic, largest
+from .moment import Reached, State, balanced, begin, copied, floor, largest, real
 from .params import WoodParams
 from .state import Wood, scratch_for
 
@@ -51,14 +51,16 @@ def broken(state: State, params: WoodParams, time: float, dt: float, share: floa
     )
     if top <= 1 and not hard:
         return state
-    before = state.books[: CONTACT + 1].sum()
+    before = state.books[: CONTACT + 1].sum() + real(state)
     allowed = min(share * params.cascade, 1.0) * float(state.books[[STRETCH, BENDING, BONDS]].sum())
     wood, rods, bonds = break_worst(wood, ratio, place, scratch.each, allowed)
     scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, 0.0, books)
-    books[LOST] += before - books[: CONTACT + 1].sum()
-    return state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds)
+    found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds)
+    # what fragments that come off no longer have by their scaled mass is lost, too
+    books[LOST] += before - books[: CONTACT + 1].sum() - real(found)
+    return found
 
 
 def _advance(state: State, params: WoodParams, time: float, dt: float, steps: int) -> State:
@@ -103,10 +105,12 @@ def explicit(
 
     """
     state = begin(wood)
-    start = kinetic(wood) + float(state.books[: CONTACT + 1].sum())
+    start = real(state) + float(state.books[: CONTACT + 1].sum())
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking = params.fracture != "none"
-    chunk = look if breaking or params.rod_contact else max(_BATCH // len(wood.motion.x) // look, 1) * look
+    # scaled masses follow what touches, at times that do not depend on which are wanted
+    often = breaking or params.rod_contact or wood.scaling > 1
+    chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
     scale, since, listing = floor(wood, params), 0, Listing(wood, params)
     for wanted in times:
         ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
