@@ -46,16 +46,16 @@ class Near:
 
     def __init__(self, wood: Wood, thick: float, slack: float, among: np.ndarray | None = None) -> None:
         """List all such pairs, or those `among` (p, 2)."""
-        self._x, self._whole = wood.motion.x.copy(), (wood.bonds.on.copy(), wood.rods.alive.copy(), wood.parent)
+        self._x, self._whole = wood.motion.x.copy(), (wood.rods.alive.copy(), wood.parent)
         self._slack = slack
         if among is None:
-            self.pair = pairs(self._x, wood.rods, wood.bonds, wood.rod, thick + slack)
+            self.pair = pairs(self._x, wood.rods, wood.rod, thick + slack)
         else:
             self.pair = among[distances(self._x, wood.rods, among) < thick + slack]
 
     def left(self, wood: Wood) -> float:
-        """Return the slack that is left [m]; negative if a bond or an edge has broken since."""
-        now = wood.bonds.on, wood.rods.alive, wood.parent
+        """Return the slack that is left [m]; negative if a rod has broken since."""
+        now = wood.rods.alive, wood.parent
         if not all(map(np.array_equal, now, self._whole)):
             return -1.0
         return self._slack - 2 * float(np.sqrt(((wood.motion.x - self._x) ** 2).sum(1).max()))
@@ -100,7 +100,7 @@ class Listing:
     def refreshed(self, state: State, ahead: float, time: float, dt: float) -> State:
         """Return the state with pairs that hold for `ahead` [s] from `time` [s], its energies booked.
 
-        A bond that broke frees its rods to touch; energy that they then have is booked as taken from what is lost.
+        What rods that touch at the start have is booked as taken from what is lost.
         """
         m = state.wood.motion
         fitted = self.fitted(state, ahead * float(np.sqrt((m.v**2).sum(1).max())) if self.on else 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .arrays import Bonds, Rods
+from .arrays import Rods
 from .rubbing import closest
 
 __all__ = ["approach", "distances", "pairs"]
@@ -54,8 +54,8 @@ def _near(x: np.ndarray, rods: Rods, rod: np.ndarray, cell: np.ndarray, order: n
     return out
 
 
-def pairs(x: np.ndarray, rods: Rods, bonds: Bonds, rod: np.ndarray, reach: float) -> np.ndarray:
-    """Return the pairs (p, 2) of edges of different rods that are within `reach` [m] and that no bond joins."""
+def pairs(x: np.ndarray, rods: Rods, rod: np.ndarray, reach: float) -> np.ndarray:
+    """Return the pairs (p, 2) of edges of different rods that are within `reach` [m]."""
     live = np.flatnonzero((rods.alive == 1) & (rods.k > 0))
     if not len(live):
         return np.zeros((0, 2), np.int32)
@@ -63,19 +63,8 @@ def pairs(x: np.ndarray, rods: Rods, bonds: Bonds, rod: np.ndarray, reach: float
     size = float(np.linalg.norm(b[live] - a[live], axis=1).max()) + reach
     cell = np.floor((a + b) / (2 * size)).astype(np.int64)
     order = live[np.lexsort(cell[live].T[::-1])]
-    found = _near(x, rods, rod, cell, order, reach)
-    count = len(rods.a)
-    on = np.flatnonzero(bonds.on == 1)
-    # a bond joins an edge to both edges that end in its vertex
-    ending = np.full((2, len(x)), -1, np.int64)
-    ending[0, rods.a[live]] = live
-    ending[1, rods.b[live]] = live
-    one = ending[:, bonds.i[on]].ravel()
-    other = np.tile(bonds.j[on].astype(np.int64), 2)
-    joined = np.unique(np.minimum(one, other) * count + np.maximum(one, other))
-    codes = found[:, 0].astype(np.int64) * count + found[:, 1]
-    kept: np.ndarray = found[~np.isin(codes, joined)]
-    return kept[np.lexsort(kept.T[::-1])]
+    found: np.ndarray = _near(x, rods, rod, cell, order, reach)
+    return found[np.lexsort(found.T[::-1])]
 
 
 @njit(cache=True, error_model="numpy")

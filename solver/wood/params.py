@@ -198,7 +198,7 @@ class WoodParams(Params):
     )
     rod_contact: bool = Field(
         False,
-        description="Whether rods that no bond joins touch each other",
+        description="Whether rods touch each other",
         json_schema_extra={"units": "1"},
     )
     rod_friction: float = Field(

@@ -10,7 +10,7 @@ import numpy as np
 from ..contract import NotConverged
 from .contact import contacts, lag
 from .equations import Equations, Step, filled
-from .explicit import CONTACT, LOST
+from .explicit import CONTACT
 from .listing import Listing
 from .local import relaxed
 from .moment import State, strength
@@ -71,12 +71,9 @@ class Solver:
         self.listing.lag(state)
 
     def again(self, state: State, time: float, dt: float) -> np.ndarray:
-        """Return the forces (v, 3) [N] after breaks; what rods freed to touch have at once is booked as lost."""
-        before = float(state.books[: CONTACT + 1].sum())
+        """Return the forces (v, 3) [N] after breaks, friction following the normal forces there."""
         self.lag(state)
-        f = filled(state, time, dt, self.listing).copy()
-        state.books[LOST] += before - float(state.books[: CONTACT + 1].sum())
-        return f
+        return filled(state, time, dt, self.listing).copy()
 
     def _stale(self, vertices: int, bdt: float) -> bool:
         """Return whether the factor does not serve: too old, or of vertices that a step taken back had split."""
