@@ -1,6 +1,7 @@
 """What contact of rods costs and keeps apart in the slow press: python -m benchmarks.wood_touch [SEED ...].
 
-Fig. 4.2 at 24 rods of 16 vertices, implicitly, with and without `rod_contact`. The overlap is the largest of any two rods, bonded or not,
+Fig. 4.2 at 24 rods of 16 vertices, implicitly, with and without `rod_contact`. The overlap is the largest of any two
+rods, bonded or not,
 over the thickness of their contact, at thirty stages; a rod in the axis of another overlaps it by 1.
 """
 

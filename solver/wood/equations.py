@@ -30,13 +30,9 @@ class Step(NamedTuple):
     time: float
 
 
-def _fitted(state: State, listing: Listing | None) -> State:
-    return state if listing is None else listing.fitted(state)
-
-
-def filled(state: State, time: float, bdt: float, listing: Listing | None) -> np.ndarray:
+def filled(state: State, time: float, bdt: float, listing: Listing) -> np.ndarray:
     """Fill the state's forces for its x and v at `time` [s]; return them (v, 3) [N]."""
-    w, s = state.wood, _fitted(state, listing).scratch
+    w, s = state.wood, listing.fitted(state).scratch
     forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, s, False, time, bdt, RUBBING, state.books)
     return s.f
 
@@ -48,8 +44,7 @@ class Equations:
     state: State
     step: Step
     params: WoodParams
-    listing: Listing | None
-    """of rods that may touch; None: of no account"""
+    listing: Listing
 
     @property
     def inertia(self) -> np.ndarray:
@@ -71,7 +66,7 @@ class Equations:
 
     def parts(self, positive: bool) -> tuple[Elements, Contacts]:
         """Return the second derivatives where the state is, or the positive ones among them."""
-        w, state = self.state.wood, _fitted(self.state, self.listing)
+        w, state = self.state.wood, self.listing.fitted(self.state)
         return elements(w.motion.x, w.rods, w.bonds, positive), contacts(state, self.step.bdt, positive)
 
     def stiffness(self, positive: bool) -> Callable[[np.ndarray], np.ndarray]:
@@ -95,4 +90,4 @@ class Equations:
         apart = np.linalg.norm(way[rods.b] - way[rods.a], axis=1)
         share = 1.0 / max(float((apart / (_TURN * rods.rest)).max(initial=0.0)), 1e-300)
         share = min(share, contact / max(float(np.abs(way).max()), 1e-300))
-        return share if self.listing is None else self.listing.allowed(self.state, way, share)
+        return self.listing.allowed(self.state, way, share)

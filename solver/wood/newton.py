@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Found", "descend", "searched"]
+__all__ = ["Found", "descend"]
 
 Field = np.ndarray
 #: Residual of the inner iteration over that of the outer, at first and at least.
@@ -27,8 +27,6 @@ _FURTHER = 3.0
 _AGAIN = 0.1
 #: Solves in one inner iteration.
 _INNER = 60
-#: What mending leaves of a residual if it is worth while.
-_MENDED = 0.7
 #: How much further a step may go than the last one did.
 _WIDER = 3.0
 
@@ -74,7 +72,7 @@ def _direction(
     return p, most, False
 
 
-def searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, most: float) -> tuple[Field, Field]:
+def _searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, most: float) -> tuple[Field, Field]:
     """Return x + a p and the residual there, with a from 0 to `most` where the slope is less than half of what it was.
 
     The first trial is 1, or `most` if that is less. A direction of which what is negative was left out is too short:
@@ -109,7 +107,6 @@ def descend(
     most: int,
     limit: Callable[[Field], float],
     little: float,
-    mend: Callable[[Field, Field], Field | None] = lambda x, r: None,
 ) -> Found:
     """Iterate from x (v, 3) until the norm of the residual is at most `wanted`, or `most` solves are used up.
 
@@ -118,21 +115,13 @@ def descend(
 
     residual: gradient (v, 3) [N], zero where held. stiffness: the product with the second derivatives where residual
     was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that
-    can be trusted. mend: a better x than that with the residual r, if there is a cheap one.
+    can be trusted.
     """
     r = residual(x)
     norm = float(np.linalg.norm(r))
     solves, rounds, share, turned, settled = 0, 0, _LOOSE, np.inf, False
-    mending, reach = True, np.inf
+    reach = np.inf
     while norm > wanted and not settled and solves < most and np.isfinite(norm):
-        better = mend(x, r) if mending else None
-        if better is not None:
-            less = residual(better)
-            if (after := float(np.linalg.norm(less))) < norm:
-                mending, x, r, norm = after < _MENDED * norm, better, less, after
-                continue
-            mending = False
-            r = residual(x)
         aim = max(share, 0.5 * wanted / norm)
         positive = norm > turned
         p, spent, bent = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves), reach)
@@ -147,7 +136,7 @@ def descend(
             break
         settled = -slope < little
         before, far = x, float(np.abs(p).max())
-        x, r = searched(residual, x, p, slope, limit(p))
+        x, r = _searched(residual, x, p, slope, limit(p))
         went = float(np.abs(x - before).max())
         # what a step was cut to, or more where it was not
         reach = _WIDER * max(went, 1e-300) if went < 0.5 * far else max(reach, _WIDER * went)

@@ -12,7 +12,6 @@ from .contact import contacts, lag
 from .equations import Equations, Step, filled
 from .explicit import CONTACT
 from .listing import Listing
-from .local import relaxed
 from .moment import State, strength
 from .newton import descend
 from .params import WoodParams
@@ -126,7 +125,6 @@ class Solver:
                 most,
                 equations.limit,
                 little,
-                lambda x, r: relaxed(equations, x, r, wanted, little),
             )
             self.solves += found.solves
             x, norm = found.x, found.norm
