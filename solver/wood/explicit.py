@@ -153,7 +153,7 @@ def _fill(
             scratch.lagged,
         )
     if len(scratch.rubbing.pair) > 0:
-        books[CONTACT] += rub(motion.x, motion.v, f, motion.mass, rods, scratch.rubbing, dt, rubbing, scratch.power)
+        books[CONTACT] += rub(motion.x, motion.v, f, scratch.light, rods, scratch.rubbing, dt, rubbing, scratch.power)
 
 
 @njit(cache=True, error_model="numpy")
@@ -188,7 +188,19 @@ def march(
     keep[held] = 1.0
     whole = scratch.fragments
     books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
-    steady(x, v, rods, bodies, scratch.centre, scratch.speed, motion.mass, whole, dt * steps, scratch.light)
+    steady(
+        x,
+        v,
+        rods,
+        bodies,
+        scratch.centre,
+        scratch.speed,
+        motion.mass,
+        scratch.rubbing.pair,
+        whole,
+        dt * steps,
+        scratch.light,
+    )
     books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
     for n in range(steps):
         power = grip(held, v, f) + scratch.power[0]

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
 from .bundle import Wood, lay
+from .listing import law
 from .params import WoodParams
 from .render import Skin
 from .settings import choose
@@ -57,9 +58,10 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]
     if params.mode == "explicit":
-        longest = longest_step(wood)
+        contact = float(law(wood, params)[1]) if params.rod_contact else 0.0
+        longest = longest_step(wood, contact)
         dt = min(settings.courant * longest, params.step or np.inf)
-        wood = touchable(wood, dt)
+        wood = touchable(wood, dt, contact)
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context)
     elif params.mode == "implicit":

@@ -9,7 +9,7 @@ fragment's rigid motion keeps its real mass (after Olovsson, Simonsson and Unoss
 
 with the fragment's force F, torque T, mass M and inertia J by the scaled m. Linear and angular momentum are those of
 the real mass. The energy of motion is sum m v^2 / 2 less (1 - 1/g) of its rigid part. A rigidly turning fragment bears
-its real centrifugal load. g is s, but less while bodies touch a fragment whose real mass they would throw off: the
+its real centrifugal load. g is s, but less while something touches a fragment whose real mass it would throw off: the
 longer step is too long for it. Then it falls and slides as if it were heavier.
 """
 
@@ -114,11 +114,14 @@ def steady(
     centre: np.ndarray,
     speed: np.ndarray,
     mass: np.ndarray,
+    pair: np.ndarray,
     parts: Fragments,
     span: float,
     light: np.ndarray,
 ) -> None:
-    """Set every g by the edges that may touch bodies, at `centre` (r, 3) [m] with `speed` [m/s], within `span` [s].
+    """Set every g by the edges that may touch within `span` [s]: bodies or, if listed in pair (p, 2), other fragments'.
+
+    centre (r, 3) [m] and speed (r, 3) [m/s]: of the bodies.
 
     light (v,) gets the mass [kg] that friction may stop at once: each touching edge has its share of a fragment's.
     """
@@ -145,6 +148,12 @@ def steady(
                 found = found and not apart(p, d, bodies.box[r, c] + near)
             if found:
                 touching[parts.of[a]] += 1.0
+    for q in range(len(pair)):
+        n = parts.of[rods.a[pair[q, 0]]]
+        m = parts.of[rods.a[pair[q, 1]]]
+        if n != m:
+            touching[n] += 1.0
+            touching[m] += 1.0
     for n in range(len(parts.gain)):
         if parts.heavy[n] > 0.0:
             most = parts.heavy[n] / max(parts.law[1] * touching[n], 1e-300)

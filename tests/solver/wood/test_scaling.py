@@ -134,8 +134,9 @@ def test_implicit_runs_need_no_scaling():
         SOLVER.parse({"mode": "implicit", "mass_scaling": 4.0})
 
 
-def test_books_close_when_fragments_come_off():
-    values = {"rods": 8, "vertices": 11, "mass_scaling": 2500.0, "seed": 3}
+@pytest.mark.parametrize("touching", [False, True])
+def test_books_close_when_fragments_come_off(touching):
+    values = {"rods": 8, "vertices": 11, "mass_scaling": 2500.0, "seed": 3, "rod_contact": touching}
     found = SOLVER.solve(SOLVER.parse(values, preset="fig-4.2"), Need(stages=(0.5, 1.0, 1.5), quality="preview"))
     assert found.broken_rods.values[-1] >= 3
     assert found.residual.values.max() < 0.05
