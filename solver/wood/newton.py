@@ -32,21 +32,25 @@ _WIDER = 3.0
 
 
 class Found(NamedTuple):
-    """Where the iteration ended: x (v, 3), the norm of the residual, solves with the factor, whether it is solved."""
+    """Where the iteration ended: x (v, 3), the norm of the residual, solves with the factor, whether it is solved.
+
+    poor: the factor is not positive to its rounding, as its products with positive second derivatives show.
+    """
 
     x: Field
     norm: float
     solves: int
     rounds: int
     settled: bool
+    poor: bool = False
 
 
 def _direction(
     r: Field, apply: Callable[[Field], Field], solve: Callable[[Field], Field], share: float, most: int, reach: float
-) -> tuple[Field, int, bool]:
+) -> tuple[Field, int, bool, bool]:
     """Return a step p with K p about -r, up to `share` of r, the solves it took, and whether K was not positive.
 
-    It ends, too, where p moves something further than `reach`: what is beyond would be cut off.
+    It ends, too, where p moves something further than `reach`: what is beyond would be cut off. Then the last is true.
     """
     p, rest = np.zeros_like(r), -r
     wanted = share * float(np.linalg.norm(r))
@@ -56,20 +60,20 @@ def _direction(
         bent = apply(way)
         curve = float(np.vdot(way, bent))
         if curve <= 0 or gain <= 0:
-            return (way if count == 1 else p), count, True
+            return (way if count == 1 else p), count, True, False
         a = gain / curve
         p = p + a * way
         if float(np.abs(p).max()) > reach:
-            return p, count, False
+            return p, count, False, True
         less = rest - a * bent
         if float(np.linalg.norm(less)) <= wanted or count == most:
-            return p, count, False
+            return p, count, False, False
         z = solve(less)
         # Polak and Ribiere's form: the factor is in single precision
         turn = float(np.vdot(z, less - rest)) / gain
         rest, gain = less, float(np.vdot(z, less))
         way = z + turn * way
-    return p, most, False
+    return p, most, False, False
 
 
 def _searched(residual: Callable[[Field], Field], x: Field, p: Field, slope: float, most: float) -> tuple[Field, Field]:
@@ -107,6 +111,7 @@ def descend(
     most: int,
     limit: Callable[[Field], float],
     little: float,
+    doubtful: bool = False,
 ) -> Found:
     """Iterate from x (v, 3) until the norm of the residual is at most `wanted`, or `most` solves are used up.
 
@@ -115,26 +120,28 @@ def descend(
 
     residual: gradient (v, 3) [N], zero where held. stiffness: the product with the second derivatives where residual
     was last asked, or with the positive ones among them. solve: the factor's. limit: the largest share of a step that
-    can be trusted.
+    can be trusted. doubtful: end where the factor is seen to be poor.
     """
     r = residual(x)
     norm = float(np.linalg.norm(r))
     solves, rounds, share, turned, settled = 0, 0, _LOOSE, np.inf, False
-    reach = np.inf
+    reach, poor = np.inf, False
     while norm > wanted and not settled and solves < most and np.isfinite(norm):
         aim = max(share, 0.5 * wanted / norm)
         positive = norm > turned
-        p, spent, bent = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves), reach)
+        p, spent, bent, short = _direction(r, stiffness(positive), solve, aim, min(_INNER, most - solves), reach)
         solves, rounds = solves + spent, rounds + 1
         if bent and not positive:
             turned = _AGAIN * norm
             if solves < most:
-                p, spent, _ = _direction(r, stiffness(True), solve, aim, min(_INNER, most - solves), reach)
+                positive = True
+                p, spent, bent, short = _direction(r, stiffness(True), solve, aim, min(_INNER, most - solves), reach)
                 solves += spent
         slope = float(np.vdot(r, p))
         if not slope < 0:
             break
-        settled = -slope < little
+        # what was cut promises little, too
+        settled = -slope < little and not short and not bent
         before, far = x, float(np.abs(p).max())
         x, r = _searched(residual, x, p, slope, limit(p))
         went = float(np.abs(x - before).max())
@@ -142,4 +149,7 @@ def descend(
         reach = _WIDER * max(went, 1e-300) if went < 0.5 * far else max(reach, _WIDER * went)
         last, norm = norm, float(np.linalg.norm(r))
         share = min(_LOOSE, max(_TIGHT, (norm / last) ** 2))
-    return Found(x, norm, solves, rounds, settled or norm <= wanted)
+        poor = bent and positive
+        if poor and doubtful:
+            break
+    return Found(x, norm, solves, rounds, settled or norm <= wanted, poor)

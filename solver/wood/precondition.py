@@ -84,14 +84,15 @@ def preconditioner(
     inertia: np.ndarray,
     contacts: Contacts,
     known: Pattern | None = None,
+    double: bool = False,
 ) -> tuple[Preconditioner, Pattern]:
     """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts.
 
-    known: the pattern, where it still holds. Returns the factor and the pattern.
+    known: the pattern, where it still holds. double: factor in double precision. Returns the factor and the pattern.
     """
     pattern = known or Pattern.of(x, rods, bonds, free, contacts.couples())
     stiffness = pattern.stiffness
-    for positive, double in ((False, False), (True, False), (True, True)):
+    for positive, exact in ((False, double), (True, double), (True, True)):
         blocks = stiffness.summed(elements(x, rods, bonds, positive=positive))
         for c in range(3):
             blocks[stiffness.diagonal, c, c] += inertia[free]
@@ -102,7 +103,7 @@ def preconditioner(
             continue
         scale = 1 / np.sqrt(own)
         blocks *= scale[pattern.row][:, :, None] * scale[stiffness.indices][:, None, :]
-        fronts = factored(pattern.analysis, blocks, double)
+        fronts = factored(pattern.analysis, blocks, exact)
         if fronts is not None:
             break
     else:

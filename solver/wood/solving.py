@@ -42,6 +42,7 @@ class Solver:
         self._pattern: Pattern | None = None
         self._key: tuple[int, int, bytes] | None = None
         self._bdt, self._excess = 0.0, 0
+        self._double = False
         self.factors, self.solves = 0, 0
 
     def _renew(self, state: State, bdt: float) -> None:
@@ -53,7 +54,7 @@ class Solver:
         pattern = self._pattern if self._key == key else None
         inertia = m.mass * (1 / bdt + self.params.damping) / bdt
         self._factor, self._pattern = preconditioner(
-            m.x, wood.rods, wood.bonds, m.held == 0, inertia, touching, pattern
+            m.x, wood.rods, wood.bonds, m.held == 0, inertia, touching, pattern, self._double
         )
         self._key, self._bdt, self._excess = key, bdt, 0
         self.factors += 1
@@ -62,6 +63,7 @@ class Solver:
         """Return a solver that sets out with the same factor, and of which this one learns nothing."""
         found = Solver(self.params, self.tolerance, copy(self.listing))
         found._factor, found._pattern, found._key, found._bdt = self._factor, self._pattern, self._key, self._bdt
+        found._double = self._double
         return found
 
     def lag(self, state: State) -> None:
@@ -125,8 +127,11 @@ class Solver:
                 most,
                 equations.limit,
                 little,
+                not self._double,
             )
             self.solves += found.solves
+            # single precision is too little for loose pieces: their inertia is 1e-8 of an edge's stiffness
+            self._double = self._double or found.poor
             x, norm = found.x, found.norm
             self._excess += max(found.solves - _FRESH * found.rounds, 0)
             if found.settled:
