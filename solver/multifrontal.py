@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
-__all__ = ["Analysis", "Factor", "analyse", "factorise"]
+__all__ = ["Analysis", "Factor", "Front", "analyse", "extend", "factorise", "gather"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -82,7 +82,7 @@ def analyse(stacks: Ints, centres: Floats, per_column: int, indptr: Ints, indice
 
 
 @njit(cache=True)
-def _gather(panel: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, data: Floats, place: Ints) -> None:
+def gather(panel: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, data: Floats, place: Ints) -> None:
     """Add the matrix's blocks (row in front, column eliminated here), lower triangle, to panel (3 nf, 3 own)."""
     for local in range(own):
         node = nodes[local]
@@ -95,7 +95,7 @@ def _gather(panel: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, d
 
 
 @njit(cache=True)
-def _extend(panel: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, pivots: int) -> None:
+def extend(panel: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, pivots: int) -> None:
     """Add a child's Schur complement (lower triangle, on `nodes`) to a front."""
     size = len(inner)
     at = np.empty(size, np.int64)
@@ -194,10 +194,10 @@ def factorise(analysis: Analysis, data: Floats) -> Factor:
         place[front.nodes] = np.arange(len(front.nodes))
         panel = np.zeros((size, pivots), order="F")
         rest = np.zeros((size - pivots, size - pivots), order="F")
-        _gather(panel, front.nodes, front.own, analysis.indptr, analysis.indices, data, place)
+        gather(panel, front.nodes, front.own, analysis.indptr, analysis.indices, data, place)
         for child in front.children:
             below = analysis.fronts[child]
-            _extend(panel, rest, open_.pop(child), below.nodes[below.own :], place, pivots)
+            extend(panel, rest, open_.pop(child), below.nodes[below.own :], place, pivots)
         place[front.nodes] = -1
         block, below_zero = _eliminate(panel, rest) if pivots else (_Block(panel, None, panel), 0)
         blocks.append(block)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..contract import NotConverged
 from ..multifrontal import Analysis
 from .arrays import Bonds, Rods
 from .contact import Contacts
@@ -89,6 +90,10 @@ def preconditioner(
     """Factor the bundle at x (v, 3) with `inertia` (v,) [N/m] and the stiffness of contacts.
 
     known: the pattern, where it still holds. double: factor in double precision. Returns the factor and the pattern.
+
+    Raises:
+        NotConverged: not even the positive part has a factor.
+
     """
     pattern = known or Pattern.of(x, rods, bonds, free, contacts.couples())
     stiffness = pattern.stiffness
@@ -107,7 +112,7 @@ def preconditioner(
         if fronts is not None:
             break
     else:
-        raise np.linalg.LinAlgError("the stiffness is not finite")
+        raise NotConverged("the stiffness is not finite.", advice="Give a shorter step.")
     local = np.zeros((len(x), 3, 3))
     local[free] = np.linalg.inv(diagonal)
     return Preconditioner(free, fronts, scale, local), pattern

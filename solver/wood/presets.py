@@ -16,6 +16,14 @@ def _block(x: float, z: float, down: float = 0.0, until: float = 3.0) -> dict[st
     return {"shape": "cylinder", "axis": "y", "size": (0.01, 0.06, 0.0), "path": path, "friction": 0.3}
 
 
+_FIG_42: dict[str, Any] = {
+    "rods": 200,
+    "clamp": "none",
+    "bodies": [_block(0.02, -0.015), _block(0.13, -0.015), _block(0.075, 0.015, 0.03)],
+    "gravity": 9.81,
+    "damping": 50.0,
+}
+
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     # one round fibre under its end load, at rest: the elastica's case
     "cantilever": {
@@ -30,22 +38,9 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     # bent at the start, free, unbreakable: Fig. 4.1's energy
     "fig-4.1": {"rods": 50, "clamp": "none", "bend": 0.0133, "fracture": "none"},
     # three blocks press on a branch of 15 cm: Fig. 4.2
-    "fig-4.2": {
-        "rods": 200,
-        "clamp": "none",
-        "bodies": [_block(0.02, -0.015), _block(0.13, -0.015), _block(0.075, 0.015, 0.03)],
-        "gravity": 9.81,
-        "damping": 50.0,
-    },
+    "fig-4.2": _FIG_42,
     # the same slow press at an affordable price: on scaled masses
-    "press": {
-        "rods": 200,
-        "clamp": "none",
-        "bodies": [_block(0.02, -0.015), _block(0.13, -0.015), _block(0.075, 0.015, 0.03)],
-        "gravity": 9.81,
-        "damping": 50.0,
-        "mass_scaling": 1e4,
-    },
+    "press": {**_FIG_42, "mass_scaling": 1e4},
     # a bent branchlet, held at one end, hit near the other
     "twig": {
         "rods": 19,

@@ -43,7 +43,6 @@ class Solver:
         self._key: tuple[int, int, bytes] | None = None
         self._bdt, self._excess = 0.0, 0
         self._double = False
-        self.factors, self.solves = 0, 0
 
     def _renew(self, state: State, bdt: float) -> None:
         wood = state.wood
@@ -57,7 +56,6 @@ class Solver:
             m.x, wood.rods, wood.bonds, m.held == 0, inertia, touching, pattern, self._double
         )
         self._key, self._bdt, self._excess = key, bdt, 0
-        self.factors += 1
 
     def twin(self) -> Solver:
         """Return a solver that sets out with the same factor, and of which this one learns nothing."""
@@ -129,7 +127,6 @@ class Solver:
                 little,
                 not self._double,
             )
-            self.solves += found.solves
             # single precision is too little for loose pieces: their inertia is 1e-8 of an edge's stiffness
             self._double = self._double or found.poor
             x, norm = found.x, found.norm
@@ -139,6 +136,6 @@ class Solver:
                 return norm / scale, scale
         raise NotConverged(
             f"an implicit step of {step.bdt:.2g} s at t = {step.time:.4g} s was not solved.",
-            advice="Give a shorter step, or take the explicit mode.",
+            advice="Give a shorter step, or take the explicit mode, for slow loads with mass_scaling.",
             residual=norm / scale,
         )
