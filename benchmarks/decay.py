@@ -16,10 +16,10 @@ import numpy as np
 
 from solver.contract import Context
 from solver.decay import SOLVER
+from solver.decay.fields.stepping import march
+from solver.decay.fields.system import System
 from solver.decay.settings import choose
-from solver.decay.stepping import march
-from solver.decay.surface import geodesic, shares_at
-from solver.decay.system import System
+from solver.decay.surfaces.surface import geodesic, shares_at
 
 
 def solve(preset: str, cells: int, tolerance: float, days: float) -> dict[str, Any]:

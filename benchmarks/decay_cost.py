@@ -11,8 +11,8 @@ import time
 import numpy as np
 
 from solver.decay import DecayParams
-from solver.decay.diffusion import listed_around
-from solver.decay.system import Both, System
+from solver.decay.fields.diffusion import listed_around
+from solver.decay.fields.system import Both, System
 
 _CELLS = (32, 64, 96, 128)
 _SHARES = (0.01, 0.1, 0.4, 1.0)

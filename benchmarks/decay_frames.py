@@ -16,10 +16,10 @@ from solver.decay.body.body import Body
 from solver.decay.body.flesh import Skin
 from solver.decay.body.wrinkles import Wrinkles
 from solver.decay.environment import water_lost
+from solver.decay.fields.stepping import march
+from solver.decay.fields.system import System
 from solver.decay.settings import choose
-from solver.decay.stepping import march
-from solver.decay.surface import extent
-from solver.decay.system import System
+from solver.decay.surfaces.surface import extent
 
 
 def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: int = 6) -> None:

@@ -21,9 +21,9 @@ from scipy import ndimage
 
 from solver.contract import Need
 from solver.decay import SOLVER, DecayParams
-from sweeps.colours import layered
-from sweeps.picture import Panel, sheet
-from sweeps.render import View, render
+from sweeps.pictures.colours import layered
+from sweeps.pictures.render import View, render
+from sweeps.pictures.sheet import Panel, sheet
 
 PIXELS = 260
 

@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from solver.decay import SOLVER, DecayParams
-from solver.decay.layer import Layer, State
-from solver.decay.rates import Rates, daily
-from solver.decay.surface import geodesic, triangulated
+from solver.decay.fields.layer import Layer, State
+from solver.decay.fields.rates import Rates, daily
+from solver.decay.surfaces.surface import geodesic, triangulated
 
 Array = NDArray[np.float64]
 DAYS, HALF, WIDE, TILT = 2.0, 1.2, 0.35, np.radians(40.0)

@@ -17,9 +17,9 @@ from scipy.stats import ttest_ind
 
 from solver.contract import Context
 from solver.decay import DecayParams
+from solver.decay.fields.stepping import march
+from solver.decay.fields.system import System
 from solver.decay.settings import choose
-from solver.decay.stepping import march
-from solver.decay.system import System
 
 _CELLS = 16
 #: Spores fall often, so that seeds differ by more than their patches of nutrient.

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from benchmarks.tries import Broken, show
 from solver.contract import Context, InvalidGeometry, Need
 from solver.decay import SOLVER, DecayParams
-from solver.decay.layer import Layer
-from solver.decay.rates import daily
+from solver.decay.fields.layer import Layer
+from solver.decay.fields.rates import daily
+from solver.decay.fields.stepping import march
+from solver.decay.fields.system import System
 from solver.decay.settings import choose
-from solver.decay.stepping import march
-from solver.decay.surface import Surface, geodesic, triangulated
-from solver.decay.system import System
+from solver.decay.surfaces.surface import Surface, geodesic, triangulated
 
 __all__ = [
     "CASES",

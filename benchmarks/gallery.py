@@ -20,8 +20,8 @@ from benchmarks.crossings import crossings
 from solver import registry
 from solver.contract import Need, SolverError
 from sweeps.outputs import triangles
-from sweeps.picture import Panel, sheet
-from sweeps.render import View
+from sweeps.pictures.render import View
+from sweeps.pictures.sheet import Panel, sheet
 
 _FOLDER = Path(__file__).parent.parent / "examples" / "growth"
 _COLUMNS = 5

@@ -17,10 +17,10 @@ from threadpoolctl import threadpool_limits
 
 from solver import shell
 from solver.contract import NotConverged
-from solver.growth.energy import elastic
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
-from solver.growth.tools import HotSpot
+from solver.growth.settling.energy import elastic
+from solver.growth.tooling.tools import HotSpot
 
 _CASES = {
     "leaf rim 3 %": (

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from solver import shell
-from solver.growth.energy import StepEnergy, Tangent
 from solver.growth.engine import Engine
-from solver.growth.minimise import lbfgs, quasi_newton
 from solver.growth.params import GrowthParams
+from solver.growth.settling.energy import StepEnergy, Tangent
+from solver.growth.settling.minimise import lbfgs, quasi_newton
 
 _STEPS = (10, 50, 100, 200)
 _THICKNESS = 0.01

@@ -18,7 +18,7 @@ from solver import shell
 from solver.contract import InvalidGeometry, NotConverged
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
-from solver.growth.tools import HotSpot
+from solver.growth.tooling.tools import HotSpot
 
 __all__ = [
     "CASES",

@@ -28,11 +28,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
+from solver.dehydration.fresh.mesh import cubed_sphere
 from solver.dehydration.kernel import Layout, build_layout, march, new_state, positions
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
 from solver.dehydration.kernel.elements import core_forces, exocarp_forces, one_point_forces
 from solver.dehydration.kernel.metric import inverse_jacobians, quadrature, shape_derivatives
-from solver.dehydration.mesh import cubed_sphere
 
 from .machine_limits import machine_limits
 

@@ -25,11 +25,13 @@ import xarray as xr
 from solver.contract import Need, finish
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes
-from store import methods, spectra, surface, tables, transforms
+from store import tables
+from store.blending import methods
 from store.keys import key
 from store.ledger import JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
+from store.surfaces import spectra, surface, transforms
 
 BAND = 96
 STAGES = (0.1, 0.15, 0.2, 0.25, 0.3)

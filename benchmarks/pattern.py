@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from solver.dehydration.harmonics import remove_low
-from solver.dehydration.mesh import inner_distance
+from solver.dehydration.fresh.mesh import inner_distance
+from solver.dehydration.measures.harmonics import remove_low
 from solver.dehydration.params import DehydrationParams
 from solver.fruit import PRESETS, azimuths, colatitudes
 from store.errors import StoreError

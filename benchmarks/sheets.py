@@ -22,7 +22,7 @@ from benchmarks.pattern import name_of
 from solver.dehydration.params import DehydrationParams
 from solver.fruit import lattice
 from store.store import Store
-from sweeps.render import render
+from sweeps.pictures.render import render
 
 PIXELS = 260
 

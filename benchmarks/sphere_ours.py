@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 
-from solver.dehydration.closed_form import sphere_radius
+from solver.dehydration.fresh.closed_form import sphere_radius
 from solver.dehydration.implicit import base_state
 from solver.dehydration.params import DehydrationParams
 from tests.solver._radial_reference import radial_reference

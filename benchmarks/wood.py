@@ -15,10 +15,10 @@ import numpy as np
 
 from solver.contract import Need
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
-from solver.wood.explicit import march
-from solver.wood.moment import begin
-from solver.wood.stability import longest_step
+from solver.wood.model.bundle import lay
+from solver.wood.stepping.explicit import march
+from solver.wood.stepping.moment import begin
+from solver.wood.stepping.stability import longest_step
 
 from .wood_splinters import splinters
 

@@ -18,11 +18,11 @@ import scipy.sparse as sp
 
 from solver.contract import Context
 from solver.wood import SOLVER, WoodParams
-from solver.wood.bundle import lay
+from solver.wood.model.bundle import lay
+from solver.wood.model.state import Wood
 from solver.wood.settings import choose
-from solver.wood.stability import longest_step
-from solver.wood.state import Wood
-from solver.wood.stepping import explicit
+from solver.wood.stepping.marching import explicit
+from solver.wood.stepping.stability import longest_step
 
 __all__ = ["fragments", "resting"]
 

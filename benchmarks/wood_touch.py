@@ -15,10 +15,10 @@ import xarray as xr
 
 from solver.contract import Need
 from solver.wood import SOLVER, WoodParams
-from solver.wood.bundle import lay
-from solver.wood.listing import law
-from solver.wood.pairs import distances, pairs
-from solver.wood.state import Wood
+from solver.wood.contact.listing import law
+from solver.wood.contact.pairs import distances, pairs
+from solver.wood.model.bundle import lay
+from solver.wood.model.state import Wood
 
 _PRESS = {"rods": 24, "vertices": 16, "mode": "implicit", "step": 1 / 60}
 _STAGES = tuple(0.1 * n for n in range(1, 31))

@@ -13,17 +13,22 @@ from fastapi import Depends, FastAPI
 from solver import __version__
 from store.tokens import Tokens
 
-from . import batch, catalogue, jobs, jobs_events, jobs_results, memory, page, problems, shapes
-from .answers import Answers, Repeats
-from .jobs_runner import JobRunner
+from . import catalogue, memory, page, problems
+from .jobs import events as jobs_events
+from .jobs import results as jobs_results
+from .jobs import routes as jobs
+from .jobs.runner import JobRunner
 from .limits import Limits
-from .live import LiveTables
 from .openapi import Documented
 from .security import requires
 from .settings import Settings
-from .shortcut import Shortcut
+from .shapes import batch
+from .shapes import routes as shapes
+from .shapes.answers import Answers, Repeats
+from .shapes.live import LiveTables
+from .shapes.shortcut import Shortcut
+from .shapes.turns import Turns
 from .telemetry import Metrics, Telemetry
-from .turns import Turns
 
 __all__ = ["create_app"]
 

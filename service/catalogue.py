@@ -9,14 +9,14 @@ from starlette.responses import JSONResponse, Response
 
 from solver import __version__, quantities, registry
 from solver.contract import Solver
-from store import methods
+from store.blending import methods
 from store.errors import CorruptTable
 from store.tables import TableInfo
 
 from . import page, problems, vocabulary
 from .formats import FORMATS
-from .live import LiveTables
 from .sequences import EXPORTS
+from .shapes.live import LiveTables
 
 __all__ = ["open_router", "router"]
 

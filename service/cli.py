@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sweeps.cli import app
-from sweeps.console import note
+from sweeps.commands.cli import app
+from sweeps.commands.console import note
 from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sweeps.console import emit, note
+from sweeps.commands.console import emit, note
+from sweeps.commands.options import As_json
 from sweeps.errors import InvalidOption
-from sweeps.options import As_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,7 +77,7 @@ def export(
 
     wizen export run.h5 --mesh my.obj --format pc2
     """
-    from sweeps import progress
+    from sweeps.commands import progress
 
     from .sequences import Options, prepared
 

@@ -12,15 +12,16 @@ from fastapi import FastAPI
 
 from solver import registry
 from solver.contract import Solver
-from store import methods
+from store.blending import methods
 from store.errors import StoreError
-from store.measures import UNITS
+from store.surfaces.measures import UNITS
 
-from . import detail, problems, vocabulary
+from . import problems, vocabulary
 from .formats import FORMATS
-from .live import LiveTables
-from .query import LIMITS, LOWEST_RESOLUTION
 from .settings import Settings
+from .shapes import detail
+from .shapes.live import LiveTables
+from .shapes.query import LIMITS, LOWEST_RESOLUTION
 
 __all__ = ["Documented"]
 

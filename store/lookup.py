@@ -1,8 +1,8 @@
 """Look-up: the shape of a fruit between the samples of a table (after Liu et al. 2014, section 5.4, Eq. 13-14).
 
 The spectra of the samples around are weighted, what their mean has lost of the wrinkles is given back (see
-`store.methods`), and one inverse FFT gives the displacement at any resolution. Weighting spectra is the same as
-weighting displacements; the spectrum buys the level of detail and the small table. Between stages the change is
+`store.blending.methods`), and one inverse FFT gives the displacement at any resolution. Weighting spectra is the same
+as weighting displacements; the spectrum buys the level of detail and the small table. Between stages the change is
 linear, and the fresh shape at s = 0 is one of them: swollen stages (s < 0) lead away from it as dried ones do. The
 fresh shape itself is not interpolated: it follows from the parameters.
 """
@@ -20,18 +20,21 @@ from numpy.typing import NDArray
 from solver.fruit import Fruit, azimuths, colatitudes
 from solver.quantities import QUANTITIES
 
-from . import asking, generation, methods, seal, surface, trust
-from .blend import Blend, Blender
+from . import seal
+from .blending import asking, methods
+from .blending.blend import Blend, Blender
+from .blending.methods.weights import Samples
+from .blending.neighbours import SAME, Weighted
 from .errors import CorruptTable, OutsideTable
-from .manifest import TableInfo
-from .measures import Measures
-from .methods.weights import Samples
-from .neighbours import SAME, Weighted
-from .samples import insert
+from .generations import generation, trust
+from .generations.manifest import TableInfo
+from .generations.samples import insert
 from .shape import Shape
 from .store import Store
+from .surfaces import surface
+from .surfaces.measures import Measures
+from .surfaces.window import WHOLE, Patch, Window
 from .tables import info, path_of
-from .window import WHOLE, Patch, Window
 
 __all__ = ["ShapeTable"]
 
@@ -149,8 +152,9 @@ class ShapeTable:
 
         `window` limits it to a part of the lattice and to some components; the rest is not computed where that pays.
 
-        `fields` are position and/or displacement; nothing else is computed. `method` is named as in `store.methods`;
-        in `idw`, and where the samples form no grid, the `m` nearest take part, with weights distance^-eta.
+        `fields` are position and/or displacement; nothing else is computed. `method` is named as in
+        `store.blending.methods`; in `idw`, and where the samples form no grid, the `m` nearest take part,
+        with weights distance^-eta.
         `max_error` limits the expected error, of the roughness or by measure.
 
         Raises:

@@ -9,8 +9,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from . import surface
 from .errors import OutsideTable
+from .surfaces import surface
 
 __all__ = ["Shape"]
 
@@ -26,8 +26,8 @@ class Shape:
     the whole lattice. `weights` says which results it was made of, `nearest` how far (scaled) the nearest one is,
     `inside` whether the query lies in the samples' convex hull, and `exact` that it is a stored result at a stored
     stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
-    `expected_error` says by measure (`store.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape may be off
-    the true one; None where the table does not know, as for any method but the one it was built for.
+    `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape
+    may be off the true one; None where the table does not know, as for any method but the one it was built for.
     """
 
     colatitude: Array = field(repr=False)

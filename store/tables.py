@@ -14,10 +14,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from . import generate, generation, seal
+from . import seal
 from .errors import EmptyTable
-from .manifest import TableInfo, directory, read_manifest, write_manifest
-from .samples import Axes, collect
+from .generations import generate, generation
+from .generations.manifest import TableInfo, directory, read_manifest, write_manifest
+from .generations.samples import Axes, collect
 from .store import Store
 
 if TYPE_CHECKING:

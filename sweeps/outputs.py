@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from store import seal, shards, spectra
+from store import seal, shards
 from store.shape import Shape
+from store.surfaces import spectra
 
-from .colours import MESH_LAYERS
 from .errors import InvalidOption
 from .formats import Encoder, Made, added
+from .pictures.colours import MESH_LAYERS
 
 if TYPE_CHECKING:
-    from .picture import Panel
+    from .pictures.sheet import Panel
 
 __all__ = ["check_suffix", "fields_for", "of_result", "save", "suffixes", "triangles"]
 
@@ -50,11 +51,11 @@ def _npz(made: Made) -> bytes:
 
 def _png(made: Made) -> bytes:
     if made.cut is not None and made.run is not None:
-        from . import section
+        from .pictures import section
 
         return section.picture(made.run, section.plane(made.cut), title=made.title, symbol=made.stage_symbol)
-    from . import colours
-    from .picture import Panel, sheet
+    from .pictures import colours
+    from .pictures.sheet import Panel, sheet
 
     if made.run is not None and "mesh_position" in made.run and "position" not in made.run:
         panels = triangles(made.run)
@@ -76,8 +77,8 @@ def triangles(run: xr.Dataset) -> list[Panel]:
     """
     from solver import meshes
 
-    from . import colours
-    from .picture import Panel
+    from .pictures import colours
+    from .pictures.sheet import Panel
 
     frames = [meshes.frame(run, i) for i in range(run.sizes["stage"])]
     points = np.concatenate([frame.vertices for frame in frames])

@@ -1,8 +1,8 @@
 """Where a table should get its next samples: where what it would predict there is worst.
 
-The error at a point is that of the samples around it, each predicted from the others (`store.trust`), times the
-distance to the nearest sample: a sample that is predicted badly asks for neighbours, and a wide gap for something in
-it. Samples that form a grid get whole lines, so that they still form one and stay interpolated along it; others get
+The error at a point is that of the samples around it, each predicted from the others (`store.generations.trust`), times
+the distance to the nearest sample: a sample that is predicted badly asks for neighbours, and a wide gap for something
+in it. Samples that form a grid get whole lines, so that they still form one and stay interpolated along it; others get
 single points. Only points that the solver accepts are proposed, so that no run is wasted.
 """
 
@@ -20,11 +20,12 @@ from scipy.spatial.distance import cdist
 from scipy.stats import qmc
 
 from solver.contract import InvalidGeometry, Params
-from store import generation, tables, trust
+from store import tables
+from store.blending.methods.weights import Samples
 from store.errors import MixedSamples
-from store.measures import Measures
-from store.methods.weights import Samples
+from store.generations import generation, trust
 from store.store import Store
+from store.surfaces.measures import Measures
 from store.tables import TableInfo
 
 from .errors import PlanError
@@ -66,7 +67,7 @@ class Proposal:
 
 
 def read(store: Store, name: str, measure: str) -> State:
-    """Return the state of the current generation of a table, by a measure of `store.measures`.
+    """Return the state of the current generation of a table, by a measure of `store.surfaces.measures`.
 
     Raises:
         PlanError: there is no such measure, or the table knows no errors.

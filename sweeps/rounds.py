@@ -15,13 +15,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from store import methods, tables, trust
+from store import tables
+from store.blending import methods
+from store.blending.methods.weights import Samples
+from store.generations import trust
+from store.generations.samples import read_axes
 from store.jobs import Job, JobSpec
 from store.lookup import ShapeTable
-from store.measures import Surface, compare
-from store.methods.weights import Samples
-from store.samples import read_axes
 from store.store import Store
+from store.surfaces.measures import Surface, compare
 from store.tables import TableInfo
 
 from . import refine, score
@@ -142,7 +144,7 @@ def _would_end_grid(store: Store, table: TableInfo, more: Collection[Job]) -> bo
 
 
 def held_out_error(store: Store, name: str, held: Path, measure: str) -> tuple[float, int]:
-    """Return the default method's mean error over held-out runs and stages, by a measure of `store.measures`; how many.
+    """Return the default method's mean error by a measure over held-out runs and stages; how many.
 
     Raises:
         InvalidOption: no run of `held` lies between the table's samples.

@@ -13,15 +13,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from solver.fruit import Fruit, lattice
-from store import keys, measures, methods, spectra
+from store import keys
+from store.blending import methods
+from store.generations.samples import read_axes
 from store.jobs import Job
 from store.lookup import ShapeTable
-from store.measures import LATTICE, Measures, Surface
-from store.samples import read_axes
 from store.store import Store
+from store.surfaces import measures, spectra
+from store.surfaces.measures import LATTICE, Measures, Surface
 
 from .errors import InvalidOption
-from .picture import Panel, sheet
+from .pictures.sheet import Panel, sheet
 from .plan import Plan
 
 __all__ = ["Case", "Report", "Row", "cases", "picture", "score"]

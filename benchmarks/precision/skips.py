@@ -72,7 +72,7 @@ def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
     from solver.dehydration.path import Path
     from solver.dehydration.run import _Record
     from solver.dehydration.settings import choose
-    from store.spectra import spectrum, synthesize
+    from store.surfaces.spectra import spectrum, synthesize
 
     params = DehydrationParams()
     settings = choose(params, quality)

@@ -18,7 +18,7 @@ from service.sequences import EXPORTS, Options, prepared, write
 from solver.contract import Need, Quality
 from solver.wood import SOLVER, Body, WoodParams
 from sweeps.outputs import triangles
-from sweeps.picture import Panel, sheet
+from sweeps.pictures.sheet import Panel, sheet
 
 #: File, stages [s], quality.
 _FAST: tuple[str, tuple[float, ...], Quality] = ("splinter.toml", (0.015, 0.03, 0.045, 0.06), "preview")

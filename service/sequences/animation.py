@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweeps import colours
+from sweeps.pictures import colours
 
 from ..errors import UnfitFormat
 from ..formats.about import GENERATOR

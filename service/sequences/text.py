@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import orjson
 
-from sweeps import colours
+from sweeps.pictures import colours
 
 from ..formats.about import GENERATOR
 from .options import Options

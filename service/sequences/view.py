@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.fruit import lattice as angles
-from store import spectra
-from sweeps import colours
+from store.surfaces import spectra
+from sweeps.pictures import colours
 
 from ..errors import InvalidQuery, UnfitFormat, Wrong
 from ..formats import mesh

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
 from .params import DecayParams, Weather
-from .places import Wound
 from .presets import PRESETS
+from .surfaces.places import Wound
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .params import DecayParams
-from .surface import Extent
+from .surfaces.surface import Extent
 
 __all__ = ["air", "damping", "deficit", "reference_radius", "saturation", "water_lost"]
 

@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from ..fruit import Fruit
 from .body.flesh import Flesh, Skin, Swing
-from .colony import MOULDS, SOFT_ROT, Colony
-from .imported import Mesh
-from .places import Neighbour, Painted, Pressure, PressureMap, Wound
+from .fields.colony import MOULDS, SOFT_ROT, Colony
+from .surfaces.imported import Mesh
+from .surfaces.places import Neighbour, Painted, Pressure, PressureMap, Wound
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .colony import MOULDS
+from .fields.colony import MOULDS
 
 __all__ = ["ENVIRONMENTS", "PRESETS"]
 

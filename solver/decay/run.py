@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
 from .environment import deficit
+from .fields.stepping import Reached, march
+from .fields.system import System
 from .params import DecayParams
 from .settings import FIELDS, MOULD, VECTORS, choose, nodes, stepped
-from .shape import Shape
-from .stepping import Reached, march
-from .surface import sampler
-from .system import System
+from .surfaces.shape import Shape
+from .surfaces.surface import sampler
 
 __all__ = ["run"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..contract import Cost, Need, Quality
 from .params import DecayParams
-from .seeds import seeds
+from .surfaces.seeds import seeds
 
 __all__ = [
     "BODY",

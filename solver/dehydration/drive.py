@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from .fresh.loading import Loading
+from .fresh.mesh import FruitMesh
 from .kernel import Layout, place, positions
 from .kernel.reload import reload
-from .loading import Loading
-from .mesh import FruitMesh
 from .params import DehydrationParams
 
 __all__ = ["Drive"]

@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 
 from ..contract import Context, Unstable
 from .drive import Drive
-from .imperfection import heights
+from .fresh.imperfection import heights
+from .fresh.mesh import FruitMesh, build_mesh
+from .fresh.pattern import pattern_heights
+from .fresh.sector import cut, evened
 from .kernel import (
     ElementReport,
     Layout,
@@ -28,10 +31,7 @@ from .kernel import (
     reweigh,
     stiffness_bounds,
 )
-from .mesh import FruitMesh, build_mesh
 from .params import DehydrationParams
-from .pattern import pattern_heights
-from .sector import cut, evened
 from .settings import Settings
 
 __all__ = ["Motion"]

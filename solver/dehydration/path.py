@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contract import Context
+from .fresh.mesh import FruitMesh
 from .kernel import new_state
-from .mesh import FruitMesh
 from .motion import Motion
 from .params import DehydrationParams
 from .settings import Settings

@@ -10,12 +10,12 @@ import xarray as xr
 
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, lattice, window
-from .descriptors import Descriptors, Surface
-from .loading import Loading
-from .mesh import Sampler
+from .fresh.loading import Loading
+from .fresh.mesh import Sampler
+from .measures.descriptors import Descriptors, Surface
+from .measures.penetration import penetration
 from .params import DehydrationParams
 from .path import Path, State
-from .penetration import penetration
 from .settings import Settings, choose
 
 __all__ = ["run"]

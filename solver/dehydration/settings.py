@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contract import Cost, Need
-from .closed_form import flat_film_wavelength, onset_estimate
-from .loading import Loading
-from .mesh import flesh_span, layer_fractions
+from .fresh.closed_form import flat_film_wavelength, onset_estimate
+from .fresh.loading import Loading
+from .fresh.mesh import flesh_span, layer_fractions
 from .params import DehydrationParams
 
 __all__ = ["Settings", "choose", "expected_cost"]

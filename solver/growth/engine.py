@@ -15,18 +15,18 @@ import numpy as np
 
 from .. import shell
 from ..contract import Context
-from .active import Habit
-from .energy import StepEnergy, Tangent
-from .equilibrium import balanced, begun
 from .fresh import fresh
 from .params import GrowthParams
-from .placing import branched, started
 from .plastic import forgotten
-from .rates import grown, rates
-from .remesh import remesh
+from .remeshing.remesh import remesh
+from .settling.active import Habit
+from .settling.energy import StepEnergy, Tangent
+from .settling.equilibrium import balanced, begun
 from .shapes import start
 from .state import State
-from .tools import Tool
+from .tooling.placing import branched, started
+from .tooling.rates import grown, rates
+from .tooling.tools import Tool
 
 __all__ = ["Engine"]
 

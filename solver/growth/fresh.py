@@ -7,10 +7,10 @@ import numpy as np
 from .. import shell
 from ..contract import Context
 from .params import GrowthParams
-from .places import share
-from .placing import border
 from .shapes import Mesh
 from .state import State
+from .tooling.places import share
+from .tooling.placing import border
 
 __all__ = ["fresh"]
 

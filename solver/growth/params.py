@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from ..contract import Params
-from .places import Place
 from .shapes import Shape
-from .tools import HotSurface, Tool
+from .tooling.places import Place
+from .tooling.tools import HotSurface, Tool
 
 __all__ = ["Attachment", "Bending", "GrowthParams", "Plane", "Solid", "SolidBall"]
 

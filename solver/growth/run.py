@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_limits
 from .. import shell
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
-from .energy import elastic
 from .engine import Engine
 from .params import GrowthParams
 from .settings import choose
+from .settling.energy import elastic
 from .state import State
 
 __all__ = ["run"]

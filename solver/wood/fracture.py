@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from .arrays import Bonds, Rods
-from .bundle import SAMPLES
-from .explicit import Motion
-from .state import Wood
+from .model.arrays import Bonds, Rods
+from .model.bundle import SAMPLES
+from .model.state import Wood
+from .stepping.explicit import Motion
 
 __all__ = ["Breaks", "break_worst", "overstress"]
 

@@ -12,13 +12,13 @@ from threadpoolctl import threadpool_limits
 
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
-from .bundle import Wood, lay
-from .listing import law
+from .contact.listing import law
+from .model.bundle import Wood, lay
 from .params import WoodParams
-from .render import Skin
 from .settings import choose
-from .stability import longest_step, touchable
-from .stepping import Reached, explicit
+from .stepping.marching import Reached, explicit
+from .stepping.stability import longest_step, touchable
+from .surface.skin import Skin
 
 __all__ = ["run"]
 
@@ -65,12 +65,12 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context)
     elif params.mode == "implicit":
-        from .implicit import implicit
+        from .stepping.implicit import implicit
 
         attrs["step"] = settings.step
         marching = implicit(wood, params, need.stages, settings, balance, context)
     else:
-        from .static import static
+        from .stepping.static import static
 
         marching = static(wood, params, need.stages, context)
     rows: list[dict[str, Any]] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx
 import pytest
 
-from service.answers import Answer, Answers
+from service.shapes.answers import Answer, Answers
 from store.store import Store
 
 from ._asking import until

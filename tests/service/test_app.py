@@ -16,7 +16,7 @@ HEAVY = {
     "matplotlib",
     "distributed",
     "typer",
-    "sweeps.cli",
+    "sweeps.commands.cli",
     "sweeps.executors",
     "sweeps.plan",
     "sweeps.runner",

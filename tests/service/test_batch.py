@@ -12,7 +12,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service import batch as module
+from service.shapes import batch as module
 from store.lookup import ShapeTable
 
 from .conftest import QUERY, SHAPE, client_of

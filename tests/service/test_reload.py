@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from service.errors import AmbiguousTable
-from service.live import LiveTables
+from service.shapes.live import LiveTables
 from store import tables
 from store.errors import UnknownTable
 from store.store import Store

@@ -16,7 +16,7 @@ from store.errors import CorruptTokens, InvalidToken, ReadOnlyStore, UnknownToke
 from store.starter import ROOT as STARTER
 from store.store import Store
 from store.tokens import Tokens
-from sweeps.cli import app
+from sweeps.commands.cli import app
 
 from ._asking import checked
 from .conftest import QUERY, SHAPE, client_of

@@ -18,7 +18,7 @@ from service.errors import InvalidQuery, UnfitFormat
 from service.sequences import STILLS, Options, Sequence, of_run, prepared
 from solver import registry
 from solver.fruit import lattice
-from sweeps import colours
+from sweeps.pictures import colours
 
 from ._gltf import accessor, parsed
 from ._runs import STAGES, made, rotting, shrinking, splitting

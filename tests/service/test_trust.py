@@ -14,16 +14,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from service.live import LiveTables
+from service.shapes.live import LiveTables
 from solver.contract import Need
 from solver.dehydration import SOLVER
 from solver.fruit import lattice
-from store import generation, methods, seal, tables
+from store import seal, tables
+from store.blending import methods
+from store.generations import generation
 from store.lookup import ShapeTable
-from store.measures import Measures
 from store.queue import Queue
 from store.starter import ROOT as STARTER
 from store.store import Store
+from store.surfaces.measures import Measures
 from store.tokens import Tokens
 
 from ..store.conftest import answer, fill

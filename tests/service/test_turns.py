@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from service.errors import Overloaded
-from service.turns import Turns
+from service.shapes.turns import Turns
 from store.store import Store
 from store.tokens import Tokens
 

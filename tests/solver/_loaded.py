@@ -6,8 +6,8 @@ import numpy as np
 
 from solver import registry
 from solver.dehydration.drive import Drive
+from solver.dehydration.fresh.mesh import build_mesh
 from solver.dehydration.kernel import build_layout
-from solver.dehydration.mesh import build_mesh
 
 SOLVER = registry.get("dehydration")
 

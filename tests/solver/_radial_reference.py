@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BarycentricInterpolator
 
-from solver.dehydration.closed_form import sphere_radius
+from solver.dehydration.fresh.closed_form import sphere_radius
 
 Floats = NDArray[np.float64]
 

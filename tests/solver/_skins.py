@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.dehydration.contact_data import make_contact
-from solver.dehydration.contact_search import find_pairs
+from solver.dehydration.contact.data import make_contact
+from solver.dehydration.contact.search import find_pairs
 
 SINGLE = np.float32
 

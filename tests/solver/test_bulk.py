@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from solver.contract import Context
+from solver.dehydration.fresh.mesh import build_mesh
 from solver.dehydration.kernel import (
     build_layout,
     dilatations,
@@ -19,7 +20,6 @@ from solver.dehydration.kernel import (
     rested,
     rests,
 )
-from solver.dehydration.mesh import build_mesh
 from solver.dehydration.params import DehydrationParams
 from solver.dehydration.path import Path
 from solver.dehydration.settings import choose

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.dehydration.closed_form import flat_film_strain, flat_film_wavelength, onset_estimate, sphere_radius
+from solver.dehydration.fresh.closed_form import flat_film_strain, flat_film_wavelength, onset_estimate, sphere_radius
 
 REFERENCE = json.loads((Path(__file__).parent / "core_shell_sphere.json").read_text())
 

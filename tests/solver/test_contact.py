@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numba import get_num_threads, njit, prange, set_num_threads
 
-from solver.dehydration.contact import push_apart
-from solver.dehydration.contact_data import ACTIVE
-from solver.dehydration.contact_search import find_pairs
-from solver.dehydration.penetration import penetration
+from solver.dehydration.contact.contact import push_apart
+from solver.dehydration.contact.data import ACTIVE
+from solver.dehydration.contact.search import find_pairs
+from solver.dehydration.measures.penetration import penetration
 
 from ._skins import SINGLE, cubed_sphere, sheet, state, touching, two_plates
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.dehydration.contact import push_apart
-from solver.dehydration.contact_data import ACTIVE, HITS, OPPOSED, PAIRS, SEARCHES, grow, make_contact
-from solver.dehydration.contact_search import find_pairs
-from solver.dehydration.penetration import penetration, penetration_depths
+from solver.dehydration.contact.contact import push_apart
+from solver.dehydration.contact.data import ACTIVE, HITS, OPPOSED, PAIRS, SEARCHES, grow, make_contact
+from solver.dehydration.contact.search import find_pairs
+from solver.dehydration.measures.penetration import penetration, penetration_depths
 
 from ._skins import SINGLE, cubed_sphere, state, touching, two_plates
 

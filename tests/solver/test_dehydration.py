@@ -10,8 +10,8 @@ import pytest
 from solver import registry
 from solver.contract import Context, Need, Unstable
 from solver.dehydration import run as run_module
-from solver.dehydration.closed_form import sphere_radius
-from solver.dehydration.imperfection import bumps
+from solver.dehydration.fresh.closed_form import sphere_radius
+from solver.dehydration.fresh.imperfection import bumps
 from solver.dehydration.path import Path
 from solver.dehydration.settings import choose
 

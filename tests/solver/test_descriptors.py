@@ -5,8 +5,8 @@ import pytest
 from scipy.special import sph_harm_y
 
 from solver import registry
-from solver.dehydration.descriptors import Surface
-from solver.dehydration.mesh import build_mesh, layer_fractions
+from solver.dehydration.fresh.mesh import build_mesh, layer_fractions
+from solver.dehydration.measures.descriptors import Surface
 
 
 @pytest.fixture(scope="module")

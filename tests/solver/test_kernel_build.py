@@ -51,8 +51,8 @@ def test_cache_is_used_across_processes_and_never_stale(tmp_path):
     """numba keys its cache by the file of the function; ours by every source the function is made of."""
     kernel = tmp_path / "solver" / "dehydration" / "kernel"
     shutil.copytree(Path(package.__file__).parent, kernel, ignore=shutil.ignore_patterns("__pycache__"))
-    for module in Path(package.__file__).parent.parent.glob("contact*.py"):
-        shutil.copy(module, kernel.parent)
+    contact = Path(package.__file__).parent.parent / "contact"
+    shutil.copytree(contact, kernel.parent / "contact", ignore=shutil.ignore_patterns("__pycache__"))
     for parent in (kernel.parent, kernel.parent.parent):
         (parent / "__init__.py").touch()
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from solver.contract import Context, InvalidGeometry, InvalidInput, Need
-from solver.dehydration.closed_form import sphere_radius
-from solver.dehydration.imperfection import bumps, heights
+from solver.dehydration.fresh.closed_form import sphere_radius
+from solver.dehydration.fresh.imperfection import bumps, heights
+from solver.dehydration.fresh.loading import Loading
+from solver.dehydration.fresh.mesh import cubed_sphere, layer_fractions
 from solver.dehydration.kernel import (
     internal_force,
     march,
@@ -17,8 +19,6 @@ from solver.dehydration.kernel import (
     positions,
     reweigh,
 )
-from solver.dehydration.loading import Loading
-from solver.dehydration.mesh import cubed_sphere, layer_fractions
 
 from ._loaded import SOLVER, drive_of, parse
 

@@ -7,8 +7,7 @@ from scipy.special import sph_harm_y
 
 from solver import registry
 from solver.contract import InvalidGeometry
-from solver.dehydration.harmonics import analyse, power, quadrature, remove_low
-from solver.dehydration.mesh import (
+from solver.dehydration.fresh.mesh import (
     Sampler,
     build_mesh,
     corner_ratios,
@@ -17,6 +16,7 @@ from solver.dehydration.mesh import (
     inner_distance,
     layer_fractions,
 )
+from solver.dehydration.measures.harmonics import analyse, power, quadrature, remove_low
 from solver.fruit import directions, lattice
 
 

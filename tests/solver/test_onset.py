@@ -20,7 +20,7 @@ from solver.dehydration.bifurcation.pencil import Pencil, Perturbations
 from solver.dehydration.bifurcation.radial_elements import radial_mesh, smooth
 from solver.dehydration.bifurcation.result import dominant_degree
 from solver.dehydration.bifurcation.search import Valley
-from solver.dehydration.closed_form import sphere_radius
+from solver.dehydration.fresh.closed_form import sphere_radius
 from solver.fruit import directions
 
 REFERENCE = json.loads((Path(__file__).parent / "core_shell_sphere.json").read_text())

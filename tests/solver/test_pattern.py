@@ -9,7 +9,7 @@ from scipy.special import sph_harm_y
 
 from solver import registry
 from solver.contract import Context, InvalidInput, Need
-from solver.dehydration.pattern import pattern_heights
+from solver.dehydration.fresh.pattern import pattern_heights
 from solver.fruit import azimuths, colatitudes, directions
 
 SOLVER = registry.get("dehydration")

@@ -10,12 +10,12 @@ import pytest
 from solver import registry
 from solver.contract import Context, InvalidGeometry
 from solver.dehydration import motion
-from solver.dehydration.contact_data import HITS
-from solver.dehydration.imperfection import heights
+from solver.dehydration.contact.data import HITS
+from solver.dehydration.fresh.imperfection import heights
+from solver.dehydration.fresh.mesh import build_mesh
+from solver.dehydration.fresh.sector import cut, evened
 from solver.dehydration.kernel import build_layout, make_skin, march, new_state, positions
-from solver.dehydration.mesh import build_mesh
 from solver.dehydration.path import Path
-from solver.dehydration.sector import cut, evened
 from solver.dehydration.settings import choose
 
 SOLVER = registry.get("dehydration")

@@ -11,6 +11,7 @@ import pytest
 
 from solver.dehydration.bifurcation.full import onset_full
 from solver.dehydration.bifurcation.radial import onset_radial
+from solver.dehydration.fresh.mesh import build_mesh
 from solver.dehydration.implicit import base_state
 from solver.dehydration.kernel import (
     build_layout,
@@ -22,7 +23,6 @@ from solver.dehydration.kernel import (
     positions,
     strain_energy,
 )
-from solver.dehydration.mesh import build_mesh
 from solver.dehydration.params import DehydrationParams
 
 from ._implicit_twin import block, rotation

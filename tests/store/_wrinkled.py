@@ -9,9 +9,9 @@ from scipy.special import sph_harm_y
 from solver.contract import finish
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes, directions, lattice
-from store import harmonics
-from store.methods.weights import Samples
+from store.blending.methods.weights import Samples
 from store.store import Store
+from store.surfaces import harmonics
 
 from .conftest import GAMMA, STAGES, TE, _spec, question
 

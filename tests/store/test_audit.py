@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from solver.dehydration import DehydrationParams
-from store import audit, compare, seal, tables, truncation
+from store import seal, tables
 from store.errors import CorruptTable, UnknownJob
-from store.manifest import write_manifest
+from store.generations import audit, compare, truncation
+from store.generations.manifest import write_manifest
 from store.store import Store
 
 from .conftest import fill
@@ -83,7 +84,7 @@ def _axis(file: h5py.File) -> None:
 def test_what_a_seal_does_not_tell(store: Store, edit: Callable[[h5py.File], None], part: str, said: str) -> None:
     from dataclasses import replace
 
-    from store import generation
+    from store.generations import generation
 
     fill(store, te=[0.03, 0.04, 0.05], gamma=[10, 20])
     table = tables.build(store, axes=AXES)

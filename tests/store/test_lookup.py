@@ -13,10 +13,11 @@ import pytest
 from solver.contract import InvalidGeometry
 from solver.dehydration import DehydrationParams
 from solver.fruit import Fruit, colatitudes, lattice
-from store import spectra, tables
+from store import tables
 from store.errors import MissingStore, OutsideTable
 from store.lookup import ShapeTable
 from store.store import Store
+from store.surfaces import spectra
 
 from .conftest import GAMMA, TE, amplitude, displacement, fill, make
 
@@ -160,7 +161,7 @@ def test_only_what_is_asked_for_is_computed(table: ShapeTable, monkeypatch: pyte
     monkeypatch.setattr("store.lookup._check_fruit", unwanted)
     query = {"te": 0.033, "gamma": 20.0}
     assert table.at(query, 0.2, fields=("displacement",)).displacement is not None
-    monkeypatch.setattr("store.window.transforms.borrow", unwanted)
+    monkeypatch.setattr("store.surfaces.window.transforms.borrow", unwanted)
     assert table.at(query, 0.2, fields=()).descriptors["roughness"] > 0
 
 

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from solver.fruit import directions, lattice
-from store import harmonics, methods, spectra, starter, tables
+from store import starter, tables
+from store.blending import methods
+from store.blending.methods.bands import Bands, Targets, add_up, multiplier
 from store.errors import OutsideTable, TooUncertain
 from store.lookup import ShapeTable
-from store.measures import Measures
-from store.methods.bands import Bands, Targets, add_up, multiplier
 from store.store import Store
+from store.surfaces import harmonics, spectra
+from store.surfaces.measures import Measures
 
 from ._wrinkled import AXES, N, grid, pattern, wrinkled
 from .conftest import GAMMA, STAGES, TE, fill

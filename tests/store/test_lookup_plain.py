@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from solver.fruit import lattice
-from store import harmonics, methods, spectra
-from store.blend import complex_view
+from store.blending import methods
+from store.blending.blend import complex_view
+from store.blending.methods import bands, cells, envelope, poles
 from store.lookup import ShapeTable
-from store.methods import bands, cells, envelope, poles
+from store.surfaces import harmonics, spectra
 
 QUERY, STAGE = {"te": 0.033, "gamma": 14.0}, 0.17
 TERMS = 8  # four corners at two stages

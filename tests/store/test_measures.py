@@ -7,8 +7,8 @@ import pytest
 from scipy.special import sph_harm_y
 
 from solver.fruit import Fruit, directions, lattice
-from store import harmonics, spectra
-from store.measures import Measures, Surface, compare, mean
+from store.surfaces import harmonics, spectra
+from store.surfaces.measures import Measures, Surface, compare, mean
 
 N = 48
 THETA, PHI = lattice(N)

@@ -7,8 +7,8 @@ import pytest
 from scipy.special import sph_harm_y
 
 from solver.fruit import azimuths, colatitudes
-from store import spectra
-from store.methods.poles import highest_degree, multiply
+from store.blending.methods.poles import highest_degree, multiply
+from store.surfaces import spectra
 
 N = 48
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.special import sph_harm_y
 
 from solver.fruit import colatitudes, lattice
-from store import spectra, transforms
+from store.surfaces import spectra, transforms
 
 from .conftest import ROOT
 

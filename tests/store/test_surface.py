@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.fruit import PRESETS, Fruit, directions, lattice
-from store import surface
+from store.surfaces import surface
 
 
 @cache

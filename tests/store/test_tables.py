@@ -11,10 +11,11 @@ import pytest
 import xarray as xr
 
 from solver.dehydration import DehydrationParams
-from store import audit, tables
+from store import tables
 from store.errors import CorruptShard, CorruptTable, EmptyTable, MixedSamples, StorageFull, UnknownTable
+from store.generations import audit
+from store.generations.samples import default_axes
 from store.lookup import ShapeTable
-from store.samples import default_axes
 from store.store import Store
 
 from .conftest import ROOT, fill, make, spec

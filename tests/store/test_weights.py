@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from store import methods
-from store.methods.weights import Samples
+from store.blending import methods
+from store.blending.methods.weights import Samples
 
 from ._wrinkled import grid
 

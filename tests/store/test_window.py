@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from store import spectra, window
 from store.errors import OutsideTable
 from store.lookup import ShapeTable
 from store.starter import ROOT
-from store.window import WHOLE, Patch, Window
+from store.surfaces import spectra, window
+from store.surfaces.window import WHOLE, Patch, Window
 
 QUERY, STAGE = {"te": 0.034, "gamma": 23.0}, 0.17
 

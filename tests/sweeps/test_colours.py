@@ -9,9 +9,10 @@ from matplotlib.image import imread
 from solver import registry
 from solver.contract import Need
 from solver.fruit import directions, lattice
-from sweeps import colours, outputs
+from sweeps import outputs
 from sweeps.formats import Made
-from sweeps.render import View, render
+from sweeps.pictures import colours
+from sweeps.pictures.render import View, render
 
 
 def test_a_picture_takes_the_colours_of_its_surface() -> None:

@@ -5,8 +5,8 @@ import pytest
 
 from solver.contract import Context, InvalidInput, Need
 from solver.decay import SOLVER
-from solver.decay.dried import at_rays
-from solver.decay.surface import geodesic
+from solver.decay.surfaces.dried import at_rays
+from solver.decay.surfaces.surface import geodesic
 from solver.fruit import directions, lattice
 from store import starter
 from store.lookup import ShapeTable

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.decay.surface import geodesic
+from solver.decay.surfaces.surface import geodesic
+from sweeps.commands.options import assignments
 from sweeps.errors import InvalidOption
-from sweeps.options import assignments
 
 trimesh = pytest.importorskip("trimesh")
 

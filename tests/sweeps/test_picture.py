@@ -8,8 +8,8 @@ from matplotlib.image import imread
 from scipy.ndimage import gaussian_filter
 
 from solver.fruit import directions, lattice
-from sweeps.picture import Panel, sheet
-from sweeps.render import View, mesh, render
+from sweeps.pictures.render import View, mesh, render
+from sweeps.pictures.sheet import Panel, sheet
 
 
 def ball(n: int = 24, amplitude: float = 0.0) -> np.ndarray:

@@ -13,7 +13,8 @@ from service.cli import app
 from solver.contract import Need, finish
 from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
-from store import methods, starter
+from store import starter
+from store.blending import methods
 from store.lookup import ShapeTable
 from store.store import Store
 from sweeps import plan, score

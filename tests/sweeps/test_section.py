@@ -9,8 +9,8 @@ from matplotlib.image import imread
 
 from solver import registry
 from solver.contract import Need
-from sweeps import section
 from sweeps.errors import InvalidOption
+from sweeps.pictures import section
 
 
 @pytest.mark.parametrize("word", ["0", "35", "equator"])

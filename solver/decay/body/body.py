@@ -16,8 +16,8 @@ from ...contract import InvalidInput
 from ...fruit import directions, lattice
 from ..environment import reference_radius
 from ..params import DecayParams
-from ..seeds import carried, gap
-from ..surface import Surface, extent, geodesic, shares_at
+from ..surfaces.seeds import carried, gap
+from ..surfaces.surface import Surface, extent, geodesic, shares_at
 from .equilibrium import Balance, rested, settle
 from .flesh import Softened, softened
 from .loads import Loads

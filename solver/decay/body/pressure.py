@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..params import DecayParams
-from ..places import painted
+from ..surfaces.places import painted
 from .flesh import Softened
 from .solid import Solid
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...contract import InvalidGeometry
 from ...fruit import Fruit
-from ..surface import GOLDEN_ICOSAHEDRON, GOLDEN_POINTS
+from ..surfaces.surface import GOLDEN_ICOSAHEDRON, GOLDEN_POINTS
 
 __all__ = ["Solid", "ball", "fill", "volumes"]
 

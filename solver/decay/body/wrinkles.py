@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...contract import Context
 from ..params import DecayParams
 from ..settings import Settings
-from ..surface import geodesic, lay, sampler, shares_at
+from ..surfaces.surface import geodesic, lay, sampler, shares_at
 from .body import Body
 from .equilibrium import Balance
 from .flesh import Skin

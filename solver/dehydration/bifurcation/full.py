@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy.special import sph_harm_y
 
 from ...contract import Context, NotConverged
-from ..closed_form import flat_film_wavelength, onset_estimate
+from ..fresh.closed_form import flat_film_wavelength, onset_estimate
+from ..fresh.mesh import layer_fractions
 from ..implicit import Equilibrium, Model, build_model, build_quadratic_mesh, equilibrium, natural_symmetry
 from ..implicit.buckling import Crossing, first_crossing, parities, stress_stiffness, tangent_at
 from ..implicit.hexahedron import shape
 from ..implicit.location import fold, locate
-from ..mesh import layer_fractions
 from ..params import DehydrationParams
 from .result import FieldMode, Method, Onset, Tie
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...contract import Context, NotConverged
-from ..closed_form import flat_film_wavelength, onset_estimate
+from ..fresh.closed_form import flat_film_wavelength, onset_estimate
 from ..params import DehydrationParams
 from .base import BaseState, Meridian
 from .meridional_mesh import PER_WAVELENGTH

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closed_form import flat_film_wavelength
-from ..mesh import layer_fractions
+from ..fresh.closed_form import flat_film_wavelength
+from ..fresh.mesh import layer_fractions
 from ..params import DehydrationParams
 
 __all__ = ["PER_WAVELENGTH", "MeridionalMesh", "build"]

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import eval_legendre
 
 from ...contract import Context
-from ..closed_form import flat_film_wavelength, onset_estimate
+from ..fresh.closed_form import flat_film_wavelength, onset_estimate
 from ..params import DehydrationParams
 from .radial_elements import linear_tangents, radial_mesh, smooth, tangent
 from .result import AxisymmetricMode, Method, Onset, Tie

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from ...contract import NotConverged
-from ..closed_form import flat_film_wavelength, sphere_radius
+from ..fresh.closed_form import flat_film_wavelength, sphere_radius
 
 __all__ = ["RadialMesh", "RadialState", "linear_tangents", "radial_mesh", "smooth", "tangent"]
 

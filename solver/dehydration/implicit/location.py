@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fruit import directions
-from ..mesh import _FACES as FACES
+from ..fresh.mesh import _FACES as FACES
 from ..params import DehydrationParams
 from .hexahedron import shape, shape_gradients
 from .mesh import QuadraticMesh

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...contract import InvalidInput
-from ..mesh import CubedSphere, build_mesh
+from ..fresh.mesh import CubedSphere, build_mesh
 from ..params import DehydrationParams
 
 __all__ = ["QuadraticMesh", "Symmetry", "build_quadratic_mesh", "graded_layers", "natural_symmetry"]

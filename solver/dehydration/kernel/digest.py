@@ -14,6 +14,6 @@ def source_digest(backend: str) -> str:
     All files of the package count, needed or not: a needless compilation costs seconds, a stale kernel a wrong table.
     """
     digest = hashlib.sha256(backend.encode())
-    for path in sorted(HERE.glob("*.py")) + sorted(HERE.parent.glob("contact*.py")):
+    for path in sorted(HERE.glob("*.py")) + sorted((HERE.parent / "contact").glob("*.py")):
         digest.update(b"\0" + path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()

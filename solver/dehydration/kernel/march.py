@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit, prange, typeof, types
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from solver.dehydration.contact_data import make_contact
+from solver.dehydration.contact.data import make_contact
 from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros

@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from solver.dehydration.contact import push_apart
-from solver.dehydration.contact_data import PAIRS, Contact, grow, make_contact
-from solver.dehydration.contact_search import find_pairs
+from solver.dehydration.contact.contact import push_apart
+from solver.dehydration.contact.data import PAIRS, Contact, grow, make_contact
+from solver.dehydration.contact.search import find_pairs
 from solver.dehydration.kernel.fixed_point import QUANTUM, positions
 from solver.dehydration.kernel.layout import Layout
 

@@ -12,7 +12,7 @@ from solver.decay.body.flesh import Flesh, softened
 from solver.decay.body.loads import Loads
 from solver.decay.body.material import blocks, energy, forces, hessian
 from solver.decay.body.solid import fill, volumes
-from solver.decay.surface import extent, geodesic, lay
+from solver.decay.surfaces.surface import extent, geodesic, lay
 from solver.fruit import PRESETS, Fruit
 
 

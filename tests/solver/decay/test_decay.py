@@ -8,12 +8,12 @@ import pytest
 from solver.contract import Context, InvalidInput, Need
 from solver.decay import SOLVER, DecayParams, Wound
 from solver.decay.environment import damping, deficit, saturation, water_lost
+from solver.decay.fields.spawning import Spawner
+from solver.decay.fields.stepping import march
+from solver.decay.fields.system import System
 from solver.decay.presets import ENVIRONMENTS
 from solver.decay.settings import choose
-from solver.decay.spawning import Spawner
-from solver.decay.stepping import march
-from solver.decay.surface import extent
-from solver.decay.system import System
+from solver.decay.surfaces.surface import extent
 
 FAST = {"growth_rate": 100.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
 

@@ -5,8 +5,8 @@ import pytest
 
 from solver.contract import InvalidGeometry, InvalidInput, Need
 from solver.decay import SOLVER, DecayParams
-from solver.decay.imported import Mesh, extent_of, rays_from
-from solver.decay.surface import geodesic, lay, triangulated
+from solver.decay.surfaces.imported import Mesh, extent_of, rays_from
+from solver.decay.surfaces.surface import geodesic, lay, triangulated
 
 QUICK = {"growth_rate": 100.0, "spawning": 0.0, "rot_spawning": 0.0}
 

@@ -10,7 +10,7 @@ from solver.decay.body.equilibrium import rested, settle
 from solver.decay.body.loads import Loads, below, pushes, touches
 from solver.decay.body.material import blocks
 from solver.decay.body.solid import fill
-from solver.decay.surface import lay
+from solver.decay.surfaces.surface import lay
 from solver.fruit import Fruit
 
 #: Outer radius of an orange with its skin.

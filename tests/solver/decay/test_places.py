@@ -6,10 +6,10 @@ import pytest
 from solver.contract import InvalidInput, Need
 from solver.decay import SOLVER
 from solver.decay.body.body import Body
-from solver.decay.places import painted
-from solver.decay.seeds import seeds
-from solver.decay.surface import geodesic, lay
-from solver.decay.system import System
+from solver.decay.fields.system import System
+from solver.decay.surfaces.places import painted
+from solver.decay.surfaces.seeds import seeds
+from solver.decay.surfaces.surface import geodesic, lay
 from solver.fruit import directions, lattice
 
 

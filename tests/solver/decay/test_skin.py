@@ -7,7 +7,7 @@ from solver.contract import Context, Need
 from solver.decay import SOLVER
 from solver.decay.body.flesh import Skin
 from solver.decay.body.skin import Shell
-from solver.decay.surface import lay
+from solver.decay.surfaces.surface import lay
 from solver.fruit import Fruit
 
 THICKNESS, RADIUS, POISSON = 0.06, 1.06, 0.3

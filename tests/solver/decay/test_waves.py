@@ -7,12 +7,12 @@ from scipy import sparse
 
 from solver.contract import InvalidGeometry
 from solver.decay import DecayParams
-from solver.decay.diffusion import linked, listed_around, rkl2, stages_for
-from solver.decay.gate import gates
-from solver.decay.layer import Layer
-from solver.decay.rates import Rates
-from solver.decay.reaction import react
-from solver.decay.surface import Surface, extent, geodesic, sampler, triangulated
+from solver.decay.fields.diffusion import linked, listed_around, rkl2, stages_for
+from solver.decay.fields.gate import gates
+from solver.decay.fields.layer import Layer
+from solver.decay.fields.rates import Rates
+from solver.decay.fields.reaction import react
+from solver.decay.surfaces.surface import Surface, extent, geodesic, sampler, triangulated
 from solver.fruit import directions, lattice
 
 RATES = Rates(

@@ -8,13 +8,14 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from solver import shell
-from solver.growth import active, reach
 from solver.growth.anchors import corners_of
-from solver.growth.energy import StepEnergy, Tangent, elastic
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
-from solver.growth.rest import edge_squares, flat_hinges
+from solver.growth.remeshing.rest import edge_squares, flat_hinges
+from solver.growth.settling import active
+from solver.growth.settling.energy import StepEnergy, Tangent, elastic
 from solver.growth.state import State
+from solver.growth.tooling import reach
 
 SPOT = {"kind": "spot", "at": (0.3, 0.2, 1.0), "radius": 0.4, "stretch": (1.01, 1.01), "duration": 100}
 BALL = {"shape": "sphere", "thickness": 0.02, "step": 1.0, "tools": [SPOT]}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from solver import shell
-from solver.growth.energy import StepEnergy, Tangent
 from solver.growth.engine import Engine
-from solver.growth.minimise import quasi_newton
 from solver.growth.params import GrowthParams
+from solver.growth.settling.energy import StepEnergy, Tangent
+from solver.growth.settling.minimise import quasi_newton
 from tests.solver.shell._meshes import sheet
 
 DISTANCE = 0.1

@@ -7,12 +7,12 @@ import pytest
 
 from solver import registry, shell
 from solver.contract import InvalidInput, Need, NotConverged, SolverError
-from solver.growth.cuts import cut
-from solver.growth.energy import StepEnergy, Tangent
 from solver.growth.engine import Engine
-from solver.growth.minimise import conjugate_gradients, lbfgs, quasi_newton
 from solver.growth.params import GrowthParams
-from solver.growth.tools import HotSpot
+from solver.growth.remeshing.cuts import cut
+from solver.growth.settling.energy import StepEnergy, Tangent
+from solver.growth.settling.minimise import conjugate_gradients, lbfgs, quasi_newton
+from solver.growth.tooling.tools import HotSpot
 
 EVERYWHERE = {"kind": "everywhere"}
 

@@ -7,10 +7,10 @@ import pytest
 
 from solver import shell
 from solver.growth.anchors import place
-from solver.growth.collapses import collapse
 from solver.growth.engine import Engine
-from solver.growth.flips import flip
 from solver.growth.params import GrowthParams
+from solver.growth.remeshing.collapses import collapse
+from solver.growth.remeshing.flips import flip
 
 MATERIAL = shell.Material(0.05)
 

@@ -9,12 +9,12 @@ from scipy.spatial import KDTree
 from solver.contract import InvalidInput, Need
 from solver.growth import SOLVER
 from solver.growth.engine import Engine
-from solver.growth.harmonic import harmonic, harmonic_tensors
 from solver.growth.params import GrowthParams
-from solver.growth.placing import border, branched, started
-from solver.growth.rates import rates
 from solver.growth.shapes import start
-from solver.growth.textures import gray_scott, laid
+from solver.growth.tooling.harmonic import harmonic, harmonic_tensors
+from solver.growth.tooling.placing import border, branched, started
+from solver.growth.tooling.rates import rates
+from solver.growth.tooling.textures import gray_scott, laid
 from solver.shell import topology
 
 

@@ -7,14 +7,14 @@ import pytest
 
 from solver.contract import Need
 from solver.wood import SOLVER
-from solver.wood.arrays import Bodies, Rods
-from solver.wood.bodies import pose, press
-from solver.wood.bundle import lay
-from solver.wood.contact import RUBBING, contacts, lag
-from solver.wood.explicit import forces
-from solver.wood.hessian import Stiffness
-from solver.wood.moment import begin
-from solver.wood.state import Wood
+from solver.wood.contact.bodies import pose, press
+from solver.wood.contact.stiffness import RUBBING, contacts, lag
+from solver.wood.forces.hessian import Stiffness
+from solver.wood.model.arrays import Bodies, Rods
+from solver.wood.model.bundle import lay
+from solver.wood.model.state import Wood
+from solver.wood.stepping.explicit import forces
+from solver.wood.stepping.moment import begin
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 BODIES = [

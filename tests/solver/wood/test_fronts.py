@@ -7,10 +7,10 @@ from scipy.sparse.linalg import spsolve
 
 from solver.contract import Need
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
-from solver.wood.dissection import dissected
-from solver.wood.fronts import factored, solved
-from solver.wood.hessian import Stiffness
+from solver.wood.forces.hessian import Stiffness
+from solver.wood.model.bundle import lay
+from solver.wood.stepping.dissection import dissected
+from solver.wood.stepping.fronts import factored, solved
 
 
 @pytest.mark.parametrize("double", [False, True])

@@ -5,7 +5,7 @@ import pytest
 
 from solver.contract import Need
 from solver.wood import SOLVER
-from solver.wood.newton import descend
+from solver.wood.stepping.newton import descend
 
 GOAL = np.random.default_rng(0).normal(size=(5, 3))
 

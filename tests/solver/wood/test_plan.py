@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
-from solver.wood.explicit import march
 from solver.wood.fracture import break_worst, overstress
-from solver.wood.moment import State, begin, copied
-from solver.wood.plan import plan_for
-from solver.wood.state import Wood
+from solver.wood.model.bundle import lay
+from solver.wood.model.plan import plan_for
+from solver.wood.model.state import Wood
+from solver.wood.stepping.explicit import march
+from solver.wood.stepping.moment import State, begin, copied
 
 
 def broken(rods: int = 12, vertices: int = 30, **values) -> Wood:

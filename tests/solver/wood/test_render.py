@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 from solver import meshes
 from solver.contract import Need
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
 from solver.wood.fracture import _sever, _split
-from solver.wood.render import Skin
-from solver.wood.render_align import aligned, bonded, corners, meeting
-from solver.wood.render_rows import rows, spans
-from solver.wood.render_section import section
-from solver.wood.section import areas
+from solver.wood.model.bundle import lay
+from solver.wood.model.section import areas
+from solver.wood.surface.align import aligned, bonded, corners, meeting
+from solver.wood.surface.cells import section
+from solver.wood.surface.rows import rows, spans
+from solver.wood.surface.skin import Skin
 
 
 def laid(**values):

@@ -8,14 +8,14 @@ from scipy.optimize import brentq
 
 from solver.contract import Context, Need
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
-from solver.wood.elements import apply, elements
-from solver.wood.explicit import forces
-from solver.wood.hessian import Stiffness
-from solver.wood.moment import begin, kinetic
-from solver.wood.state import Wood, scratch_for
-from solver.wood.static import equilibrium
-from solver.wood.stepping import explicit as march
+from solver.wood.forces.elements import apply, elements
+from solver.wood.forces.hessian import Stiffness
+from solver.wood.model.bundle import lay
+from solver.wood.model.state import Wood, scratch_for
+from solver.wood.stepping.explicit import forces
+from solver.wood.stepping.marching import explicit as march
+from solver.wood.stepping.moment import begin, kinetic
+from solver.wood.stepping.static import equilibrium
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 

@@ -8,15 +8,15 @@ from scipy.optimize import minimize
 
 from solver.contract import Context, InvalidInput, Need
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
-from solver.wood.crossing import crossings
-from solver.wood.implicit import implicit
-from solver.wood.listing import law
-from solver.wood.moment import kinetic
-from solver.wood.pairs import approach, pairs
-from solver.wood.rubbing import MIDDLE, Rubbing, normals, rub
+from solver.wood.contact.crossing import crossings
+from solver.wood.contact.listing import law
+from solver.wood.contact.pairs import approach, pairs
+from solver.wood.contact.rubbing import MIDDLE, Rubbing, normals, rub
+from solver.wood.model.bundle import lay
 from solver.wood.settings import choose
-from solver.wood.stepping import explicit
+from solver.wood.stepping.implicit import implicit
+from solver.wood.stepping.marching import explicit
+from solver.wood.stepping.moment import kinetic
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 VALUES = {"rods": 2, "vertices": 11, "reach": 0.0, "clamp": "none", "radius": 0.004, "length": 0.1, **PLAIN}

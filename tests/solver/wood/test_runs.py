@@ -5,9 +5,9 @@ import pytest
 
 from solver.contract import InvalidGeometry, InvalidInput, Need, SolverError
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
 from solver.wood.fracture import break_worst
-from solver.wood.moment import begin
+from solver.wood.model.bundle import lay
+from solver.wood.stepping.moment import begin
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 ROD = {"rods": 1, "radius": 0.002, "vertices": 16, **PLAIN}
@@ -35,8 +35,8 @@ def test_a_step_ten_times_too_long_is_shortened():
 
 
 def test_the_longest_stable_step_is_just_that(monkeypatch):
-    from solver.wood import stability
-    from solver.wood.stepping import explicit
+    from solver.wood.stepping import stability
+    from solver.wood.stepping.marching import explicit
 
     params = SOLVER.parse({"rods": 9, "vertices": 12, "bend": 0.01, **PLAIN})
     longest = stability.longest_step(lay(params, 12)) * np.sqrt(1.03)

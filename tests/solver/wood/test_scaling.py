@@ -5,11 +5,11 @@ import pytest
 
 from solver.contract import InvalidInput, Need
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
-from solver.wood.explicit import BONDS, STRETCH, march
-from solver.wood.moment import begin, real
-from solver.wood.scaling import fragments, rigid
-from solver.wood.stability import longest_step
+from solver.wood.model.bundle import lay
+from solver.wood.stepping.explicit import BONDS, STRETCH, march
+from solver.wood.stepping.moment import begin, real
+from solver.wood.stepping.scaling import fragments, rigid
+from solver.wood.stepping.stability import longest_step
 
 FREE = {"rods": 7, "vertices": 8, "clamp": "none", "fracture": "none"}
 

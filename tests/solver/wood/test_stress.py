@@ -5,7 +5,7 @@ import pytest
 from benchmarks.wood_rest import fragments
 from benchmarks.wood_stress import CASES, tried
 from solver.wood import SOLVER
-from solver.wood.bundle import lay
+from solver.wood.model.bundle import lay
 
 
 @pytest.mark.parametrize("name", CASES)

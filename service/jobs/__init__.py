@@ -1,0 +1,1 @@
+"""`/v1/jobs`: exact runs, asked for over HTTP."""

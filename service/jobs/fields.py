@@ -1,0 +1,65 @@
+"""Fields of a result as JSON: for whoever wants a few numbers and no library for netCDF."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InvalidQuery, Wrong
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["encode"]
+
+
+def encode(run: xr.Dataset, names: str | None, stage: float | None, most: int) -> bytes:
+    """Return fields by name (with commas between; None: those of one number per stage), at one stage or at all.
+
+    Each has `dims`, `shape`, `units`, `long_name` and `values`, nested lists; coordinates are fields too.
+
+    Raises:
+        InvalidQuery: no such field or stage, or more than `most` numbers.
+
+    """
+    known = sorted(str(name) for name in run.variables)
+    asked = [name for name in known if run[name].dims == ("stage",)] if names is None else names.split(",")
+    unknown = [name for name in asked if name not in known]
+    if unknown:
+        wrong = [Wrong("fields", f"the result has no {name[:40]!r}", f"Known: {', '.join(known)}.") for name in unknown]
+        raise InvalidQuery.of(wrong)
+    if stage is not None:
+        stages = run["stage"].values.tolist()
+        near = min(range(len(stages)), key=lambda i: abs(stages[i] - stage))
+        if abs(stages[near] - stage) > 1e-9 * max(1.0, abs(stage)):
+            advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
+            raise InvalidQuery.of([Wrong("stage", f"the result has no stage {stage:g}", advice)])
+        # the vertices and faces of a mesh that changes its triangles lie end to end
+        for dim in ("vertex", "face"):
+            if f"{dim}_count" in run:
+                ends = run[f"{dim}_count"].values.cumsum()
+                run = run.isel({dim: slice(ends[near] - run[f"{dim}_count"].values[near], ends[near])})
+        run = run.isel(stage=[near])
+    count = sum(run[name].size for name in asked)
+    if count > most:
+        advice = "Ask for fewer fields or one stage, or take the netCDF."
+        raise InvalidQuery.of([Wrong("fields", f"{count} numbers are more than {most}", advice)])
+    body = {
+        "solver": run.attrs["solver"],
+        "solver_version": run.attrs["solver_version"],
+        "params": json.loads(run.attrs["params"]),
+        "need": json.loads(run.attrs["need"]),
+        "known": known,
+        "fields": {name: _field(run[name]) for name in dict.fromkeys(asked)},
+    }
+    return json.dumps(body, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _field(found: xr.DataArray) -> dict[str, Any]:
+    return {
+        "dims": [str(dim) for dim in found.dims],
+        "shape": list(found.shape),
+        "units": str(found.attrs.get("units", "1")),
+        "long_name": str(found.attrs.get("long_name", "")),
+        "values": found.values.tolist(),
+    }

@@ -1,0 +1,267 @@
+"""`GET /v1/jobs/{id}/result`: the whole run as netCDF, a scene, a cache or a map, or one stage as a shape."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import quote
+
+import mimeparse
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.responses import FileResponse, Response
+
+from solver import registry
+from solver.contract import Params, Solver, SolverError
+from store import seal
+from store.errors import CorruptShard, UnknownJob
+from store.jobs import Job
+from store.store import Store
+
+from .. import problems, vocabulary
+from ..errors import InvalidQuery, JobFailed, NotAcceptable, NotDone, Wrong
+from ..formats import FORMATS, About, Format
+from ..sequences import EXPORTS, STILLS, Export, Options, prepared, write
+from ..settings import Settings
+from . import fields as jobs_fields
+from .routes import JobId, stored_job
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["router"]
+
+router = APIRouter(tags=["jobs"])
+
+NETCDF = "application/x-netcdf"
+_NAMES = ("netcdf", *FORMATS, *EXPORTS)
+_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_CONTENT = {NETCDF: _BINARY} | {
+    f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()
+}
+
+
+def _said(name: str) -> str:
+    return str(Options.model_fields[name].description)
+
+
+_CONTENT |= {e.media_type.partition(";")[0]: _BINARY for e in EXPORTS.values()}
+
+
+def _options(
+    colour: Annotated[str | None, Query(max_length=100, description=_said("colour"))] = None,
+    scale: Annotated[float | None, Query(gt=0, le=1e6, allow_inf_nan=False, description=_said("scale"))] = None,
+    fps: Annotated[float | None, Query(ge=1, le=240, allow_inf_nan=False, description=_said("fps"))] = None,
+    step: Annotated[float | None, Query(gt=0, le=1000, allow_inf_nan=False, description=_said("step"))] = None,
+    textures: Annotated[int | None, Query(ge=0, le=4096, description=_said("textures"))] = None,
+    map: Annotated[str | None, Query(max_length=100, description=_said("map"))] = None,
+    size: Annotated[int | None, Query(ge=2, le=8192, description=_said("size"))] = None,
+    low: Annotated[float | None, Query(allow_inf_nan=False, description=_said("low"))] = None,
+    high: Annotated[float | None, Query(allow_inf_nan=False, description=_said("high"))] = None,
+) -> Options:
+    return Options.parse(dict(locals()))
+
+
+@router.get(
+    "/v1/jobs/{id}/result",
+    summary="A job's result",
+    response_class=Response,
+    responses={
+        200: {"description": "The result", "content": _CONTENT},
+        304: {"description": "The result that the asker has is the one"},
+        **problems.responses(404, 406, 409, 422, 501, 503),
+    },
+)
+def result(
+    request: Request,
+    id: JobId,
+    options: Annotated[Options, Depends(_options)],
+    stage: Annotated[
+        float | None,
+        Query(allow_inf_nan=False, description="Which stage; left out, all where a format holds them, else the last"),
+    ] = None,
+    format: Annotated[
+        str | None,
+        Query(description="Representation; goes before the Accept header", json_schema_extra={"enum": list(_NAMES)}),
+    ] = None,
+    fields: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=1000,
+            description="With format=json: fields by name, commas between them, with their numbers. Without it, "
+            "results that are no surface on the lattice send those of one number per stage",
+        ),
+    ] = None,
+) -> Response:
+    """Fetch what a job computed: the whole run as netCDF-4/HDF5, as a scene, a vertex cache or maps, or one stage.
+
+    netCDF opens with `xarray.open_dataset(path, engine="h5netcdf")` and answers who accepts anything. docs/formats.md
+    says which program reads which format, and what each one needs.
+    """
+    job = stored_job(request, id)
+    chosen = _negotiate(request.headers.get("accept"), format)
+    _check_done(job)
+    store: Store = request.app.state.tables.store
+    name = chosen.name if chosen else "netcdf"
+    settings = request.app.state.settings
+    asked = options.model_dump(exclude_defaults=True)
+    said = {"stage": stage, "fields": fields, **asked}
+    word = "".join(f"-{key}={value!r}" for key, value in sorted(said.items()) if value is not None)
+    tag = f'"{job.digest}-{name}{"" if chosen is None else quote(word, safe="=-")}"'
+    headers = {
+        "ETag": tag,
+        "Vary": "Accept",
+        "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
+    }
+    if tag in {part.strip().removeprefix("W/") for part in request.headers.get("if-none-match", "").split(",")}:
+        return Response(status_code=304, headers=headers)
+    if chosen is None:
+        return _shard(store, job, headers)
+    run = store.get(job.key)
+    if chosen.name == "json" and (fields is not None or not _is_surface(run, job)):
+        body = jobs_fields.encode(run, fields, stage, settings.max_export_samples)
+    elif isinstance(chosen, Export) or (chosen.name in STILLS and _is_scene(run, asked)):
+        body = _scene(run, stage, chosen, options, settings)
+    else:
+        body = _shape(run, job, stage, chosen)
+    if chosen.name != "json":
+        headers["Content-Disposition"] = f'attachment; filename="{job.solver}-{job.key[:12]}{chosen.suffix}"'
+    return Response(body, headers=headers, media_type=chosen.media_type.partition(";")[0])
+
+
+def _is_scene(run: xr.Dataset, asked: dict[str, Any]) -> bool:
+    """Return whether a stage as glb or obj is more than the bare lattice: a mesh, colours, another scale."""
+    return bool(asked) or "mesh_position" in run or bool({"rot", "mould"} & set(run.data_vars))
+
+
+def _is_surface(run: xr.Dataset, job: Job) -> bool:
+    """Return whether a result holds the whole surface on the lattice."""
+    whole = job.need.get("region") is None and {"colatitude", "azimuth"} <= set(run.dims)
+    return whole and ("position" in run or "displacement" in run)
+
+
+def _scene(
+    run: xr.Dataset, stage: float | None, chosen: Format | Export, options: Options, settings: Settings
+) -> bytes:
+    """Return a result, or one stage of it, in a format of whole results.
+
+    Raises:
+        UnfitFormat: the format cannot hold this result.
+        InvalidQuery: no such stage or field, or more than the service sends.
+
+    """
+    sequence = prepared(run, options, stage, single=not isinstance(chosen, Export) or chosen.single)
+    pixels = max(options.size if chosen.name in ("png", "exr") else 0, options.textures)
+    if pixels > settings.max_map:
+        raise InvalidQuery.of([Wrong("size", f"{pixels} pixels are more than {settings.max_map}", "Ask for fewer.")])
+    if sequence.samples + len(sequence) * options.textures**2 > settings.max_export_samples:
+        raise InvalidQuery.of(
+            [
+                Wrong(
+                    "format",
+                    f"the file would hold {sequence.samples} vertices, more than {settings.max_export_samples}",
+                    "Ask for one stage, or take the netCDF and write the file with `wizen export`.",
+                )
+            ]
+        )
+    if isinstance(chosen, Export):
+        return write(sequence, chosen, options)
+    return STILLS[chosen.name](sequence, options)
+
+
+def _negotiate(accept: str | None, explicit: str | None) -> Format | Export | None:
+    """Return the format asked for; None is netCDF.
+
+    Raises:
+        InvalidQuery: `explicit` names no format.
+        NotAcceptable: nothing in `accept` can be had.
+
+    """
+    if explicit is not None:
+        if explicit == "netcdf":
+            return None
+        if explicit not in _NAMES:
+            advice = f"Formats: {', '.join(_NAMES)}."
+            raise InvalidQuery.of([Wrong("format", f"there is no format {explicit[:40]!r}", advice)])
+        return EXPORTS.get(explicit) or FORMATS[explicit]
+    known: dict[str, Format | Export] = {e.media_type: e for e in EXPORTS.values()}
+    known |= {f.media_type: f for f in FORMATS.values()}
+    try:
+        best = mimeparse.best_match([*known, NETCDF], (accept or "").strip().lower() or "*/*")
+    except mimeparse.MimeTypeParseException:
+        best = ""
+    if best == NETCDF:
+        return None
+    if not best:
+        listed = f"{NETCDF} (format=netcdf), " + ", ".join(f"{t} (format={f.name})" for t, f in known.items())
+        raise NotAcceptable(f"no representation fits Accept: {accept}.", advice=f"Ask for one of {listed}.")
+    return known[best]
+
+
+def _check_done(job: Job) -> None:
+    if job.state == "failed":
+        error = job.error or {}
+        raise JobFailed(
+            f"this job failed: {error.get('message', 'nobody knows why.')}", advice=str(error.get("advice", ""))
+        )
+    if job.state == "cancelled":
+        raise NotDone("this job was cancelled.", advice="Ask for it again with POST /v1/jobs.")
+    if job.state != "done":
+        raise NotDone(
+            f"this job is {job.state} ({job.progress:.0%}).",
+            advice=f"Follow /v1/jobs/{job.key}/events until it is done.",
+        )
+
+
+def _shard(store: Store, job: Job, headers: dict[str, str]) -> Response:
+    path = store.shard_path(job.key)
+    try:
+        whole = seal.is_whole(path)
+    except FileNotFoundError:
+        raise UnknownJob("the result is no longer stored.", "Ask for it again with POST /v1/jobs.") from None
+    if not whole:
+        raise CorruptShard("the stored result is damaged.", "Delete its file; then ask for it again.")
+    return FileResponse(path, headers=headers, media_type=NETCDF, filename=f"{job.solver}-{job.key[:12]}.h5")
+
+
+def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> bytes:
+    """Return one stage of a run in a format of the shapes.
+
+    Raises:
+        NotAcceptable: the result is no whole surface.
+        InvalidQuery: it has no such stage.
+
+    """
+    from sweeps.outputs import of_result
+
+    solver = vocabulary.solver_named(job.solver)
+    params = _params(solver, job)
+    stages = [float(value) for value in run["stage"].values]
+    wanted = stages[-1] if stage is None else stage
+    near = min(range(len(stages)), key=lambda i: abs(stages[i] - wanted))
+    if abs(stages[near] - wanted) > 1e-9 * max(1.0, abs(wanted)):
+        advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
+        raise InvalidQuery.of([Wrong("stage", f"the result has no stage {wanted:g}", advice)])
+    if _is_surface(run, job) and "position" not in run and hasattr(params, "surface"):
+        from solver.fruit import lattice
+
+        fresh = params.surface(*lattice(run.sizes["colatitude"]))
+        run["position"] = run["displacement"] + fresh.astype(run["displacement"].dtype)
+    if not _is_surface(run, job) or "position" not in run:
+        advice = f"Ask for {NETCDF}; a job whose need has the field 'position' and no region is a shape."
+        raise NotAcceptable("this result is not a whole surface.", advice=advice)
+    axes = vocabulary.axes(job.solver)
+    shape = replace(of_result(run, {name: params.axis(name) for name in axes}, near), table=str(job.digest))
+    symbol = solver.stages.symbol
+    units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}
+    return chosen.encode(shape, About(job.solver, "", {}, symbol, units))
+
+
+def _params(solver: Solver, job: Job) -> Params:
+    try:
+        return registry.get(solver.name).parse(job.params)
+    except SolverError:
+        raise NotAcceptable(
+            f"the result is of version {job.version} of {solver.name}, whose parameters were others.",
+            advice=f"Ask for {NETCDF}.",
+        ) from None

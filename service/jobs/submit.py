@@ -1,0 +1,116 @@
+"""Asking for a job: checked by the solver's own model and weighed before anything is queued."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from fastapi.datastructures import State
+
+from solver.contract import Need, Params, Quality, Solver
+from store.jobs import Job, JobSpec
+from store.queue import Queue, Quota
+from store.starter import check_own
+from store.store import Store
+
+from ..errors import TooCostly
+from ..settings import Settings
+
+__all__ = ["Submitted", "submit"]
+
+
+class Submitted(NamedTuple):
+    """A job in the queue, and whether it waits now and did not before."""
+
+    job: Job
+    new: bool
+
+    @property
+    def location(self) -> str:
+        """Where the job is asked about."""
+        return f"/v1/jobs/{self.job.key}"
+
+
+def submit(
+    state: State,
+    solver: Solver,
+    params: Mapping[str, Any],
+    need: Need,
+    owner: str,
+    *,
+    preset: str | None = None,
+    again: bool = False,
+    unlimited: bool = False,
+) -> Submitted:
+    """Ask for a run in the name of `owner` (a token's id, checked by the caller); the same question is the same job.
+
+    Args:
+        state: the app's state: `settings` and `tables`.
+        solver: who computes.
+        params: its parameters, over those of `preset`.
+        need: what is needed.
+        owner: whose quota counts.
+        preset: named parameters to start from.
+        again: try once more what was given up.
+        unlimited: for administrators: no quota, no limit of cost.
+
+    Raises:
+        InvalidInput: the solver refuses the parameters or the need.
+        TooCostly: more than the operator allows.
+        QueueFull: too many jobs wait already.
+        MissingStore, ReadOnlyStore: there is no store that could take it.
+
+    """
+    settings: Settings = state.settings
+    check_own(settings.store)
+    values, settled = solver.parse(params, preset), solver.settle(need)
+    if not unlimited:
+        _weigh(solver, values, settled, settings)
+    store: Store = state.tables.store
+    spec = JobSpec.of(solver, values, settled)
+    quota = None if unlimited else Quota(settings.max_jobs, settings.max_jobs_per_token)
+    job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=not store.has(spec.key))
+    return Submitted(job, new)
+
+
+def _weigh(solver: Solver, params: Params, need: Need, settings: Settings) -> None:
+    """Refuse what is too costly, with what would make it cheaper.
+
+    Raises:
+        TooCostly: it is.
+
+    """
+    seconds, memory = _cost(solver, params, need)
+    if seconds > settings.max_job_seconds:
+        what = f"take about {seconds:.0f} s, longer than the {settings.max_job_seconds:g} s"
+    elif memory > settings.max_job_bytes:
+        what = f"need about {memory / 1e9:.3g} GB, more than the {settings.max_job_bytes / 1e9:.3g} GB"
+    else:
+        return
+    raise TooCostly(f"this run would {what} that one job may.", advice=_cheaper(solver, params, need))
+
+
+def _cost(solver: Solver, params: Params, need: Need) -> tuple[float, float]:
+    """Return expected seconds, and the bytes of the memory or of the result, whichever is more."""
+    cost = solver.cost(params, need)
+    # the contract promises nothing about a result's size: here every field counts as vectors on the surface
+    samples = 2 * (need.resolution or 0) ** 2 * 3 * (4 if need.dtype == "float32" else 8)
+    return cost.seconds, max(cost.bytes, samples * len(need.fields) * len(need.stages))
+
+
+def _cheaper(solver: Solver, params: Params, need: Need) -> str:
+    """Say which parts of a need cost what."""
+    order: list[Quality] = ["preview", "default", "fine"]
+    tries = {
+        f"quality {quality!r}": need.model_copy(update={"quality": quality})
+        for quality in order[: order.index(need.quality)]
+    }
+    if len(need.stages) > 1:
+        first = need.stages[:1]
+        tries[f"stage {first[0]:g} alone"] = need.model_copy(update={"stages": first})
+    said = [
+        f"{name} would take about {seconds:.0f} s and {memory / 1e9:.2g} GB"
+        for name, (seconds, memory) in ((name, _cost(solver, params, other)) for name, other in tries.items())
+    ]
+    known = f" ({'; '.join(said)})" if said else ""
+    return f"Lower the quality, the resolution, or the number and reach of the stages{known}."

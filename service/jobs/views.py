@@ -1,0 +1,143 @@
+"""Jobs as the outside sees them: what is sent to ask for one, and what is said of one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from functools import lru_cache
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from solver import registry
+from solver.contract import Cost, Need, SolverError
+from store.canonical import canonical
+from store.jobs import Job, State
+
+from ..problems import URN
+
+__all__ = ["ENDED", "Expected", "Failure", "JobList", "JobRequest", "JobView", "view"]
+
+#: States that a job does not leave by itself.
+ENDED: tuple[State, ...] = ("done", "failed", "cancelled")
+
+
+class JobRequest(BaseModel):
+    """What to compute: a solver, its parameters (over those of a preset), and what of the result is needed."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    solver: str = Field(description="Name of a solver; GET /v1/solvers lists them")
+    preset: str | None = Field(None, description="Named parameters to start from; GET /v1/solvers/{name} lists them")
+    params: dict[str, Any] = Field(default_factory=dict, description="Parameters, and scalar axes as they are queried")
+    need: Need = Field(default_factory=Need, description="What is needed; nothing else is computed")
+    again: bool = Field(False, description="Try once more what was given up")
+
+
+class Progress(BaseModel):
+    """How far a job is."""
+
+    fraction: float = Field(ge=0, le=1, description="0 to 1")
+    message: str = Field("", description="What the solver says it does, where it says anything")
+
+
+class Expected(BaseModel):
+    """What a run is expected to take on this machine."""
+
+    seconds: float = Field(description="Wall time [s]")
+    bytes: int = Field(description="Memory [bytes]")
+
+
+class Failure(BaseModel):
+    """Why a job was given up, in the words of a problem (RFC 9457)."""
+
+    type: str = Field(description="What kind of problem this is", examples=[f"{URN}not-converged"])
+    title: str = Field(description="The kind in words")
+    detail: str = Field(description="What happened")
+    advice: str = Field("", description="What to change")
+    last_stage: float | None = Field(None, description="Last stage that converged, if any")
+
+
+class JobView(BaseModel):
+    """A job. Its id is the hash of what it computes: the same question is the same job, whoever asks."""
+
+    id: str = Field(description="64 hexadecimal digits")
+    solver: str = Field(description="Name of the solver")
+    version: str = Field(description="The solver's version")
+    state: State = Field(description="wanted: it waits; running; done; failed: given up; cancelled")
+    progress: Progress
+    seconds: float | None = Field(None, description="Wall time of the finished run [s]")
+    expected: Expected | None = Field(None, description="What the run is expected to take, where it can be said")
+    attempts: int = Field(description="How often it was begun")
+    created: str = Field(description="When it was first asked for (UTC)")
+    updated: str = Field(description="When it last changed (UTC)")
+    params: dict[str, Any] = Field(description="All parameters")
+    need: dict[str, Any] = Field(description="All that is needed")
+    problem: Failure | None = Field(None, description="Why it failed, or why its last attempt did")
+    links: dict[str, str] = Field(description="Addresses of the job, its events, and its result once it is done")
+
+
+class JobList(BaseModel):
+    """A page of jobs, newest first."""
+
+    jobs: list[JobView]
+    next: str | None = Field(None, description="Address of the next page, if there is one")
+
+
+def view(job: Job) -> JobView:
+    """Return what is said of a job."""
+    own = f"/v1/jobs/{job.key}"
+    links = {"self": own, "events": f"{own}/events"}
+    if job.state == "done":
+        links["result"] = f"{own}/result"
+    return JobView(
+        id=job.key,
+        solver=job.solver,
+        version=job.version,
+        state=job.state,
+        progress=Progress(fraction=job.progress, message=job.message if job.state == "running" else ""),
+        seconds=job.seconds if job.state == "done" else None,
+        expected=_expected(job),
+        attempts=job.attempts,
+        created=_date(job.created),
+        updated=_date(job.updated),
+        params=dict(job.params),
+        need=dict(job.need),
+        problem=_failure(job.error),
+        links=links,
+    )
+
+
+def _failure(error: Mapping[str, Any] | None) -> Failure | None:
+    """Return a ledger's error; what the log should know alone (a traceback) stays inside."""
+    if error is None:
+        return None
+    code = str(error.get("code", "internal-error"))
+    return Failure(
+        type=URN + code,
+        title=code.replace("-", " ").capitalize(),
+        detail=str(error.get("message", "")),
+        advice=str(error.get("advice", "")),
+        last_stage=error.get("last_stage"),
+    )
+
+
+def _expected(job: Job) -> Expected | None:
+    cost = _cost(job.solver, job.version, canonical(job.params), canonical(job.need))
+    return None if cost is None else Expected(seconds=cost.seconds, bytes=cost.bytes)
+
+
+@lru_cache(maxsize=1024)
+def _cost(solver: str, version: str, params: bytes, need: bytes) -> Cost | None:
+    """Return the expected cost; None for a solver that is gone or has changed since."""
+    try:
+        found = registry.get(solver)
+        if found.version != version:
+            return None
+        return found.cost(found.params.model_validate_json(params), Need.model_validate_json(need))
+    except (SolverError, ValueError):
+        return None
+
+
+def _date(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

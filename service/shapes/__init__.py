@@ -1,0 +1,1 @@
+"""`/v1/shapes`: interpolated shapes, one by one and in batches."""

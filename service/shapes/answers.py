@@ -1,0 +1,155 @@
+"""Answers worth keeping: sliders come back to where they were, and pipelines ask again.
+
+A body is kept under its entity tag, which stands for the generation, the question in its one spelling and the format;
+so different spellings share it, and a new generation is never answered with an old one's shape. `Repeats` answers a
+question that came before, in the same words, without waking the router.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from typing import NamedTuple
+
+from starlette.datastructures import State
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from solver.contract import SolverError
+from store.errors import StoreError
+
+from ..errors import ServiceError
+
+__all__ = ["Answer", "Answers", "Question", "Repeats", "matches"]
+
+#: Questions in words whose answer is remembered, and the longest of them [bytes].
+_QUESTIONS, _LONGEST = 4096, 512
+#: Share of the room that one body may take.
+_SHARE = 4
+
+
+class Question(NamedTuple):
+    """A question in the asker's words: path, query string and Accept header."""
+
+    path: str
+    query: bytes
+    accept: bytes
+
+
+class Answer(NamedTuple):
+    """A whole answer: its tag, headers as they go on the wire, and body."""
+
+    tag: str
+    headers: tuple[tuple[bytes, bytes], ...]
+    body: bytes
+
+
+class _Asked(NamedTuple):
+    solver: str
+    table: str | None
+    digest: str
+    tag: str
+    route: object
+
+
+class Answers:
+    """The answers last given, up to `room` bytes of bodies; 0 keeps none. Safe among threads."""
+
+    def __init__(self, room: int) -> None:
+        self._room = room
+        self._held = 0
+        self._bodies: OrderedDict[str, Answer] = OrderedDict()
+        self._asked: OrderedDict[Question, _Asked] = OrderedDict()
+        self._guard = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._bodies)
+
+    @property
+    def held(self) -> int:
+        """Bytes of all bodies."""
+        return self._held
+
+    def get(self, tag: str) -> Answer | None:
+        """Return the answer with a tag, if it is still there."""
+        with self._guard:
+            found = self._bodies.get(tag)
+            if found is not None:
+                self._bodies.move_to_end(tag)
+            return found
+
+    def keep(self, answer: Answer) -> None:
+        """Keep an answer, and let go of those not asked for the longest; one too large for the room is not kept."""
+        size = len(answer.body)
+        if size * _SHARE > self._room:
+            return
+        with self._guard:
+            if answer.tag in self._bodies:
+                return
+            self._bodies[answer.tag] = answer
+            self._held += size
+            while self._held > self._room:
+                self._held -= len(self._bodies.popitem(last=False)[1].body)
+
+    def remember(self, scope: Scope, solver: str, table: str | None, digest: str, tag: str) -> None:
+        """Remember that the words of a request ask for the answer `tag` while the table has that digest."""
+        asked = _question(scope)
+        if len(asked.query) + len(asked.path) + len(asked.accept) > _LONGEST:
+            return
+        with self._guard:
+            self._asked[asked] = _Asked(solver, table, digest, tag, scope.get("route"))
+            self._asked.move_to_end(asked)
+            while len(self._asked) > _QUESTIONS:
+                self._asked.popitem(last=False)
+
+    def repeated(self, scope: Scope, state: State) -> Answer | None:
+        """Return the answer to a question that was asked before in these words, if it still holds."""
+        asked = self._asked.get(_question(scope))
+        if asked is None:
+            return None
+        try:
+            table = state.tables.get(state.tables.choose(asked.solver, asked.table))
+        except (StoreError, ServiceError, SolverError, OSError):
+            return None  # the handler meets the same, and explains it
+        if table.digest != asked.digest:
+            return None
+        found = self.get(asked.tag)
+        if found is not None:
+            scope["route"] = asked.route  # for the log and the metrics
+        return found
+
+
+class Repeats:
+    """Answers repeated questions at once. Only where reading is free: whoever must show a token is asked for it."""
+
+    def __init__(self, app: ASGIApp, state: State) -> None:
+        self.app = app
+        self.state = state
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send what is kept, or that the asker has it; pass on everything else."""
+        found = None
+        if scope["type"] == "http" and scope["method"] == "GET":
+            found = self.state.answers.repeated(scope, self.state)
+        if found is None:
+            await self.app(scope, receive, send)
+            return
+        if matches(_header(scope, b"if-none-match").decode("latin-1"), found.tag):
+            kept = [pair for pair in found.headers if pair[0] in (b"etag", b"cache-control", b"vary")]
+            await send({"type": "http.response.start", "status": 304, "headers": kept})
+            await send({"type": "http.response.body", "body": b""})
+            return
+        await send({"type": "http.response.start", "status": 200, "headers": list(found.headers)})
+        await send({"type": "http.response.body", "body": found.body})
+
+
+def matches(header: str, tag: str) -> bool:
+    """Return whether an If-None-Match header names the tag; the comparison is the weak one, as RFC 9110 has it."""
+    return tag.removeprefix("W/") in {part.strip().removeprefix("W/") for part in header.split(",")}
+
+
+def _question(scope: Scope) -> Question:
+    return Question(scope["path"], scope.get("query_string", b""), _header(scope, b"accept"))
+
+
+def _header(scope: Scope, name: bytes) -> bytes:
+    return b",".join(value for key, value in scope["headers"] if key == name)

@@ -1,0 +1,226 @@
+"""`POST /v1/shapes:batch`: many shapes of one table in one request, for pipelines.
+
+One address for all solvers, with the solver in the body, as for jobs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import chain
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response, StreamingResponse
+
+from solver.contract import SolverError
+from store.errors import StoreError, TooUncertain
+from store.lookup import ShapeTable
+from store.shape import Shape
+
+from .. import problems, vocabulary
+from ..errors import BatchTooLarge, InvalidQuery, OutsideRanges, UncertainBatch, Wrong
+from ..formats import About
+from ..settings import Settings
+from . import batch_formats
+from . import detail as level
+from .batch_formats import Batch
+from .batch_request import BatchRequest, expand
+from .live import LiveTables
+from .query import RESERVED, ShapeQuery, Words, parse
+from .routes import words_of
+
+__all__ = ["router"]
+
+router = APIRouter(tags=["shapes"])
+
+#: Bytes up to which an answer is made before any of it is sent; a longer one is streamed in pieces of this size.
+_PIECE = 1 << 20
+_CONTENT: dict[str, Any] = {
+    media_type: {"schema": {"type": "string", "format": "binary"}} for media_type in batch_formats.MEDIA_TYPES
+}
+
+
+@router.post(
+    "/v1/shapes:batch",
+    summary="Many shapes, interpolated from one table",
+    response_class=Response,
+    responses={
+        200: {"description": "The shapes, in the order asked for", "content": _CONTENT},
+        **problems.responses(400, 404, 406, 413, 422, 500, 503),
+    },
+)
+def batch(request: Request, body: BatchRequest) -> Response:
+    """Interpolate one table at many points and stages, at one level of detail.
+
+    `npz` is one archive with a leading axis over the shapes, `json` one line per shape, the others one part per shape
+    of a multipart/mixed body. Everything is checked before anything is computed, and every wrong entry named.
+    """
+    settings: Settings = request.app.state.settings
+    tables: LiveTables = request.app.state.tables
+    solver = vocabulary.solver_named(body.solver)
+    chosen = batch_formats.negotiate(request.headers.get("accept"), body.format)
+    name = tables.choose(body.solver, body.table)
+    table = tables.get(name)
+    words = words_of(solver, table, settings.max_resolution)
+    detail = level.read(body.detail)
+    # what is wrong with all of them is said first, and alone: it would hide what is wrong with some
+    resolution = detail.resolution(body.resolution, table.resolution, settings.max_resolution)
+    entries = expand(body.points)
+    _check_size(detail, resolution, len(entries), settings)
+    wrong = [*detail.refused(chosen), *_off(body, settings)]
+    if wrong:
+        raise InvalidQuery.of(wrong)
+    queries = _queries(entries, words)
+    # of an archive, positions: the other half of it only for those who name it
+    fields = ("position",) if chosen.name == "npz" and detail.fields is None else detail.of(chosen)
+    _check_fruits(table, queries, "position" in fields)
+    options: dict[str, Any] = {} if body.method is None else {"method": body.method}
+    if body.max_error is not None:
+        _check_trust(table, queries, {**options, "max_error": body.max_error})
+
+    def look_up() -> Iterator[Shape]:
+        for query in queries:
+            yield table.at(
+                query.point, query.stage, resolution=resolution, fields=fields, window=detail.window, **options
+            )
+
+    about = About(
+        solver=body.solver,
+        table=name,
+        fixed=words.fixed,
+        stage_symbol=words.stage,
+        units=words.units,
+        detail=detail.said(resolution, table.resolution),
+    )
+    found = Batch(table, about, queries, resolution, detail.window, fields, look_up)
+    return _answer(batch_formats.encode(chosen, found), batch_formats.media_type(chosen, found))
+
+
+def _answer(parts: Iterator[bytes], media_type: str) -> Response:
+    """Return an answer with its length if it is short, else a stream, which holds no more than a piece of it."""
+    pieces = _gather(parts)
+    first = next(pieces, b"")
+    if len(first) < _PIECE:
+        return Response(first, media_type=media_type)
+    return StreamingResponse(chain([first], pieces), media_type=media_type)
+
+
+def _gather(parts: Iterator[bytes]) -> Iterator[bytes]:
+    """Join parts to pieces, all but the last of them of at least `_PIECE` bytes."""
+    held: list[bytes] = []
+    size = 0
+    for part in parts:
+        held.append(part)
+        size += len(part)
+        if size >= _PIECE:
+            yield b"".join(held)
+            held, size = [], 0
+    if held:
+        yield b"".join(held)
+
+
+def _check_size(detail: level.Detail, resolution: int, count: int, settings: Settings) -> None:
+    """Refuse what is too much for one answer.
+
+    Raises:
+        BatchTooLarge: naming the limit.
+
+    """
+    patch = detail.window.on(resolution)
+    points = count * patch.height * patch.width
+    wrong = []
+    if count > settings.max_batch:
+        advice = f"Send at most {settings.max_batch} at once; an operator raises the limit with WIZEN_MAX_BATCH."
+        wrong.append(Wrong("points", f"{count} shapes are more than {settings.max_batch}", advice))
+    if points > settings.max_batch_samples:
+        most = settings.max_batch_samples // (patch.height * patch.width)
+        advice = (
+            f"At this resolution send at most {most} shapes at once; "
+            "an operator raises the limit with WIZEN_MAX_BATCH_SAMPLES."
+        )
+        said = f"{count} shapes of {patch.height} x {patch.width} points are {points}, more than"
+        wrong.append(Wrong("points", f"{said} {settings.max_batch_samples}", advice))
+    if wrong:
+        raise BatchTooLarge.of(wrong)
+
+
+def _off(body: BatchRequest, settings: Settings) -> list[Wrong]:
+    if body.resolution is None or body.resolution <= settings.max_resolution:
+        return []
+    detail = f"{body.resolution} colatitude samples are more than {settings.max_resolution}"
+    return [Wrong("resolution", detail, "An operator raises the limit with WIZEN_MAX_RESOLUTION.")]
+
+
+def _queries(entries: list[Mapping[str, float]], words: Words) -> list[ShapeQuery]:
+    """Return the questions of all entries.
+
+    Raises:
+        OutsideRanges: listing every number off its axis, where nothing else is wrong.
+        InvalidQuery: listing all that is wrong with any entry.
+
+    """
+    wrong: list[Wrong] = []
+    queries, only_outside = [], True
+    for i, entry in enumerate(entries):
+        common = [Wrong(n, "is not a parameter of one shape", "Give it for all.") for n in RESERVED if n in entry]
+        try:
+            query = parse([(name, repr(value)) for name, value in entry.items()], words, common)
+        except InvalidQuery as error:
+            only_outside = False
+            wrong += _entry(i, error.wrong)
+        else:
+            wrong += _entry(i, query.outside)
+            queries.append(query)
+    if wrong:
+        raise _summed(OutsideRanges if only_outside else InvalidQuery, wrong)
+    return queries
+
+
+def _check_fruits(table: ShapeTable, queries: list[ShapeQuery], wanted: bool) -> None:
+    """Refuse points where no fruit exists though every number is on its axis.
+
+    Raises:
+        InvalidQuery: listing them.
+
+    """
+    wrong: list[Wrong] = []
+    for i, query in enumerate(queries if wanted else []):
+        try:
+            table.fruit(query.point)
+        except SolverError as error:
+            wrong += _entry(i, [Wrong("", error.message, error.advice)])
+    if wrong:
+        raise _summed(InvalidQuery, wrong)
+
+
+def _check_trust(table: ShapeTable, queries: list[ShapeQuery], options: Mapping[str, Any]) -> None:
+    """Refuse shapes that may be too far off.
+
+    Raises:
+        UncertainBatch: listing them.
+
+    """
+    wrong: list[Wrong] = []
+    for i, query in enumerate(queries):
+        try:
+            table.at(query.point, query.stage, fields=(), **options)
+        except TooUncertain as error:
+            wrong += _entry(i, [Wrong("", *_said(error))])
+    if wrong:
+        raise _summed(UncertainBatch, wrong)
+
+
+def _said(error: StoreError) -> tuple[str, str]:
+    return error.message.rstrip("."), error.advice
+
+
+def _entry(i: int, wrong: tuple[Wrong, ...] | list[Wrong]) -> list[Wrong]:
+    """Return what is wrong with entry `i`, named with its number."""
+    return [Wrong(f"points[{i}]" + (f".{w.name}" if w.name else ""), w.detail, w.advice) for w in wrong]
+
+
+def _summed(kind: type[InvalidQuery], wrong: list[Wrong]) -> InvalidQuery:
+    """Return an error that lists all, with a sentence on the first few."""
+    error = kind.of(wrong[:3])
+    more = "" if len(wrong) <= 3 else f" And {len(wrong) - 3} more."
+    return kind(f"{error.message}{more}", advice=error.advice, wrong=wrong)

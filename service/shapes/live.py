@@ -1,0 +1,218 @@
+"""Open tables, kept current: a new generation is taken up between two requests, and none is dropped for it.
+
+Readers hold the `ShapeTable` that they were given until they are done; a swap only changes what the next one is given.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import threading
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from store.errors import CorruptTable, StoreError, UnknownTable
+from store.generations.generation import Judged, judged
+from store.lookup import ShapeTable
+from store.store import Store
+from store.tables import TableInfo, info, path_of
+
+from ..errors import AmbiguousTable, Wrong
+from ..telemetry import LOGGER
+
+__all__ = ["LiveTables"]
+
+#: A manifest as the file system tells it: another inode, time or size is another generation.
+Stamp = tuple[int, int, int]
+
+
+@dataclass
+class _Open:
+    table: ShapeTable
+    stamp: Stamp
+    looked: float
+    complaint: str = ""
+
+
+class LiveTables:
+    """The store's tables by name, each opened when first asked for and looked at again at most every `interval` s."""
+
+    def __init__(self, root: Path, interval: float) -> None:
+        self._root = root
+        self._interval = interval
+        self._open: dict[str, _Open] = {}
+        self._chosen: dict[str, tuple[str, float]] = {}
+        self._opening = threading.Lock()
+        self._looking = threading.Lock()
+        self._store: Store | None = None
+
+    @property
+    def store(self) -> Store:
+        """The store, opened when first needed, so that the service may start before it.
+
+        Raises:
+            MissingStore: there is none yet.
+
+        """
+        if self._store is None or not self._store.tables_dir.is_dir():
+            self._store = Store.open(self._root)
+        return self._store
+
+    def names(self) -> list[str]:
+        """Return the names of all tables.
+
+        Raises:
+            MissingStore: there is no store.
+
+        """
+        return self.store.table_names()
+
+    def info(self, name: str) -> TableInfo:
+        """Return what is known of a table.
+
+        Raises:
+            UnknownTable: there is none of that name.
+            CorruptTable: its manifest is damaged.
+
+        """
+        self._known(name)
+        return info(self.store, name)
+
+    def judged(self, table: TableInfo) -> Judged:
+        """Return what a table says of its own trust, without opening all of it; nothing if it cannot be read."""
+        try:
+            return _judged(path_of(self.store, table))
+        except (CorruptTable, FileNotFoundError):
+            return Judged(None, None)  # /healthz and /v1/shapes complain
+
+    def complaint(self, name: str) -> str:
+        """Return why the newest generation of an open table is not the one that is served, or nothing."""
+        entry = self._open.get(name)
+        return entry.complaint if entry else ""
+
+    def get(self, name: str) -> ShapeTable:
+        """Return the table's newest generation that is open; a newer one is opened meanwhile, for later requests.
+
+        Raises:
+            UnknownTable: there is none of that name, or no longer.
+            CorruptTable: it is damaged, and no older generation is open.
+
+        """
+        entry = self._open.get(name)
+        if entry is None:
+            with self._opening:
+                if name not in self._open:
+                    self._open[name] = self._first(name)
+                return self._open[name].table
+        # one request looks; the others go on with what they have
+        if time.monotonic() - entry.looked >= self._interval and self._looking.acquire(blocking=False):
+            try:
+                self._look(name, entry)
+            finally:
+                self._looking.release()
+        return entry.table
+
+    def choose(self, solver: str, name: str | None = None) -> str:
+        """Return `name`, or else the solver's table: the one of its name, the default, or the only one.
+
+        Raises:
+            UnknownTable: the solver has no table, or none of that name.
+            AmbiguousTable: it has several, none of which goes before the others.
+
+        """
+        if name is not None:
+            found = self._solver(name)
+            if found != solver:
+                raise UnknownTable(
+                    f"table {name!r} belongs to the solver {found!r}, not to {solver!r}.",
+                    f"Ask /v1/shapes/{found}, or choose another table.",
+                )
+            return name
+        chosen, looked = self._chosen.get(solver, ("", -math.inf))
+        if time.monotonic() - looked < self._interval and chosen in self._open:
+            return chosen  # the directory is not listed for every request
+        found = self._usual(solver)
+        self._chosen[solver] = found, time.monotonic()
+        return found
+
+    def is_ready(self, solver: str, name: str | None = None) -> bool:
+        """Return whether `choose` and `get` will find an open table at once."""
+        return (self._chosen.get(solver, ("", 0.0))[0] if name is None else name) in self._open
+
+    def _usual(self, solver: str) -> str:
+        names = self.names()
+        own = [n for n in names if self._belongs(n, solver)]
+        for usual in (solver, "default"):
+            if usual in own:
+                return usual
+        if len(own) == 1:
+            return own[0]
+        if not own:
+            raise UnknownTable(
+                f"there is no table of {solver!r} yet.", "Run a sweep and build a table; GET /v1/tables lists all."
+            )
+        wrong = Wrong("table", f"{solver} has several tables", f"Add table= and one of {', '.join(own)}.")
+        raise AmbiguousTable.of([wrong])
+
+    def _belongs(self, name: str, solver: str) -> bool:
+        try:
+            return self._solver(name) == solver
+        except CorruptTable:
+            return False  # a damaged table must not hide the others
+
+    def _solver(self, name: str) -> str:
+        # a table that is open need not be read again to know whose it is
+        entry = self._open.get(name)
+        return entry.table.info.solver if entry else self.info(name).solver
+
+    def _known(self, name: str) -> None:
+        # before any path is made of it: a name from outside is only compared
+        names = self.names()
+        if name not in names:
+            near = difflib.get_close_matches(name, names, n=1)
+            hint = f"Did you mean {near[0]!r}? " if near else ""
+            raise UnknownTable(f"there is no table {name!r}.", f"{hint}GET /v1/tables lists all.")
+
+    def _stamp(self, name: str) -> Stamp:
+        try:
+            status = (self.store.tables_dir / name / "current.json").stat()
+        except FileNotFoundError:
+            raise UnknownTable(f"there is no table {name!r}.", "GET /v1/tables lists all.") from None
+        return status.st_ino, status.st_mtime_ns, status.st_size
+
+    def _first(self, name: str) -> _Open:
+        self._known(name)
+        # the stamp comes first: a swap in between is then noticed at the next look
+        stamp = self._stamp(name)
+        return _Open(ShapeTable.open(self.store, name), stamp, time.monotonic())
+
+    def _look(self, name: str, entry: _Open) -> None:
+        """See whether there is another generation, and open it on the side: a large one takes seconds to verify."""
+        try:
+            stamp = self._stamp(name)
+        except UnknownTable:
+            self._open.pop(name, None)
+            raise
+        entry.looked = time.monotonic()
+        if stamp != entry.stamp:
+            entry.stamp = stamp
+            threading.Thread(target=self._renew, args=(name, entry, stamp), daemon=True).start()
+
+    def _renew(self, name: str, entry: _Open, stamp: Stamp) -> None:
+        try:
+            table = ShapeTable.open(self.store, name)
+        except (StoreError, OSError) as error:
+            if entry.stamp == stamp:
+                entry.complaint = str(error)
+            LOGGER.error("table %s: keeping the old generation: %s", name, error)
+            return
+        if entry.stamp == stamp:  # else a still newer one is on its way
+            entry.table, entry.complaint = table, ""
+            LOGGER.info("table %s: new generation %s", name, table.digest)
+
+
+@lru_cache(maxsize=256)
+def _judged(path: Path) -> Judged:
+    return judged(path)  # a generation's file never changes

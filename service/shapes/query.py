@@ -1,0 +1,199 @@
+"""A query string as numbers: every parameter checked against the table's words, every wrong one named."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from store.blending import methods
+from store.errors import OutsideTable
+from store.surfaces.measures import Measures
+
+from ..errors import InvalidQuery, Wrong
+from . import detail
+
+__all__ = ["LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
+
+#: Names that are not axes.
+RESERVED = ("resolution", "table", "format", "method", "max_error", "exact", *detail.NAMES)
+
+#: Fewer colatitude samples hold no shape.
+LOWEST_RESOLUTION = 4
+#: How errors are limited: a number, or measure:number, several of them with commas between.
+_LIMIT = rf"(?:(?:{'|'.join(Measures._fields)}):)?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?"
+LIMITS = rf"{_LIMIT}(?:,{_LIMIT})*"
+
+_RESOLUTION = re.compile(r"(\d{1,6})(?:[x×](\d{1,6}))?")
+
+#: Share of a range by which a number may lie outside: round-off of bounds that went through text.
+_SLACK = 1e-9
+
+Range = tuple[float, float]
+
+
+class Words(NamedTuple):
+    """What may be asked: axes and stage with their ranges and units, and the numbers that the table holds fixed."""
+
+    axes: Mapping[str, Range]
+    fixed: Mapping[str, float]
+    stage: str
+    stages: Range
+    units: Mapping[str, str]
+    max_resolution: int
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """All that must be given, with its range."""
+        return {**self.axes, self.stage: self.stages}
+
+    def say(self, name: str) -> str:
+        """Return the range of an axis or of the stage with its units, in words."""
+        low, high = self.ranges[name]
+        units = self.units.get(name, "1")
+        return f"{low:g} to {high:g}" + ("" if units == "1" else f" [{units}]")
+
+
+class ShapeQuery(NamedTuple):
+    """One question: the point on the axes, the stage, and the resolution where one was named.
+
+    `named` are fixed parameters that were given all the same, and `outside` what is off the table: then `point`,
+    `stage` and `named` are a question to the solver, not to the table. `method` is spelt in one way. `max_error` limits
+    errors by measure. `exact`: what the table cannot answer is to be run.
+    """
+
+    point: dict[str, float]
+    stage: float
+    resolution: int | None
+    named: dict[str, float]
+    outside: tuple[Wrong, ...] = ()
+    method: str = methods.DEFAULT
+    max_error: dict[str, float] | None = None
+    exact: bool = False
+
+
+def parse(items: Sequence[tuple[str, str]], words: Words, also: Sequence[Wrong] = ()) -> ShapeQuery:
+    """Return the question that the decoded `items` of a query string ask; it may lie outside the table.
+
+    `also` is what is wrong besides.
+
+    Raises:
+        InvalidQuery: listing every name that is unknown, missing or repeated, and every value that cannot be used.
+
+    """
+    wrong = [*_repeated(items), *also]
+    outside: list[Wrong] = []
+    numbers: dict[str, float] = {}
+    chosen: dict[str, Any] = {"resolution": None}
+    given = dict(items)
+    for name, text in given.items():
+        if name in _READERS:
+            found = _READERS[name](text, words)
+            if isinstance(found, Wrong):
+                wrong.append(found)
+            else:
+                chosen[name] = found
+        elif name in words.ranges or name in words.fixed:
+            number = _number(text)
+            if number is None:
+                wrong.append(Wrong(name, f"{text[:40]!r} is not a finite number", "Write it like 0.05."))
+            else:
+                numbers[name] = number
+                outside += _off(name, number, words)
+        elif name not in RESERVED:
+            wrong.append(_unknown(name, [*words.ranges, *words.fixed, *RESERVED]))
+    for name in words.ranges:
+        if name not in given:
+            wrong.append(Wrong(name, "is missing", f"Add {name}= and a number from {words.say(name)}."))
+    if wrong:
+        raise InvalidQuery.of([*wrong, *outside])
+    point = {name: numbers[name] for name in words.axes}
+    named = {name: value for name, value in numbers.items() if name in words.fixed}
+    return ShapeQuery(point, numbers[words.stage], named=named, outside=tuple(outside), **chosen)
+
+
+def _unknown(name: str, known: Sequence[str]) -> Wrong:
+    near = difflib.get_close_matches(name, known, n=1)
+    advice = f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(known)}."
+    return Wrong(name[:40], "is not a parameter of this table", advice)
+
+
+def _off(name: str, number: float, words: Words) -> list[Wrong]:
+    """Return what is wrong with a number that the table does not reach, or nothing."""
+    if name in words.fixed:
+        held = words.fixed[name]
+        if math.isclose(number, held, rel_tol=_SLACK, abs_tol=1e-12):
+            return []
+        return [Wrong(name, f"this table holds {name} = {held:g} only", f"Leave {name} out, or choose another table.")]
+    low, high = words.ranges[name]
+    slack = _SLACK * (high - low)
+    if low - slack <= number <= high + slack:
+        return []
+    return [Wrong(name, f"{number:g} is off the table's {words.say(name)}", f"Take {name} from {words.say(name)}.")]
+
+
+def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:
+    counts = Counter(name for name, _ in items)
+    return [Wrong(name[:40], "is given more than once", "Give it once.") for name, n in counts.items() if n > 1]
+
+
+def _number(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _resolution(text: str, words: Words) -> int | Wrong:
+    """Return the colatitude samples that `64` or `64x128` name."""
+    highest = words.max_resolution
+    match = _RESOLUTION.fullmatch(text.strip().lower())
+    if match is None:
+        return Wrong("resolution", f"{text[:40]!r} is not a resolution", "Write it like 64 or 64x128.")
+    rows, columns = int(match[1]), match[2]
+    if columns is not None and int(columns) != 2 * rows:
+        advice = f"Ask for {rows} or {rows}x{2 * rows}."
+        return Wrong("resolution", f"{text[:40]}: azimuth has twice as many samples as colatitude", advice)
+    if not LOWEST_RESOLUTION <= rows <= highest:
+        return Wrong(
+            "resolution",
+            f"{rows} colatitude samples are not between {LOWEST_RESOLUTION} and {highest}",
+            f"Ask for {LOWEST_RESOLUTION} to {highest}; an operator raises the limit with WIZEN_MAX_RESOLUTION.",
+        )
+    return rows
+
+
+def _method(text: str, words: Words) -> str | Wrong:
+    """Return the one spelling of a method; a plus that came as a blank, as an unquoted one does, is one."""
+    try:
+        return str(methods.parse(text.replace(" ", "+")))
+    except OutsideTable as error:
+        return Wrong("method", f"{text[:40]!r} is not a method of look-up", error.advice)
+
+
+def _max_error(text: str, words: Words) -> dict[str, float] | Wrong:
+    """Return the limits that `0.05` (of the roughness) or `rgh:0.05,dB:1.5` set."""
+    advice = f"Write it like 0.05, for the roughness, or dB:1.5; measures: {', '.join(Measures._fields)}."
+    pairs = [part.rpartition(":") for part in text.split(",")]
+    limits = {name or "rgh": float(value) for name, _, value in pairs} if re.fullmatch(LIMITS, text) else {}
+    if not limits or not all(map(math.isfinite, limits.values())):
+        return Wrong("max_error", f"{text[:40]!r} limits no error", advice)
+    return limits
+
+
+def _exact(text: str, words: Words) -> bool | Wrong:
+    if text != "run":
+        return Wrong("exact", f"{text[:40]!r} is not run", "Write exact=run, or leave it out.")
+    return True
+
+
+_READERS: Mapping[str, Callable[[str, Words], Any]] = {
+    "resolution": _resolution,
+    "method": _method,
+    "max_error": _max_error,
+    "exact": _exact,
+}

@@ -1,0 +1,244 @@
+"""`GET /v1/shapes/{solver}`: one interpolated shape in the representation that the asker prefers."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+from urllib.parse import urlencode
+from weakref import WeakKeyDictionary
+
+from fastapi import APIRouter, Path, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from solver import __version__
+from solver.contract import Solver
+from store.canonical import canonical
+from store.errors import TooUncertain
+from store.lookup import ShapeTable
+
+from .. import problems, vocabulary
+from ..errors import OutsideRanges
+from ..formats import FORMATS, About, Format, negotiate
+from ..settings import Settings
+from . import detail as level
+from . import exact
+from .answers import Answer, Answers, matches
+from .live import LiveTables
+from .query import ShapeQuery, Words, parse
+
+__all__ = ["at_once", "router", "words_of"]
+
+router = APIRouter(tags=["shapes"])
+
+#: Formats and largest lattice [colatitudes] of shapes that take less time than to hand them to another thread and wait
+#: for the interpreter there.
+_QUICK = ("points", "npz", "json")
+_SMALL = 128
+
+#: The words of the tables in use, which one application serves with one limit.
+_kept_words: WeakKeyDictionary[ShapeTable, Words] = WeakKeyDictionary()
+
+_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()}
+
+
+@router.get(
+    "/v1/shapes/{solver}",
+    summary="One shape, interpolated from a table",
+    response_class=Response,
+    responses={
+        200: {"description": "The shape", "content": _CONTENT},
+        303: exact.RESPONSE,
+        304: {"description": "The shape that the asker has is the current one"},
+        **problems.responses(401, 403, 404, 406, 409, 413, 414, 422, 429, 500, 503, 507),
+    },
+)
+async def shape(
+    request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")
+) -> Response:
+    """Interpolate the table at a point of its axes and a stage.
+
+    Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Every answer
+    says what error to expect (`expected_error`, by measure) and whether it lies between the runs (`inside`);
+    `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table.
+    """
+    found = await at_once(request, solver)
+    return await run_in_threadpool(_shape, request, solver) if found is None else found
+
+
+async def at_once(request: Request, solver: str) -> Response | None:
+    """Return a shape that is computed in the event loop, in its turn; None for what is better done in a thread.
+
+    Raises:
+        ServiceError, StoreError, SolverError: as `_ask` and `_settle`, or too many wait already.
+
+    """
+    if not request.app.state.tables.is_ready(solver, request.query_params.get("table")):
+        return None  # opening a large table takes seconds
+    asked = _ask(request, solver)
+    if not asked.is_quick:
+        return None
+    async with request.app.state.turns:
+        return _settle(request, asked)
+
+
+class _Asked(NamedTuple):
+    """A question understood: what to look up where, and in which format to send it."""
+
+    solver: Solver
+    name: str
+    table: ShapeTable
+    words: Words
+    query: ShapeQuery
+    detail: level.Detail
+    chosen: Format
+    resolution: int
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether a shape is small, and no job is to be asked for."""
+        return self.resolution <= _SMALL and self.chosen.name in _QUICK and not self.query.exact
+
+
+def _shape(request: Request, solver: str) -> Response:
+    return _settle(request, _ask(request, solver))
+
+
+def _ask(request: Request, solver: str) -> _Asked:
+    """Return the question of a request.
+
+    Raises:
+        ServiceError, StoreError: it cannot be understood, or there is no table for it.
+
+    """
+    settings: Settings = request.app.state.settings
+    tables: LiveTables = request.app.state.tables
+    given = request.query_params
+    known = vocabulary.solver_named(solver)
+    chosen = negotiate(request.headers.get("accept"), given.get("format"))
+    name = tables.choose(solver, given.get("table"))
+    table = tables.get(name)
+    words = _kept_words.get(table)
+    if words is None:
+        words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
+    detail = level.read(given)
+    query = parse(given.multi_items(), words, detail.refused(chosen))
+    resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
+    return _Asked(known, name, table, words, query, detail, chosen, resolution)
+
+
+def _settle(request: Request, asked: _Asked) -> Response:
+    """Return the shape, or send its asker to the run of it."""
+    try:
+        if asked.query.outside:
+            raise OutsideRanges.of(asked.query.outside)
+        return _answer(request, asked)
+    except (OutsideRanges, TooUncertain) as error:
+        if not asked.query.exact:
+            raise exact.offered(error) from None
+        return exact.redirect(request, asked.solver, asked.table, asked.query, asked.chosen)
+
+
+def _answer(request: Request, asked: _Asked) -> Response:
+    """Return the shape, or that the asker has it already.
+
+    Raises:
+        TooUncertain: it would be worse than the query allows.
+
+    """
+    settings: Settings = request.app.state.settings
+    answers: Answers = request.app.state.answers
+    solver, name, table, words, query, detail, chosen, resolution = asked
+    tag = _tag(chosen, name, table.digest, query, resolution, *detail.key)
+    headers = {
+        "ETag": tag,
+        "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
+        "Vary": "Accept",
+    }
+    if matches(request.headers.get("if-none-match", ""), tag):
+        return Response(status_code=304, headers=headers)
+    kept = answers.get(tag)
+    if kept is not None:
+        answers.remember(request.scope, solver.name, request.query_params.get("table"), table.digest, tag)
+        return _whole(kept)
+
+    begin = time.perf_counter()
+    found = table.at(
+        query.point,
+        query.stage,
+        resolution=resolution,
+        fields=detail.of(chosen),
+        method=query.method,
+        max_error=query.max_error,
+        window=detail.window,
+    )
+    looked = time.perf_counter()
+    about = About(
+        solver=solver.name,
+        table=name,
+        fixed=words.fixed,
+        stage_symbol=words.stage,
+        units=words.units,
+        detail=detail.said(resolution, table.resolution),
+        links=_links(request, resolution, detail) if chosen.name == "json" else {},
+        timings={"lookup": 1e3 * (looked - begin)},
+    )
+    body = chosen.encode(found, about)
+    encoded = time.perf_counter()
+    timing = f"lookup;dur={1e3 * (looked - begin):.3f}, encode;dur={1e3 * (encoded - looked):.3f}"
+    if chosen.name == "json":  # its timings and its links are this request's own
+        return Response(body, headers={**headers, "Server-Timing": timing}, media_type=chosen.media_type)
+    headers["Content-Disposition"] = f'attachment; filename="{_filename(solver.name, query, words.stage, chosen)}"'
+    headers["Content-Type"], headers["Content-Length"] = chosen.media_type, str(len(body))
+    wire = tuple((key.lower().encode("latin-1"), value.encode("latin-1")) for key, value in headers.items())
+    made = Answer(tag, (*wire, (b"server-timing", b"kept;desc=answered-before")), body)
+    answers.keep(made)
+    answers.remember(request.scope, solver.name, request.query_params.get("table"), table.digest, tag)
+    return _whole(Answer(tag, (*wire, (b"server-timing", timing.encode("latin-1"))), body))
+
+
+def _whole(answer: Answer) -> Response:
+    """Return an answer as a response; its headers are complete."""
+    response = Response(answer.body)
+    response.raw_headers = list(answer.headers)
+    return response
+
+
+def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
+    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers."""
+    described = vocabulary.axes(solver.name)
+    fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
+    units = {name: described[name].units for name in (*table.axes, *fixed) if name in described}
+    return Words(
+        axes=table.axes,
+        fixed=fixed,
+        stage=solver.stages.symbol,
+        stages=table.reach,
+        units={**units, solver.stages.symbol: solver.stages.units},
+        max_resolution=max_resolution,
+    )
+
+
+def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int, *detail: str) -> str:
+    """Return the entity tag; JSON carries timings, so its bytes differ and its tag is a weak one."""
+    words = [__version__, chosen.name, name, digest, query.point, query.stage, resolution, *detail]
+    words += [query.method, query.max_error]
+    text = hashlib.sha256(canonical(words)).hexdigest()[:32]
+    return f'W/"{text}"' if chosen.name == "json" else f'"{text}"'
+
+
+def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str, str]:
+    """Return the addresses of this shape's other representations that can hold it, relative to this host."""
+    settled = ("format", "resolution", "screen_px", "distance", "fov")
+    kept = [(k, v) for k, v in request.query_params.multi_items() if k not in settled]
+    others = [name for name, chosen in FORMATS.items() if name != "json" and not detail.refused(chosen)]
+    pairs = [*kept, ("resolution", str(resolution))]
+    return {name: f"{request.url.path}?{urlencode([*pairs, ('format', name)])}" for name in others}
+
+
+def _filename(solver: str, query: ShapeQuery, symbol: str, chosen: Format) -> str:
+    numbers: Mapping[str, float] = {**query.point, symbol: query.stage}
+    return "-".join([solver, *(f"{name}{value:g}" for name, value in numbers.items())]) + chosen.suffix

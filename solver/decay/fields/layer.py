@@ -1,0 +1,120 @@
+"""One organism and its nutrient on the surface: a state, and one symmetric step of all that happens to it.
+
+Strang splitting, second order: half of [react, spread, react], the nutrient's diffusion, half again. Reaction and
+spreading run over the listed vertices only (where something lives, and a few rings about it): they cost what is
+infected. The nutrient's diffusion runs everywhere, with three to five stages per step.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..surfaces.surface import Surface
+from .diffusion import Links, linked, listed_around, rkl2, stages_for
+from .rates import Rates
+from .reaction import react
+
+__all__ = ["Layer", "State"]
+
+Array = NDArray[np.float64]
+
+#: Rings about what lives that a step may reach; beyond them densities fall doubly exponentially (D ~ u).
+_RINGS = 3
+#: Density below which nothing lives, over d2.
+_CUT = 1e-8
+_NO_ROT: Array = np.empty(0)
+
+
+class State(NamedTuple):
+    """Active u, inactive v and nutrient n, each (v), and the mean density that was added from outside."""
+
+    u: Array
+    v: Array
+    n: Array
+    added: float
+
+
+class Layer:
+    """An organism on a surface. `coarse` (v) is the random factor 1 + delta on motility, Eq. 5."""
+
+    def __init__(self, surface: Surface, rates: Rates, fresh: Array, coarse: Array) -> None:
+        self.surface, self.rates = surface, rates
+        self._coarse = coarse
+        self._all = np.arange(len(fresh))
+        self._everywhere = self._linked(np.ones_like(fresh), _NO_ROT, self._all)
+        zero = np.zeros_like(fresh)
+        self.fresh = State(zero, zero, fresh, 0.0)
+        self._store = rates.theta * surface.mean(fresh)
+
+    def share(self, state: State) -> Array:
+        """Return u + v over what the nutrient n = 1 can feed: the organism's map, 0 to 1."""
+        return np.minimum((state.u + state.v) / self.rates.theta, 1.0)
+
+    def advance(self, state: State, dt: float, rot: Array = _NO_ROT, rates: Rates | None = None) -> State:
+        """Return the state dt [day] later. rot (v): the map whose gate says where the organism may spread.
+
+        rates: those of this step, where the weather changes them.
+        """
+        rates = rates or self.rates
+        u, v, n = state.u.copy(), state.v.copy(), state.n.copy()
+        s = self.surface
+        listed = listed_around(u, _CUT * self.rates.cap, _RINGS, s.start, s.near)
+        self._half(u, v, n, listed, dt / 2, rot, rates)
+        if rates.feed > 0:
+            stages = stages_for(dt, rates.feed * s.stiffest)
+            rkl2(n, self._everywhere, rates.feed, 0.0, dt, stages, self._all, s.area)
+        self._half(u, v, n, listed, dt / 2, rot, rates)
+        return State(u, v, n, state.added)
+
+    def _half(
+        self,
+        u: Array,
+        v: Array,
+        n: Array,
+        listed: NDArray[np.int64],
+        dt: float,
+        rot: Array,
+        rates: Rates,
+    ) -> None:
+        s = self.surface
+        if not len(listed):
+            return
+        react(u, v, n, listed, dt / 2, rates)
+        c = self._coarse * n
+        # two stages would be stable but less accurate
+        stages = max(3, stages_for(dt, rates.fastest * s.stiffest * float(c[listed].max())))
+        rkl2(u, self._linked(c, rot, listed), rates.mobility, rates.cap, dt, stages, listed, s.area)
+        react(u, v, n, listed, dt / 2, rates)
+
+    def _linked(self, c: Array, rot: Array, listed: NDArray[np.int64]) -> Links:
+        s = self.surface
+        return linked(c, rot, listed, s.start, s.near, s.weight, s.area)
+
+    def seeded(self, state: State, centre: Array, radius: float, gate: Array | None = None) -> State:
+        """Return the state with a new colony: a smooth bump of height d2 about a point (3), times the gate.
+
+        Its total does not depend on the mesh; a mesh coarser than the bump takes it all at the nearest vertex.
+        """
+        far = ((self.surface.points - centre) ** 2).sum(axis=1)
+        nearest = int(np.argmin(far))
+        bump = np.clip(1 - far / radius**2, 0, None) ** 2
+        bump[nearest] = max(bump[nearest], 1e-3)
+        whole = self.surface.total(bump)
+        if gate is not None:
+            bump *= gate
+        bump *= self.rates.cap * np.pi * radius**2 / 3 / whole
+        return state._replace(u=state.u + bump, added=state.added + self.surface.mean(bump))
+
+    def painted(self, state: State, share: Array) -> State:
+        """Return the state with colonies of height d2 where share (v), 0 to 1, is 1."""
+        more = self.rates.cap * share
+        return state._replace(u=state.u + more, added=state.added + self.surface.mean(more))
+
+    def budget_error(self, state: State) -> float:
+        """Return what is missing of theta n + u + v, over what there was and what was added."""
+        total = self.surface.mean(self.rates.theta * state.n + state.u + state.v)
+        there = self._store + state.added
+        return abs(total - there) / there

@@ -1,0 +1,167 @@
+"""Where the surface is in a stage: as fresh, moved with a body that lost water and rotted, or as a table says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...contract import Context, InvalidInput, Need
+from ...fruit import lattice, window
+from ..environment import water_lost
+from ..fields.system import laid
+from ..params import DecayParams
+from ..settings import BODY, Settings, moved
+from . import dried
+from .imported import extent_of
+from .surface import Surface, extent, geodesic
+
+if TYPE_CHECKING:
+    from ..body.equilibrium import Balance
+    from ..body.skin import Settled
+
+__all__ = ["Shape"]
+
+Array = NDArray[np.float64]
+
+
+class _Settled(NamedTuple):
+    """A body and how far its skin stands off from it."""
+
+    balance: Balance | None
+    folds: Settled | None
+
+
+class Shape:
+    """What the need asks of the fruit's shape, water lost included; nothing else is laid, filled or settled.
+
+    surface: the mesh that was laid, if one had to be.
+    """
+
+    def __init__(self, params: DecayParams, need: Need, settings: Settings) -> None:
+        self._params, self._need = params, need
+        self._wanted = set(need.fields)
+        moves = moved(params, self._wanted)
+        meshed = not {"volume", "mesh_position", "triangle"}.isdisjoint(self._wanted)
+        self._dries = params.body == "table" and not BODY.isdisjoint(self._wanted)
+        self._rays = geodesic(settings.cells)[0] if self._dries and meshed else None
+        own = params.mesh is not None
+        self.surface = laid(params, settings.cells) if moves or meshed or own else None
+        # an open patch does not say how much it closes: water is lost by the fruit of the parameters
+        self._closed = extent_of(self.surface) if own and self.surface is not None else extent(params)
+        self._extent = self._closed or extent(params)
+        self._body = self._wrinkles = None
+        self._node: _Settled = _Settled(None, None)
+        if moves and self.surface is not None:
+            from ..body.body import Body
+
+            self._body = Body(params, self.surface, settings.cells, settings.layers, settings.balance)
+            if params.skin is not None:
+                from ..body.wrinkles import Wrinkles
+
+                self._wrinkles = Wrinkles(params, params.skin, self._body, settings)
+
+    def check(self, context: Context) -> None:
+        """Refuse, before any step, what no table can answer.
+
+        Raises:
+            InvalidInput: the need names the flesh, or the fruit on the last day lies outside the table; or it asks an
+                imported mesh for what only the fruit has.
+
+        """
+        if self._params.mesh is not None:
+            if "displacement" in self._wanted or self._need.region is not None:
+                raise InvalidInput(
+                    "an imported mesh has no lattice of colatitudes.",
+                    advice="Ask for fields without a region, and no displacement.",
+                )
+            if "volume" in self._wanted and self._closed is None:
+                raise InvalidInput("an open mesh has no volume.", advice="Close it, or leave the volume out.")
+        if self._dries:
+            dried.check(self._params, self._need)
+            dried.displaced(self._params, self._lost(self._need.stages[-1]), 4, context)
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """Faces (f, 3) of the surface whose vertices are `mesh_position`."""
+        assert self.surface is not None
+        return self.surface.faces.astype(np.int32)
+
+    def at(self, day: float, rot: Array | None, context: Context) -> dict[str, Any]:
+        """Return the wanted shape of a day, with rot (v) on the surface's vertices.
+
+        Raises:
+            NotConverged: body or skin found no equilibrium.
+            InvalidInput: the table of dried fruits does not reach there.
+
+        """
+        wanted, need = self._wanted, self._need
+        row: dict[str, Any] = {}
+        if "water_lost" in wanted:
+            row["water_lost"] = self._lost(day)
+        (balance, folds), found = self._settled(day, rot, context)
+        row |= found
+        if "least_jacobian" in wanted:
+            row["least_jacobian"] = balance.least_jacobian if balance else 1.0
+        if wanted & {"position", "displacement"}:
+            assert need.resolution is not None  # settled
+            inside = window(need.resolution, need.region)
+            fresh = self._params.surface(*lattice(need.resolution))
+            gone = self._body.on_lattice(balance, need.resolution) if self._body and balance else np.zeros_like(fresh)
+            if self._dries:
+                gone = self._dried(day, need.resolution, context)
+            if self._wrinkles and folds is not None:
+                gone = gone + self._wrinkles.on_lattice(folds.points, need.resolution)
+            for name, values in (("position", fresh + gone), ("displacement", gone)):
+                if name in wanted:
+                    row[name] = values[inside].astype(need.dtype)
+        if wanted & {"mesh_position", "volume"}:
+            assert self.surface is not None
+            points = self.surface.points
+            if self._body and balance:
+                points = points + self._body.on_surface(balance)
+            if self._wrinkles and folds is not None:
+                points = points + self._wrinkles.on_surface(folds.points)
+            if self._rays is not None:
+                points = points + dried.at_rays(self._dried(day, dried.ROWS, context), self._rays)
+            if "mesh_position" in wanted:
+                row["mesh_position"] = points.astype(need.dtype)
+            if "volume" in wanted:
+                # an imported mesh may be wound either way
+                own = self._closed if self._params.mesh is not None else None
+                row["volume"] = own.volume if own else _volume(points, self.surface)
+        return row
+
+    def follow(self, day: float, rot: Array | None, context: Context) -> None:
+        """Settle a day of the march: later days, stages among them, start from its shape.
+
+        Raises:
+            NotConverged: body or skin found no equilibrium.
+
+        """
+        self._node, _ = self._settled(day, rot, context)
+
+    def _settled(self, day: float, rot: Array | None, context: Context) -> tuple[_Settled, dict[str, Any]]:
+        """Return the moved shape of a day, and what is kept of how it was found."""
+        if self._body is None:
+            return _Settled(None, None), {}
+        watch, before = context.check_cancelled, self._node
+        balance = self._body.settled(self._body.state(self._lost(day), rot), before.balance, watch)
+        row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
+        folds = None
+        if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:
+            folds = self._wrinkles.at(balance, before.folds, watch)
+            row["skin_residual"], row["skin_steps"] = folds.residual, folds.steps
+        return _Settled(balance, folds), row
+
+    def _dried(self, day: float, resolution: int, context: Context) -> Array:
+        return dried.displaced(self._params, self._lost(day), resolution, context)
+
+    def _lost(self, day: float) -> float:
+        return water_lost(self._params, self._extent, day)
+
+
+def _volume(points: Array, surface: Surface) -> float:
+    a, b, c = (points[surface.faces[:, k]] for k in range(3))
+    return float(np.sum(a * np.cross(b, c))) / 6

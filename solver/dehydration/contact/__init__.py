@@ -1,0 +1,1 @@
+"""Self-contact of the skin for an explicit march with unit steps."""

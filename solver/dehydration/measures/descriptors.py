@@ -1,0 +1,112 @@
+"""What a wrinkled surface is like, in a handful of numbers that converge where the pattern itself is chaotic."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ...fruit import Fruit, lattice
+from ..fresh.mesh import FruitMesh, Sampler
+from .harmonics import analyse, power, quadrature, remove_low
+
+__all__ = ["Descriptors", "Surface"]
+
+Array = NDArray[np.float64]
+
+#: Degrees below this are the shape of the fruit (size, shift, ellipticity), not wrinkles.
+LOWEST_DEGREE = 3
+#: Lattice and degree of the analysis; buckles of a skin of 0.005 have degree 100.
+RESOLUTION, DEGREE = 128, 120
+#: Amplitude below which a surface counts as smooth: no degree, wavelength or buckle is read from noise.
+SMOOTH = 1e-5
+
+
+class Descriptors(NamedTuple):
+    """One stage's numbers; units as in `solver.quantities`."""
+
+    mean_radius: float
+    volume: float
+    roughness: float
+    dominant_degree: float
+    wavelength: float
+    buckle_count: int
+    ridge_anisotropy: float
+
+
+class Surface:
+    """Reads descriptors and lattice fields from the nodes of a mesh's outer surface."""
+
+    def __init__(self, fruit: Fruit, mesh: FruitMesh) -> None:
+        self._mesh = mesh
+        self._sampler = Sampler(mesh.sphere, RESOLUTION)
+        theta, phi = lattice(RESOLUTION)
+        self._fresh = fruit.surface(theta, phi)
+        self._ray = self._fresh / np.linalg.norm(self._fresh, axis=-1, keepdims=True)
+        self._fresh_nodes = mesh.positions[mesh.surface_nodes]
+        self._weight = np.repeat(quadrature(RESOLUTION)[:, None], 2 * RESOLUTION, axis=1)
+        along = np.linalg.norm(np.gradient(self._fresh, np.pi / RESOLUTION, axis=0), axis=-1)
+        around = np.linalg.norm(_around(self._fresh), axis=-1)
+        self._metric = along, around
+        self._area = along * around
+        self._tree = cKDTree(mesh.rays)
+
+    def describe(self, nodes: Array) -> Descriptors:
+        """Return the descriptors of the deformed surface nodes (nc, 3), units of r1."""
+        shift = self._sampler(nodes - self._fresh_nodes)
+        position = self._fresh + shift
+        area = self._area / self._area.sum()
+        mean_radius = float((area * np.linalg.norm(position, axis=-1)).sum())
+        radial = np.einsum("tpi,tpi->tp", shift, self._ray)
+        wrinkles = remove_low(radial, LOWEST_DEGREE)
+        spectrum = power(analyse(radial, DEGREE))[LOWEST_DEGREE:]
+        roughness = float(np.sqrt(spectrum.sum()))
+        volume = self._volume(nodes)
+        if roughness < SMOOTH:
+            return Descriptors(mean_radius, volume, roughness, 0.0, 0.0, 0, 0.0)
+        degrees = np.arange(LOWEST_DEGREE, DEGREE + 1)
+        degree = float((degrees * spectrum).sum() / spectrum.sum())
+        wavelength = 2 * np.pi * mean_radius / np.sqrt(degree * (degree + 1))
+        return Descriptors(
+            mean_radius,
+            volume,
+            roughness,
+            degree,
+            float(wavelength),
+            self._count(nodes, roughness, degree),
+            self._anisotropy(wrinkles),
+        )
+
+    def _volume(self, nodes: Array) -> float:
+        corners = nodes[self._mesh.sphere.quads]
+        # a bilinear quad's flux is that of the mean of its two triangulations
+        a, b, c, d = np.moveaxis(corners, 1, 0)
+        flux = sum(np.einsum("qi,qi->q", p, np.cross(q, r)) for p, q, r in ((a, b, c), (a, c, d), (a, b, d), (b, c, d)))
+        return float(np.sum(flux) / 12)
+
+    def _count(self, nodes: Array, roughness: float, degree: float) -> int:
+        """Count inward buckles: nodes lowest within a third of a wavelength and below half the rms."""
+        depth = np.einsum("ni,ni->n", nodes - self._fresh_nodes, self._mesh.rays)
+        depth -= depth.mean()
+        radius = 2 * np.sin(np.pi / degree * 0.35)
+        low = np.flatnonzero(depth < -0.5 * roughness)
+        around = self._tree.query_ball_point(self._mesh.rays[low], radius)
+        return int(sum(depth[i] <= depth[near].min() for i, near in zip(low, around, strict=True)))
+
+    def _anisotropy(self, wrinkles: Array) -> float:
+        along, around = self._metric
+        slope_along = np.gradient(wrinkles, np.pi / RESOLUTION, axis=0) / along
+        slope_around = _around(wrinkles) / around
+        weight = self._area.copy()
+        weight[: RESOLUTION // 16] = weight[-RESOLUTION // 16 :] = 0  # directions lose their meaning at the poles
+        a = float((weight * slope_along**2).sum())
+        b = float((weight * slope_around**2).sum())
+        return (b - a) / (b + a)
+
+
+def _around(field: Array) -> Array:
+    """Return the derivative along the periodic azimuth (axis 1)."""
+    step = np.pi / RESOLUTION
+    return (np.roll(field, -1, axis=1) - np.roll(field, 1, axis=1)) / (2 * step)

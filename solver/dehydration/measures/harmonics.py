@@ -1,0 +1,66 @@
+"""Spherical-harmonic analysis of fields on the cell-centred lattice of `solver.fruit`."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import sph_harm_y
+
+from ...fruit import colatitudes
+
+__all__ = ["analyse", "power", "quadrature", "remove_low"]
+
+Array = NDArray[np.float64]
+
+
+@lru_cache(maxsize=8)
+def quadrature(resolution: int) -> Array:
+    """Return Fejer weights (resolution,) for the integral over cos(colatitude), summing to 2; exact to degree n - 1."""
+    theta = colatitudes(resolution)
+    k = np.arange(1, resolution // 2 + 1)
+    series = (np.cos(2 * np.outer(theta, k)) / (4 * k**2 - 1)).sum(axis=1)
+    weights = 2 / resolution * (1 - 2 * series)
+    weights.flags.writeable = False
+    return weights
+
+
+@lru_cache(maxsize=4)
+def _legendre(resolution: int, degree: int) -> Array:
+    """Return orthonormal Y_lm(colatitude, 0) as (m, l, resolution); zero where l < m."""
+    theta = colatitudes(resolution)
+    table = np.zeros((degree + 1, degree + 1, resolution))
+    for m in range(degree + 1):
+        table[m, m:] = sph_harm_y(np.arange(m, degree + 1)[:, None], m, theta[None, :], 0.0).real
+    table.flags.writeable = False
+    return table
+
+
+def analyse(field: Array, degree: int) -> NDArray[np.complex128]:
+    """Return coefficients (m, l) of a real field (n, 2n) on the unit sphere, l up to `degree` (at most n - 1).
+
+    Exact where l plus the field's own degree is below n; beyond that the finest degrees alias, as in any quadrature.
+    """
+    n = len(field)
+    rings = np.fft.rfft(field, axis=1)[:, : degree + 1] * (np.pi / n)
+    # without BLAS (no optimize): its rounding depends on the number of threads, and results must not
+    return np.einsum("mlt,tm->ml", _legendre(n, degree), rings * quadrature(n)[:, None])
+
+
+def power(coefficients: NDArray[np.complex128]) -> Array:
+    """Return the mean square of the field carried by each degree l (Parseval over the sphere's area 4 pi)."""
+    twice = np.full(len(coefficients), 2.0)
+    twice[0] = 1.0
+    return (twice[:, None] * np.abs(coefficients) ** 2).sum(axis=0) / (4 * np.pi)
+
+
+def remove_low(field: Array, lowest: int) -> Array:
+    """Return the field (n, 2n) without its degrees l < `lowest`."""
+    n = len(field)
+    coefficients = analyse(field, lowest - 1)
+    table = _legendre(n, lowest - 1)
+    rings = np.einsum("mlt,ml->tm", table, coefficients)
+    spectrum = np.zeros((n, n + 1), dtype=complex)
+    spectrum[:, : rings.shape[1]] = rings
+    return field - np.fft.irfft(spectrum, n=2 * n, axis=1) * (2 * n)

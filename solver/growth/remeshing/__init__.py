@@ -1,0 +1,1 @@
+"""Remeshing by the rest metric: edges collapse, split and flip."""

@@ -1,0 +1,45 @@
+"""Remeshing after a step: short rest edges collapse, long ones are cut, and thin triangles turn over."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..state import State
+from .collapses import collapse
+from .cuts import cut
+from .flips import flip
+
+__all__ = ["remesh"]
+
+Ints = NDArray[np.int64]
+
+#: Rest edges shorter than this share of the longest allowed are removed: a cut leaves no less than half.
+_SHORT = 0.25
+
+
+def remesh(state: State, longest: float, most: int) -> Generator[None, None, tuple[State, list[Ints]]]:
+    """Find the state without rest edges above `longest` or far below it, edges turned over where that helps.
+
+    Yields after pieces of the work; the generator's value is the state and, with it, the changes: for each vertex
+    (n', 2) the two before in the middle of which it lies, twice the same where it was there. Beyond `most` vertices
+    nothing is cut.
+    """
+    changes: list[Ints] = []
+    coarser, left = collapse(state, longest * _SHORT)
+    if coarser is not state:
+        state = coarser
+        changes.append(np.stack([left, left], -1))
+    yield
+    while len(state.x) < most:
+        finer, ends = cut(state, longest)
+        if finer is state:
+            break
+        stayed = np.arange(len(state.x))
+        changes.append(np.concatenate([np.stack([stayed, stayed], -1), ends]))
+        state = finer
+        yield
+    yield
+    return flip(state), changes

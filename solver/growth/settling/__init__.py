@@ -1,0 +1,1 @@
+"""The search for equilibrium after a step of growth."""

@@ -1,0 +1,218 @@
+"""The energy of one growth step: membrane, bending, pressure as a dead load, solids as penalties, held vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import shell
+from ...shell.dissection import Fronts
+from ...shell.inverse import Inverse, fronts_of, inverse_of
+from ...shell.normals import normals
+from ..params import Bending, Plane, SolidBall
+from ..state import State
+
+__all__ = ["StepEnergy", "Tangent", "ahead", "elastic"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
+_SHIFT = 1e-5
+#: An inverse outlives so many remeshings, and so many times its vertices.
+_LAYERS, _MORE = 12, 1.3
+#: Stiffness of a membrane's vertex [mu]: about the diagonal of six equilateral triangles.
+_STIFFEST = 10.0
+#: How far vertices move before contact looks for its pairs again, over the distance.
+_SLACK = 0.5
+#: Penalty of solids per area and depth [mu / l^2].
+_HARDNESS = 30.0
+
+
+class Tangent:
+    """Pattern, order of elimination and last inverse of one topology; outlives the growth steps between remeshings."""
+
+    def __init__(self, mesh: shell.Topology, inverse: Inverse | None = None) -> None:
+        self.mesh = mesh
+        self.fronts: Fronts | None = None
+        self.inverse = inverse
+
+    @cached_property
+    def pattern(self) -> shell.Pattern:
+        """Where blocks go."""
+        return shell.pattern(self.mesh)
+
+    def copy(self) -> Tangent:
+        """Return a tangent that starts from this one's inverse, and may take another."""
+        found = Tangent(self.mesh, self.inverse)
+        found.fronts = self.fronts
+        if "pattern" in self.__dict__:
+            found.__dict__["pattern"] = self.pattern
+        return found
+
+    def remeshed(self, mesh: shell.Topology, pairs: Ints) -> Tangent:
+        """Return the tangent of a mesh whose vertices lie in the middle of `pairs` (n', 2) of this one's."""
+        kept = self.inverse
+        if kept is not None and (len(kept.parents) >= _LAYERS or len(pairs) > _MORE * len(kept.normals)):
+            kept = None
+        return Tangent(mesh, kept.remeshed(pairs) if kept else None)
+
+
+def elastic(state: State, material: shell.Material, bending: Bending) -> float:
+    """Return the energy of stretching and bending of a state, in mu l^2."""
+    return StepEnergy(state, material, 0.0, (), Tangent(state.mesh), bending=bending)(state.x)[0]
+
+
+def ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
+    """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
+    if state.drift is None:
+        return state.x
+    x = state.x + dt * state.drift
+    if float(np.abs(x - state.x).max()) > energy.longest:
+        return state.x
+    least = energy(state.x)[0]
+    return x if energy(x)[0] < least else state.x
+
+
+class StepEnergy:
+    """Energy of positions (n, 3) against a state's rest metrics and angles, in mu l^2."""
+
+    def __init__(
+        self,
+        state: State,
+        material: shell.Material,
+        pressure: float,
+        solids: Sequence[Plane | SolidBall],
+        tangent: Tangent,
+        gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        distance: float = 0.0,
+        bending: Bending = "hinges",
+    ) -> None:
+        self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
+        self._pressure, self._gravity, self._bending = pressure, gravity, bending
+        self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
+        self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
+        self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
+        self.free = ~state.held
+        self._last: tuple[Floats, float, Floats] | None = None
+        self._distance, self._looked = distance, state.x
+        self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
+        thirds = np.repeat(shell.areas(state.g) / 3, 3)
+        self.areas = np.bincount(state.mesh.triangles.ravel(), thirds, len(state.x)).astype(np.float64)
+        if any(gravity):
+            weight = (self.areas[:, None] * np.array(gravity)).astype(np.float64)
+            self.load = weight if self.load is None else self.load + weight
+
+    def __call__(self, x: Floats) -> tuple[float, Floats]:
+        """Return energy and gradient; the gradient of held directions is 0. What was asked last is remembered."""
+        if self._last is None or self._last[0] is not x:
+            self._last = x, *self._at(x)
+        return self._last[1:]
+
+    def _at(self, x: Floats) -> tuple[float, Floats]:
+        state, gradient = self.state, np.zeros_like(x)
+        energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient)
+        if self._mean is None:
+            energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
+        else:
+            energy += shell.mean_bending(x, state.mesh.hinges, state.rest, *self._mean, gradient)
+        if self.load is not None:
+            energy -= float(np.vdot(self.load, x - state.x))
+            gradient -= self.load
+        if self._distance:
+            if float(np.abs(x - self._looked).max()) > _SLACK * self._distance:
+                self._pairs, self._looked = self._look(x), x
+            hard = _HARDNESS * self.areas / self._distance
+            energy += shell.contact(x, state.mesh.triangles, self._pairs, self._distance, hard, gradient)
+        for solid in self.solids:
+            depth, normal = _depth(solid, x)
+            energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
+            gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
+        gradient[state.held] = 0.0
+        return energy, gradient
+
+    def part(self, state: State, tangent: Tangent) -> StepEnergy:
+        """Return the same energy, without contact, of a part of the state."""
+        rest = tangent, self._gravity, 0.0, self._bending
+        return StepEnergy(state, self.material, self._pressure, self.solids, *rest)
+
+    def rounding(self, x: Floats) -> float:
+        """Return the largest gradient component that is rounding: what it changes by where x moves by last digits.
+
+        And what no step can take away, because the energy changes by less than its own rounding: (2 stiffness x
+        rounding of the energy)^(1/2), with the stiffness of a membrane's vertex and the energy's terms in magnitude.
+        """
+        signs = np.where(np.arange(x.size).reshape(x.shape) * 2654435761 % 2**32 < 2**31, 1.0, -1.0)
+        energy, gradient = self(x)
+        moved = self(x + signs * np.spacing(np.abs(x).max()))[1]
+        terms = abs(energy)
+        if self.load is not None:
+            terms += float(np.abs(self.load * (x - self.state.x)).sum())
+        digits = np.finfo(float).eps
+        return float(np.abs(moved - gradient).max() + np.sqrt(2 * _STIFFEST * digits * terms))
+
+    @property
+    def longest(self) -> float:
+        """Longest move of a vertex in one step that contact can follow."""
+        return 0.4 * self._distance if self._distance else np.inf
+
+    def _look(self, x: Floats) -> Ints:
+        # moves of up to the slack by either side, per axis
+        return shell.candidates(x, self.state.mesh, self._distance * (1 + 2 * np.sqrt(3) * _SLACK))
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is an inverse."""
+        return self.tangent.inverse is not None
+
+    def refactor(self, x: Floats) -> Iterator[None]:
+        """Take the inverse of the positive semidefinite tangent at x, shifted; yields after pieces of the work."""
+        state, tangent = self.state, self.tangent
+        if tangent.fronts is None:
+            tangent.fronts = fronts_of(state.mesh, x)
+            yield
+        new, pattern = "pattern" not in tangent.__dict__, tangent.pattern
+        if new:
+            yield
+        blocks = np.zeros((pattern.blocks, 3, 3))
+        shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
+        shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
+        blocks[pattern.diagonal] += _SHIFT * np.eye(3)
+        for solid in self.solids:
+            depth, normal = _depth(solid, x)
+            weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
+            blocks[pattern.diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
+        if self._distance:
+            hard = _HARDNESS * self.areas / self._distance
+            t = state.mesh.triangles
+            shell.contact_diagonal(x, t, self._pairs, self._distance, hard, pattern.diagonal, blocks)
+        yield
+        n = normals(x, state.mesh.triangles)
+        tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, np.asarray(state.held.all(axis=1)))
+
+    def precondition(self, v: Floats) -> Floats:
+        """Return the last inverse applied to v (n, 3)."""
+        assert self.tangent.inverse is not None
+        found = self.tangent.inverse.apply(v)
+        found[self.state.held] = 0.0
+        return found
+
+
+def _area_vectors(x: Floats, triangles: Ints) -> Floats:
+    """Return a third of the area vectors of each vertex's triangles (n, 3)."""
+    p = x[triangles]
+    third = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6
+    return np.stack([np.bincount(triangles.ravel(), np.repeat(third[:, c], 3), len(x)) for c in range(3)], -1)
+
+
+def _depth(solid: Plane | SolidBall, x: Floats) -> tuple[Floats, Floats]:
+    """Return how deep vertices are in a solid (n,), 0 outside, and the way out (n, 3)."""
+    if isinstance(solid, Plane):
+        normal = np.array(solid.normal) / np.linalg.norm(solid.normal)
+        return np.maximum((np.array(solid.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
+    way = x - np.array(solid.centre)
+    distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
+    return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]

@@ -1,0 +1,95 @@
+"""The search for a step's equilibrium: parts first where that is asked for, the whole, and a nudge off symmetry."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...contract import Context, NotConverged, Unstable
+from ...shell.normals import normals
+from ..params import GrowthParams
+from ..state import State
+from .active import Habit, Settled, settle
+from .energy import StepEnergy, ahead
+from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
+
+__all__ = ["balanced", "begun"]
+
+Floats = NDArray[np.float64]
+
+_WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
+#: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
+_NUDGE, _WAVES = 0.2, (1, 2, 4)
+
+
+def begun(
+    energy: StepEnergy, before: State, dt: float, goal: float, params: GrowthParams, habit: Habit
+) -> Generator[None, None, Settled]:
+    """Find where the search for the whole begins, from the state before the step; yields after pieces of work."""
+    state = energy.state
+    if not (params.active and params.imperfection and not params.contact):
+        return Settled(ahead(energy, state, dt), 0, habit)
+    now, last = state.g.T, before.g.T
+    changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])
+    if state.rest is not before.rest:
+        changed[state.mesh.hinge_faces[state.rest != before.rest]] = True
+    return (yield from settle(energy, changed, goal, dt, habit.copy(), _WAYS[params.solver]))
+
+
+def balanced(
+    energy: StepEnergy, begin: Floats, spent: int, goal: float, most: int, params: GrowthParams, last: float
+) -> Generator[None, None, tuple[Point, int]]:
+    """Find the equilibrium from `begin` (n, 3), after `spent` of at most `most` steps; yields after pieces of work.
+
+    goal: largest force. last: growth time of the state before. The generator's value is the equilibrium and the steps.
+
+    Raises:
+        NotConverged: it was not found.
+        Unstable: the shape left the finite.
+
+    """
+    state, point = energy.state, Point(energy.state.x, 0.0, np.inf)
+    nudges = 0 if params.imperfection else 1
+    while True:
+        for nearer in _WAYS[params.solver](energy, begin):
+            spent += nearer.x is not point.x
+            point = nearer
+            if point.gradient <= goal or point.stuck:
+                break
+            if not np.isfinite(point.gradient):
+                raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=last)
+            if spent > most:
+                break
+            yield
+        begin = _nudged(energy, point.x, point.energy, params.seed) if nudges else point.x
+        nudges -= 1
+        if begin is point.x:
+            break
+    # a goal below what the digits hold is met where rounding is
+    if not (point.gradient <= goal or point.gradient <= energy.rounding(point.x)):
+        raise NotConverged(
+            f"no equilibrium at growth time {state.time:g}: residual {point.gradient / state.length:.1e}.",
+            advice="Take a shorter step or a thicker sheet.",
+            last_stage=last,
+            residual=point.gradient / state.length,
+        )
+    return point, spent
+
+
+def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
+    """Return x with small waves if that lowers the energy, else x itself.
+
+    A perfect shape sits on its symmetry, in balance but not at rest: only so it finds the way out.
+    """
+    found, generator = x, Context.generator(seed)
+    normal = np.where(energy.free, normals(x, energy.state.mesh.triangles), 0.0)
+    for waves in _WAVES:
+        ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(x, axis=0).max()))
+        height = np.cos(x @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
+        trial = x + (_NUDGE * energy.material.thickness * height)[:, None] * normal
+        value = energy(trial)[0]
+        if value < least:
+            found, least = trial, value
+    return found

@@ -1,0 +1,157 @@
+"""Where tools begin on the shape, and what becomes of hot spots when they split: in rings, or by an L-system."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import shell
+from ...contract import Context, InvalidInput
+from ..anchors import Anchors, place
+from ..shapes import Mesh
+from ..state import Spot, State
+from .places import share
+from .tools import Apex, HotCurve, HotSpot, HotSurface, Tool
+
+__all__ = ["border", "branched", "started"]
+
+Floats = NDArray[np.float64]
+
+#: Control points of a curve about an apex; and how far ahead a heading is marked, over the spot's radius.
+_AROUND, _AHEAD = 24, 0.2
+
+
+def border(mesh: shell.Topology) -> NDArray[np.int64]:
+    """Return the vertices of the surface's edge."""
+    return np.unique(mesh.edges[mesh.border])
+
+
+def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> State:
+    """Return the state with the tools placed that start in the next step, on the shape at its beginning.
+
+    Raises:
+        InvalidInput: a place that the shape does not have, an apex without its hot spot.
+
+    """
+    shares, spots, curves = dict(state.shares), dict(state.spots), dict(state.curves)
+    mesh = Mesh(state.x, state.mesh.triangles)
+    rim = border(state.mesh)
+    for number, tool in enumerate(tools):
+        if number in shares or number in spots or number in curves or tool.start > state.time + step - 1e-9:
+            continue
+        if isinstance(tool, HotSurface):
+            shares[number] = share(tool.where, mesh, rim, seed + number)
+            if tool.later is not None:
+                shares[number] = np.stack([shares[number], share(tool.later, mesh, rim, seed + number)], -1)
+        elif isinstance(tool, HotCurve):
+            points = np.array(tool.points) if tool.apex is None else _about(tool.apex, spots, mesh)
+            curves[number] = place(points, *mesh)
+        else:
+            spots[number] = (_first(tool, mesh),)
+    return replace(state, shares=shares, spots=spots, curves=curves)
+
+
+def branched(state: State, tools: Mapping[int, Tool], seed: int) -> State:
+    """Return the state with the spots split whose time has come."""
+    spots = dict(state.spots)
+    for number, tool in tools.items():
+        if not isinstance(tool, HotSpot) or not spots.get(number):
+            continue
+        while spots[number] and (done := spots[number][0].splits) < len(tool.splits):
+            if state.time - tool.start < tool.splits[done] - 1e-9:
+                break
+            chance = Context.generator(seed + 1000 * number + done)
+            spots[number] = tuple(
+                child
+                for spot in spots[number]
+                for child in (_written(state, spot, tool, chance) if tool.rules else _ring(state, spot, tool))
+            )
+    return replace(state, spots=spots)
+
+
+def _first(tool: HotSpot, mesh: Mesh) -> Spot:
+    anchor = place(np.array([tool.at]), *mesh)
+    if not tool.rules:
+        return Spot(anchor, tool.radius)
+    centre, normal = anchor.at(*mesh)[0], _normal(anchor, mesh)
+    side, _ = _plane(normal, np.array(tool.frame))
+    return Spot(_headed(centre, side, tool.radius, mesh), tool.radius, 0, tool.axiom)
+
+
+def _headed(centre: Floats, way: Floats, radius: float, mesh: Mesh) -> Anchors:
+    return place(np.stack([centre, centre + _AHEAD * radius * way]), *mesh)
+
+
+def _normal(anchor: Anchors, mesh: Mesh) -> Floats:
+    p = mesh.x[mesh.triangles[anchor.faces[0]]]
+    normal = np.cross(p[1] - p[0], p[2] - p[0])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _plane(normal: Floats, frame: Floats) -> tuple[Floats, Floats]:
+    """Return two directions at right angles in the plane of a normal, the first as near to `frame` as can be."""
+    side = frame - (normal @ frame) * normal
+    if np.linalg.norm(side) < 1e-6:
+        side = np.eye(3)[np.argmin(np.abs(normal))]
+        side = side - (normal @ side) * normal
+    side = side / np.linalg.norm(side)
+    return side, np.cross(normal, side)
+
+
+def _about(apex: Apex, spots: Mapping[int, tuple[Spot, ...]], mesh: Mesh) -> Floats:
+    """Return the control points of a curve about an apex."""
+    if apex.tool is not None:
+        if not spots.get(apex.tool):
+            raise InvalidInput(
+                f"an apex follows tool {apex.tool}, which is no hot spot that has started.",
+                advice="Give a hot spot's number that stands before the curve in the list.",
+            )
+        anchor = spots[apex.tool][0].anchor
+    else:
+        anchor = place(np.array([apex.at]), *mesh)
+    centre = anchor.at(*mesh)[0]
+    side, other = _plane(_normal(anchor, mesh), np.array(apex.frame))
+    if apex.across:
+        return centre + apex.radius * np.linspace(-1, 1, _AROUND)[:, None] * side
+    turns = np.radians(apex.arc) * np.linspace(0, 1, _AROUND, endpoint=apex.arc < 360)
+    return np.asarray(centre + apex.radius * (np.cos(turns)[:, None] * side + np.sin(turns)[:, None] * other))
+
+
+def _ring(state: State, spot: Spot, tool: HotSpot) -> Iterator[Spot]:
+    """Yield the spots around one; every generation splits at right angles to the one before."""
+    mesh = Mesh(state.x, state.mesh.triangles)
+    centre = spot.anchor.at(*mesh)[0]
+    other, side = _plane(_normal(spot.anchor, mesh), np.array(tool.frame))
+    for k in range(tool.branches):
+        turn = 2 * np.pi * k / tool.branches + (np.pi / 2 if spot.splits % 2 else 0.0)
+        target = centre + tool.spread * spot.radius * (np.cos(turn) * side - np.sin(turn) * other)
+        yield Spot(place(target[None], *mesh), spot.radius * tool.shrink, spot.splits + 1)
+
+
+def _written(state: State, spot: Spot, tool: HotSpot, chance: np.random.Generator) -> Iterator[Spot]:
+    """Yield the spots that a letter's rule writes, by a turtle in the plane of the spot; without a rule, itself."""
+    words = tool.rules.get(spot.letter, (spot.letter,))
+    word = words[int(chance.integers(len(words)))]
+    mesh = Mesh(state.x, state.mesh.triangles)
+    centre, ahead = spot.anchor.at(*mesh)
+    normal = _normal(spot.anchor, mesh)
+    side, other = _plane(normal, ahead - centre)
+    at, heading, radius = centre, 0.0, spot.radius
+    kept: list[tuple[Floats, float, float]] = []
+    for sign in word:
+        way = np.cos(heading) * side + np.sin(heading) * other
+        if sign == "f":
+            at = at + tool.spread * radius * way
+        elif sign in "+-":
+            heading += np.radians(tool.turn) * (1 if sign == "+" else -1)
+        elif sign == "!":
+            radius *= tool.shrink
+        elif sign == "[":
+            kept.append((at, heading, radius))
+        elif sign == "]":
+            at, heading, radius = kept.pop()
+        else:
+            yield Spot(_headed(at, way, radius, mesh), radius, spot.splits + 1, sign)

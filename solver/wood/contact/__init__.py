@@ -1,0 +1,1 @@
+"""Contact of rods with bodies and with each other."""

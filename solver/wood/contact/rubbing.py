@@ -1,0 +1,165 @@
+"""Contact between rods, bonded or not: a penalty between closest points of two edges, and friction.
+
+Edges are capsules of one thickness, somewhat below the least distance of rods in the section, so that nothing touches
+as laid. The same force acts on both closest points, shared by the ends of their edges: linear momentum is kept to
+round-off. Closest points of parallel edges jump: so the square of the distance is the least of that between points at s
+and t plus a small weight of (s - 1/2)^2 + (t - 1/2)^2, which is smooth, costs the thickness 2.5 % where both edges end,
+and has the force of the points themselves as its slope.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..model.arrays import Rods
+from .bodies import eased
+
+__all__ = ["Rubbing", "closest", "crossed", "none", "normals", "rub"]
+
+_TINY = 1e-30
+#: Weight of places away from the middles of edges, over the thickness squared.
+MIDDLE = 0.1
+
+
+class Rubbing(NamedTuple):
+    """Listed pairs, what a contact is made of, and what friction follows."""
+
+    pair: np.ndarray  # (p, 2) int32 edges
+    law: np.ndarray  # (4,) thickness [m], stiffness [N/m], friction [1], depth over which the stiffness grows [m]
+    lagged: np.ndarray  # (p,) normal forces that an implicit step's friction follows [N]
+
+
+def none() -> Rubbing:
+    """Return no pairs."""
+    return Rubbing(np.zeros((0, 2), np.int32), np.zeros(4), np.zeros(0))
+
+
+@njit(cache=True, error_model="numpy")
+def closest(x: np.ndarray, a: int, b: int, c: int, d: int, middle: float) -> tuple[float, float]:
+    """Return where the edges a-b and c-d are closest, each 0 to 1 (Ericson 2005, sec. 5.1.9).
+
+    middle [m2]: weight of (s - 1/2)^2 + (t - 1/2)^2; with it they are segments in five dimensions.
+    """
+    p = middle
+    q = middle
+    e = 0.0
+    f = -0.5 * middle
+    g = 0.5 * middle
+    for k in range(3):
+        u = x[b, k] - x[a, k]
+        v = x[d, k] - x[c, k]
+        r = x[a, k] - x[c, k]
+        p += u * u
+        q += v * v
+        e += u * v
+        f += u * r
+        g += v * r
+    det = p * q - e * e
+    s = 0.5
+    if det > 1e-9 * p * q:
+        s = min(max((e * g - f * q) / det, 0.0), 1.0)
+    t = (e * s + g) / max(q, _TINY)
+    if t < 0.0 or t > 1.0:
+        t = min(max(t, 0.0), 1.0)
+        s = min(max((e * t - f) / max(p, _TINY), 0.0), 1.0)
+    return s, t
+
+
+@njit(cache=True, error_model="numpy")
+def crossed(
+    x: np.ndarray, rods: Rods, pair: np.ndarray, thick: float, vertex: np.ndarray, weight: np.ndarray, way: np.ndarray
+) -> float:
+    """Write the vertices (4,) of two edges, their weights (4,) in the way (3,) between closest points [m].
+
+    Returns the distance [m], at least the length of the way; infinite where an edge is severed.
+    """
+    e = pair[0]
+    w = pair[1]
+    if rods.alive[e] == 0 or rods.alive[w] == 0:
+        return np.inf
+    vertex[0], vertex[1], vertex[2], vertex[3] = rods.a[e], rods.b[e], rods.a[w], rods.b[w]
+    middle = MIDDLE * thick * thick
+    s, t = closest(x, vertex[0], vertex[1], vertex[2], vertex[3], middle)
+    weight[0], weight[1], weight[2], weight[3] = 1.0 - s, s, t - 1.0, -t
+    apart = middle * ((s - 0.5) ** 2 + (t - 0.5) ** 2)
+    for c in range(3):
+        way[c] = 0.0
+        for k in range(4):
+            way[c] += weight[k] * x[vertex[k], c]
+        apart += way[c] * way[c]
+    return np.sqrt(apart)
+
+
+@njit(cache=True, error_model="numpy")
+def normals(x: np.ndarray, rods: Rods, rubbing: Rubbing) -> None:
+    """Write the normal forces of all pairs to `lagged` [N]."""
+    vertex = np.zeros(4, np.int64)
+    weight = np.zeros(4)
+    way = np.zeros(3)
+    thick = rubbing.law[0]
+    for m in range(len(rubbing.pair)):
+        gap = thick - crossed(x, rods, rubbing.pair[m], thick, vertex, weight, way)
+        rubbing.lagged[m] = eased(gap, rubbing.law[1], rubbing.law[3])[1] if gap > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def rub(
+    x: np.ndarray,
+    v: np.ndarray,
+    f: np.ndarray,
+    mass: np.ndarray,
+    rods: Rods,
+    rubbing: Rubbing,
+    dt: float,
+    slow: float,
+    power: np.ndarray,
+) -> float:
+    """Add contact forces to f (v, 3) [N] and what friction loses to power[1] [W]; return their energy [J].
+
+    slow: 0, or the slip [m/s] beyond which an implicit scheme's friction has its full size, as in `bodies.press`.
+    """
+    thick, stiff, friction, ease = rubbing.law[0], rubbing.law[1], rubbing.law[2], rubbing.law[3]
+    energy = 0.0
+    n = np.zeros(3)
+    slide = np.zeros(3)
+    vertex = np.zeros(4, np.int64)
+    weight = np.zeros(4)
+    for m in range(len(rubbing.pair)):
+        apart = crossed(x, rods, rubbing.pair[m], thick, vertex, weight, n)
+        gap = thick - apart
+        if gap <= 0.0 or apart == 0.0:
+            continue
+        own, normal, _ = eased(gap, stiff, ease)
+        energy += own
+        square = max(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], _TINY)
+        along = 0.0
+        for c in range(3):
+            slide[c] = 0.0
+            for k in range(4):
+                slide[c] += weight[k] * v[vertex[k], c]
+            along += slide[c] * n[c]
+        slip = 0.0
+        for c in range(3):
+            slide[c] -= along * n[c] / square
+            slip += slide[c] * slide[c]
+        slip = np.sqrt(slip)
+        drag = 0.0
+        if slip > 0.0 and friction > 0.0:
+            if slow > 0.0:
+                soft = min(slip / slow, 1.0)
+                drag = friction * rubbing.lagged[m] * soft * (2.0 - soft) / slip
+            else:
+                lightness = 0.0
+                for k in range(4):
+                    lightness += weight[k] * weight[k] / mass[vertex[k]]
+                # no more than what stops the slip in half a step
+                drag = min(friction * normal, 0.5 * slip / (lightness * dt)) / slip
+        power[1] += drag * slip * slip
+        for c in range(3):
+            push = normal * n[c] / apart - drag * slide[c]
+            for k in range(4):
+                f[vertex[k], c] += weight[k] * push
+    return energy

@@ -1,0 +1,1 @@
+"""Forces within and between rods, and their second derivatives."""

@@ -1,0 +1,67 @@
+"""All arrays of a run, and the work arrays that fit them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..contact.rubbing import none
+from ..stepping.explicit import Motion, Scratch
+from ..stepping.scaling import fragments
+from .arrays import Bodies, Bonds, Rods, Turns
+from .plan import plan_for
+
+__all__ = ["Wood", "scratch_for"]
+
+
+@dataclass(frozen=True)
+class Wood:
+    """All arrays of a run. Their contents change as it runs, and a break that adds vertices makes a new value."""
+
+    motion: Motion
+    rods: Rods
+    bonds: Bonds
+    turns: Turns
+    bodies: Bodies
+    turning: bool
+    strength: np.ndarray  # (e, samples) tensile strain that each place bears
+    rod: np.ndarray  # (e,) int32 rod of an edge, ghosts too
+    grid: np.ndarray  # (rods, vertices) int32: vertex numbers as laid
+    cut: np.ndarray  # (e,) where an edge is cut, 0 to 1; -1: it is not
+    parent: np.ndarray  # (v,) int32 vertex that one was split from; itself as laid
+    scaling: float = 1.0  # masses over real ones, see `scaling`
+    least: float = 0.0  # real mass that an edge in contact needs to be stable [kg]
+
+    def copied(self) -> Wood:
+        """Return a copy that can be stepped without touching this one."""
+        return replace(
+            self,
+            motion=Motion(*(a.copy() for a in self.motion)),
+            rods=Rods(*(a.copy() for a in self.rods)),
+            bonds=Bonds(*(a.copy() for a in self.bonds)),
+            cut=self.cut.copy(),
+        )
+
+
+def scratch_for(wood: Wood) -> Scratch:
+    """Return work arrays that fit, and the plan of what is whole."""
+    plan = plan_for(wood.rods, wood.bonds, wood.strength)
+    v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
+    return Scratch(
+        np.zeros((v, 3)),
+        wood.motion.old.copy(),
+        1.0 / wood.rods.rest,
+        np.zeros(e),
+        np.zeros(len(wood.bonds.i)),
+        np.zeros((r, 3)),
+        np.zeros((r, 3)),
+        np.zeros((r, 3)),
+        np.zeros(2),
+        np.zeros((r, wood.bodies.first[-1] if r else 0)),
+        wood.motion.mass.copy(),
+        np.zeros((len(plan.part) - 1, 4)),
+        none(),
+        plan,
+        fragments(wood.rods, wood.bonds, wood.motion.held, wood.motion.mass, wood.scaling, wood.least),
+    )

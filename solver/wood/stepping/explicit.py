@@ -1,0 +1,241 @@
+"""The explicit scheme: symplectic, with velocities synchronised to the positions, and every joule booked.
+
+Half a kick, a drift, half a kick (velocity Verlet): the same path as the thesis' symplectic Euler, but its energy is
+taken where positions and velocities are of the same time, so that it is exact to second order in the step.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..contact.bodies import pose, press
+from ..contact.rubbing import Rubbing, rub
+from ..forces.internal import internal
+from ..forces.twist import carry, turn, twists
+from ..model.arrays import Bodies, Bonds, Rods, Turns
+from ..model.plan import Plan
+from .scaling import Fragments, push, rigid, steady
+from .verlet import drift, grip, kick, slowed
+
+__all__ = ["BENDING", "BONDS", "CONTACT", "LOST", "STRETCH", "WORK", "Motion", "Scratch", "forces", "march"]
+
+#: Entries of the books [J]: energies of the present, then sums over time.
+STRETCH, BENDING, BONDS, CONTACT, WORK, LOST = range(6)
+
+
+class Motion(NamedTuple):
+    """The state of all vertices and edges."""
+
+    x: np.ndarray  # (v, 3) [m]
+    v: np.ndarray  # (v, 3) [m/s]
+    mass: np.ndarray  # (v,) [kg]
+    held: np.ndarray  # (v,) uint8: keeps its velocity whatever the force
+    load: np.ndarray  # (v, 3) dead load and weight [N]
+    d: np.ndarray  # (e, 3) reference director
+    old: np.ndarray  # (e, 3) tangent that d belongs to
+    theta: np.ndarray  # (e,) angle of the material frame [radian]
+    spin: np.ndarray  # (e,) [radian/s]
+    reference: np.ndarray  # (h,) reference twist [radian]
+
+
+class Scratch(NamedTuple):
+    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3), contacts (r, n); pairs of edges."""
+
+    f: np.ndarray
+    t: np.ndarray
+    inverse: np.ndarray
+    torque: np.ndarray
+    each: np.ndarray
+    centre: np.ndarray
+    speed: np.ndarray
+    push: np.ndarray
+    power: np.ndarray
+    lagged: np.ndarray
+    light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]
+    found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
+    rubbing: Rubbing
+    plan: Plan
+    fragments: Fragments
+
+
+@njit(cache=True, error_model="numpy")
+def forces(
+    motion: Motion,
+    rods: Rods,
+    bonds: Bonds,
+    turns: Turns,
+    bodies: Bodies,
+    scratch: Scratch,
+    turning: bool,
+    time: float,
+    dt: float,
+    rubbing: float,
+    books: np.ndarray,
+) -> None:
+    """Fill scratch.f with all forces [N], loads and contacts included, and the first four books with energies [J].
+
+    scratch.plan must be that of rods and bonds; see `state.scratch_for`.
+    """
+    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, rubbing, books, True)
+
+
+@njit(cache=True, error_model="numpy")
+def _fill(
+    motion: Motion,
+    rods: Rods,
+    turns: Turns,
+    bodies: Bodies,
+    scratch: Scratch,
+    turning: bool,
+    time: float,
+    dt: float,
+    rubbing: float,
+    books: np.ndarray,
+    look: bool,
+) -> None:
+    """Do what `forces` does; energies of rods and bonds only with `look`."""
+    f = scratch.f
+    plan = scratch.plan
+    f[:] = motion.load
+    scratch.push[:] = 0.0
+    scratch.power[:] = 0.0
+    internal(
+        motion.x,
+        f,
+        plan,
+        0,
+        len(plan.part) - 1,
+        turning,
+        look,
+        scratch.t,
+        scratch.inverse,
+        scratch.each,
+        scratch.found,
+    )
+    if look:
+        books[STRETCH] = scratch.found[:, 0].sum()
+        books[BENDING] = scratch.found[:, 1].sum()
+        books[BONDS] = scratch.found[:, 2].sum()
+    if turning:
+        scratch.torque[:] = 0.0
+        carry(motion.d, motion.old, scratch.t, rods)
+        twists(motion.d, scratch.t, rods, motion.reference)
+        books[BENDING] = turn(
+            f,
+            scratch.torque,
+            rods,
+            turns,
+            scratch.t,
+            scratch.inverse,
+            motion.d,
+            motion.theta,
+            motion.reference,
+        )
+    books[CONTACT] = 0.0
+    if len(bodies.kind) > 0:
+        pose(bodies, time, scratch.centre, scratch.speed)
+        books[CONTACT] = press(
+            motion.x,
+            motion.v,
+            f,
+            scratch.light,
+            rods,
+            bodies,
+            scratch.centre,
+            scratch.speed,
+            dt,
+            rubbing,
+            scratch.push,
+            scratch.power,
+            scratch.lagged,
+        )
+    if len(scratch.rubbing.pair) > 0:
+        books[CONTACT] += rub(motion.x, motion.v, f, scratch.light, rods, scratch.rubbing, dt, rubbing, scratch.power)
+
+
+@njit(cache=True, error_model="numpy")
+def march(
+    motion: Motion,
+    rods: Rods,
+    bonds: Bonds,
+    turns: Turns,
+    bodies: Bodies,
+    scratch: Scratch,
+    turning: bool,
+    time: float,
+    dt: float,
+    steps: int,
+    damping: float,
+    books: np.ndarray,
+    impulse: np.ndarray,
+) -> bool:
+    """Advance `steps` steps of `dt` [s] in place; scratch must hold the forces of the start. False: no longer finite.
+
+    `damping` [1/s] slows every velocity by exp(-damping t). impulse (r, 3) [N s] gathers what each body received.
+    """
+    x = motion.x
+    v = motion.v
+    f = scratch.f
+    slow = np.exp(-damping * dt)
+    half = 0.5 * dt
+    held = np.flatnonzero(motion.held)
+    weight = half / motion.mass
+    weight[held] = 0.0
+    keep = np.full(len(x), slow)
+    keep[held] = 1.0
+    whole = scratch.fragments
+    books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
+    steady(
+        x,
+        v,
+        rods,
+        bodies,
+        scratch.centre,
+        scratch.speed,
+        motion.mass,
+        scratch.rubbing.pair,
+        whole,
+        dt * steps,
+        scratch.light,
+    )
+    books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
+    for n in range(steps):
+        power = grip(held, v, f) + scratch.power[0]
+        rubbed = scratch.power[1]
+        kick(v, f, weight)
+        push(x, v, whole, half)
+        work = drift(x, v, motion.load, dt)
+        if turning:
+            for e in range(len(motion.theta)):
+                if turns.inertia[e] > 0.0:
+                    motion.spin[e] += half * scratch.torque[e] / turns.inertia[e]
+                    motion.theta[e] += dt * motion.spin[e]
+        for r in range(len(bodies.kind)):
+            for c in range(3):
+                impulse[r, c] += half * scratch.push[r, c]
+        look = n == steps - 1
+        _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books, look)
+        less = rigid(x, v, f, motion.mass, whole, half)
+        kick(v, f, weight)
+        push(x, v, whole, half)
+        if turning:
+            for e in range(len(motion.theta)):
+                if turns.inertia[e] > 0.0:
+                    motion.spin[e] += half * scratch.torque[e] / turns.inertia[e]
+        for r in range(len(bodies.kind)):
+            for c in range(3):
+                impulse[r, c] += half * scratch.push[r, c]
+        books[WORK] += work + half * (power + grip(held, v, f) + scratch.power[0])
+        books[LOST] += half * (rubbed + scratch.power[1])
+        if damping > 0.0:
+            books[LOST] -= less * (1.0 - slow * slow)
+            books[LOST] += slowed(v, keep, motion.mass)
+            if turning:
+                for e in range(len(motion.spin)):
+                    books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)
+                    motion.spin[e] *= slow
+    total = books[STRETCH] + books[BENDING] + books[BONDS]
+    return np.isfinite(total) and np.isfinite(v).all()

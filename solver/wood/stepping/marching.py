@@ -1,0 +1,138 @@
+"""March the explicit scheme through the wanted times, breaking what is overstressed on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...contract import Context, Unstable
+from ..contact.listing import Listing
+from ..fracture import break_worst, overstress
+from ..model.state import Wood, scratch_for
+from ..params import WoodParams
+from .explicit import BENDING, BONDS, CONTACT, LOST, STRETCH, forces, march
+from .moment import Reached, State, balanced, begin, copied, floor, largest, real
+
+__all__ = ["broken", "explicit"]
+
+#: Steps between looks for breaks, so many that they cost little and a wave passes few edges meanwhile.
+_LOOK, _FEWEST, _MOST = 6000, 4, 32
+#: Seconds of wall time between looks at the context, about, as steps times vertices.
+_BATCH = 500_000
+#: Of the bound of strain over strength, below which nothing breaks: it is rounded otherwise than what it bounds.
+_BELOW = 0.999
+
+
+def broken(state: State, params: WoodParams, time: float, dt: float, share: float = 1.0) -> State:
+    """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost.
+
+    share: of the elastic energy that a pass may release, over `cascade`.
+    """
+    wood, scratch = state.wood, state.scratch
+    anywhere = params.fracture == "stress"
+    hard = (scratch.each > wood.bonds.limit).any()
+    # most looks find nothing: a bound says so for less
+    if anywhere and not wood.turning and not hard and float(scratch.found[:, 3].max()) < _BELOW:
+        return state
+    ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
+    m = wood.motion
+    top = overstress(
+        wood.rods,
+        scratch.t,
+        scratch.inverse,
+        wood.strength,
+        m.theta,
+        m.reference,
+        wood.turning,
+        anywhere,
+        ratio,
+        place,
+    )
+    if top <= 1 and not hard:
+        return state
+    before = state.books[: CONTACT + 1].sum() + real(state)
+    allowed = min(share * params.cascade, 1.0) * float(state.books[[STRETCH, BENDING, BONDS]].sum())
+    wood, rods, bonds = break_worst(wood, ratio, place, scratch.each, allowed)
+    scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
+    books = state.books
+    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, 0.0, books)
+    found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds)
+    # what fragments that come off no longer have by their scaled mass is lost, too
+    books[LOST] += before - books[: CONTACT + 1].sum() - real(found)
+    return found
+
+
+def _advance(state: State, params: WoodParams, time: float, dt: float, steps: int) -> State:
+    """Return the state `steps` later.
+
+    Raises:
+        Unstable: it is no longer finite.
+
+    """
+    w = state.wood
+    fine = march(
+        w.motion,
+        w.rods,
+        w.bonds,
+        w.turns,
+        w.bodies,
+        state.scratch,
+        w.turning,
+        time,
+        dt,
+        steps,
+        params.damping,
+        state.books,
+        state.impulse,
+    )
+    if not fine:
+        raise Unstable(
+            f"the rods blew up before t = {time + steps * dt:.4g} s.",
+            advice="Give a shorter step, a lower contact_stiffness, or slower bodies.",
+        )
+    return state._replace(steps=state.steps + steps)
+
+
+def explicit(
+    wood: Wood, params: WoodParams, times: Sequence[float], dt: float, tolerance: float, context: Context
+) -> Iterator[Reached]:
+    """Yield the state at each wanted time [s]; what is between does not depend on which times are wanted.
+
+    Raises:
+        Unstable: positions are no longer finite, or the energy balance is lost.
+        Cancelled: the observer asked to stop.
+
+    """
+    state = begin(wood)
+    start = real(state) + float(state.books[: CONTACT + 1].sum())
+    look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
+    breaking = params.fracture != "none"
+    # scaled masses follow what touches, at times that do not depend on which are wanted
+    often = breaking or params.rod_contact or wood.scaling > 1
+    chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
+    scale, since, listing = floor(wood, params), 0, Listing(wood, params)
+    for wanted in times:
+        ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
+        while state.steps + look <= ahead:
+            steps = min(chunk, (ahead - state.steps) // look * look)
+            time = state.steps * dt
+            state = listing.refreshed(state, steps * dt, time, dt)
+            state = _advance(state, params, time, dt, steps)
+            if breaking:
+                state = broken(state, params, time + steps * dt, dt)
+            since += steps * len(wood.motion.x)
+            if since > _BATCH:
+                since = 0
+                context.check_cancelled()
+                found = balanced(state, state.steps * dt, start, scale, tolerance)
+                scale = largest(found.energy, scale)
+                context.report(state.steps * dt / times[-1], f"t = {state.steps * dt:.4g} s")
+        rest = ahead - state.steps
+        state = listing.refreshed(state, look * dt, state.steps * dt, dt)
+        shown = copied(state)
+        if rest:
+            shown = _advance(shown, params, state.steps * dt, dt, rest)
+        if wanted - ahead * dt > 1e-9 * dt:
+            shown = _advance(shown, params, ahead * dt, wanted - ahead * dt, 1)
+        yield balanced(shown, wanted, start, scale, tolerance)

@@ -1,0 +1,144 @@
+"""A moment of a run, and what is reported of a stage."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...contract import Unstable
+from ..model.state import Wood, scratch_for
+from ..params import WoodParams
+from .explicit import CONTACT, LOST, WORK, Scratch, forces
+from .scaling import saved
+
+__all__ = [
+    "Energy",
+    "Reached",
+    "State",
+    "balanced",
+    "begin",
+    "copied",
+    "floor",
+    "kinetic",
+    "largest",
+    "reached",
+    "real",
+    "strength",
+]
+
+#: Kinetic, elastic, lost, work, dissipated and at the start [J].
+Energy = tuple[float, float, float, float, float, float]
+
+
+class State(NamedTuple):
+    """A moment of a run. books (6,) [J] as `explicit` numbers them; impulse (r, 3) [N s]; steps taken.
+
+    dissipated [J]: what an implicit scheme takes on its own account.
+    """
+
+    wood: Wood
+    scratch: Scratch
+    books: np.ndarray
+    impulse: np.ndarray
+    rods: int
+    bonds: int
+    steps: int
+    dissipated: float = 0.0
+
+
+class Reached(NamedTuple):
+    """What is reported of a stage.
+
+    energy: (kinetic, elastic, lost, work, dissipated, start) [J]; error: of what ended it.
+    """
+
+    time: float
+    state: State
+    energy: Energy
+    error: float
+    sound: bool
+
+
+def kinetic(wood: Wood) -> float:
+    """Return the kinetic energy [J] of what is not held, spinning about the rods' axes included."""
+    m = wood.motion
+    free = m.held == 0
+    spin = 0.5 * float((wood.turns.inertia * m.spin**2).sum()) if wood.turning else 0.0
+    return 0.5 * float((m.mass[free, None] * m.v[free] ** 2).sum()) + spin
+
+
+def real(state: State) -> float:
+    """Return the energy of motion [J], that of fragments as a whole by their real mass."""
+    m = state.wood.motion
+    return kinetic(state.wood) - saved(m.x, m.v, m.mass, state.scratch.fragments)
+
+
+def floor(wood: Wood, params: WoodParams) -> float:
+    """Return a small energy [J] below which nothing counts: a billionth of what the rods bear before they break."""
+    return 0.5e-9 * float(wood.rods.k @ wood.rods.rest) * params.strain_limit**2
+
+
+def strength(wood: Wood, params: WoodParams) -> float:
+    """Return the load [N] that the bundle bears by its mean section and strain limit."""
+    return float(wood.rods.k @ wood.rods.rest) * params.strain_limit / params.length
+
+
+def reached(time: float, state: State, start: float, error: float, sound: bool) -> Reached:
+    """Return what is reported of a stage that was solved rather than marched to."""
+    elastic, lost, work = float(state.books[: CONTACT + 1].sum()), float(state.books[LOST]), float(state.books[WORK])
+    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, 0.0, start), error, sound)
+
+
+def begin(wood: Wood) -> State:
+    """Return the state at time 0, forces known."""
+    scratch = scratch_for(wood)
+    books = np.zeros(6)
+    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, 0.0, books)
+    return State(wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), 0, 0, 0)
+
+
+def _again(scratch: Scratch) -> Scratch:
+    """Return a copy; plan and fragments are not written to, but for what a step writes before it reads it."""
+    kept = ("rubbing", "plan", "fragments")
+    fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
+    return scratch._replace(**fresh)
+
+
+def copied(state: State) -> State:
+    """Return a state that can be stepped without touching this one."""
+    wood = state.wood.copied()
+    return state._replace(
+        wood=wood,
+        scratch=_again(state.scratch),
+        books=state.books.copy(),
+        impulse=state.impulse.copy(),
+    )
+
+
+def largest(energy: Energy, scale: float) -> float:
+    """Return the largest energy [J] of a run so far: what errors of the balance are held against."""
+    kinetic_, elastic, lost, work, dissipated, start = energy
+    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost) + abs(dissipated))
+
+
+def balanced(state: State, time: float, start: float, scale: float, tolerance: float) -> Reached:
+    """Return the stage with its balance; a balance lost altogether is a run that blew up.
+
+    Raises:
+        Unstable: see above.
+
+    """
+    elastic = float(state.books[: CONTACT + 1].sum())
+    moving = real(state)
+    energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), state.dissipated, start)
+    error = abs(moving + elastic + energy[2] + energy[4] - energy[3] - start) / largest(energy, scale)
+    # what is not finite is not less, either
+    if not error <= 0.5:
+        lost = f"the energy balance is off by {100 * error:.0f} percent" if error > 0.5 else "energies are not finite"
+        raise Unstable(
+            f"at t = {time:.4g} s {lost}.",
+            advice="Give a shorter step, or a lower contact_stiffness"
+            + (", or less mass_scaling." if state.wood.scaling > 1 else "."),
+        )
+    return Reached(time, state, energy, error, error <= tolerance)

@@ -1,0 +1,1 @@
+"""From a question to weights of samples, and from weights to a surface."""

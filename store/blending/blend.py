@@ -1,0 +1,151 @@
+"""From weights to a surface: the weighted mean of spectra, corrected, and its way back to the lattice."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..surfaces import harmonics, window
+from ..surfaces.window import Patch
+from .methods import Method, bands, envelope, poles
+from .methods.cells import Cells
+from .methods.weights import Samples
+
+__all__ = ["Blend", "Blender", "complex_view", "powers"]
+
+Array = NDArray[Any]
+
+#: What the harmonics of order 0, which alone reach the poles, are there: sqrt(2 l + 1), and (-1)^l times that.
+_AT_POLES = np.array([[np.sqrt(2 * d + 1), (-1) ** d * np.sqrt(2 * d + 1)] for d in range(harmonics.LOWEST)])
+
+
+class Blend(NamedTuple):
+    """Waves (3, m, k) of the displacement; with a `ratio` (`methods.envelope`), of its wrinkles alone, which are to be
+    multiplied by it on the lattice before the shape `low` of the fruit is added.
+    """
+
+    waves: Array
+    ratio: Array | None = None
+    low: Array | None = None
+
+    @contextmanager
+    def fields(self, patch: Patch) -> Iterator[Array]:
+        """Lend the displacement (components, height, width) on a patch of the lattice; good until left."""
+        with window.planes(self.waves, patch) as planes:
+            if self.ratio is not None and self.low is not None:
+                envelope.apply(planes, self.ratio, self.low, patch)
+            yield planes
+
+    def poles(self) -> Array:
+        """Return the displacement (2, 3) of the two poles."""
+        # only waves m = 0 reach them
+        ends = (self.waves[:, 0].real @ _signs(self.waves.shape[-1], self.waves.real.dtype.str)).T
+        if self.ratio is None or self.low is None:
+            return ends
+        shape = self.low[:, 0].real @ _AT_POLES
+        return ends * envelope.at_poles(self.ratio)[:, None] + shape.T
+
+
+class Blender:
+    """Blends the spectra (sample, stage, component, m, k, part) of a table.
+
+    `power` (sample, stage, l) by degree is read from the spectra where a table does not say.
+    """
+
+    def __init__(self, stored: Array, samples: Samples | None, power: Array | None = None) -> None:
+        self._stored = stored
+        self._samples = samples
+        self._given = power
+
+    def __call__(
+        self,
+        query: Array | None,
+        samples: Array,
+        weights: Array,
+        stages: Mapping[int, float],
+        method: Method,
+        band: int | None = None,
+    ) -> Blend:
+        """Blend samples at stored stages (place -> weight; what is missing to 1 is the fresh shape's).
+
+        `query` is the point that the corrections aim at. Waves beyond `band` are left out.
+        """
+        chosen, places = tuple(samples.tolist()), tuple(stages)
+        parts = np.multiply.outer(weights, list(stages.values())).ravel()
+        waves = self._mean(chosen, places, parts, band)
+        if len(parts) <= 1 or not method.corrections or query is None:
+            # one sample at one stage, or on its way there from the fresh shape: nothing was lost
+            return Blend(waves)
+        targets, cells, known = self._tools
+        cell = cells.of(chosen, places)
+        total = None
+        if "LL" in method.corrections:
+            mean = _form(parts, cell.power)
+            gains = targets.gains(known.scale(query), samples, weights, dict(stages), mean)
+            factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
+            poles.multiply(waves, factor, targets.highest)
+            total = float((gains**2 * mean).sum())
+        if "env" not in method.corrections:
+            return Blend(waves)
+        ratio = envelope.factor(_form(parts, cell.local), parts @ cell.amplitude, total)
+        low = (parts @ cell.low.view(float).reshape(len(parts), -1)).view(complex).reshape(cell.low.shape[1:])
+        envelope.take_low(waves, low)
+        return Blend(waves, ratio, low)
+
+    @property
+    def power(self) -> Array:
+        """Power by degree (sample, stage, l) of the displacement's three components together."""
+        return self._given if self._given is not None else powers(self._stored)
+
+    @cached_property
+    def _tools(self) -> tuple[bands.Targets, Cells, Samples]:
+        assert self._samples is not None
+        targets = bands.Targets(self.power, self._samples)
+        return targets, Cells(self._stored, targets.bands), self._samples
+
+    def _mean(self, samples: tuple[int, ...], stages: tuple[int, ...], parts: Array, band: int | None) -> Array:
+        cut = slice(None if band is None else band + 1)
+        kind = self._stored.dtype.type
+        # not by BLAS: its threads would wait for each other in a busy server, for a sum of a tenth of a millisecond
+        terms = [
+            (self._stored[i, j][:, cut, cut], kind(w))
+            for (i, j), w in zip(itertools.product(samples, stages), parts.tolist(), strict=True)
+        ]
+        if not terms:  # the fresh shape alone
+            return complex_view(np.zeros_like(self._stored[0, 0][:, cut, cut]))
+        total = np.multiply(*terms[0], order="C")
+        scaled = np.empty_like(total)
+        for waves, w in terms[1:]:
+            np.add(total, np.multiply(waves, w, out=scaled), out=total)
+        return complex_view(total)
+
+
+@lru_cache(maxsize=16)
+def _signs(waves: int, dtype: str) -> Array:
+    """Return what cosines k < `waves` are at the two poles, (k, 2)."""
+    k = np.arange(waves)
+    return np.stack([np.ones(waves), (-1.0) ** k], axis=1).astype(dtype)
+
+
+def complex_view(parts: Array) -> Array:
+    """Return contiguous (..., part) as complex (...)."""
+    return parts.view(np.result_type(parts.dtype, np.complex64))[..., 0]
+
+
+def powers(stored: Array) -> Array:
+    """Return the power by degree (sample, stage, l) of spectra (sample, stage, component, m, k, part)."""
+    return np.array(
+        [[harmonics.power(harmonics.degrees(complex_view(stage))).sum(axis=0) for stage in sample] for sample in stored]
+    )
+
+
+def _form(parts: Array, products: Array) -> Array:
+    """Return the quadratic form (...) of terms (T,) and their products (T, T, ...)."""
+    count = len(parts)
+    return parts @ (parts @ products.reshape(count, -1)).reshape(count, -1)

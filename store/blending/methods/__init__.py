@@ -1,0 +1,56 @@
+"""Methods of look-up: a weighting of samples, then corrections of what their weighted mean has lost.
+
+A method is named by its parts, 'linear+LL+env': the weighting first, then the corrections in the order in which they
+act. Weightings: `idw` (the paper's Eq. 13-14), `nearest`, `linear`, `scattered`. Corrections: `LL` (power by degree)
+and `env` (local amplitude).
+"""
+
+from __future__ import annotations
+
+import difflib
+from functools import lru_cache
+from typing import NamedTuple
+
+from ...errors import OutsideTable
+
+__all__ = ["CORRECTIONS", "DEFAULT", "NAMED", "WEIGHTINGS", "Method", "parse"]
+
+WEIGHTINGS = ("idw", "nearest", "linear", "scattered")
+CORRECTIONS = ("LL", "env")
+
+#: What a query gets that names no method. Four held-out fruits between the starter table's twelve (one pattern, s 0.1
+#: to 0.3): roughness 0.98 to 1.00 of the true one where `idw` has 0.78 to 0.97, band powers within 1.1 to 2.1 dB
+#: (`idw`: 1.1 to 4.5), slopes within 0.4 to 2.3 degrees (`idw`: 1.4 to 10.5), and continuous, as `nearest` is not.
+DEFAULT = "linear+LL+env"
+
+#: The methods that are scored against each other; others can be composed from the same parts.
+NAMED = ("nearest", "idw", "idw+LL", "idw+LL+env", "linear", "linear+LL", "linear+LL+env")
+
+
+class Method(NamedTuple):
+    """A weighting and the corrections after it."""
+
+    weighting: str
+    corrections: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return "+".join((self.weighting, *self.corrections))
+
+
+@lru_cache(maxsize=64)
+def parse(name: str) -> Method:
+    """Return the method of a name; corrections come out in the order in which they act.
+
+    Raises:
+        OutsideTable: a part of it is unknown or repeated.
+
+    """
+    first, *rest = name.split("+")
+    for part, known in ((first, WEIGHTINGS), *((part, CORRECTIONS) for part in rest)):
+        if part not in known:
+            near = difflib.get_close_matches(part, known, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise OutsideTable(f"there is no look-up method {name!r}.", f"{hint}Known: {', '.join(NAMED)}.")
+    if len(set(rest)) < len(rest):
+        raise OutsideTable(f"the method {name!r} names a correction twice.", "Name it once.")
+    return Method(first, tuple(part for part in CORRECTIONS if part in rest))

@@ -1,0 +1,194 @@
+"""LL: give the weighted mean back the power by degree that incoherent samples take from each other.
+
+The target lies between the samples in three ways, each where it is smooth in the parameters: total power by its
+logarithm, the shape of the spectrum by the Wasserstein mean (the quantiles of ln l are averaged, so that a peak moves
+instead of splitting in two), and its centroid with it. Total and centroid also follow a log-linear fit over the table
+wherever the weights alone do not reproduce it. At a sample all three are its own. Between stages amplitudes change
+linearly, as displacements do, and below the onset there is no power to divide by: then nothing is corrected.
+"""
+
+from __future__ import annotations
+
+import itertools
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...surfaces import harmonics
+from . import poles
+from .weights import Samples
+
+__all__ = ["Bands", "Targets", "add_up", "multiplier"]
+
+Array = NDArray[Any]
+
+#: Bands per doubling of the degree.
+_PER_OCTAVE = 3
+#: Power [r1^2] of nothing: the square of the amplitude below which a surface counts as smooth.
+_NOTHING = 1e-10
+#: Share of the power below which a band is not corrected, and of a spectrum that is spread evenly.
+_FAINT = 1e-3
+#: No band is made stronger or weaker than this: sixteen incoherent samples lose a factor of four.
+_MOST = 4.0
+_QUANTILES = (np.arange(48) + 0.5) / 48
+
+
+class Bands:
+    """Bands of degrees `LOWEST`..`highest`; `first` (bands,) is each one's first degree, `edges` those of ln l."""
+
+    def __init__(self, highest: int) -> None:
+        self.highest = highest
+        octaves = np.log2((highest + 1) / harmonics.LOWEST)
+        ends = harmonics.LOWEST * 2 ** (np.arange(max(int(octaves * _PER_OCTAVE), 1) + 1) / _PER_OCTAVE)
+        self.first = np.unique(np.ceil(ends[ends <= highest] - 1e-9).astype(int))
+        self.edges = np.log(np.append(self.first, highest + 1) - 0.5)
+        self.centres = (self.edges[1:] + self.edges[:-1]) / 2
+
+
+def add_up(power: Array, bands: Bands) -> Array:
+    """Return the power by band (..., bands) of powers by degree (..., l)."""
+    return np.add.reduceat(power, bands.first, axis=-1)
+
+
+class Targets:
+    """What the spectra of a table say about the spectrum between them; from powers by degree (sample, stage, l)."""
+
+    def __init__(self, power: Array, samples: Samples) -> None:
+        self.bands = Bands(power.shape[-1] - 1)
+        self.highest = poles.highest_degree(power)
+        own = add_up(np.asarray(power, float), self.bands)
+        even = _NOTHING / own.shape[-1]
+        self._total = np.log(own.sum(axis=-1) + _NOTHING)
+        shares = own + even + _FAINT * own.mean(axis=-1, keepdims=True)
+        shares /= shares.sum(axis=-1, keepdims=True)
+        below = np.concatenate([np.zeros((*shares.shape[:-1], 1)), shares.cumsum(axis=-1)], axis=-1)
+        flat = below.reshape(-1, below.shape[-1])
+        quantiles = np.array([np.interp(_QUANTILES, row, self.bands.edges) for row in flat])
+        # what quantiles and back do to a sample's own spectrum is undone in the same proportion
+        back = np.array([self._shares(row) for row in quantiles])
+        true = (own + even) / (own + even).sum(axis=-1, keepdims=True)
+        self._mended = true / back.reshape(true.shape)
+        self._quantiles = quantiles.reshape(*true.shape[:-1], -1)
+        self._points = samples.points
+        self._known = lru_cache(maxsize=64)(self._known_of)
+        fitted = len(self._points) >= self._points.shape[1] + 2
+        self._total_slope = _slopes(self._points, self._total, fitted)
+        self._centroid_slope = _slopes(self._points, self._quantiles.mean(axis=-1), fitted)
+
+    def gains(self, point: Array, samples: Array, weights: Array, stages: dict[int, float], mean: Array) -> Array:
+        """Return the factor (bands,) on amplitudes for a weighted mean that has power `mean` (bands,).
+
+        `point` (axes,) is the query among `Samples.points`.
+        """
+        amplitudes = np.sqrt(self._powers(point, tuple(samples.tolist()), weights, tuple(stages)))
+        wanted = (np.array(list(stages.values())) @ amplitudes) ** 2
+        least = _FAINT * (float(mean.sum()) / len(mean)) + _NOTHING
+        found: Array = np.minimum(np.maximum(np.sqrt((wanted + least) / (mean + least)), 1 / _MOST), _MOST)
+        return found
+
+    def _powers(self, point: Array, samples: tuple[int, ...], weights: Array, stages: tuple[int, ...]) -> Array:
+        """Return the powers (stages, bands) wanted at stored stages."""
+        known = self._known(samples, stages)
+        mean = weights @ known.rows
+        points, totals, moved, mended = (mean[part] for part in known.parts)
+        step = known.slopes @ (point - points)
+        total = np.exp(totals + step[: len(stages)])
+        moved = moved.reshape(len(stages), -1) + step[len(stages) :, None]
+        shares = np.array([self._shares(row) for row in moved])
+        shares *= mended.reshape(shares.shape)
+        return np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
+
+    def _known_of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> _Known:
+        at = np.array(samples)[:, None], np.array(stages)
+        columns = [self._points[at[0][:, 0]], self._total[at], self._quantiles[at], self._mended[at]]
+        rows = [part.reshape(len(samples), -1) for part in columns]
+        ends = np.cumsum([0, *(row.shape[1] for row in rows)]).tolist()
+        slopes = np.concatenate([self._total_slope[at[1]], self._centroid_slope[at[1]]])
+        return _Known(np.concatenate(rows, axis=1), tuple(itertools.starmap(slice, pairwise(ends))), slopes)
+
+    def _shares(self, quantiles: Array) -> Array:
+        """Return the shares (bands,) of a distribution given by its quantiles; no band is quite empty."""
+        knots = np.empty(len(quantiles) + 2)
+        knots[1:-1] = quantiles
+        knots[0], knots[-1] = 2 * quantiles[0] - quantiles[1], 2 * quantiles[-1] - quantiles[-2]
+        below = np.interp(self.bands.edges, knots, _KNOTS, left=0, right=1)
+        below[0], below[-1] = 0, 1
+        shares = below[1:] - below[:-1] + 1e-4
+        shares /= shares.sum()
+        return shares
+
+
+class _Known(NamedTuple):
+    """What is known at some samples: `rows` (samples, ...) of which `parts` are their points, and at some stages their
+    totals, quantiles and mended shares; and the `slopes` (2 * stages, axes) of totals and centroids.
+    """
+
+    rows: Array
+    parts: tuple[slice, ...]
+    slopes: Array
+
+
+_KNOTS = np.concatenate([[0.0], _QUANTILES, [1.0]])
+
+
+def _slopes(points: Array, values: Array, fitted: bool) -> Array:
+    """Return the slopes (stage, axes) of a linear fit to values (sample, stage); zero where too few samples fix it."""
+    if not fitted:
+        return np.zeros((values.shape[1], points.shape[1]))
+    offsets = points - points.mean(axis=0)
+    return np.linalg.lstsq(offsets, values - values.mean(axis=0), rcond=1e-6)[0].T
+
+
+def multiplier(gains: Array, bands: Bands, band: int) -> Array:
+    """Return the factor (m, k), m, k <= `band`, on amplitudes of the double Fourier sphere for gains by degree.
+
+    A factor by hypot(m, k), the degree of a mode where it is at home, costs one product; by true degree it would cost
+    more than all else. A harmonic has modes below its degree too, so that gains leak into the bands above: what leaks
+    is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
+    """
+    sharp = np.minimum(np.maximum(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST), _MOST)
+    excess = _kept_spreading(band, tuple(bands.centres.tolist())) @ (sharp - 1).astype(np.float32)
+    excess += np.float32(1)
+    found: Array = excess.reshape(band + 1, band + 1)
+    return found
+
+
+@lru_cache(maxsize=16)
+def _kept_spreading(band: int, centres: tuple[float, ...]) -> Array:
+    return _spreading(band, centres).astype(np.float32)
+
+
+def _spreading(band: int, centres: tuple[float, ...]) -> Array:
+    """Return the matrix (m k, bands) from gains to the factor (m, k), both less 1, which is linear in ln hypot(m, k)
+    between the bands' centres.
+    """
+    upper, part = (values.ravel() for values in _places(band, centres))
+    # the ends: the shape of the fruit, whose factor is 1, and beyond the last band as in it
+    ends = np.concatenate([np.zeros((1, len(centres))), np.eye(len(centres)), np.eye(len(centres))[-1:]])
+    spread: Array = ends[upper - 1] * (1 - part)[:, None] + ends[upper] * part[:, None]
+    return spread
+
+
+@lru_cache(maxsize=8)
+def _unleak(highest: int) -> Array:
+    """Return the matrix (bands, bands) from gains by degree to gains by hypot(m, k), both less 1."""
+    bands, shares = Bands(highest), harmonics.shares(highest)
+    spread = _spreading(highest, tuple(bands.centres.tolist()))
+    size = np.diff([*bands.first, highest + 1])
+    leak = np.empty((len(size), len(size)))
+    for i, gains in enumerate(np.eye(len(size))):
+        passed = (shares * (spread @ gains).reshape(highest + 1, -1)).sum(axis=(1, 2))
+        leak[:, i] = np.add.reduceat(passed, bands.first) / size
+    return np.linalg.inv(leak)
+
+
+def _places(band: int, centres: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return for every mode the band above it among [shape of the fruit, bands..., end], and how near that one is."""
+    waves = np.arange(band + 1.0)
+    degree = np.log(np.maximum(np.hypot(waves[:, None], waves), 1))
+    knots = np.concatenate([[np.log(2.9)], centres, [np.log(3.0 * band + 3)]])
+    upper = np.clip(np.searchsorted(knots, degree, side="right"), 1, len(knots) - 1)
+    return upper, np.clip((degree - knots[upper - 1]) / (knots[upper] - knots[upper - 1]), 0, 1)

@@ -1,0 +1,1 @@
+"""Generations of tables: written from results, read, checked and compared."""

@@ -1,0 +1,203 @@
+"""The writing of one generation of a table: spectra of all samples and stages, their axes and descriptors.
+
+Spectra lie uncompressed, contiguous and aligned, so that a reader maps them instead of loading them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import h5netcdf  # type: ignore[import-untyped]
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import quantities
+from solver.fruit import Fruit
+
+from ..blending import methods
+from ..blending.blend import Blender, powers
+from ..blending.methods.weights import Samples as Points
+from ..canonical import canonical
+from ..errors import MixedSamples, StorageFull
+from ..store import Store
+from ..surfaces import spectra
+from ..surfaces.measures import UNITS, Measures
+from . import trust
+from .generation import CONVERGENCE, DIMS, combined, map_spectra
+from .samples import Samples
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Written", "spectra_of", "write"]
+
+_PAGE = 4096
+#: What a result says per stage: name -> values and attributes.
+Rows = dict[str, "xr.Variable"]
+
+
+class Written(NamedTuple):
+    """What came of a file: the digest of its content and the names of the descriptors in it."""
+
+    digest: str
+    descriptors: tuple[str, ...]
+
+
+def write(
+    path: Path,
+    store: Store,
+    samples: Samples,
+    solver: str,
+    band: int,
+    dtype: Literal["float32", "float64"],
+    units: Mapping[str, str],
+) -> Written:
+    """Write the generation of `samples` to `path`, one sample in memory at a time.
+
+    Raises:
+        CorruptShard: a result is damaged.
+        MixedSamples: a result is not what its need says.
+        StorageFull: the disk is full.
+
+    """
+    shape = (len(samples.keys), len(samples.need["stages"]), 3, band + 1, band + 1, 2)
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    if shutil.disk_usage(path.parent).free < size:
+        raise StorageFull(f"a table of {size / 1e6:.0f} MB does not fit on the disk of {path}.", "Free space first.")
+    total = hashlib.sha256()
+    rows: list[Rows] = []
+    with h5netcdf.File(path, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file:
+        file.dimensions = dict(zip(DIMS, shape, strict=True))
+        target = file.create_variable("spectrum", DIMS, dtype)
+        target.attrs["units"] = quantities.QUANTITIES["displacement"].units
+        target.attrs["long_name"] = "double-Fourier-sphere amplitudes of the displacement, see `store.surfaces`"
+        for i, key in enumerate(samples.keys):
+            result = store.get(key)
+            block = spectra_of(result, key, samples.need, band).astype(dtype)
+            total.update(block.data)
+            target[i] = block
+            rows.append(_rows(result))
+    small = _small(samples, rows, solver, band, units)
+    small = small.assign(_judge(map_spectra(path), samples))
+    content = combined(small, total.hexdigest())
+    small.attrs["digest"] = content
+    encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
+    for name in ("key", "component", "part"):
+        encoding[name]["dtype"] = "S1"
+    small.to_netcdf(path, mode="a", engine="h5netcdf", encoding=encoding)
+    return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
+
+
+def spectra_of(result: xr.Dataset, key: str, need: Mapping[str, Any], band: int) -> NDArray[Any]:
+    """Return (stage, component, m, k, part) in float64 of a result.
+
+    Raises:
+        MixedSamples: it is not what its need says.
+
+    """
+    n = need["resolution"]
+    stages = result["stage"].values
+    if stages.shape != (len(need["stages"]),) or not np.allclose(stages, need["stages"], rtol=0, atol=1e-9):
+        raise MixedSamples(
+            f"the result {key} has the stages {stages.tolist()}, not {need['stages']}.",
+            "Run it again, or leave it out by building from a plan without it.",
+        )
+    field = result["displacement"].transpose("stage", "component", "colatitude", "azimuth").values
+    if field.shape[1:] != (3, n, 2 * n):
+        raise MixedSamples(f"the result {key} is not on the lattice of {n}.", "Run it again over the whole surface.")
+    waves = spectra.truncate(spectra.spectrum(field.astype(np.float64)), band)
+    return np.ascontiguousarray(waves).view(np.float64).reshape(*waves.shape, 2)
+
+
+def _rows(result: xr.Dataset) -> Rows:
+    """Return what a result says per stage: convergence and descriptors, but not the wall time."""
+    volatile = {name for name, quantity in quantities.QUANTITIES.items() if quantity.volatile}
+    return {str(n): v.variable for n, v in result.data_vars.items() if v.dims == ("stage",) and n not in volatile}
+
+
+def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Mapping[str, str]) -> xr.Dataset:
+    """Return all but the spectra as a dataset."""
+    import xarray as xr
+
+    waves = np.arange(band + 1)
+    axes = {name: _axis(samples, name, units) for name in samples.axes}
+    common = [name for name in rows[0] if all(name in row for row in rows)]
+    data = {
+        name: (("sample", "stage"), np.array([row[name].values for row in rows]), dict(rows[0][name].attrs))
+        for name in common
+    }
+    coords = {
+        "stage": ("stage", np.array(samples.need["stages"]), quantities.attrs("stage")),
+        "component": ("component", ["x", "y", "z"], quantities.attrs("component")),
+        "m": ("m", waves, {"units": "1", "long_name": "azimuthal wavenumber"}),
+        "k": ("k", waves, {"units": "1", "long_name": "colatitudinal wavenumber: cosine for even m, sine for odd m"}),
+        "part": ("part", ["real", "imag"], {"long_name": "part of the complex amplitude"}),
+        "key": ("sample", list(samples.keys), {"long_name": "key of the result"}),
+        **axes,
+    }
+    attrs = {
+        "title": f"look-up table of {solver}",
+        "solver": solver,
+        "solver_version": samples.version,
+        "params": canonical(samples.template).decode(),
+        "fixed": canonical(samples.fixed).decode(),
+        "need": canonical(samples.need).decode(),
+        "Conventions": "CF-1.11",
+    }
+    return xr.Dataset(data, coords, attrs)
+
+
+def _judge(stored: NDArray[Any], samples: Samples) -> dict[str, xr.Variable]:
+    """Return what look-ups want to know of the spectra: power by degree, errors, likeness of neighbours."""
+    import xarray as xr
+
+    power = _rounded(powers(stored))
+    found = {
+        "degree_power": xr.Variable(
+            ("sample", "stage", "degree"),
+            power,
+            {"units": "1", "long_name": "mean square displacement by spherical-harmonic degree, in units of r1^2"},
+        )
+    }
+    points, fruits = samples.points(), samples.fruits()
+    if points is None or fruits is None:
+        return found
+    scattered, method = Points(points), methods.parse(methods.DEFAULT)
+    blender = Blender(stored, scattered, power)
+    errors = trust.leave_one_out(blender, stored, scattered, fruits, method)
+    found |= {
+        f"left_out_{name}": xr.Variable(
+            ("sample", "stage"),
+            _rounded(errors[..., i]),
+            {
+                "units": UNITS[name],
+                "long_name": f"{name} of the sample predicted from the others",
+                "method": str(method),
+            },
+        )
+        for i, name in enumerate(Measures._fields)
+    }
+    likeness = trust.correlations(stored, scattered, fruits)
+    about = {"units": "1", "long_name": "mean correlation of the radial wrinkles of neighbouring samples"}
+    return found | {"neighbour_correlation": xr.Variable("stage", _rounded(likeness), about)}
+
+
+def _rounded(values: NDArray[Any]) -> NDArray[Any]:
+    """Keep five digits: the last bits of sums differ between processors, and the digest should not."""
+    scale = 10.0 ** (4 - np.floor(np.log10(np.maximum(np.abs(values), 1e-300))))
+    return (np.round(values * scale) / scale).astype(np.float32)
+
+
+def _axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, NDArray[Any], dict[str, str]]:
+    field, index = samples.axes[name]
+    where = field if index is None else f"{field}[{index}]"
+    attrs = {"long_name": f"parameter {where}"}
+    # lengths of the fruit are in units of r1, and so without units
+    unit = units.get(name, "1" if name in Fruit.axes else "")
+    if unit:
+        attrs["units"] = unit
+    return "sample", np.array([values[name] for values in samples.values]), attrs

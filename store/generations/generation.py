@@ -1,0 +1,166 @@
+"""One generation of a table as a file, read: its spectra mapped, its axes and descriptors, its digest.
+
+`generate` writes it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import shards
+from ..canonical import canonical
+from ..errors import CorruptTable
+from ..surfaces.measures import Measures
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "CONVERGENCE",
+    "DIMS",
+    "Column",
+    "Judged",
+    "combined",
+    "digest",
+    "judged",
+    "left_out",
+    "map_spectra",
+    "open",
+    "read",
+]
+
+DIMS = ("sample", "stage", "component", "m", "k", "part")
+
+#: Rows of a result that say how its run went, not what the surface is like.
+CONVERGENCE = ("converged", "residual", "iterations")
+
+_ADVICE = "Rebuild the table from the shards."
+
+
+class Column(NamedTuple):
+    """A small variable of a generation."""
+
+    values: NDArray[Any]
+    attrs: Mapping[str, Any]
+
+
+def read(path: Path) -> dict[str, Column]:
+    """Read all of a generation but its spectra, without xarray, whose import takes longer than a service's start may.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    try:
+        with h5py.File(path) as file:
+            return {name: _column(file[name]) for name in file if name != "spectrum" and file[name].ndim}
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # HDF5 reports damage as whatever it stumbles over
+        raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
+
+
+def _column(variable: h5py.Dataset) -> Column:
+    values = variable[()]
+    if values.dtype.kind == "S":  # letters, one by one
+        values = np.array([b"".join(row).decode() for row in values])
+    return Column(values, {name: value for name, value in variable.attrs.items() if isinstance(value, str)})
+
+
+def open(path: Path) -> xr.Dataset:
+    """Open a generation lazily; close it after use.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    import xarray as xr
+
+    try:
+        return xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # HDF5 reports damage as whatever it stumbles over
+        raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
+
+
+class Judged(NamedTuple):
+    """What a generation says of its own trust: the method whose errors it holds, and how alike neighbours are.
+
+    `neighbour_correlation` has one entry per stored stage. Both are None where they were not stored.
+    """
+
+    method: str | None
+    neighbour_correlation: tuple[float, ...] | None
+
+
+def judged(path: Path) -> Judged:
+    """Return what a generation file says of its trust, without reading its spectra.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    opened = read(path)
+    found, likeness = left_out(opened), opened.get("neighbour_correlation")
+    return Judged(found[1] if found else None, tuple(likeness.values.tolist()) if likeness else None)
+
+
+def map_spectra(path: Path) -> NDArray[Any]:
+    """Map the spectra (sample, stage, component, m, k, part) of a generation, read-only.
+
+    The mapping outlives the file's name. `path` must have been verified: HDF5 only tells where the values lie.
+
+    Raises:
+        CorruptTable: they do not lie there in one piece.
+
+    """
+    try:
+        with h5py.File(path) as file:
+            variable = file["spectrum"]
+            offset, shape, dtype = variable.id.get_offset(), variable.shape, variable.dtype
+        if offset is None:
+            raise ValueError("the spectra are in chunks")
+        return np.asarray(np.memmap(path, dtype, "r", offset, shape))
+    except (OSError, KeyError, ValueError, RuntimeError) as error:
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise CorruptTable(f"the spectra in {path} cannot be mapped ({error}).", _ADVICE) from error
+
+
+def digest(path: Path) -> str:
+    """Compute the digest of a generation's content anew.
+
+    Raises:
+        CorruptTable: it cannot be read.
+
+    """
+    total = hashlib.sha256()
+    for block in map_spectra(path):
+        total.update(np.ascontiguousarray(block).data)
+    with open(path) as opened:
+        small = opened.drop_vars("spectrum").load()
+    return combined(small, total.hexdigest())
+
+
+def left_out(opened: Mapping[str, Column]) -> tuple[NDArray[Any], str] | None:
+    """Return the measures (sample, stage, measure) of samples predicted from the others, and by which method.
+
+    None for a table that holds none: of one sample, or of no fruits.
+    """
+    names = [f"left_out_{name}" for name in Measures._fields]
+    if names[0] not in opened:
+        return None
+    return np.stack([opened[name].values for name in names], axis=-1), str(opened[names[0]].attrs["method"])
+
+
+def combined(small: xr.Dataset, of_spectra: str) -> str:
+    """Return the digest of a generation from its small variables and the digest of its spectra."""
+    return hashlib.sha256(canonical([shards.digest(small), small.attrs["fixed"], of_spectra])).hexdigest()

@@ -1,0 +1,132 @@
+"""How far a table can be trusted: every sample predicted from the others, and how alike neighbours are.
+
+A sample is predicted from its neighbours on both sides, so over twice the table's spacing; one at a corner has none
+and is extrapolated. Both err more than a query between the samples does, never less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.fruit import Fruit, lattice
+
+from ..blending.blend import Blend, Blender, complex_view
+from ..blending.methods import Method
+from ..blending.methods.weights import Samples
+from ..blending.neighbours import Weighted
+from ..errors import OutsideTable, TooUncertain
+from ..surfaces import harmonics
+from ..surfaces.measures import LATTICE, Measures, Surface, compare
+from ..surfaces.window import WHOLE
+
+__all__ = ["Trust", "correlations", "errors", "fresh", "leave_one_out", "refuse", "surface_of"]
+
+Array = NDArray[Any]
+
+
+def errors(found: Measures) -> dict[str, float]:
+    """Return measures as errors, all zero for a perfect answer: |rgh - 1|, 1 - corr, and the others as they are."""
+    return {**found._asdict(), "rgh": abs(found.rgh - 1), "corr": 1 - found.corr}
+
+
+def surface_of(blend: Blend, start: Array) -> Surface:
+    """Return a blend as a surface over fresh positions `start` (n, 2n, 3)."""
+    with blend.fields(WHOLE.on(len(start))) as planes:
+        return Surface(start, np.moveaxis(planes, 0, -1))
+
+
+def leave_one_out(blender: Blender, stored: Array, samples: Samples, fruits: list[Fruit], method: Method) -> Array:
+    """Return measures (sample, stage, measure) of every sample predicted by the others.
+
+    The log-linear fit behind LL is that of the whole table.
+    """
+    rows = []
+    for i, fruit in enumerate(fruits):
+        others, start = samples.without(i, method.weighting), fresh(fruit)
+        rows.append(
+            [
+                compare(
+                    surface_of(blender(samples.values[i], others.samples, others.weights, {j: 1.0}, method), start),
+                    surface_of(Blend(complex_view(stored[i, j])), start),
+                )
+                for j in range(stored.shape[1])
+            ]
+        )
+    return np.array(rows)
+
+
+def fresh(fruit: Fruit, n: int = LATTICE) -> Array:
+    """Return the fresh surface (n, 2n, 3) of a fruit."""
+    return fruit.surface(*lattice(n))
+
+
+def correlations(stored: Array, samples: Samples, fruits: list[Fruit]) -> Array:
+    """Return the mean correlation (stage,) of the radial wrinkles of neighbouring samples."""
+    pairs = samples.adjacent()
+    found = np.empty((len(pairs), stored.shape[1]))
+    for j in range(stored.shape[1]):
+        seen = [surface_of(Blend(complex_view(stored[i, j])), fresh(fruit)).wrinkles for i, fruit in enumerate(fruits)]
+        norms = [float(np.sqrt(_dot(w, w))) + 1e-12 for w in seen]
+        found[:, j] = [_dot(seen[a], seen[b]) / (norms[a] * norms[b]) for a, b in pairs]
+    return found.mean(axis=0)
+
+
+def _dot(a: Array, b: Array) -> float:
+    return float((harmonics.area(len(a)) * a * b).sum())
+
+
+class Trust:
+    """Leave-one-out measures (sample, stage, measure) of a table, interpolated to queries."""
+
+    def __init__(self, found: Array, method: str, samples: Samples) -> None:
+        self.method = method
+        own = np.array([[list(errors(Measures(*row)).values()) for row in rows] for rows in found])
+        # side by side: the errors by stage, and the spacing
+        self._rows = np.column_stack([own.reshape(len(own), -1), samples.spacing])
+
+    def expect(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
+        """Return the error to expect of each measure: nothing at a sample, a sample's own a whole spacing away."""
+        *own, spacing = (near.weights @ self._rows[near.samples]).tolist()
+        share, count = min(near.nearest / spacing, 1.0), len(Measures._fields)
+        return {
+            name: share * sum(t * own[count * j + k] for j, t in stages.items())
+            for k, name in enumerate(Measures._fields)
+        }
+
+
+def refuse(
+    expected: Mapping[str, float] | None, limit: float | Mapping[str, float], inside: bool, known: str | None
+) -> None:
+    """Refuse an answer that is worse than asked for; a number limits the error of the roughness.
+
+    `known` is the method whose errors the table holds, if it holds any.
+
+    Raises:
+        TooUncertain: an expected error is above its limit, or nobody knows it.
+        OutsideTable: there is no such measure.
+
+    """
+    limits = limit if isinstance(limit, Mapping) else {"rgh": limit}
+    for name, most in limits.items():
+        if name not in Measures._fields or not most >= 0:
+            raise OutsideTable(f"max_error {name} = {most}.", f"Limit any of {', '.join(Measures._fields)}, from 0 on.")
+        if expected is None:
+            if known is None:
+                raise TooUncertain(
+                    "this table does not say how far it errs: it holds one result, or no errors were stored with it.",
+                    "Rebuild the table (`wizen table build`) from two results or more, or ask without max_error.",
+                )
+            raise TooUncertain(
+                f"this table does not say how far methods other than {known} err.",
+                f"Take the method {known}, or ask without max_error.",
+            )
+        if expected[name] > most:
+            where = "" if inside else " The query lies outside the hull of the samples."
+            raise TooUncertain(
+                f"the expected error {name} is {expected[name]:.3g}, above {most:g}.{where}",
+                "Run exactly these parameters, add samples near them, or allow a larger error.",
+            )

@@ -1,0 +1,235 @@
+"""The commands that keep tables: rebuild, verify and compare. No finite-element run is needed but for spot checks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from ..errors import InvalidOption
+from .console import emit, grid
+from .options import As_json, StorePath, TableName
+
+__all__ = ["add_to"]
+
+
+def add_to(table_app: typer.Typer) -> None:
+    """Add the commands of this module to `wizen table`."""
+    table_app.command()(rebuild)
+    table_app.command()(verify)
+    table_app.command()(compare)
+
+
+def rebuild(
+    store: StorePath,
+    name: TableName = "default",
+    resolution: Annotated[
+        int | None, typer.Option("--resolution", min=4, help="Waves to keep, and the grid that holds them.")
+    ] = None,
+    precision: Annotated[
+        Literal["float32", "float64"] | None, typer.Option("--precision", help="float32 or float64.")
+    ] = None,
+    as_json: As_json = False,
+) -> None:
+    """Write a table anew from the runs that it was built of: another grid, band limit or precision; no run is repeated.
+
+    What is not said stays as it is. The old generation serves until the new one is whole, and whoever has it open
+    keeps it. `wizen table build` chooses runs; this keeps them.
+
+    [bold]Examples[/bold]
+
+    wizen table rebuild --store demo --resolution 32
+
+    wizen table rebuild --store demo --name exact --precision float64
+    """
+    from store import tables
+    from store.errors import CorruptTable
+    from store.generations import truncation
+    from store.store import Store
+
+    from ..plan import units_of
+
+    opened = Store.open(store)
+    old = tables.info(opened, name)
+    path = tables.path_of(opened, old)
+    try:
+        was = (path.stat().st_size, truncation.losses(opened, old)) if path.is_file() else None
+    except CorruptTable:
+        was = None
+    new = tables.rebuild(opened, name, units=units_of(old.solver), resolution=resolution, dtype=precision)
+    size, lost = tables.path_of(opened, new).stat().st_size, truncation.losses(opened, new)
+
+    def side(table: Any, size: int | None, losses: Any) -> dict[str, Any]:
+        return {
+            "digest": table.digest,
+            "resolution": table.resolution,
+            "precision": table.dtype,
+            "samples": table.samples,
+            "bytes": size,
+            "truncation": [row._asdict() for row in losses or ()],
+        }
+
+    before, after = side(old, *(was or (None, None))), side(new, size, lost)
+    document = {"table": name, "changed": old.digest != new.digest, "before": before, "after": after}
+
+    def show(console: Any) -> None:
+        console.print(f"table {name}: " + ("rebuilt" if old.digest != new.digest else "rebuilt, and the same"))
+        rows = [
+            ["digest", old.digest[:16], new.digest[:16]],
+            ["resolution", str(old.resolution), str(new.resolution)],
+            ["precision", old.dtype, new.dtype],
+            ["samples", str(old.samples), str(new.samples)],
+            ["size", _size(before["bytes"]), _size(size)],
+        ]
+        lost_before = {row.stage: row for row in was[1]} if was else {}
+        for row in lost:
+            gone = lost_before.get(row.stage)
+            then = f"{gone.rms:.2g} (max {gone.max:.2g})" if gone else "damaged"
+            rows.append([f"lost at s = {row.stage:g} [r1]", then, f"{row.rms:.2g} (max {row.max:.2g})"])
+        grid(console, ["", "before", "after"], rows)
+
+    emit(document, as_json, show)
+
+
+def verify(
+    store: StorePath,
+    name: TableName = "default",
+    recompute: Annotated[int, typer.Option("--recompute", min=0, metavar="N", help="Solve N of its runs again.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Which runs are solved again.")] = 0,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", min=0, help="Change of displacement [r1] allowed to other machines.")
+    ] = 0.0,
+    as_json: As_json = False,
+) -> None:
+    """Check a table to the last byte, and every run behind it. Exit code 1 if anything is wrong.
+
+    Manifest, seal, digest, variables, units, trust; each run's seal and digest, and that the table holds its waves.
+
+    [bold]Examples[/bold]
+
+    wizen table verify --store demo
+
+    wizen table verify --store demo --recompute 2
+    """
+    from store import tables
+    from store.generations import audit
+    from store.store import Store
+
+    from ..recompute import recompute as solve_again
+    from . import progress
+
+    opened = Store.open(store)
+    findings = audit.verify(opened, name)
+    spots = []
+    if recompute and not any(finding.part == "manifest" for finding in findings):
+        table = tables.info(opened, name)
+        broken = {finding.name for finding in findings if finding.part == "result"}
+        kept = [key for key in table.keys if key not in broken]
+        with progress.stopping() as stop:
+            for found in solve_again(opened, table, kept, recompute, seed, tolerance, stop.is_set):
+                if isinstance(found, audit.Finding):
+                    findings.append(found)
+                else:
+                    spots.append(found)
+    document = {
+        "table": name,
+        "sound": not findings,
+        "findings": [finding._asdict() for finding in findings],
+        "recomputed": [spot._asdict() for spot in spots],
+    }
+
+    def show(console: Any) -> None:
+        if findings:
+            grid(console, ["part", "name", "finding"], [[f.part, f.name[:16], f.message] for f in findings])
+        else:
+            console.print(f"table {name} is sound", markup=False)
+        for spot in spots:
+            how = "the same bytes" if spot.same else f"displacement within {spot.apart:.2g} r1"
+            console.print(f"solved again: {spot.key[:12]}: {how}", markup=False)
+
+    emit(document, as_json, show)
+    if findings:
+        raise typer.Exit(1)
+
+
+def compare(
+    a: Annotated[str, typer.Argument(metavar="A", help="A table's name, a generation (.h5), or a store's directory.")],
+    b: Annotated[str, typer.Argument(metavar="B", help="What to compare with it.")],
+    store: Annotated[
+        Path | None, typer.Option("--store", metavar="DIR", envvar="WIZEN_STORE", help="Where A and B are names.")
+    ] = None,
+    name: TableName = "default",
+    as_json: As_json = False,
+) -> None:
+    """Say how two tables differ: samples, and B against A in displacement and descriptors at every stage.
+
+    A and B are names of tables in --store, generations (STORE/tables/NAME/DIGEST.h5), or stores, whose table --name is
+    meant.
+
+    [bold]Examples[/bold]
+
+    wizen table compare default coarse --store demo
+
+    wizen table compare cold-store continued-store
+
+    wizen table compare demo/tables/default/0123456789abcdef.h5 demo
+    """
+    from store.generations import compare as comparing
+
+    found = comparing.compare(_generation(a, store, name), _generation(b, store, name))
+
+    def show(console: Any) -> None:
+        same = "the same content" if found.equal else "different contents"
+        console.print(
+            f"{same}: {found.common} samples in both, {len(found.only_a)} only in A, {len(found.only_b)} only in B",
+            markup=False,
+        )
+        rows = [
+            [what, str(x), str(y)]
+            for what, x, y in [
+                ("digest", found.a.digest[:16], found.b.digest[:16]),
+                ("solver", f"{found.a.solver} {found.a.version}", f"{found.b.solver} {found.b.version}"),
+                ("samples", found.a.samples, found.b.samples),
+                ("stages", len(found.a.stages), len(found.b.stages)),
+                ("resolution", found.a.resolution, found.b.resolution),
+                ("precision", found.a.dtype, found.b.dtype),
+                ("size", _size(found.a.size), _size(found.b.size)),
+                *((key, x, y) for key, (x, y) in found.fixed.items()),
+            ]
+        ]
+        grid(console, ["", "A", "B"], rows)
+        units = {row.of: row.units for row in found.differences}
+        numbers = [[r.of, f"{r.stage:g}", f"{r.rms:.3g}", f"{r.max:.3g}", units[r.of]] for r in found.differences]
+        if numbers:
+            grid(console, ["B against A", "s", "rms", "max", "units"], numbers)
+
+    emit(found.to_json(), as_json, show)
+
+
+def _generation(text: str, store: Path | None, name: str) -> Path:
+    """Return the generation file that a word on the command line means.
+
+    Raises:
+        InvalidOption: it means none.
+
+    """
+    from store import tables
+    from store.store import Store
+
+    path = Path(text)
+    if path.suffix == ".h5":
+        if not path.is_file():
+            raise InvalidOption(f"there is no generation {text}.", "STORE/tables/NAME/ holds them.")
+        return path
+    if (path / "shards").is_dir():
+        opened, name = Store.open(path), name
+    elif store is not None:
+        opened, name = Store.open(store), text
+    else:
+        raise InvalidOption(f"{text!r} is no store.", "Name the store in which it is a table: --store DIR.")
+    return tables.path_of(opened, tables.info(opened, name))
+
+
+def _size(size: int | None) -> str:
+    return "damaged" if size is None else f"{size / 1e6:.3g} MB"

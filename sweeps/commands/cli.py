@@ -1,0 +1,283 @@
+"""The `wizen` command below HTTP: presets, solve, sweep, status, and the commands about tables.
+
+Nothing heavy is imported before a command runs: `wizen --help` must answer at once.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from solver import __version__
+
+from ..errors import InvalidOption
+from . import onset as cli_onset
+from . import queue as cli_queue
+from . import refine as cli_refine
+from . import shapes as cli_shapes
+from . import tables as cli_tables
+from .console import Root, emit, grid, note
+from .options import (
+    As_json,
+    Out,
+    Params,
+    Preset,
+    Quality,
+    Seed,
+    Set,
+    Stages,
+    StorePath,
+    assignments,
+    numbers,
+    parameters,
+)
+
+__all__ = ["app"]
+
+app = typer.Typer(
+    name="wizen",
+    cls=Root,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"wizen {__version__}")
+        raise typer.Exit
+
+
+@app.callback(
+    epilog="First steps: wizen sweep examples/fig7-right.toml --store demo; wizen table build --store demo; "
+    "wizen map --store demo --out map.png; wizen serve --store demo"
+)
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Physically based wrinkling as shapes that can be asked for: solve, sweep, look up, serve."""
+
+
+@app.command()
+def presets(as_json: As_json = False) -> None:
+    """List the solvers, their parameters and their named presets.
+
+    [bold]Examples[/bold]
+
+    wizen presets
+
+    wizen presets --json | jq '.dehydration.presets.plum1'
+    """
+    from solver import registry
+
+    from .words import short
+
+    solvers = {name: registry.get(name) for name in registry.names()}
+    document = {
+        name: {
+            "title": solver.title,
+            "version": solver.version,
+            "axes": {axis: field for axis, (field, _) in solver.params.axes.items()},
+            "fields": list(solver.fields),
+            "presets": {preset: dict(values) for preset, values in solver.presets.items()},
+        }
+        for name, solver in solvers.items()
+    }
+
+    def show(console: Any) -> None:
+        for name, solver in solvers.items():
+            rows = [(p, ", ".join(f"{k}={short(v)}" for k, v in v.items())) for p, v in solver.presets.items()]
+            grid(console, ("preset", "parameters"), rows, f"{name}: {solver.title}")
+            console.print(f"  --set {', '.join(solver.params.axes)}\n")
+
+    emit(document, as_json, show)
+
+
+@app.command()
+def solve(
+    solver: Annotated[str, typer.Argument(help="Name of a solver (`wizen presets`).")],
+    preset: Preset = None,
+    params_file: Params = None,
+    set_: Set = None,
+    stages: Stages = None,
+    quality: Quality = None,
+    seed: Seed = None,
+    out: Out = None,
+    cut: Annotated[
+        str | None, typer.Option("--cut", metavar="PLANE", help=".png: cut open along an azimuth [degree], or equator.")
+    ] = None,
+    as_json: As_json = False,
+) -> None:
+    """Run a solver once, here and now, without a store.
+
+    --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, and shapes as .obj or .glb.
+
+    [bold]Examples[/bold]
+
+    wizen solve dehydration --preset sphere --set te=0.04 --set gamma=30 --stages 0.1,0.2 --out run.h5
+
+    wizen solve dehydration --preset plum1 --quality preview --stages 0.3 --out plum.png --json
+
+    wizen solve decay --preset orange --stages 0,4,8 --out inside.png --cut 35
+
+    wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
+    """
+    from solver import registry
+    from solver.contract import Context, Need
+    from store import shards
+
+    from .. import outputs
+    from ..dried import dried
+    from ..formats import Made
+    from ..plan import job, units_of
+    from . import progress
+    from .words import per_stage, show_run
+
+    if cut is not None:
+        from ..pictures import section
+
+        section.plane(cut)
+        if out is None or out.suffix != ".png":
+            raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
+    chosen = registry.get(solver)
+    values = parameters(params_file) | assignments(set_)
+    if seed is not None:
+        values["seed"] = seed
+    params = chosen.parse(values, preset)
+    need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})))
+    if out is not None:
+        outputs.check_suffix(out, True, len(need.stages))
+        need = chosen.settle(
+            need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen.fields))})
+        )
+    spec = job(chosen, params, need)
+    start = time.perf_counter()
+    with progress.one_run(solver) as observe, progress.stopping() as stop:
+        result = chosen.solve(params, need, Context(observe, stop.is_set, dried=dried))
+    seconds = time.perf_counter() - start
+    document = {
+        "key": spec.key,
+        "solver": chosen.name,
+        "version": chosen.version,
+        "params": dict(spec.params),
+        "need": dict(spec.need),
+        "digest": shards.digest(result),
+        "seconds": round(seconds, 3),
+        "path": None if out is None else str(out),
+        "stages": [float(stage) for stage in result["stage"]],
+        "descriptors": per_stage(result),
+    }
+    if out is not None:
+        axes = {name: params.axis(name) for name in params.axes}
+        shapes = [outputs.of_result(result, axes, i) for i in range(len(need.stages))] if "position" in result else []
+        title = f"{chosen.title}: {preset or (params_file.stem if params_file else solver)}"
+        symbol, units = chosen.stages.symbol, units_of(solver)
+        made = Made(
+            shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key, cut=cut
+        )
+        outputs.save(out, made)
+    emit(document, as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+@app.command()
+def sweep(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="A plan file (TOML); examples/ holds some.")],
+    store: StorePath,
+    workers: Annotated[int | None, typer.Option("--workers", help="Local processes; they share the cores.")] = None,
+    dask: Annotated[bool, typer.Option("--dask", help="Let Dask run the local processes, with its dashboard.")] = False,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler.")
+    ] = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try again what was given up.")] = False,
+    as_json: As_json = False,
+) -> None:
+    """Run all jobs of a plan. Stop it at any time: the same command goes on where it stopped.
+
+    [bold]Examples[/bold]
+
+    wizen sweep examples/fig7-right.toml --store demo
+
+    wizen sweep examples/fig7-right.toml --store demo --workers 4
+
+    wizen sweep big.toml --store /shared/fruits --scheduler tcp://10.0.0.1:8786
+    """
+    from store.store import Store
+
+    from .. import executors
+    from ..plan import Plan
+    from ..runner import run_plan
+    from . import progress
+    from .words import readers, report_document, show_report
+
+    read = Plan.load(plan)
+    with executors.choose(workers, dask, scheduler) as pool:
+        opened = Store.open(store, create=True)
+        left_out = f", {read.skipped} impossible ones left out" if read.skipped else ""
+        note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
+        reports = []
+        for part in read.parts():
+            with progress.stopping() as stop, progress.sweep(part.name, readers(part)) as observe:
+                reports.append(run_plan(part, opened, pool, observe, stop=stop, again=retry_failed))
+            if reports[-1].stopped or (part is read.first and not reports[-1].complete):
+                break
+    report = next((r for r in reports if r.plan == read.name), reports[-1])
+    document = report_document(report) | {"store": str(store), "skipped": read.skipped, "repeated": read.repeated}
+    document["parts"] = [report_document(r) for r in reports]
+
+    emit(document, as_json, lambda console: show_report(console, report, store, read.name if read.controls else ""))
+    if any(r.stopped for r in reports):
+        raise typer.Exit(130)
+    if not all(r.complete for r in reports):
+        raise typer.Exit(1)
+
+
+@app.command()
+def status(store: StorePath, as_json: As_json = False) -> None:
+    """Say how far the jobs of a store are, what failed and why, and which tables there are.
+
+    [bold]Examples[/bold]
+
+    wizen status --store demo
+
+    wizen status --store demo --json | jq '.failed[].error'
+    """
+    from store.store import Store
+
+    opened = Store.open(store)
+    running, failed = opened.ledger.jobs("running"), opened.ledger.jobs("failed")
+    counts = opened.ledger.counts()
+    document = {
+        "store": str(store),
+        "jobs": counts,
+        "results": len(list(opened.keys())),
+        "running": [{"key": j.key, "plan": j.plan, "worker": j.worker, "progress": j.progress} for j in running],
+        "failed": [{"key": j.key, "plan": j.plan, "params": dict(j.params), "error": j.error} for j in failed],
+        "tables": opened.table_names(),
+    }
+
+    def show(console: Any) -> None:
+        grid(console, list(counts), [[str(count) for count in counts.values()]], f"jobs in {store}")
+        for j in running:
+            console.print(f"running {j.key[:12]} {j.progress:4.0%} {j.plan}", markup=False)
+        for j in failed:
+            error = j.error or {}
+            console.print(f"failed  {j.key[:12]} {error.get('message')} {error.get('advice')}", markup=False)
+        console.print(
+            f"{document['results']} results, tables: {', '.join(opened.table_names()) or 'none'}", markup=False
+        )
+
+    emit(document, as_json, show)
+
+
+cli_refine.add_to(app)
+cli_onset.add_to(app)
+cli_queue.add_to(app)
+cli_tables.add_to(app)
+cli_shapes.add_to(app)

@@ -1,0 +1,154 @@
+"""The command that says where a fruit starts to buckle."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from ..errors import InvalidOption
+from .console import emit, grid
+from .options import As_json, Preset, Quality, Set, assignments
+
+__all__ = ["add_to"]
+
+_METHODS = ("exact", "linear", "both")
+#: Height of the buckles in a picture of a mode [r1], in wavelengths, so that they can be seen.
+_PICTURED = 0.15
+_FINEST = 256
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command of this module to the root command."""
+    app.command()(onset)
+
+
+def onset(
+    preset: Preset = None,
+    set_: Set = None,
+    method: Annotated[
+        str, typer.Option("--method", help="exact (on the shrunk shape), linear (the paper's Eq. 11) or both.")
+    ] = "exact",
+    kappa_ratio: Annotated[
+        float | None, typer.Option("--kappa-ratio", help="Bulk over shear modulus; incompressible if left out.")
+    ] = None,
+    quality: Quality = None,
+    mode_out: Annotated[
+        Path | None, typer.Option("--mode-out", metavar="FILE", help="The first mode, as .npz or as a picture, .png.")
+    ] = None,
+    as_json: As_json = False,
+) -> None:
+    """Say at which shrinkage a dehydrating fruit starts to buckle, and into what.
+
+    Spheres take milliseconds, fruits with a circular equator seconds, others minutes. With --method both, the JSON
+    document is the exact answer and holds the linear one under "linear".
+
+    [bold]Examples[/bold]
+
+    wizen onset --preset sphere
+
+    wizen onset --set stone=[0.3,0.3] --set te=0.02 --set gamma=30 --kappa-ratio 1000 --json
+
+    wizen onset --preset raisin --method both --mode-out raisin.png
+    """
+    if method not in _METHODS:
+        raise InvalidOption(f"--method {method}: unknown.", f"Known: {', '.join(_METHODS)}.")
+    if mode_out is not None:
+        _check(mode_out)
+    from solver.contract import Context
+    from solver.dehydration import SOLVER, DehydrationParams, bifurcation
+
+    from . import progress
+
+    params = cast(DehydrationParams, SOLVER.parse(assignments(set_), preset))
+    asked = ("exact", "linear") if method == "both" else (method,)
+    found = {}
+    with progress.one_run("onset") as observe, progress.stopping() as stop:
+        for each in asked:
+            found[each] = bifurcation.onset(
+                params,
+                method=each,  # type: ignore[arg-type]
+                kappa_ratio=kappa_ratio,
+                quality=quality or "default",
+                context=Context(observe, stop.is_set),
+            )
+    first = found[asked[0]]
+    document = {**first.summary(), "mode": None if mode_out is None or first.mode is None else str(mode_out)}
+    if method == "both":
+        document["linear"] = found["linear"].summary()
+    if mode_out is not None and first.mode is not None:
+        _write(mode_out, params, first, document, preset)
+    emit(document, as_json, lambda console: _show(console, list(found.values()), document))
+
+
+def _check(path: Path) -> None:
+    if path.suffix not in (".npz", ".png"):
+        raise InvalidOption(f"--mode-out {path}: cannot write {path.suffix or 'no suffix'!r}.", "Known: .npz, .png.")
+    if path.is_dir():
+        raise InvalidOption(f"--mode-out {path} is a directory.", "Name a file in it.")
+    if not path.absolute().parent.is_dir():
+        raise InvalidOption(f"--mode-out {path}: there is no directory {path.parent}.", "Create it first.")
+
+
+def _write(path: Path, params: Any, found: Any, document: dict[str, Any], preset: str | None) -> None:
+    """Write the mode on the fruit's lattice: as numbers, or the fresh fruit with the mode on it as a picture."""
+    import numpy as np
+
+    from solver.fruit import azimuths, colatitudes, lattice
+    from store import seal
+
+    resolution = min(max(96, 4 * found.degree), _FINEST)
+    fresh = params.surface(*lattice(resolution))
+    heights = found.mode.on(*lattice(resolution))
+    if path.suffix == ".npz":
+        out = io.BytesIO()
+        np.savez_compressed(
+            out,
+            colatitude=colatitudes(resolution),
+            azimuth=azimuths(resolution),
+            height=heights,
+            position=fresh,
+            onset=np.array(json.dumps(document)),
+        )
+        seal.publish(path, out.getvalue())
+        return
+    from ..pictures.sheet import Panel, sheet
+
+    height = _PICTURED * 2 * np.pi / found.degree * heights[..., None]
+    shape = fresh + height * fresh / np.linalg.norm(fresh, axis=-1, keepdims=True)
+    label = f"{preset or 'fruit'}: {found.method} onset at s = {found.s_cr:.4f}"
+    seal.publish(path, sheet([[Panel(shape)]], title=label, pixels=480))
+
+
+def _show(console: Any, found: list[Any], document: dict[str, Any]) -> None:
+    head = ["", *(f"{each.method}" for each in found)]
+    rows = [
+        ["shrinkage at onset s_cr [1]", *(_cell(each.s_cr, ".5f") for each in found)],
+        ["degree [1]", *(_cell(each.degree, "d") for each in found)],
+        ["azimuthal wavenumber m [1]", *(_cell(each.wavenumber, "d") for each in found)],
+        ["bulk / shear modulus [1]", *(_cell(each.kappa_ratio, "g", "incompressible") for each in found)],
+        ["path", *(each.path for each in found)],
+        ["time [s]", *(f"{each.seconds:.3g}" for each in found)],
+    ]
+    grid(console, head, rows)
+    first = found[0]
+    if first.s_cr is None:
+        console.print(f"This fruit {first.reason}.", markup=False)
+    else:
+        near = ", ".join(f"degree {t.degree} m {t.wavenumber} at {t.s_cr:.5f}" for t in first.ties[:3])
+        also = f" Close behind: {near}." if near else ""
+        console.print(f"It stays smooth until it has shrunk by {first.s_cr:.2%}.{also}", markup=False)
+        if first.reason:
+            console.print(f"Note: {first.reason}.", markup=False)
+    if len(found) == 2 and None not in (found[0].s_cr, found[1].s_cr):
+        miss = found[1].s_cr / found[0].s_cr - 1
+        console.print(f"Linearising at the fresh shape misses that by {miss:+.1%}.", markup=False)
+    if document["mode"]:
+        console.print(f"mode written to {document['mode']}", markup=False)
+
+
+def _cell(value: Any, form: str, none: str = "none") -> str:
+    return none if value is None else format(value, form)

@@ -1,0 +1,152 @@
+"""`wizen work` and `wizen token`: who works off the jobs that are asked for over HTTP, and who may ask."""
+
+from __future__ import annotations
+
+import re
+import time
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import InvalidOption
+from .console import emit, grid, note
+from .options import As_json, StorePath
+
+__all__ = ["add_to"]
+
+_SPAN = re.compile(r"(\d+(?:\.\d+)?)([smhd])")
+_SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400}
+
+tokens = typer.Typer(
+    no_args_is_help=True, rich_markup_mode="rich", help="Make, list and take back tokens for the service."
+)
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add these commands to the `wizen` command."""
+    app.command()(work)
+    app.add_typer(tokens, name="token")
+
+
+def work(
+    store: StorePath,
+    workers: Annotated[int | None, typer.Option("--workers", help="Local processes; they share the cores.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler.")
+    ] = None,
+    until_empty: Annotated[bool, typer.Option("--until-empty", help="End when no job is left.")] = False,
+    as_json: As_json = False,
+) -> None:
+    """Run the jobs that were asked for over HTTP, as they come. Stop it at any time; any number may run at once.
+
+    A service with WIZEN_JOBS_WORKERS=0 leaves all jobs to such workers.
+
+    [bold]Examples[/bold]
+
+    wizen work --store demo --workers 4
+
+    wizen work --store demo --until-empty
+    """
+    import math
+
+    from store.starter import check_own
+    from store.store import Store
+
+    from .. import executors
+    from ..runner import run_queue
+    from . import progress
+
+    check_own(store)
+    with executors.choose(workers, scheduler=scheduler) as pool, progress.stopping() as stop:
+        note(f"working for {store} on {pool.title}")
+        solved = run_queue(Store.open(store, create=True), pool, stop, 0.0 if until_empty else math.inf)
+    emit({"solved": solved}, as_json, lambda console: console.print(f"{solved} solved"))
+    if stop.is_set():
+        raise typer.Exit(130)
+
+
+@tokens.command()
+def create(
+    store: StorePath,
+    name: Annotated[str, typer.Option("--name", help="What the token is for; shown in lists.")],
+    scopes: Annotated[str, typer.Option("--scopes", help="read, run or admin, or several: run includes read.")] = "run",
+    expires: Annotated[
+        str | None, typer.Option("--expires", metavar="SPAN", help="For how long, e.g. 90d, 12h; for ever if left out.")
+    ] = None,
+    as_json: As_json = False,
+) -> None:
+    """Make a token and print its secret, which cannot be shown again.
+
+    [bold]Examples[/bold]
+
+    wizen token create --store demo --name studio --scopes run --expires 90d
+    """
+    from store.store import Store
+    from store.tokens import Tokens
+
+    wanted: Any = [part for part in re.split(r"[,\s]+", scopes) if part]
+    seconds = None if expires is None else _span(expires)
+    token, secret = Tokens(Store.open(store, create=True).root).create(name, wanted, seconds)
+    note(f"token {token.name!r} for {', '.join(token.scopes)}; the secret is not shown again:")
+    emit({**_row(token), "secret": secret}, as_json, lambda console: console.print(secret, markup=False))
+
+
+@tokens.command(name="list")
+def list_(store: StorePath, as_json: As_json = False) -> None:
+    """List the tokens of a store, without their secrets.
+
+    [bold]Examples[/bold]
+
+    wizen token list --store demo
+    """
+    from store.store import Store
+    from store.tokens import Tokens
+
+    rows = [_row(token) for token in Tokens(Store.open(store).root).all()]
+
+    def show(console: Any) -> None:
+        cells = [[r["name"], ", ".join(r["scopes"]), r["id"], r["created"], r["expires"] or "never"] for r in rows]
+        grid(console, ("name", "scopes", "id", "created", "expires"), cells)
+
+    emit({"tokens": rows}, as_json, show)
+
+
+@tokens.command()
+def revoke(
+    name: Annotated[str, typer.Argument(help="Name or id of the token (`wizen token list`).")],
+    store: StorePath,
+    as_json: As_json = False,
+) -> None:
+    """Take a token back: services refuse it from the next request on.
+
+    [bold]Examples[/bold]
+
+    wizen token revoke studio --store demo
+    """
+    from store.store import Store
+    from store.tokens import Tokens
+
+    token = Tokens(Store.open(store).root).revoke(name)
+    emit(_row(token), as_json, lambda console: console.print(f"revoked {token.name}", markup=False))
+
+
+def _row(token: Any) -> dict[str, Any]:
+    return {
+        "id": token.id,
+        "name": token.name,
+        "scopes": list(token.scopes),
+        "created": _date(token.created),
+        "expires": None if token.expires is None else _date(token.expires),
+        "expired": token.expired,
+    }
+
+
+def _date(seconds: float) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))
+
+
+def _span(text: str) -> float:
+    match = _SPAN.fullmatch(text.strip())
+    if match is None:
+        raise InvalidOption(f"--expires {text!r} is not a span of time.", "Write for example 90d, 12h or 30m.")
+    return float(match[1]) * _SECONDS[match[2]]

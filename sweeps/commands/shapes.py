@@ -1,0 +1,172 @@
+"""The commands that show what a table holds between its samples: map and query."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import InvalidOption
+from .console import emit, grid
+from .options import As_json, Out, Set, Stages, StoreToRead, TableName, assignments, numbers
+
+__all__ = ["add_to"]
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands of this module to the root command."""
+    app.command("map")(draw_map)
+    app.command()(query)
+
+
+def draw_map(
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="The picture.")],
+    store: StoreToRead = None,
+    name: TableName = "default",
+    x: Annotated[str | None, typer.Option("--x", metavar="AXIS", help="From left to right.")] = None,
+    y: Annotated[str | None, typer.Option("--y", metavar="AXIS", help="From bottom to top.")] = None,
+    stage: Annotated[float | None, typer.Option("--stage", help="One stage; the last one if not given.")] = None,
+    stages: Stages = None,
+    set_: Set = None,
+    pixels: Annotated[int, typer.Option("--pixels", min=32, max=1024, help="Side of one fruit.")] = 260,
+    as_json: As_json = False,
+) -> None:
+    """Draw a table as a contact sheet: two axes at one stage, or with --stages one row per sample.
+
+    [bold]Examples[/bold]
+
+    wizen map --store demo --out map.png --x gamma --y te --stage 0.3
+
+    wizen map --store demo --out stages.png --stages 0.1,0.2,0.3
+    """
+    from store import seal, starter
+    from store.lookup import ShapeTable
+    from store.store import Store
+
+    from .. import outputs
+    from ..pictures.maps import Map
+    from ..plan import units_of
+
+    if out.suffix != ".png":
+        raise InvalidOption(f"--out {out}: a map is a picture.", "Name it .png.")
+    if stage is not None and stages is not None:
+        raise InvalidOption("--stage and --stages exclude each other.", "Keep one of them.")
+    outputs.check_suffix(out, False, 1)
+    opened = Store.open(store or starter.ROOT)
+    table = ShapeTable.open(opened, name)
+    drawing = Map(opened, table, units_of(table.info.solver), assignments(set_), pixels)
+    at = table.stages[-1] if stage is None else stage
+    picture = drawing.by_stages(numbers(stages)) if stages is not None else drawing.by_axes(x, y, at)
+    seal.publish(out, picture)
+    document = {"path": str(out), "table": name, "digest": table.digest, "shapes": drawing.count}
+    emit(document, as_json, lambda console: console.print(f"{drawing.count} shapes drawn to {out}", markup=False))
+
+
+def query(
+    store: StoreToRead = None,
+    set_: Set = None,
+    stages: Stages = None,
+    name: TableName = "default",
+    resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None,
+    method: Annotated[str | None, typer.Option("--method", help="How to look up, as `table score` names it.")] = None,
+    max_error: Annotated[
+        str | None,
+        typer.Option("--max-error", metavar="X|M:X,...", help="Refuse worse: 0.05 (roughness), rgh:0.05,dB:1.5."),
+    ] = None,
+    out: Out = None,
+    as_json: As_json = False,
+) -> None:
+    """Ask a table for a shape between its samples, and write it as .obj, .glb, .npz or .png.
+
+    [bold]Examples[/bold]
+
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --out fruit.glb
+
+    wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.2 --out shape.obj
+
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --method idw --out paper.glb
+
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --max-error rgh:0.1,dB:3
+
+    wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
+    """
+    from store import starter
+    from store.blending import methods
+    from store.lookup import ShapeTable
+
+    from .. import outputs
+    from ..formats import Made
+    from ..plan import units_of
+
+    wanted = numbers(stages)
+    table = ShapeTable.open(store or starter.ROOT, name)
+    if not wanted:
+        low, high = table.reach
+        raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
+    fields: tuple[str, ...] = ()
+    if out is not None:
+        outputs.check_suffix(out, False, len(wanted))
+        fields = outputs.fields_for(out, False)
+    values, how, limits = assignments(set_), method or methods.DEFAULT, _limits(max_error)
+    shapes = [
+        table.at(values, stage, resolution=resolution, fields=fields, method=how, max_error=limits) for stage in wanted
+    ]
+    document = {
+        "table": name,
+        "digest": table.digest,
+        "method": shapes[0].method,
+        "parameters": {**table.fixed, **shapes[0].parameters},
+        "path": None if out is None else str(out),
+        "stages": [_document(shape) for shape in shapes],
+    }
+    if out is not None:
+        title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
+        units = units_of(table.info.solver)
+        outputs.save(out, Made(shapes, document, title, table.info.solver, name, table.fixed, units=units))
+
+    def show(console: Any) -> None:
+        rows = [
+            [key, *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
+            for key in shapes[-1].descriptors
+        ]
+        errors = [shape.expected_error for shape in shapes if shape.expected_error is not None]
+        if len(errors) == len(shapes):
+            rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
+        rows += [["exact", *(str(shape.exact) for shape in shapes)]]
+        grid(console, ["", *(f"s = {shape.stage:g}" for shape in shapes)], rows)
+        if out is not None:
+            console.print(f"written to {out}", markup=False)
+
+    emit(document, as_json, show)
+
+
+def _limits(text: str | None) -> dict[str, float] | None:
+    """Return the limits by measure that `0.05` (of the roughness) or `rgh:0.05,dB:1.5` set.
+
+    Raises:
+        InvalidOption: the text sets none.
+
+    """
+    if text is None:
+        return None
+    pairs = [part.rpartition(":") for part in text.split(",")]
+    try:
+        return {name or "rgh": float(value) for name, _, value in pairs}
+    except ValueError:
+        raise InvalidOption(f"--max-error {text}: limits no error.", "Write 0.05, or rgh:0.05,dB:1.5.") from None
+
+
+def _document(shape: Any) -> dict[str, Any]:
+    return {
+        "stage": shape.stage,
+        "exact": shape.exact,
+        "converged": shape.converged,
+        "nearest": shape.nearest,
+        "inside": shape.inside,
+        "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
+        "weights": dict(shape.weights),
+        "descriptors": {
+            name: {"value": value, "units": shape.units.get(name, "")} for name, value in shape.descriptors.items()
+        },
+    }

@@ -1,0 +1,158 @@
+"""The commands about tables: build, info and score; `cli_tools` holds those that keep them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import InvalidOption
+from . import care as cli_tools
+from .console import emit, grid
+from .options import As_json, Quality, StorePath, StoreToRead, TableName
+
+__all__ = ["add_to"]
+
+table_app = typer.Typer(no_args_is_help=True, help="Build, keep, check, compare and describe look-up tables.")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands of this module to the root command."""
+    cli_tools.add_to(table_app)
+    app.add_typer(table_app, name="table")
+
+
+@table_app.command()
+def build(
+    store: StorePath,
+    name: TableName = "default",
+    solver: Annotated[str, typer.Option("--solver", help="Whose results.")] = "dehydration",
+    plan: Annotated[str | None, typer.Option("--plan", help="Only the results of this plan.")] = None,
+    quality: Quality = None,
+    resolution: Annotated[int | None, typer.Option("--resolution", help="Cut the spectra to this band.")] = None,
+    as_json: As_json = False,
+) -> None:
+    """Build a table from the finished runs in a store, and make it the current one.
+
+    [bold]Examples[/bold]
+
+    wizen table build --store demo
+
+    wizen table build --store demo --name coarse --plan fig7-right --resolution 32
+    """
+    from solver import registry
+    from store import tables
+    from store.store import Store
+
+    from ..plan import units_of
+
+    opened, chosen = Store.open(store), registry.get(solver)
+    made = tables.build(
+        opened,
+        name,
+        solver,
+        axes=chosen.params.axes,
+        units=units_of(solver),
+        plan=plan,
+        quality=quality,
+        resolution=resolution,
+    )
+    _show_table(made, tables.path_of(opened, made), as_json)
+
+
+@table_app.command()
+def info(store: StoreToRead = None, name: TableName = "default", as_json: As_json = False) -> None:
+    """Say what a table holds: its axes with bounds, what is fixed, its stages.
+
+    [bold]Examples[/bold]
+
+    wizen table info --store demo
+
+    wizen table info --store demo --name coarse --json
+    """
+    from store import starter, tables
+    from store.store import Store
+
+    opened = Store.open(store or starter.ROOT)
+    found = tables.info(opened, name)
+    _show_table(found, tables.path_of(opened, found), as_json)
+
+
+@table_app.command()
+def score(
+    store: StoreToRead = None,
+    name: TableName = "default",
+    held_out: Annotated[
+        Path | None,
+        typer.Option("--held-out", metavar="PLAN|STORE", help="Runs to predict; without, each sample from the others."),
+    ] = None,
+    methods_: Annotated[str | None, typer.Option("--methods", metavar="M,M,...", help="Only these methods.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Truth, the paper's and the default.")
+    ] = None,
+    stage: Annotated[float, typer.Option("--stage", help="The picture's stage: the stored one next to it.")] = 0.2,
+    as_json: As_json = False,
+) -> None:
+    """Score the look-up methods by stage: against runs that the table has not seen, or leaving out its own.
+
+    rgh: roughness over the true one. dB: error of band powers. W1: slopes' distributions [degree]. patch: variation of
+    local slope energy. L2nr, ang [degree] and corr: point by point. The method "seed" is the floor: how two runs
+    differ whose seeds alone do.
+
+    [bold]Examples[/bold]
+
+    wizen table score --store demo
+
+    wizen table score --store demo --held-out held.toml --picture score.png
+
+    wizen table score --store demo --held-out other-store --methods idw,linear+LL+env --json
+    """
+    from store import seal, starter
+    from store.blending import methods
+    from store.lookup import ShapeTable
+    from store.store import Store
+
+    from .. import score as scores
+
+    if picture is not None and picture.suffix != ".png":
+        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+    names = methods.NAMED if methods_ is None else [str(methods.parse(part)) for part in methods_.split(",")]
+    opened = Store.open(store or starter.ROOT)
+    table = ShapeTable.open(opened, name)
+    cases, pairs = scores.cases(opened, table, held_out)
+    report = scores.score(table, cases, pairs, names, held_out is not None)
+    if picture is not None:
+        near = min(table.stages, key=lambda stored: abs(stored - stage))
+        seal.publish(picture, scores.picture(cases, near))
+    document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
+
+    def show(console: Any) -> None:
+        kind = "held-out runs" if report.held_out else "samples, each predicted from the others"
+        console.print(f"table {name}: {len(cases)} {kind}; {len(pairs)} pairs of seeds; * default", markup=False)
+        rows = [
+            [row.method + " *" * (row.method == methods.DEFAULT), f"{row.stage:g}"]
+            + [f"{value:.3g}" for value in row.measures]
+            for row in report.rows
+        ]
+        grid(console, ["method", "s", *report.rows[0].measures._fields], rows)
+        likeness = [[f"{s:g}", f"{value:.3f}"] for s, value in report.correlation.items()]
+        grid(console, ["s", "correlation of neighbours"], likeness)
+        if picture is not None:
+            console.print(f"drawn to {picture}", markup=False)
+
+    emit(document, as_json, show)
+
+
+def _show_table(table: Any, path: Path, as_json: bool) -> None:
+    document = table.to_json() | {"path": str(path)}
+
+    def show(console: Any) -> None:
+        console.print(f"table {table.name}: {table.samples} samples of {table.solver}, digest {table.digest[:16]}")
+        rows = [(axis, f"{low:g} to {high:g}") for axis, (low, high) in table.axes.items()]
+        rows.append(("stages", ", ".join(f"{stage:g}" for stage in table.stages)))
+        rows.append(("resolution", str(table.resolution)))
+        grid(console, ("axis", "values"), rows)
+        console.print(str(path), markup=False)
+
+    emit(document, as_json, show)

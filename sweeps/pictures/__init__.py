@@ -1,0 +1,1 @@
+"""Surfaces as pictures: a software renderer, contact sheets, maps and sections."""

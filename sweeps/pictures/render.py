@@ -1,0 +1,150 @@
+"""A small software renderer for surfaces of triangles: no window, no GPU, only numpy.
+
+Lattices are resampled through their spectrum, other triangles are cut in four until they cover few pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from store.surfaces import spectra
+
+from .raster import finer, normals, rasterise
+from .shading import floor_shadow, relief, shade
+
+__all__ = ["View", "mesh", "render", "render_triangles"]
+
+Array = NDArray[Any]
+
+_SUPERSAMPLES = 2
+#: Resolution at which surfaces are drawn: one lattice cell of it covers about a pixel of a large picture.
+_FINEST = 256
+#: Longest side of a triangle's box when it is drawn [sub-pixels]; and the colour of surfaces that have none.
+_COARSEST = 16
+_CLAY = np.array([0.42, 0.50, 0.20])
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the camera stands [degree] and how much it sees: `extent` [r1] from the middle to the picture's edge."""
+
+    azimuth: float = 35.0
+    elevation: float = 22.0
+    extent: float = 1.15
+
+
+def mesh(position: Array, poles: Array | None = None, resolution: int | None = None) -> tuple[Array, Array]:
+    """Return (vertices (v, 3), triangles (t, 3), wound outwards) of a surface (n, 2n, 3), resampled if asked for.
+
+    Missing poles, and those of a resampled surface, come from its spectrum.
+    """
+    if poles is None or (resolution is not None and resolution != len(position)):
+        waves = spectra.spectrum(position)
+        poles = spectra.poles(waves)
+        if resolution is not None:
+            position = spectra.synthesize(waves, resolution)
+    n, m = position.shape[:2]
+    vertices = np.concatenate([position.reshape(-1, 3), poles]).astype(float)
+    here = np.arange(n * m).reshape(n, m)
+    east = np.roll(here, -1, axis=1)
+    a, b, c, d = here[:-1], east[:-1], here[1:], east[1:]
+    north, south = np.full(m, n * m), np.full(m, n * m + 1)
+    faces = [
+        np.stack([a, b, d], -1).reshape(-1, 3),
+        np.stack([a, d, c], -1).reshape(-1, 3),
+        np.stack([north, east[0], here[0]], -1),
+        np.stack([south, here[-1], east[-1]], -1),
+    ]
+    return vertices, np.concatenate(faces)
+
+
+def render(
+    position: Array,
+    poles: Array | None = None,
+    pixels: int = 320,
+    view: View | None = None,
+    colour: Array | None = None,
+) -> Array:
+    """Return a picture (pixels, pixels, 3), uint8, of a surface (n, 2n, 3) [r1].
+
+    colour: (n, 2n, 3) of the same lattice, linear light, in place of a dried jujube's.
+    """
+    view = view or View()
+    side = pixels * _SUPERSAMPLES
+    resolution = int(np.clip(side // 3, len(position), max(_FINEST, len(position))))
+    vertices, faces = mesh(position, poles, resolution)
+    paint = None if colour is None else _paint(colour, resolution)
+    return _draw(vertices, faces, paint, pixels, view, _frame(view), open_=False)
+
+
+def render_triangles(
+    vertices: Array,
+    triangles: Array,
+    pixels: int = 320,
+    view: View | None = None,
+    colour: Array | None = None,
+    up: str = "y",
+) -> Array:
+    """Return a picture (pixels, pixels, 3), uint8, of vertices (v, 3) and triangles (f, 3), seen from both sides.
+
+    The view's middle is the origin. colour: (v, 3), linear light; up: the axis that points up, y or z.
+    """
+    view = view or View()
+    frame = _frame(view)
+    if up == "z":
+        frame = frame[:, [2, 0, 1]]
+    paint = np.broadcast_to(_CLAY, np.shape(vertices)) if colour is None else colour
+    return _draw(np.asarray(vertices, float), np.asarray(triangles, np.int64), paint, pixels, view, frame, open_=True)
+
+
+def _draw(
+    vertices: Array, faces: Array, paint: Array | None, pixels: int, view: View, frame: Array, open_: bool
+) -> Array:
+    side = pixels * _SUPERSAMPLES
+    scale = side / 2 / view.extent
+    upright = normals(vertices, faces)
+    if open_:
+        values = np.concatenate([vertices, upright, np.asarray(paint, float)], axis=1)
+        values, faces = finer(values, faces, _COARSEST / scale)
+        vertices, upright, paint = values[:, :3], values[:, 3:6], values[:, 6:]
+    seen, turned = vertices @ frame.T, upright @ frame.T
+    points = np.stack([side / 2 + scale * seen[:, 0], side / 2 - scale * seen[:, 1]], axis=-1)
+    index, face, weights, back = rasterise(points, seen[:, 2], faces, side, open_)
+    corners = faces[face]
+    depth = np.full(side * side, -np.inf)
+    depth[index] = np.einsum("fk,fk->f", weights, seen[corners, 2])
+    normal = np.einsum("fk,fkc->fc", weights, turned[corners])
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    normal[back] *= -1
+    image = floor_shadow(side, view.elevation, seen, scale)
+    skin = None if paint is None else np.einsum("fk,fkc->fc", weights, paint[corners])
+    image.reshape(-1, 3)[index] = shade(normal, relief(depth.reshape(side, side)).ravel()[index], skin)
+    small = image.reshape(pixels, _SUPERSAMPLES, pixels, _SUPERSAMPLES, 3).mean(axis=(1, 3))
+    return (255 * np.clip(small, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
+
+
+def _frame(view: View) -> Array:
+    """Return the camera's axes as rows: right, up, towards the eye. The world's y axis is up."""
+    turn, tilt = np.radians([view.azimuth, view.elevation])
+    eye = np.array([np.cos(tilt) * np.cos(turn), np.sin(tilt), np.cos(tilt) * np.sin(turn)])
+    right = np.array([np.sin(turn), 0.0, -np.cos(turn)])
+    return np.stack([right, np.cross(eye, right), eye])
+
+
+def _paint(colour: Array, resolution: int) -> Array:
+    """Return the colours of the vertices of `mesh` at a resolution, bilinear: waves would ring at fronts."""
+    n, m = colour.shape[:2]
+    # rows beyond the poles are those of the other side
+    rows = np.concatenate([np.roll(colour[:1], m // 2, axis=1), colour, np.roll(colour[-1:], m // 2, axis=1)])
+    down = (np.arange(resolution) + 0.5) * n / resolution + 0.5
+    along = np.arange(2 * resolution) * m / (2 * resolution)
+    grid = np.meshgrid(down, along, indexing="ij")
+    fine = np.stack(
+        [ndimage.map_coordinates(rows[..., k], grid, order=1, mode="grid-wrap").ravel() for k in range(3)], axis=-1
+    )
+    return np.concatenate([fine, colour[:1].mean(axis=1), colour[-1:].mean(axis=1)])
