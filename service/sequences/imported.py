@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array, Ints
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
 from .nearest import nearest
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "Bound", "bind", "load"]
 
-Array = NDArray[Any]
 
 KINDS = (".obj", ".ply", ".glb", ".stl")
 Binding = Literal["nearest", "direction"]
@@ -44,7 +44,7 @@ class Bound:
     """
 
     points: Array
-    corners: NDArray[np.int64]
+    corners: Ints
     shares: Array
     gain: Array
     scale: float
