@@ -15,7 +15,17 @@ from ..arrays import Floats
 from .params import DecayParams
 from .surfaces.surface import Extent
 
-__all__ = ["air", "damping", "deficit", "reference_radius", "saturation", "water_lost"]
+__all__ = [
+    "ACTIVITY",
+    "air",
+    "damping",
+    "deficit",
+    "evaporated",
+    "opened",
+    "reference_radius",
+    "saturation",
+    "water_lost",
+]
 
 
 _STEAM_POINT = 373.16
@@ -23,7 +33,7 @@ _STEAM_POINT = 373.16
 _ICE_POINT = 273.16
 _STEAM_PRESSURE = 101324.6
 #: Water activity at the evaporating surface: dissolved matter lowers the vapour pressure (the paper: 0.98 or 0.99).
-_ACTIVITY = 0.98
+ACTIVITY = 0.98
 _SECONDS = 86400.0
 _DENSITY = 1e6
 
@@ -52,7 +62,7 @@ def air(params: DecayParams, day: float | Floats) -> tuple[Any, Any]:
 def deficit(params: DecayParams, day: float | Floats = 0.0) -> Any:
     """Return P_s - P_a [Pa] at times [day], at least 0: fruit and air share one temperature, and no dew falls."""
     celsius, humidity = air(params, day)
-    return np.maximum(saturation(celsius) * (_ACTIVITY - humidity / 100), 0.0)
+    return np.maximum(saturation(celsius) * (ACTIVITY - humidity / 100), 0.0)
 
 
 def water_lost(params: DecayParams, extent: Extent, days: float) -> float:
@@ -60,9 +70,19 @@ def water_lost(params: DecayParams, extent: Extent, days: float) -> float:
 
     The fruit's size follows from its weight, its shape and a density of 1 g/cm^3.
     """
+    lost = params.transpiration * evaporated(params, extent, 0.0, days)
+    return float(min(lost, params.water_content / 100))
+
+
+def evaporated(params: DecayParams, extent: Extent, start: float, end: float) -> float:
+    """Return what the whole skin loses between two days at a conductance of 1 g/(m2 s MPa), over the fresh weight."""
     r1 = reference_radius(params, extent)
-    grams = params.transpiration * extent.area * r1**2 * _dryness(params, days) * 1e-6 * _SECONDS
-    return float(min(grams / params.weight, params.water_content / 100))
+    return extent.area * r1**2 * _dryness(params, start, end) * 1e-6 * _SECONDS / params.weight
+
+
+def opened(params: DecayParams) -> float:
+    """Return the conductance of rotten or wounded skin [g/(m2 s MPa)]; the paper knows sound skin alone."""
+    return params.transpiration if params.climate == "paper" else max(params.transpiration, params.open_transpiration)
 
 
 def reference_radius(params: DecayParams, extent: Extent) -> float:
@@ -70,9 +90,9 @@ def reference_radius(params: DecayParams, extent: Extent) -> float:
     return float((params.weight / (_DENSITY * extent.volume)) ** (1 / 3))
 
 
-def _dryness(params: DecayParams, days: float) -> float:
+def _dryness(params: DecayParams, start: float, end: float) -> float:
     """Return the integral of the deficit over time [Pa day]: Simpson's rule between the given days."""
-    knots = np.unique(np.clip([0.0, *(w.day for w in params.weather), days], 0.0, days))
+    knots = np.unique(np.clip([start, *(w.day for w in params.weather), end], start, end))
     total = 0.0
     for first, last in pairwise(knots):
         samples = deficit(params, np.linspace(first, last, 17))

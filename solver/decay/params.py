@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from ..fruit import Fruit
 from .body.flesh import Flesh, Skin, Swing
-from .fields.colony import MOULDS, SOFT_ROT, Colony
+from .fields.colony import MOULDS, ROTS, Colony
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Painted, Pressure, PressureMap, Wound
 
@@ -69,11 +69,25 @@ class DecayParams(Fruit):
         description="Mass transfer coefficient K of Eq. 10",
         json_schema_extra={"units": "g m-2 s-1 MPa-1"},
     )
+    climate: Literal["cardinal", "paper"] = Field(
+        "cardinal",
+        description="How temperature and humidity bear on growth: by each species' cardinal temperatures, water "
+        "activity and lag, or by Eq. 6 as printed, which damps motility alone and knows no frost",
+        json_schema_extra={"units": "1"},
+    )
+    open_transpiration: float = Field(
+        3.0,
+        ge=0,
+        le=50,
+        description="Mass transfer coefficient of rotten or wounded skin; a choice; the paper's climate knows none",
+        json_schema_extra={"units": "g m-2 s-1 MPa-1"},
+    )
     growth_rate: float = Field(
-        20.0,
+        50.0,
         ge=0,
         le=100,
-        description="Growth rate of Table 2: the clock of all organisms, 50 is their own pace",
+        description="The clock of all organisms: 50 is as quick as they were measured, or in the paper's climate their "
+        "own pace (Table 2)",
         json_schema_extra={"units": "1"},
     )
     propagation_rate: float = Field(
@@ -125,11 +139,16 @@ class DecayParams(Fruit):
         description="Kinetics of the mould",
         json_schema_extra={"units": "1"},
     )
-    rot: Colony = Field(SOFT_ROT, description="Kinetics of the soft rot", json_schema_extra={"units": "1"})
+    rot: Colony = Field(
+        ROTS["penicillium-expansum"],
+        description="Kinetics of the rot in the flesh: a mould's own lesion, or bacteria",
+        json_schema_extra={"units": "1"},
+    )
     wounds: tuple[Wound, ...] = Field(
         (Wound(colatitude=0), Wound(colatitude=180)),
         max_length=64,
-        description="Where rot and mould enter on day 0; by default the stem and the point the fruit rests on",
+        description="Where rot and mould enter on day 0, to grow after their lag; by default the stem and the point "
+        "the fruit rests on",
         json_schema_extra={"units": "1"},
     )
     wound_map: Painted = Field(

@@ -1,7 +1,8 @@
 """Fruits of Tables 1 and 2 and the four environments, as parameters.
 
-Table 2 has no peach and no pear: they take the apple's skin and rates. The transpiration coefficients of orange and
-peach are the paper's, and implausible: 9 and 18 % of the weight in a day (docs/decay.md).
+Table 2 has no peach and no pear: they take the apple's skin and rates. A fruit grows its own species at the speed that
+was measured; the same fruit as `...-paper` has the paper's climate, growth rates and transpiration coefficients, of
+which orange and peach are implausible: 9 and 18 % of the weight in a day (docs/decay.md).
 """
 
 from __future__ import annotations
@@ -9,9 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .fields.colony import MOULDS
+from .fields.colony import MOULDS, PAPER_MOULDS, PAPER_ROT, ROTS
 
 __all__ = ["ENVIRONMENTS", "PRESETS"]
+
+#: Transpiration coefficients by area [g/(m2 s MPa)], where Table 1's are implausible; sources in docs/decay.md.
+_TRANSPIRATION = {"orange": 1.72, "peach": 5.2}
 
 
 def _fruit(
@@ -32,12 +36,24 @@ def _fruit(
         "transpiration": k,
         "porosity": porosity,
         "firmness": firmness,
+        "climate": "paper",
         "growth_rate": rates[0],
         "propagation_rate": rates[1],
-        "mould": MOULDS[mould].model_dump(),
+        "mould": PAPER_MOULDS[mould].model_dump(),
+        "rot": PAPER_ROT.model_dump(),
         "skin_colour": skin,
         "mould_colour": mould_colour,
         **shape,
+    }
+
+
+def _lived(name: str, paper: Mapping[str, Any], mould: str) -> dict[str, Any]:
+    """Return a fruit of the paper as it is outside of it."""
+    rest = {key: value for key, value in paper.items() if key not in ("climate", "growth_rate")}
+    return rest | {
+        "transpiration": _TRANSPIRATION.get(name, paper["transpiration"]),
+        "mould": MOULDS[mould].model_dump(),
+        "rot": ROTS[mould].model_dump(),
     }
 
 
@@ -59,7 +75,7 @@ ENVIRONMENTS: Mapping[str, Mapping[str, float]] = {
     "cold-desert": {"temperature": 5.0, "humidity": 35.0},
 }
 
-_FRUITS: Mapping[str, Mapping[str, Any]] = {
+_PAPER: Mapping[str, Mapping[str, Any]] = {
     "apple": _fruit(138, 84, 0.17, 25, 80, (20, 5), "penicillium-expansum", (0.55, 0.06, 0.04), _BLUE, **_APPLE),
     "apple-neofabraea": _fruit(138, 84, 0.17, 25, 80, (20, 5), "neofabraea", (0.50, 0.42, 0.08), _PALE, **_APPLE),
     "orange": _fruit(
@@ -70,7 +86,18 @@ _FRUITS: Mapping[str, Mapping[str, Any]] = {
     "tomato": _fruit(123, 94, 0.9, 40, 50, (75, 1), "rhizopus", (0.70, 0.06, 0.03), _GREY, **_TOMATO),
 }
 
-#: Fruits in the temperate climate, and every fruit in each of the others as e.g. `orange-tropical`.
+#: Which species a fruit grows.
+_SPECIES = {
+    "apple": "penicillium-expansum",
+    "apple-neofabraea": "neofabraea",
+    "orange": "penicillium-digitatum",
+    "peach": "rhizopus",
+    "pear": "penicillium-expansum",
+    "tomato": "rhizopus",
+}
+_FRUITS: Mapping[str, Mapping[str, Any]] = {name: _lived(name, paper, _SPECIES[name]) for name, paper in _PAPER.items()}
+
+#: Fruits in the temperate climate, every fruit in each of the others as e.g. `orange-tropical`, and in the paper's.
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     **_FRUITS,
     **{
@@ -79,4 +106,5 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         for climate, air in ENVIRONMENTS.items()
         if climate != "temperate"
     },
+    **{f"{fruit}-paper": values for fruit, values in _PAPER.items()},
 }

@@ -52,11 +52,11 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             attrs["path"] = "closed-form"
             for day in days:
                 if day in followed:
-                    shape.follow(day, None, context)
+                    shape.follow(shape.lost(day), None, context)
                 if day not in need.stages:
                     continue
                 row = _row(day, 0, 0.0, True)
-                _finish(rows, row, shape, None, begun, need, context)
+                _finish(rows, row, shape, (shape.lost(day), None), begun, need, context)
             return _dataset(rows, need, attrs, shape)
         with_mould = bool(wanted & MOULD)
         context.report(0.0, f"laying {settings.vertices} points on the fruit")
@@ -65,12 +65,12 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
         for reached in march(system, days, settings.tolerance, settings.longest, context):
             rot = system.rot.share(reached.state.rot)
             if reached.day in followed:
-                shape.follow(reached.day, rot, context)
+                shape.follow(reached.state.water, rot, context)
             if reached.day not in need.stages:
                 continue
             errors = [
                 layer.budget_error(state)
-                for layer, state in zip((system.rot, system.mould), reached.state, strict=True)
+                for layer, state in zip((system.rot, system.mould), reached.state[:2], strict=True)
                 if layer is not None and state is not None
             ]
             sound = reached.error <= 1 and max(errors) <= _ROUND_OFF
@@ -78,7 +78,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             if "budget_error" in wanted:
                 row["budget_error"] = max(errors)
             row |= _fields(system, reached, need, settings.cells)
-            _finish(rows, row, shape, rot, begun, need, context)
+            _finish(rows, row, shape, (reached.state.water, rot), begun, need, context)
     except SolverError as error:
         if rows:
             error.partial = _dataset(rows, need, attrs, shape)
@@ -91,13 +91,13 @@ def _finish(
     rows: list[dict[str, Any]],
     row: dict[str, Any],
     shape: Shape,
-    rot: Floats | None,
+    state: tuple[float, Floats | None],
     begun: float,
     need: Need,
     context: Context,
 ) -> None:
-    """Add the stage's shape and seconds to its row, and the row to the others."""
-    row |= shape.at(row["stage"], rot, context)
+    """Add the stage's shape, of the water lost and the rot (v), and seconds to its row, and the row to the others."""
+    row |= shape.at(*state, context)
     row["seconds"] = time.perf_counter() - begun
     rows.append(row)
     context.report(row["stage"] / max(need.stages[-1], 1e-9), f"day {row['stage']:.2f} settled")

@@ -6,9 +6,12 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from ..contract import Cost, Need, Quality
+from .environment import opened, reference_radius
+from .fields.rates import units
 from .names import BODY, FIELDS, MOULD, ROT, VECTORS, completed
 from .params import DecayParams
 from .surfaces.seeds import seeds
+from .surfaces.surface import extent
 
 __all__ = ["Settings", "choose", "expected_cost", "moved", "nodes", "stepped"]
 
@@ -79,8 +82,12 @@ def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:
 
 
 def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
-    """Return whether rot has to be stepped: it is wanted, or bears on a body that moves."""
-    bears = moved(params, wanted) and params.flesh.heeds_rot and (bool(params.wound_map) or len(seeds(params)) > 0)
+    """Return whether rot has to be stepped: it is wanted, or bears on the body that moves or on the water lost."""
+    wounded = bool(params.wound_map) or len(seeds(params)) > 0
+    bears = moved(params, wanted) and params.flesh.heeds_rot and wounded
+    # broken skin loses more water
+    dries = wounded and opened(params) > params.transpiration
+    bears |= dries and ("water_lost" in wanted or (params.body != "none" and not BODY.isdisjoint(wanted)))
     return bears or not {*ROT, *MOULD, "budget_error"}.isdisjoint(wanted)
 
 
@@ -102,4 +109,6 @@ def expected_cost(params: DecayParams, need: Need) -> Cost:
 
 
 def _clock(params: DecayParams) -> float:
-    return max(params.rot.pace, params.mould.pace) * params.growth_rate / 50
+    """Return the units of the quicker organism's time in a day, at its best."""
+    radius = 1e3 * reference_radius(params, extent(params))
+    return max(units(colony, params, radius) for colony in (params.rot, params.mould))

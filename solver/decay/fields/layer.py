@@ -44,6 +44,7 @@ class Layer:
         self._coarse = coarse
         self._all = np.arange(len(fresh))
         self._everywhere = self._linked(np.ones_like(fresh), _NO_ROT, self._all)
+        self._even = np.ones_like(fresh)
         zero = np.zeros_like(fresh)
         self.fresh = State(zero, zero, fresh, 0.0)
         self._store = rates.theta * surface.mean(fresh)
@@ -52,20 +53,30 @@ class Layer:
         """Return u + v over what the nutrient n = 1 can feed: the organism's map, 0 to 1."""
         return np.minimum((state.u + state.v) / self.rates.theta, 1.0)
 
-    def advance(self, state: State, dt: float, rot: Floats = _NO_ROT, rates: Rates | None = None) -> State:
+    def advance(
+        self,
+        state: State,
+        dt: float,
+        rot: Floats = _NO_ROT,
+        rates: Rates | None = None,
+        pace: Floats | None = None,
+    ) -> State:
         """Return the state dt [day] later. rot (v): the map whose gate says where the organism may spread.
 
-        rates: those of this step, where the weather changes them.
+        rates: those of this step, where the climate changes them. pace (v): over them, where it differs by place.
         """
         rates = rates or self.rates
+        if rates.consume == 0 and rates.mobility == 0 and rates.feed == 0 and rates.wither == 0:
+            return state  # frozen, or too hot
+        pace = self._even if pace is None else pace
         u, v, n = state.u.copy(), state.v.copy(), state.n.copy()
         s = self.surface
         listed = listed_around(u, _CUT * self.rates.cap, _RINGS, s.start, s.near)
-        self._half(u, v, n, listed, dt / 2, rot, rates)
+        self._half(u, v, n, listed, dt / 2, rot, rates, pace)
         if rates.feed > 0:
             stages = stages_for(dt, rates.feed * s.stiffest)
             rkl2(n, self._everywhere, rates.feed, 0.0, dt, stages, self._all, s.area)
-        self._half(u, v, n, listed, dt / 2, rot, rates)
+        self._half(u, v, n, listed, dt / 2, rot, rates, pace)
         return State(u, v, n, state.added)
 
     def _half(
@@ -77,23 +88,26 @@ class Layer:
         dt: float,
         rot: Floats,
         rates: Rates,
+        pace: Floats,
     ) -> None:
         s = self.surface
         if not len(listed):
             return
-        react(u, v, n, listed, dt / 2, rates)
-        c = self._coarse * n
+        react(u, v, n, listed, dt / 2, pace, rates)
+        c = self._coarse * n * pace
         # two stages would be stable but less accurate
         stages = max(3, stages_for(dt, rates.fastest * s.stiffest * float(c[listed].max())))
         rkl2(u, self._linked(c, rot, listed), rates.mobility, rates.cap, dt, stages, listed, s.area)
-        react(u, v, n, listed, dt / 2, rates)
+        react(u, v, n, listed, dt / 2, pace, rates)
 
     def _linked(self, c: Floats, rot: Floats, listed: Ints) -> Links:
         s = self.surface
         return linked(c, rot, listed, s.start, s.near, s.weight, s.area)
 
-    def seeded(self, state: State, centre: Floats, radius: float, gate: Floats | None = None) -> State:
-        """Return the state with a new colony: a smooth bump of height d2 about a point (3), times the gate.
+    def seeded(
+        self, state: State, centre: Floats, radius: float, gate: Floats | None = None, share: float = 1.0
+    ) -> State:
+        """Return the state with a new colony: a smooth bump of a share of d2 about a point (3), times the gate.
 
         Its total does not depend on the mesh; a mesh coarser than the bump takes it all at the nearest vertex.
         """
@@ -104,7 +118,7 @@ class Layer:
         whole = self.surface.total(bump)
         if gate is not None:
             bump *= gate
-        bump *= self.rates.cap * np.pi * radius**2 / 3 / whole
+        bump *= share * self.rates.cap * np.pi * radius**2 / 3 / whole
         return state._replace(u=state.u + bump, added=state.added + self.surface.mean(bump))
 
     def painted(self, state: State, share: Floats) -> State:

@@ -19,9 +19,10 @@ __all__ = ["react"]
 
 
 @njit(cache=True)
-def react(u: Floats, v: Floats, n: Floats, listed: Ints, dt: float, rates: Rates) -> None:
-    """Advance the listed vertices by dt [day] in place."""
+def react(u: Floats, v: Floats, n: Floats, listed: Ints, whole: float, pace: Floats, rates: Rates) -> None:
+    """Advance the listed vertices by a time [day] in place, each at its own pace (v)."""
     for i in listed:
+        dt = whole * pace[i]
         u0, n0 = u[i], n[i]
         if u0 <= 1e-200:
             continue

@@ -1,11 +1,13 @@
-"""Rot and mould together on one fruit: initial fields, the gate between them, wounds and spawning.
+"""Rot and mould together on one fruit: initial fields, the gate between them, wounds, lags and spawning.
 
 The soft rot lives on the flesh and eats what is in it, the mould lives on the skin and eats what is there; both start
-as random fields of one kind (D15). The mould spreads only where rot is (D14).
+as random fields of one kind (D15). The mould spreads only where rot is (D14). In the cardinal climate both grow as
+their species do (`solver.decay.climate`), what lands waits for its lag, and broken skin loses more water.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,17 +16,20 @@ from scipy.spatial import KDTree
 from ...arrays import Floats
 from ...contract import Context
 from ...fruit import directions
+from ..climate import Germination, flesh_activity, moisture, surface_activity, warmth
+from ..environment import air, evaporated, opened, reference_radius
 from ..params import DecayParams
-from ..surfaces.imported import rays_from
+from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.places import painted
 from ..surfaces.seeds import seeds
-from ..surfaces.surface import Surface, geodesic, lay, triangulated
+from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
 from .colony import Colony
 from .gate import SHUT, gates
 from .layer import Layer, State
 from .noise import patches
 from .rates import Rates, daily
 from .spawning import Landing, Spawner
+from .waiting import Seed, Waiting
 
 __all__ = ["Both", "System", "laid"]
 
@@ -32,20 +37,16 @@ __all__ = ["Both", "System", "laid"]
 #: Radius of a spawned colony [r1], and the share of the map above which a place is taken already.
 _SPORE = 0.06
 _TAKEN = 0.05
+#: Density of what starts to grow after its lag, over d2: a twentieth of the map, which nobody sees yet.
+_INOCULUM = 4.0
 
 
 class Both(NamedTuple):
-    """State of the rot, and of the mould if there is one."""
+    """State of the rot, of the mould if there is one, and the water that has evaporated, over the fresh weight."""
 
     rot: State
     mould: State | None
-
-
-class _Due(NamedTuple):
-    """A spore that will take root, and whether it is rot."""
-
-    landing: Landing
-    rots: bool
+    water: float = 0.0
 
 
 def laid(params: DecayParams, cells: int) -> Surface:
@@ -71,6 +72,10 @@ class System:
         self.surface = surface or laid(params, cells)
         self._rays = geodesic(cells)[0] if params.mesh is None else rays_from(self.surface.points)
         self._tree = KDTree(self._rays)
+        own = extent_of(self.surface) if params.mesh is not None else None
+        self._extent = own or extent(params)
+        self._radius = 1e3 * reference_radius(params, self._extent)
+        self._cardinal = params.climate == "cardinal"
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
         chance = params.spawning / (10 - params.propagation_rate)
         self.rot = self._layer(params, "rot", for_rot)
@@ -78,33 +83,63 @@ class System:
         self.mould = self._layer(params, "mould", for_mould) if with_mould else None
         strays = params.rot_spawning if with_mould else 0.0
         self._mould_spawner = Spawner(chance, strays, params.spawn_reach, mould_clocks)
-        self._due: _Due | None = None
-        self.start = self._wounded(params)
+        self._waits = {True: Germination(params.rot, params), False: Germination(params.mould, params)}
+        self._waiting = Waiting()
+        self._due: tuple[float, Seed] | None = None
+        self._wounds = self._opened()
+        self.start = Both(self.rot.fresh, self.mould.fresh if self.mould else None)
+        for seed in self._wounding():
+            if self._cardinal:
+                self._waiting.add(self._waits[seed.rots].day(0.0), seed)
+            else:
+                self.start = self._seeded(self.start, 0.0, seed)
 
     def _layer(self, params: DecayParams, name: str, generator: np.random.Generator) -> Layer:
         points, size = self.surface.points, params.patch_size
         fresh = params.nutrient * (1 + params.unevenness * patches(points, size, generator))
         coarse = 1 + params.noise * patches(points, size, generator)
-        return Layer(self.surface, daily(getattr(params, name), params), fresh, coarse)
+        return Layer(self.surface, daily(getattr(params, name), params, self._radius), fresh, coarse)
 
-    def _wounded(self, params: DecayParams) -> Both:
-        rot, mould = self.rot.fresh, self.mould.fresh if self.mould else None
-        for wound in seeds(params):
+    def _wounding(self) -> Iterator[Seed]:
+        """Yield what the wounds bring: rot, and mould where there is one."""
+        kinds = (True, False) if self.mould is not None else (True,)
+        for wound in seeds(self._params):
             ray = directions(*np.radians([wound.colatitude, wound.azimuth]))
             if wound.vertex is not None:
                 ray = self._rays[wound.vertex]
             centre = self._place(ray) if wound.vertex is None else self.surface.points[wound.vertex]
-            rot = self.rot.seeded(rot, centre, wound.radius)
-            self._rot_spawner.settle(ray, 0.0)
-            if self.mould is not None and mould is not None:
-                mould = self.mould.seeded(mould, centre, wound.radius, self.gate(rot))
-                self._mould_spawner.settle(ray, 0.0)
-        if params.wound_map:
-            share = painted(params.wound_map, self._rays)
-            rot = self.rot.painted(rot, share)
-            if self.mould is not None and mould is not None:
-                mould = self.mould.painted(mould, share * self.gate(rot))
-        return Both(rot, mould)
+            for rots in kinds:
+                yield Seed(rots, ray, centre, wound.radius)
+        if self._params.wound_map:
+            for rots in kinds:
+                yield Seed(rots, None, None, 0.0)
+
+    def _opened(self) -> Floats:
+        """Return where wounds have broken the skin on day 0, 0 to 1 (v)."""
+        found = np.zeros(len(self.surface.points))
+        for seed in self._wounding():
+            if seed.place is None:
+                found = np.maximum(found, painted(self._params.wound_map, self._rays))
+            else:
+                far = ((self.surface.points - seed.place) ** 2).sum(axis=1)
+                found = np.maximum(found, np.clip(1 - far / seed.radius**2, 0, None) ** 2)
+        return found
+
+    def _seeded(self, state: Both, day: float, seed: Seed) -> Both:
+        """Return the state with a seed that starts to grow on a day."""
+        layer = self.rot if seed.rots else self.mould
+        assert layer is not None
+        here = state.rot if seed.rots else state.mould
+        assert here is not None
+        gate = None if seed.rots else self.gate(state.rot)
+        share = _INOCULUM if self._cardinal else 1.0
+        if seed.ray is None or seed.place is None:
+            map_ = share * painted(self._params.wound_map, self._rays)
+            grown = layer.painted(here, map_ if gate is None else map_ * gate)
+        else:
+            (self._rot_spawner if seed.rots else self._mould_spawner).settle(seed.ray, day)
+            grown = layer.seeded(here, seed.place, seed.radius, gate, share)
+        return state._replace(rot=grown) if seed.rots else state._replace(mould=grown)
 
     @property
     def imported(self) -> bool:
@@ -122,20 +157,41 @@ class System:
 
     def advance(self, state: Both, day: float, dt: float) -> Both:
         """Return the state dt [day] after a day, without new colonies; rot and air are those of the step's middle."""
-        rot = self.rot.advance(state.rot, dt, rates=self._rates(self._params.rot, day + dt / 2))
+        middle, params = day + dt / 2, self._params
+        flesh = flesh_activity(params, state.water) if self._cardinal else 1.0
+        rates = self._rates(params.rot, middle, self.rot.rates)
+        if self._cardinal:
+            rates = rates.slowed(float(moisture(params.rot, flesh)))
+        rot = self.rot.advance(state.rot, dt, rates=rates)
+        broken = [self.broken(x) for x in (state.rot, rot)]
+        water = self._evaporated(state.water, (broken[0] + broken[1]) / 2, day, day + dt)
         if self.mould is None or state.mould is None:
-            return Both(rot, None)
+            return Both(rot, None, water)
         ground = (self.rot.share(state.rot) + self.rot.share(rot)) / 2
-        rates = self._rates(self._params.mould, day + dt / 2)
-        return Both(rot, self.mould.advance(state.mould, dt, ground, rates))
+        pace = None
+        if self._cardinal:
+            out = surface_activity(params, middle, flesh, (broken[0] + broken[1]) / 2)
+            pace = np.asarray(moisture(params.mould, flesh + params.mould.exposed * (out - flesh)))
+        rates = self._rates(params.mould, middle, self.mould.rates)
+        return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water)
 
-    def _rates(self, colony: Colony, day: float) -> Rates | None:
-        return daily(colony, self._params, day) if self._params.weather else None
+    def _rates(self, colony: Colony, day: float, steady: Rates) -> Rates:
+        return daily(colony, self._params, self._radius, day) if self._params.weather else steady
+
+    def broken(self, rot: State) -> Floats:
+        """Return where the skin is rotten or wounded, 0 to 1 (v)."""
+        return np.maximum(self.rot.share(rot), self._wounds)
+
+    def _evaporated(self, before: float, broken: Floats, start: float, end: float) -> float:
+        """Return the water lost by the end, with a share (v) of the skin broken meanwhile."""
+        params = self._params
+        skin = params.transpiration + (opened(params) - params.transpiration) * self.surface.mean(broken)
+        return min(before + skin * evaporated(params, self._extent, start, end), params.water_content / 100)
 
     def distance(self, a: Both, b: Both) -> float:
         """Return the largest relative L2 difference of density u + v between two states, of rot and of mould."""
         worst = 0.0
-        for x, y in zip(a, b, strict=True):
+        for x, y in zip(a[:2], b[:2], strict=True):
             if x is None or y is None:
                 continue
             there = y.u + y.v
@@ -146,34 +202,32 @@ class System:
         return worst
 
     def next_root(self, state: Both, until: float) -> float:
-        """Return when the next spore takes root [day], infinite if none does before `until`.
+        """Return when the next seed starts to grow [day], infinite if none does before `until`.
 
-        Whether it will is judged on the state at the start of the step it falls in, so that the many that land on
+        Whether a spore will is judged on the state at the start of the step it lands in, so that the many that land on
         barren or taken ground cost no step.
         """
         while self._due is None:
             first = self._rot_spawner if self._rot_spawner.next <= self._mould_spawner.next else self._mould_spawner
-            if first.next > until:
+            if min(first.next, self._waiting.next) > until:
                 return np.inf
+            if self._waiting.next <= first.next:
+                self._due = self._waiting.next, self._waiting.pop()
+                break
             landing = first.land()
+            rots = first is self._rot_spawner
             site = int(self._tree.query(landing.direction)[1])
-            if self._roots(state, landing, site, first is self._rot_spawner):
-                self._due = _Due(landing, first is self._rot_spawner)
-        return self._due.landing.day
+            if self._roots(state, landing, site, rots):
+                seed = Seed(rots, landing.direction, self._place(landing.direction), _SPORE)
+                self._waiting.add(self._waits[rots].day(landing.day) if self._cardinal else landing.day, seed)
+        return self._due[0]
 
     def root(self, state: Both) -> Both:
         """Return the state with the colony that is due."""
         assert self._due is not None
-        landing, rots = self._due
+        day, seed = self._due
         self._due = None
-        place = self._place(landing.direction)
-        if rots:
-            self._rot_spawner.settle(landing.direction, landing.day)
-            return state._replace(rot=self.rot.seeded(state.rot, place, _SPORE))
-        assert self.mould is not None
-        assert state.mould is not None
-        self._mould_spawner.settle(landing.direction, landing.day)
-        return state._replace(mould=self.mould.seeded(state.mould, place, _SPORE, self.gate(state.rot)))
+        return self._seeded(state, day, seed)
 
     def _place(self, ray: Floats) -> Floats:
         """Return the point (3) of the skin in a unit direction; of an imported mesh the vertex nearest to it."""
@@ -184,9 +238,16 @@ class System:
 
     def _roots(self, state: Both, landing: Landing, site: int, rots: bool) -> bool:
         rotten = float(self.rot.share(state.rot)[site])
+        # colonies that grow slowly seed slowly
+        chance = self._growing(rots, landing.day)
         if rots:
-            return rotten < _TAKEN
+            return rotten < _TAKEN and landing.mark < chance
         assert self.mould is not None
         assert state.mould is not None
-        chance = rotten if landing.stray else 1.0
+        chance *= rotten if landing.stray else 1.0
         return rotten > SHUT and landing.mark < chance and float(self.mould.share(state.mould)[site]) < _TAKEN
+
+    def _growing(self, rots: bool, day: float) -> float:
+        if not self._cardinal:
+            return 1.0
+        return float(warmth(self._params.rot if rots else self._params.mould, air(self._params, day)[0]))

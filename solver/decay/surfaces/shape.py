@@ -79,7 +79,7 @@ class Shape:
                 raise InvalidInput("an open mesh has no volume.", advice="Close it, or leave the volume out.")
         if self._dries:
             dried.check(self._params, self._need)
-            dried.displaced(self._params, self._lost(self._need.stages[-1]), 4, context)
+            dried.displaced(self._params, self.lost(self._need.stages[-1]), 4, context)
 
     @property
     def triangles(self) -> Ints32:
@@ -87,7 +87,7 @@ class Shape:
         assert self.surface is not None
         return self.surface.faces.astype(np.int32)
 
-    def at(self, day: float, rot: Floats | None, context: Context) -> dict[str, Any]:
+    def at(self, water: float, rot: Floats | None, context: Context) -> dict[str, Any]:
         """Return the wanted shape of a day, with rot (v) on the surface's vertices.
 
         Raises:
@@ -98,8 +98,8 @@ class Shape:
         wanted, need = self._wanted, self._need
         row: dict[str, Any] = {}
         if "water_lost" in wanted:
-            row["water_lost"] = self._lost(day)
-        (balance, folds), found = self._settled(day, rot, context)
+            row["water_lost"] = water
+        (balance, folds), found = self._settled(water, rot, context)
         row |= found
         if "least_jacobian" in wanted:
             row["least_jacobian"] = balance.least_jacobian if balance else 1.0
@@ -109,7 +109,7 @@ class Shape:
             fresh = self._params.surface(*lattice(need.resolution))
             gone = self._body.on_lattice(balance, need.resolution) if self._body and balance else np.zeros_like(fresh)
             if self._dries:
-                gone = self._dried(day, need.resolution, context)
+                gone = self._dried(water, need.resolution, context)
             if self._wrinkles and folds is not None:
                 gone = gone + self._wrinkles.on_lattice(folds.points, need.resolution)
             for name, values in (("position", fresh + gone), ("displacement", gone)):
@@ -123,7 +123,7 @@ class Shape:
             if self._wrinkles and folds is not None:
                 points = points + self._wrinkles.on_surface(folds.points)
             if self._rays is not None:
-                points = points + dried.at_rays(self._dried(day, dried.ROWS, context), self._rays)
+                points = points + dried.at_rays(self._dried(water, dried.ROWS, context), self._rays)
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
             if "volume" in wanted:
@@ -132,21 +132,21 @@ class Shape:
                 row["volume"] = own.volume if own else _volume(points, self.surface)
         return row
 
-    def follow(self, day: float, rot: Floats | None, context: Context) -> None:
+    def follow(self, water: float, rot: Floats | None, context: Context) -> None:
         """Settle a day of the march: later days, stages among them, start from its shape.
 
         Raises:
             NotConverged: body or skin found no equilibrium.
 
         """
-        self._node, _ = self._settled(day, rot, context)
+        self._node, _ = self._settled(water, rot, context)
 
-    def _settled(self, day: float, rot: Floats | None, context: Context) -> tuple[_Settled, dict[str, Any]]:
+    def _settled(self, water: float, rot: Floats | None, context: Context) -> tuple[_Settled, dict[str, Any]]:
         """Return the moved shape of a day, and what is kept of how it was found."""
         if self._body is None:
             return _Settled(None, None), {}
         watch, before = context.check_cancelled, self._node
-        balance = self._body.settled(self._body.state(self._lost(day), rot), before.balance, watch)
+        balance = self._body.settled(self._body.state(water, rot), before.balance, watch)
         row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
         folds = None
         if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:
@@ -154,10 +154,11 @@ class Shape:
             row["skin_residual"], row["skin_steps"] = folds.residual, folds.steps
         return _Settled(balance, folds), row
 
-    def _dried(self, day: float, resolution: int, context: Context) -> Floats:
-        return dried.displaced(self._params, self._lost(day), resolution, context)
+    def _dried(self, water: float, resolution: int, context: Context) -> Floats:
+        return dried.displaced(self._params, water, resolution, context)
 
-    def _lost(self, day: float) -> float:
+    def lost(self, day: float) -> float:
+        """Return the water that a sound skin has lost by a day, over the fresh weight."""
         return water_lost(self._params, self._extent, day)
 
 

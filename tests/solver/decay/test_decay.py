@@ -8,6 +8,7 @@ import pytest
 from solver.contract import Context, InvalidInput, Need
 from solver.decay import SOLVER, DecayParams, Wound
 from solver.decay.environment import damping, deficit, saturation, water_lost
+from solver.decay.fields.colony import PAPER_MOULDS, PAPER_ROT
 from solver.decay.fields.spawning import Spawner
 from solver.decay.fields.stepping import march
 from solver.decay.fields.system import System
@@ -15,7 +16,13 @@ from solver.decay.presets import ENVIRONMENTS
 from solver.decay.settings import choose
 from solver.decay.surfaces.surface import extent
 
-FAST = {"growth_rate": 100.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
+#: The paper's climate and kinetics, which start at once.
+PAPER = {
+    "climate": "paper",
+    "rot": PAPER_ROT.model_dump(),
+    "mould": PAPER_MOULDS["penicillium-expansum"].model_dump(),
+}
+FAST = {**PAPER, "growth_rate": 100.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
 
 
 @pytest.mark.parametrize(
@@ -46,10 +53,10 @@ def test_the_room_of_the_paper():
 
 
 @pytest.mark.parametrize(
-    ("fruit", "daily"), [("apple", 0.0018), ("pear", 0.0069), ("tomato", 0.010), ("orange", 0.091)]
+    ("fruit", "daily"), [("apple", 0.0018), ("pear", 0.0069), ("tomato", 0.010), ("orange", 0.091), ("peach", 0.177)]
 )
 def test_daily_losses_of_table_1(fruit, daily):
-    params = SOLVER.parse({"radii": (1.0,) * 8}, fruit)
+    params = SOLVER.parse({"radii": (1.0,) * 8}, f"{fruit}-paper")
     fresh = extent(params)
     assert water_lost(params, fresh, 1.0) == pytest.approx(daily, rel=0.1)
     assert water_lost(params, fresh, 1e6) == params.water_content / 100
@@ -94,9 +101,10 @@ def test_frames_do_not_change_the_rot():
     for a, b in zip(few, many[::4], strict=True):
         assert a.day == b.day
         assert a.steps == b.steps
-        for x, y in zip(a.state, b.state, strict=True):
+        for x, y in zip(a.state[:2], b.state[:2], strict=True):
             assert np.array_equal(x.u, y.u)
             assert np.array_equal(x.n, y.n)
+        assert a.state.water == b.state.water
 
 
 def test_the_rot_without_mould_is_the_rot_with_it():
@@ -112,7 +120,7 @@ def test_the_rot_without_mould_is_the_rot_with_it():
 def test_mould_is_only_where_rot_is():
     whole = system(cells=16)
     for reached in stages(whole, (0.0, 1.0, 2.0, 3.0)):
-        rot, mould = reached.state
+        rot, mould, _ = reached.state
         fresh = whole.rot.share(rot) < 0.001
         assert (mould.u + mould.v)[fresh].max(initial=0) == 0
         assert fresh.any() or reached.day >= 3
@@ -157,14 +165,18 @@ def test_no_wounds_no_rot():
 
 
 def test_a_wound_stays_where_it_was_put():
-    one = System(SOLVER.parse({"wounds": [Wound(colatitude=90, azimuth=90).model_dump()]}), 16, True)
+    one = System(
+        SOLVER.parse({**PAPER, "growth_rate": 20.0, "wounds": [Wound(colatitude=90, azimuth=90).model_dump()]}),
+        16,
+        True,
+    )
     (end,) = stages(one, (3.0,))
     middle = (one.surface.points * (end.state.rot.u + end.state.rot.v)[:, None]).sum(axis=0)
     assert middle[2] > 0.95 * np.linalg.norm(middle)
 
 
 def test_asking_for_no_mould_computes_none_and_asking_for_water_steps_nothing():
-    params = SOLVER.parse({"growth_rate": 100.0})
+    params = SOLVER.parse({**PAPER, "growth_rate": 100.0})
     need = {"stages": (1.0,), "quality": "preview"}
     rot = SOLVER.solve(params, Need(fields=("mean_rot",), **need))
     assert rot.attrs["path"] == "rot"
@@ -175,7 +187,7 @@ def test_asking_for_no_mould_computes_none_and_asking_for_water_steps_nothing():
 
 
 def test_fields_lie_on_the_lattice_between_0_and_1():
-    params = SOLVER.parse({"growth_rate": 100.0})
+    params = SOLVER.parse({**PAPER, "growth_rate": 100.0})
     run = SOLVER.solve(
         params, Need(stages=(0.0, 2.0), quality="preview", resolution=32, fields=("rot", "mould", "position"))
     )
@@ -223,8 +235,8 @@ HOSTILE = {
 
 @pytest.mark.parametrize("case", HOSTILE)
 def test_hostile_parameters_end_finite_positive_and_in_balance(case):
-    whole = System(SOLVER.parse({"growth_rate": 50.0} | HOSTILE[case]), 4, True)
+    whole = System(SOLVER.parse({**PAPER, "growth_rate": 50.0} | HOSTILE[case]), 4, True)
     for reached in march(whole, (0.5, 3.0), 1e-3, choose(DecayParams(), "preview").longest, Context()):
-        for layer, state in zip((whole.rot, whole.mould), reached.state, strict=True):
+        for layer, state in zip((whole.rot, whole.mould), reached.state[:2], strict=True):
             assert all(np.isfinite(part).all() and part.min() >= 0 for part in state[:3])
             assert layer.budget_error(state) < 1e-12

@@ -8,7 +8,7 @@ from solver.decay import SOLVER, DecayParams
 from solver.decay.surfaces.imported import Mesh, extent_of, rays_from
 from solver.decay.surfaces.surface import geodesic, lay, triangulated
 
-QUICK = {"growth_rate": 100.0, "spawning": 0.0, "rot_spawning": 0.0}
+QUICK = {"climate": "paper", "growth_rate": 100.0, "spawning": 0.0, "rot_spawning": 0.0}
 
 
 def mesh(points: np.ndarray, faces: np.ndarray) -> dict:

@@ -37,7 +37,7 @@ def test_a_painted_map_is_read_where_it_was_painted():
 def test_painted_wounds_are_where_the_paint_is_and_keep_the_budget():
     theta, phi = lattice(32)
     paint = np.where((theta < 1.2) & (phi < 1.5), 1.0, 0.0)
-    values = {"wounds": (), "wound_map": paint.tolist()}
+    values = {"wounds": (), "wound_map": paint.tolist(), "climate": "paper"}
     system = System(SOLVER.parse(values), 8, True)
     rot = system.rot.share(system.start.rot)
     rays = geodesic(8)[0]

@@ -192,7 +192,7 @@ def test_reaction_keeps_the_total_and_the_sign_for_any_step():
     u[20:40] = 0.0
     before = RATES.theta * n + u + v
     for dt in (1e-3, 0.1, 10.0, 1e4):
-        react(u, v, n, np.arange(500), dt, RATES)
+        react(u, v, n, np.arange(500), dt, np.ones(500), RATES)
         assert min(u.min(), v.min(), n.min()) >= 0
         assert np.abs(RATES.theta * n + u + v - before).max() < 1e-16 * 50
 
@@ -202,7 +202,7 @@ def test_reaction_is_of_second_order():
     for steps in (40, 80, 160, 5120):
         u, v, n = np.array([0.004]), np.zeros(1), np.ones(1)
         for _ in range(steps):
-            react(u, v, n, np.arange(1), 0.8 / steps, RATES)
+            react(u, v, n, np.arange(1), 0.8 / steps, np.ones(1), RATES)
         ends.append(np.concatenate([u, v, n]))
     errors = [float(np.linalg.norm(e - ends[-1])) for e in ends[:-1]]
     assert slope(errors) == pytest.approx(2, abs=0.2)
