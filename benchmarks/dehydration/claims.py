@@ -1,4 +1,4 @@
-"""The paper's maps as measured statements: python -m benchmarks.claims DIR [--json FILE].
+"""The paper's maps as measured statements: python -m benchmarks.dehydration.claims DIR [--json FILE].
 
 DIR holds one store per plan: fig7, fig8, fig9, fig10, table1 (`wizen sweep examples/fig7.toml --store DIR/fig7`, ...).
 Claims C1 to C6 are those of Liu et al. 2014, section 4; each gets the quantity that decides it, at s = 0.3, and a
@@ -18,7 +18,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.pattern import Pattern, patterns
+from benchmarks.dehydration.pattern import Pattern, patterns
 
 STAGE = 0.3
 #: A trend counts if its ends differ by more than twice what another seed changes (about 5 %).

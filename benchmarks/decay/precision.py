@@ -1,6 +1,6 @@
 """Error over time on one three-field colony: ours, the paper's way (explicit Euler on a grid), and py-pde.
 
-    python -m benchmarks.decay_precision FILE.png [python with py-pde]
+    python -m benchmarks.decay.precision FILE.png [python with py-pde]
 
 A round colony of rot (the apple's rates, even nutrient) spreads for two days; about its middle everything depends on
 the distance alone, so a method of lines in one dimension (scipy's LSODA, conservative cells) is the reference for all.

@@ -1,6 +1,6 @@
 """What the number of frames does to the statistics of a rot: nothing. Means and spreads over seeds.
 
-    python -m benchmarks.decay_seeds [seeds] [days]
+    python -m benchmarks.decay.seeds [seeds] [days]
 
 The same seeds with 24 and with 96 frames a day, then other seeds with 96: the first two must be equal, and the third
 differ from them by no more than seeds differ. `t` is Welch's, against the first row: within +-2 is noise.

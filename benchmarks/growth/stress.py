@@ -1,4 +1,4 @@
-"""What is meant to break growth, and how each try ends: python -m benchmarks.growth_stress [case ...].
+"""What is meant to break growth, and how each try ends: python -m benchmarks.growth.stress [case ...].
 
 Each case returns what was found; what must not happen ends in `Broken`. A typed error is a good end where one is due,
 and leaves the last equilibrium standing.
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.crossings import crossings
+from benchmarks.growth.crossings import crossings
 from benchmarks.tries import Broken, show
 from solver import shell
 from solver.contract import InvalidGeometry, NotConverged

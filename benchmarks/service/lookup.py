@@ -1,4 +1,4 @@
-"""Time of one look-up on one core: python -m benchmarks.lookup [--json PATH].
+"""Time of one look-up on one core: python -m benchmarks.service.lookup [--json PATH].
 
 Rows go by resolution, by what is asked for (in the default method), and by method (positions).
 

@@ -1,4 +1,4 @@
-"""Pictures of the decay examples, each solved anew: python -m benchmarks.decay_pictures PLAN.toml FILE.png.
+"""Pictures of the decay examples, each solved anew: python -m benchmarks.decay.pictures PLAN.toml FILE.png.
 
 One row per sample, one column per stage. --group draws all samples of a stage as one heap: the first stands at the
 origin, the others where it sees its neighbours. Touching round fruits never hide one another in turn, so that painting

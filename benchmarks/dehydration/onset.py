@@ -1,4 +1,4 @@
-"""The onset of the exact references on both roads: python -m benchmarks.onset [--quality Q] [--json PATH].
+"""The onset of the exact references on both roads: python -m benchmarks.dehydration.onset [--quality Q] [--json PATH].
 
 Error is that of s_cr, relative to the reference; seconds are those of one call on this machine.
 """
@@ -14,7 +14,7 @@ from typing import Any
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.dehydration.bifurcation import onset
 
-REFERENCE = Path(__file__).parents[1] / "tests" / "solver" / "core_shell_sphere.json"
+REFERENCE = Path(__file__).parents[2] / "tests" / "solver" / "core_shell_sphere.json"
 AXISYMMETRIC = ("raisin", "wolfberry", "jujube1", "jujube2")
 
 

@@ -1,4 +1,4 @@
-"""What is meant to break the wood solver, and how each try ends: python -m benchmarks.wood_stress [case ...].
+"""What is meant to break the wood solver, and how each try ends: python -m benchmarks.wood.stress [case ...].
 
 Each case returns what was found; what must not happen ends in `Broken`. A typed error is a good end where one is due.
 """

@@ -1,4 +1,6 @@
-"""Contact sheets of stored runs as they are, nothing interpolated: python -m benchmarks.sheets STORE FILE.png.
+"""Contact sheets of stored runs as they are, nothing interpolated.
+
+python -m benchmarks.dehydration.sheets STORE FILE.png
 
 One row per skin thickness, one column per sample in the order of the other axes; --stages draws one row per sample
 instead, as in Fig. 11 of Liu et al. 2014.
@@ -18,7 +20,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from benchmarks.pattern import name_of
+from benchmarks.dehydration.pattern import name_of
 from solver.dehydration.params import DehydrationParams
 from solver.fruit import lattice
 from store.store import Store

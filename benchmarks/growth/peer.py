@@ -1,6 +1,6 @@
 """Ours against newton's CPU cloth: a disc whose rest lengths grow at once by 1 + 0.3 r^4, from the same noise.
 
-python -m benchmarks.growth_peer PYTHON [vertices]     PYTHON: an interpreter that has newton (benchmarks/peers)
+python -m benchmarks.growth.peer PYTHON [vertices]     PYTHON: an interpreter that has newton (benchmarks/peers)
 
 Both are judged by one energy and gradient, ours: energy and largest force over mu l against CPU seconds of one thread.
 Newton's membrane is neo-Hookean with the same moduli, which differs beyond small strains, and its hinges have about the
@@ -60,7 +60,7 @@ def main(python: str, vertices: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         given, out = Path(folder) / "disc.npz", Path(folder) / "out.npz"
         np.savez(given, points=x, triangles=triangles, growth=growth, edge_ke=edge_ke)
-        script = Path(__file__).parent / "peers" / "newton_disc.py"
+        script = Path(__file__).parents[1] / "peers" / "newton_disc.py"
         subprocess.run([python, script, given, out, *map(str, _STEPS)], check=True, stdout=subprocess.DEVNULL)
         found = np.load(out)
         for step, seconds, y in zip(_STEPS, found["seconds"], found["positions"], strict=True):

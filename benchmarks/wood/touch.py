@@ -1,4 +1,4 @@
-"""What contact of rods costs and keeps apart in the slow press: python -m benchmarks.wood_touch [SEED ...].
+"""What contact of rods costs and keeps apart in the slow press: python -m benchmarks.wood.touch [SEED ...].
 
 Fig. 4.2 at 24 rods of 16 vertices, implicitly, with and without `rod_contact`. The overlap is the largest of any two
 rods, bonded or not,

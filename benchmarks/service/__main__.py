@@ -5,7 +5,7 @@ worker each, in turns), `batch` (one request against many), `memory` (four worke
 generation 200 times under load). The peer needs a Python with xpublish below 0.5, whose zarr routes later ones lack:
 python -m venv peers/xpublish && peers/xpublish/bin/pip install 'xpublish<0.5' 'fastapi<0.120' zarr uvicorn.
 
-The table is the synthetic one of `benchmarks.lookup`: 30 samples, 5 stages, 96 waves, 34 MB.
+The table is the synthetic one of `benchmarks.service.lookup`: 30 samples, 5 stages, 96 waves, 34 MB.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from store.store import Store
 from .http_load import drive
 from .lookup import fill
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("start", "load", "batch", "memory", "swaps")
 #: Its points take as many bytes as the peer's chunk of 50000 numbers.
 RESOLUTION = 90

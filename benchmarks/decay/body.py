@@ -1,6 +1,6 @@
 """Seconds of body and skin by mesh, and the body's error against a finer one: one stage, fields already there.
 
-    python -m benchmarks.decay_body [preset] [day]
+    python -m benchmarks.decay.body [preset] [day]
 
 Milliseconds are CPU time of one thread, the least of three.
 """

@@ -1,6 +1,6 @@
 """Milliseconds of a frame by part: fields, body and skin of an animation, against the paper's 10 s.
 
-    python -m benchmarks.decay_frames [preset] [day] [frames a day] [frames]
+    python -m benchmarks.decay.frames [preset] [day] [frames a day] [frames]
 
 Default quality; each frame starts from the march's last shape, one a frame behind it. CPU time of one thread, means.
 """

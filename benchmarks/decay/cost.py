@@ -1,4 +1,4 @@
-"""What a step of rot and mould costs, by points and by infected area: python -m benchmarks.decay_cost.
+"""What a step of rot and mould costs, by points and by infected area: python -m benchmarks.decay.cost.
 
 A colony that covers a share of the sphere, both organisms; CPU milliseconds of a step, the least of five, and slopes
 of log cost over log points and of cost over listed points.

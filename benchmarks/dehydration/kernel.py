@@ -1,4 +1,6 @@
-"""Time of the explicit kernel per element and step, against the C prototype: python -m benchmarks.kernel [--json PATH].
+"""Time of the explicit kernel per element and step, against the C prototype.
+
+python -m benchmarks.dehydration.kernel [--json PATH]
 
 One thread, no contact. All contestants take turns in one run, so that the ratios hold even where the machine is noisy;
 times are CPU time, the median over the turns. Beside them: arithmetic and memory traffic per element and step,

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 #: One thread each, so that CPU seconds of different codes compare.
 SINGLE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
@@ -91,9 +91,9 @@ def answer(command: Sequence[str], *, limit: float, env: Mapping[str, str] | Non
 
 
 def worker(function: str, **arguments: Any) -> Row:
-    """Call `benchmarks.precision.<module>:<function>` in a process of its own."""
+    """Call `benchmarks.dehydration.precision.<module>:<function>` in a process of its own."""
     limit = float(arguments.pop("limit", 3600.0))
-    command = [sys.executable, "-m", "benchmarks.precision.worker", function, json.dumps(arguments)]
+    command = [sys.executable, "-m", "benchmarks.dehydration.precision.worker", function, json.dumps(arguments)]
     return answer(command, limit=limit)
 
 

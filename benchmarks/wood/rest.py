@@ -1,6 +1,6 @@
 """What it would save to let fragments sleep: how much of a run's work goes into fragments that are at rest.
 
-`python -m benchmarks.wood_rest [SLOWEST]`. A fragment is what edges, whole hinges and bonds join. It is at rest at a
+`python -m benchmarks.wood.rest [SLOWEST]`. A fragment is what edges, whole hinges and bonds join. It is at rest at a
 stage if no vertex has been faster than SLOWEST [m/s] at this stage and the one before. Nearly all work is the bonds'
 and the edges', so that their number at rest, over all, bounds what a run without them could save.
 """
@@ -74,7 +74,7 @@ def resting(values: dict[str, Any], until: float, slowest: float) -> str:
 
 
 def main(slowest: float) -> None:
-    file = Path(__file__).parents[1] / "examples" / "wood" / "splinter.toml"
+    file = Path(__file__).parents[2] / "examples" / "wood" / "splinter.toml"
     press = tomllib.loads(file.read_text()) | {"rods": 30, "vertices": 24, "seed": 1}
     floor = {"size": (1.0, 1.0, 0.02), "path": [{"time": 0, "position": (0.075, 0, -0.03)}], "friction": 0.6}
     on_floor = press | {"bodies": [*press["bodies"], floor], "damping": 200.0}

@@ -1,4 +1,4 @@
-"""PyElastica beside our rods, in one run: python -m benchmarks.wood_peer PYTHON_WITH_PYELASTICA.
+"""PyElastica beside our rods, in one run: python -m benchmarks.wood.peer PYTHON_WITH_PYELASTICA.
 
 Free rods, no bonds: CPU time of a vertex and step, and the tip of a cantilever against the elastica. PyElastica's rods
 shear and twist besides; ours are timed with and without twist.
@@ -17,7 +17,7 @@ from scipy.integrate import solve_bvp
 from solver.contract import Need
 from solver.wood import SOLVER
 
-from .wood import per_step
+from .__main__ import per_step
 
 #: One rod: length, radius [m], modulus [Pa], density [kg/m3], elements; end load over EI / L^2.
 _ROD = {"length": 0.15, "radius": 0.002, "modulus": 1e10, "density": 600.0, "load": 1.0}

@@ -1,4 +1,4 @@
-"""Our implicit solver on the peers' common case before buckling: python -m benchmarks.sphere_ours --json.
+"""Our implicit solver on the peers' common case before buckling: python -m benchmarks.dehydration.sphere_ours --json.
 
 Sphere with skin 1 to 1.04, rigid stone 0.4, mu 1 and 10, kappa = 1000 mu, core shrunk by theta in one load step on
 one octant, as the peers. Errors are of the radius at all nodes and at random points between them, against the radial
@@ -20,7 +20,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The hostile matrix: python -m benchmarks.stress [--quick] [--only WORD] [--json FILE].
+"""The hostile matrix: python -m benchmarks.dehydration.stress [--quick] [--only WORD] [--json FILE].
 
 Each run ends converged, or unconverged and saying so, or in a typed error with the stages that were settled before
 it. Anything else is a violation: a hang (the worker is killed), a crash, an untyped exception, a run that is cancelled

@@ -1,6 +1,6 @@
 """The gallery of Combaz and Neyret 2004, Fig. 2: every file in examples/growth grown, measured and drawn.
 
-python -m benchmarks.gallery [--quality Q] [--keep FOLDER] [--out docs/growth-gallery.png] [NAME ...]
+python -m benchmarks.growth.gallery [--quality Q] [--keep FOLDER] [--out docs/growth-gallery.png] [NAME ...]
 
 prints a table; CPU seconds of one thread, kernels compiled beforehand; crossings: edges that pass through triangles.
 With --keep, results are written to the folder, and those newer than their example file are not grown again.
@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from benchmarks.crossings import crossings
+from benchmarks.growth.crossings import crossings
 from solver import registry
 from solver.contract import Need, SolverError
 from sweeps.outputs import triangles
 from sweeps.pictures.render import View
 from sweeps.pictures.sheet import Panel, sheet
 
-_FOLDER = Path(__file__).parent.parent / "examples" / "growth"
+_FOLDER = Path(__file__).parents[2] / "examples" / "growth"
 _COLUMNS = 5
 #: What lies flat is looked at from above, a strip from its side.
 _VIEWS = {"b-leaf": (-35, 50), "c": (35, 45), "c-pumpkin": (35, 25), "d-bed": (35, 38), "e-cloth": (35, 25)}

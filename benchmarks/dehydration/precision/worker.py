@@ -1,4 +1,4 @@
-"""One run in a process of its own: python -m benchmarks.precision.worker MODULE:FUNCTION ARGUMENTS-AS-JSON."""
+"""One run in a process of its own: python -m benchmarks.dehydration.precision.worker MODULE:FUNCTION JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import sys
 
 def main() -> None:
     module, function = sys.argv[1].split(":")
-    row = getattr(importlib.import_module(f"benchmarks.precision.{module}"), function)(**json.loads(sys.argv[2]))
+    found = importlib.import_module(f"benchmarks.dehydration.precision.{module}")
+    row = getattr(found, function)(**json.loads(sys.argv[2]))
     row["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(json.dumps(row))
 
