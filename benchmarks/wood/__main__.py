@@ -112,7 +112,7 @@ def _asked() -> None:
     parser.add_argument("--vertices", type=int, default=30)
     parser.add_argument("--until", type=float, default=3.0, help="seconds that are simulated")
     parser.add_argument("--seeds", type=int, nargs="*", default=[1])
-    parser.add_argument("--modes", nargs="+", choices=("scaled", "implicit", "explicit"), default=["scaled"])
+    parser.add_argument("--modes", nargs="+", choices=("scaled", "explicit"), default=["scaled"])
     parser.add_argument("--no-elastic", action="store_true", help="leave the run without fracture out")
     asked = parser.parse_args()
     if asked.fig42:

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array, Ints
 
 from sweeps.errors import installing
 
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "Bound", "bind", "load"]
 
-Array = NDArray[Any]
 
 KINDS = (".obj", ".ply", ".glb", ".stl")
 Binding = Literal["nearest", "direction"]
@@ -46,7 +46,7 @@ class Bound:
     """
 
     points: Array
-    corners: NDArray[np.int64]
+    corners: Ints
     shares: Array
     gain: Array
     scale: float

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
 from .environment import deficit
@@ -98,7 +98,7 @@ def _finish(
     rows: list[dict[str, Any]],
     row: dict[str, Any],
     shape: Shape,
-    rot: NDArray[np.float64] | None,
+    rot: Floats | None,
     begun: float,
     need: Need,
     context: Context,
