@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from solver.arrays import Array, Ints
-
 from sweeps.errors import installing
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
