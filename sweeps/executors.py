@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from .errors import InvalidOption, SweepError
+from .errors import InvalidOption, SweepError, installing
 from .processes import Processes
 
 __all__ = ["SchedulerLost", "Workers", "choose", "cores", "dask_cluster", "dask_local", "processes", "serial"]
@@ -265,7 +265,7 @@ def _need_dask() -> None:
     try:
         import distributed  # noqa: F401
     except ImportError:
-        raise NoScheduler("Dask is not installed.", "Install it with `pip install -e '.[cluster]'`.") from None
+        raise NoScheduler("Dask is not installed.", installing("cluster")) from None
 
 
 @contextmanager
