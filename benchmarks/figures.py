@@ -3,7 +3,8 @@
 A record says how it came about (`source`), by which command, at which commit, of which solver and version, on which
 processor and when; `runs` holds every run with its seed, also those that failed or did not converge, and `table` the
 rows that were printed of them. `source` is "run" where the benchmark itself wrote the record, and "text" where the rows
-were taken over from a document that had been written by hand: no record of those runs was kept, and the document says so.
+were taken over from a document that had been written by hand: no record of those runs was kept, which the document
+says.
 """
 
 from __future__ import annotations
