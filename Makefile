@@ -51,13 +51,13 @@ test-slow: $(STAMP) $(PAGE)
 ## bench: the kernel against the C prototype, the look-up per resolution, the solver's error over time in short; run it
 ## on an idle machine
 bench: $(STAMP)
-	$(BIN)/python -m benchmarks.kernel
-	$(BIN)/python -m benchmarks.lookup
+	$(BIN)/python -m benchmarks.dehydration.kernel
+	$(BIN)/python -m benchmarks.service.lookup
 	$(BIN)/python -m benchmarks.dehydration --short --no-peers
 
 ## stress: every hostile corner of the parameters on tiny meshes; five minutes on two cores
 stress: $(STAMP)
-	$(BIN)/python -m benchmarks.stress
+	$(BIN)/python -m benchmarks.dehydration.stress
 
 ## lint: style, types, floors
 lint: $(STAMP)

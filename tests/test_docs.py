@@ -16,7 +16,7 @@ def test_named_files_exist(text: Path) -> None:
     words = text.read_text()
     links = re.findall(r"\]\((?!https?:)([\w/.-]+)\)", words) if text.suffix == ".md" else []
     plans = [ROOT / name for name in re.findall(r"\bexamples/[\w/.-]+\.(?:toml|py)\b", words)]
-    modules = [ROOT / name.replace(".", "/") for name in re.findall(r"python -m (benchmarks\.\w+)", words)]
+    modules = [ROOT / name.replace(".", "/") for name in re.findall(r"python -m (benchmarks[.\w]*\w)", words)]
     missing = [path for path in [*(text.parent / link for link in links), *plans] if not path.exists()]
     missing += [path for path in modules if not (path.is_dir() or path.with_suffix(".py").exists())]
     assert not missing

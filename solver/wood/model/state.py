@@ -58,7 +58,6 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((r, 3)),
         np.zeros((r, 3)),
         np.zeros(2),
-        np.zeros((r, wood.bodies.first[-1] if r else 0)),
         wood.motion.mass.copy(),
         np.zeros((len(plan.part) - 1, 4)),
         none(),

@@ -42,7 +42,7 @@ class Motion(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3), contacts (r, n); pairs of edges."""
+    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3); pairs of edges."""
 
     f: np.ndarray
     t: np.ndarray
@@ -53,7 +53,6 @@ class Scratch(NamedTuple):
     speed: np.ndarray
     push: np.ndarray
     power: np.ndarray
-    lagged: np.ndarray
     light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]
     found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
     rubbing: Rubbing
@@ -72,14 +71,13 @@ def forces(
     turning: bool,
     time: float,
     dt: float,
-    rubbing: float,
     books: np.ndarray,
 ) -> None:
     """Fill scratch.f with all forces [N], loads and contacts included, and the first four books with energies [J].
 
     scratch.plan must be that of rods and bonds; see `state.scratch_for`.
     """
-    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, rubbing, books, True)
+    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, books, True)
 
 
 @njit(cache=True, error_model="numpy")
@@ -92,7 +90,6 @@ def _fill(
     turning: bool,
     time: float,
     dt: float,
-    rubbing: float,
     books: np.ndarray,
     look: bool,
 ) -> None:
@@ -147,13 +144,11 @@ def _fill(
             scratch.centre,
             scratch.speed,
             dt,
-            rubbing,
             scratch.push,
             scratch.power,
-            scratch.lagged,
         )
     if len(scratch.rubbing.pair) > 0:
-        books[CONTACT] += rub(motion.x, motion.v, f, scratch.light, rods, scratch.rubbing, dt, rubbing, scratch.power)
+        books[CONTACT] += rub(motion.x, motion.v, f, scratch.light, rods, scratch.rubbing, dt, scratch.power)
 
 
 @njit(cache=True, error_model="numpy")
@@ -217,7 +212,7 @@ def march(
             for c in range(3):
                 impulse[r, c] += half * scratch.push[r, c]
         look = n == steps - 1
-        _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, 0.0, books, look)
+        _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, books, look)
         less = rigid(x, v, f, motion.mass, whole, half)
         kick(v, f, weight)
         push(x, v, whole, half)

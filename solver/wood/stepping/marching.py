@@ -24,11 +24,8 @@ _BATCH = 500_000
 _BELOW = 0.999
 
 
-def broken(state: State, params: WoodParams, time: float, dt: float, share: float = 1.0) -> State:
-    """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost.
-
-    share: of the elastic energy that a pass may release, over `cascade`.
-    """
+def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
+    """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost."""
     wood, scratch = state.wood, state.scratch
     anywhere = params.fracture == "stress"
     hard = (scratch.each > wood.bonds.limit).any()
@@ -52,11 +49,11 @@ def broken(state: State, params: WoodParams, time: float, dt: float, share: floa
     if top <= 1 and not hard:
         return state
     before = state.books[: CONTACT + 1].sum() + real(state)
-    allowed = min(share * params.cascade, 1.0) * float(state.books[[STRETCH, BENDING, BONDS]].sum())
+    allowed = params.cascade * float(state.books[[STRETCH, BENDING, BONDS]].sum())
     wood, rods, bonds = break_worst(wood, ratio, place, scratch.each, allowed)
     scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, 0.0, books)
+    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
     found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds)
     # what fragments that come off no longer have by their scaled mass is lost, too
     books[LOST] += before - books[: CONTACT + 1].sum() - real(found)

@@ -27,15 +27,12 @@ __all__ = [
     "strength",
 ]
 
-#: Kinetic, elastic, lost, work, dissipated and at the start [J].
-Energy = tuple[float, float, float, float, float, float]
+#: Kinetic, elastic, lost, work and at the start [J].
+Energy = tuple[float, float, float, float, float]
 
 
 class State(NamedTuple):
-    """A moment of a run. books (6,) [J] as `explicit` numbers them; impulse (r, 3) [N s]; steps taken.
-
-    dissipated [J]: what an implicit scheme takes on its own account.
-    """
+    """A moment of a run. books (6,) [J] as `explicit` numbers them; impulse (r, 3) [N s]; steps taken."""
 
     wood: Wood
     scratch: Scratch
@@ -44,13 +41,12 @@ class State(NamedTuple):
     rods: int
     bonds: int
     steps: int
-    dissipated: float = 0.0
 
 
 class Reached(NamedTuple):
     """What is reported of a stage.
 
-    energy: (kinetic, elastic, lost, work, dissipated, start) [J]; error: of what ended it.
+    energy: (kinetic, elastic, lost, work, start) [J]; error: of what ended it.
     """
 
     time: float
@@ -87,14 +83,14 @@ def strength(wood: Wood, params: WoodParams) -> float:
 def reached(time: float, state: State, start: float, error: float, sound: bool) -> Reached:
     """Return what is reported of a stage that was solved rather than marched to."""
     elastic, lost, work = float(state.books[: CONTACT + 1].sum()), float(state.books[LOST]), float(state.books[WORK])
-    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, 0.0, start), error, sound)
+    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, start), error, sound)
 
 
 def begin(wood: Wood) -> State:
     """Return the state at time 0, forces known."""
     scratch = scratch_for(wood)
     books = np.zeros(6)
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, 0.0, books)
+    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, books)
     return State(wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), 0, 0, 0)
 
 
@@ -118,8 +114,8 @@ def copied(state: State) -> State:
 
 def largest(energy: Energy, scale: float) -> float:
     """Return the largest energy [J] of a run so far: what errors of the balance are held against."""
-    kinetic_, elastic, lost, work, dissipated, start = energy
-    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost) + abs(dissipated))
+    kinetic_, elastic, lost, work, start = energy
+    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost))
 
 
 def balanced(state: State, time: float, start: float, scale: float, tolerance: float) -> Reached:
@@ -131,8 +127,8 @@ def balanced(state: State, time: float, start: float, scale: float, tolerance: f
     """
     elastic = float(state.books[: CONTACT + 1].sum())
     moving = real(state)
-    energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), state.dissipated, start)
-    error = abs(moving + elastic + energy[2] + energy[4] - energy[3] - start) / largest(energy, scale)
+    energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), start)
+    error = abs(moving + elastic + energy[2] - energy[3] - start) / largest(energy, scale)
     # what is not finite is not less, either
     if not error <= 0.5:
         lost = f"the energy balance is off by {100 * error:.0f} percent" if error > 0.5 else "energies are not finite"

@@ -129,9 +129,9 @@ def test_bodies_do_not_throw_scaled_fragments_off():
     assert found.elastic_energy.values[-1] > 0
 
 
-def test_implicit_runs_need_no_scaling():
+def test_equilibria_need_no_scaling():
     with pytest.raises(InvalidInput, match="mass_scaling 1"):
-        SOLVER.parse({"mode": "implicit", "mass_scaling": 4.0})
+        SOLVER.parse({"mode": "static", "mass_scaling": 4.0})
 
 
 @pytest.mark.parametrize("touching", [False, True])
