@@ -63,7 +63,7 @@ def fill(store: Store) -> None:
             name = key(SOLVER.name, SOLVER.version, params, need)
             asked = params.model_dump(mode="json"), need.model_dump(mode="json")
             store.ledger.want([JobSpec(name, SOLVER.name, SOLVER.version, *asked)])
-            store.ledger.done(name, store.put(name, result), 0.0)
+            store.ledger.done(store.ledger.claim("benchmark", 60.0, [name]), store.put(name, result), 0.0)
 
 
 def median(call: Callable[[], Any], seconds: float = 1.0) -> float:
