@@ -49,6 +49,10 @@ def _part(seconds: float) -> str:
     return f"1/{round(times, 1 - int(math.log10(times))):.0f}"
 
 
+def _depth(values: Sequence[float]) -> str:
+    return f"{max(values):.1g}" if max(values) > 0 else "0"
+
+
 def _share(values: Sequence[float]) -> str:
     return " ".join(f"{100 * value:+.0f}" for value in values) + " %"
 
@@ -68,11 +72,11 @@ def _whole(record: Row) -> str:
             [
                 name, f"{row['elements']:,}", f"{row['steps']:,}", _four(row["cpu"], "{:.0f}"), _four(row["roughness"]),
                 _share(off), _four(row["residual"], "{:.1e}"), ", ".join(missed) or "none",
-                f"{row['least_jacobian'][-1]:.2f}",
+                f"{row['least_jacobian'][-1]:.2f}", _depth(row["penetration"]),
             ]
         )  # fmt: skip
     head = ("quality, seed", "elements", "steps", "CPU s to each stage", "roughness [r1]", "against fine's mean")
-    return markdown((*head, "residual", "not converged at s =", "least J"), lines)
+    return markdown((*head, "residual", "not converged at s =", "least J", "deepest [te]"), lines)
 
 
 def _eighths(record: Row) -> str:
@@ -90,11 +94,11 @@ def _eighths(record: Row) -> str:
                 f"{te:g}" + (f", gamma {gamma:g}" if gamma != 10 else ""), f"{quality}, {len(same)}",
                 f"{same[0]['elements']:,}", _four([row["cpu"] for row in found], "{:.0f}"),
                 _four([row["roughness"]["mean"] for row in found]), off, f"{missed} of {len(same) * len(STAGES)}",
-                _part(found[-1]["cpu"]), f"{max(row['peak_MB'] for row in same):.0f}",
+                _depth([depth for row in same for depth in row["penetration"]]), _part(found[-1]["cpu"]), f"{max(row['peak_MB'] for row in same):.0f}",
             ]
         )  # fmt: skip
     head = ("te", "quality, seeds", "elements", "CPU s to each stage", "roughness [r1]", "against fine's mean")
-    return markdown((*head, "stages not converged", f"of {_PAPER:.0f} s", "peak MB"), lines)
+    return markdown((*head, "stages not converged", "deepest [te]", f"of {_PAPER:.0f} s", "peak MB"), lines)
 
 
 def _measured(record: Row, mirrors: str) -> list[Row]:
