@@ -94,7 +94,8 @@ def _eighths(record: Row) -> str:
                 f"{te:g}" + (f", gamma {gamma:g}" if gamma != 10 else ""), f"{quality}, {len(same)}",
                 f"{same[0]['elements']:,}", _four([row["cpu"] for row in found], "{:.0f}"),
                 _four([row["roughness"]["mean"] for row in found]), off, f"{missed} of {len(same) * len(STAGES)}",
-                _depth([depth for row in same for depth in row["penetration"]]), _part(found[-1]["cpu"]), f"{max(row['peak_MB'] for row in same):.0f}",
+                _depth([depth for row in same for depth in row["penetration"]]), _part(found[-1]["cpu"]),
+                f"{max(row['peak_MB'] for row in same):.0f}",
             ]
         )  # fmt: skip
     head = ("te", "quality, seeds", "elements", "CPU s to each stage", "roughness [r1]", "against fine's mean")

@@ -13,7 +13,7 @@ from solver import registry
 
 _MARKED = re.compile(r"<!-- (?:figures|measured): .*?<!-- end -->", re.DOTALL)
 #: A table with one of these in its head is a measured one.
-_MEASURED = re.compile(r"CPU s|seconds|\bms\b|\bns\b|residual|error|requests/s")
+_MEASURED = re.compile(r"CPU s|seconds|\bms\b|\bns\b|error|requests/s")
 
 
 @pytest.mark.parametrize("path", documents.DOCUMENTS, ids=lambda path: path.name)
@@ -92,7 +92,6 @@ def test_all_seeds_of_a_table_are_in_it() -> None:
     table = documents.table(figures.load("dehydration-buckled"), "whole")
     record = figures.load("dehydration-buckled")
     runs = [run for run in record["runs"] if not run["mirrors"] and run["version"] == record["version"]]
-    assert {f"{run['quality']}, {run['seed']}" for run in runs} == set(
-        re.findall(r"^\| (\w+, \d+) \|", table, re.MULTILINE)
-    )
+    shown = re.findall(r"^\| (\w+, \d+) \|", table, re.MULTILINE)
+    assert sorted(shown) == sorted(f"{run['quality']}, {run['seed']}" for run in runs)
     assert any(0 in run["converged"] for run in runs)
