@@ -122,6 +122,11 @@ class Fruit(Params):
         """Whether the equator is a circle."""
         return self.radii[3] == self.radii[7]
 
+    @property
+    def keeps_shape(self) -> bool:
+        """Whether a run leaves the surface where it is fresh, so that a result without a position has that one."""
+        return False
+
     def generatrix(self, colatitude: Floats) -> tuple[Floats, Floats]:
         """Return (x, y) of the sarcocarp's generatrix (Eq. 8) at colatitudes [radian], shapes as given.
 

@@ -2,8 +2,9 @@
 
 A result holds either the fruit's lattice (`position` or `displacement` on colatitude x azimuth; topology and texture
 coordinates of `service.formats.mesh`) or meshes (`solver.meshes`).
-Fields without a shape are shown on the fresh fruit. Lengths are in the result's own unit; y is up, and a result whose
-attribute `up` is z is turned about x. Nothing else is turned, or scaled but by `Sequence.scale`.
+Fields without a shape are shown on the fresh fruit if it keeps its shape, and refused if it moves. Lengths are in the
+result's own unit; y is up, and a result whose attribute `up` is z is turned about x. Nothing else is turned, or scaled
+but by `Sequence.scale`.
 """
 
 from __future__ import annotations
@@ -227,6 +228,11 @@ def _positions(run: xr.Dataset, index: int) -> Array:
     from solver import registry
 
     params: Any = registry.get(str(run.attrs["solver"])).parse(json.loads(run.attrs["params"]))
+    if "displacement" not in run and not params.keeps_shape:
+        raise UnfitFormat(
+            "this result holds fields of a surface that moves, and not where it is.",
+            advice="Solve again with the field 'position': `wizen solve` keeps it, a plan names it under [need].",
+        )
     fresh = params.surface(*angles(run.sizes["colatitude"])).astype("f4")
     return fresh + run["displacement"].values[index] if "displacement" in run else fresh
 

@@ -11,8 +11,9 @@ from ...contract import Context, InvalidInput, Need
 from ...fruit import lattice, window
 from ..environment import water_lost
 from ..fields.system import laid
+from ..names import BODY
 from ..params import DecayParams
-from ..settings import BODY, Settings, moved
+from ..settings import Settings, moved
 from . import dried
 from .imported import extent_of
 from .surface import Surface, extent, geodesic
