@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from solver.arrays import Array, Ints
+from sweeps.errors import installing
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
 from .nearest import nearest
@@ -84,7 +85,7 @@ def load(path: Path) -> tuple[Array, Array]:
     try:
         import trimesh
     except ImportError:
-        raise Unavailable("meshes need the package trimesh.", advice="pip install 'wizen[formats]'.") from None
+        raise Unavailable("meshes need the package trimesh.", advice=installing("formats")) from None
     try:
         mesh: Any = trimesh.load(path, force="mesh", process=False)
         points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
