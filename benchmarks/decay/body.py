@@ -21,11 +21,9 @@ from solver.decay import SOLVER
 from solver.decay.body.body import Body
 from solver.decay.body.flesh import Skin
 from solver.decay.body.wrinkles import Wrinkles
-from solver.decay.environment import water_lost
 from solver.decay.fields.stepping import march
 from solver.decay.fields.system import System
 from solver.decay.settings import choose
-from solver.decay.surfaces.surface import extent
 
 _CELLS = 32
 
@@ -43,7 +41,7 @@ def main(preset: str = "apple", day: float = 20.0) -> None:
     params = SOLVER.parse({"body": "quasi-static", "te": 0.03}, preset)
     system = System(params, _CELLS, False)
     (reached,) = march(system, (day,), 1e-4, choose(params, "preview").longest, Context())
-    rot, water = system.rot.share(reached.state.rot), water_lost(params, extent(params), day)
+    rot, water = system.rot.share(reached.state.rot), reached.state.water
 
     def body(layers: int, tolerance: float) -> Body:
         return Body(params, system.surface, _CELLS, layers, tolerance)

@@ -23,7 +23,7 @@ _STEP = 0.04
 
 def measured(cells: int, share: float) -> tuple[int, float]:
     """Return how many points are listed, and milliseconds of a step, with colonies on a share of the sphere."""
-    system = System(DecayParams(wounds=()), cells, True)
+    system = System(DecayParams(wounds=(), climate="paper"), cells, True)
     s = system.surface
     inside = s.points[:, 1] > np.linalg.norm(s.points, axis=1) * (1 - 2 * share)
     assert system.mould is not None

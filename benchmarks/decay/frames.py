@@ -16,11 +16,9 @@ from solver.decay import SOLVER, DecayParams
 from solver.decay.body.body import Body
 from solver.decay.body.flesh import Skin
 from solver.decay.body.wrinkles import Wrinkles
-from solver.decay.environment import water_lost
 from solver.decay.fields.stepping import march
 from solver.decay.fields.system import System
 from solver.decay.settings import choose
-from solver.decay.surfaces.surface import extent
 
 
 def frames(preset: str, day: float, rate: float, count: int) -> dict[str, float]:
@@ -40,7 +38,7 @@ def frames(preset: str, day: float, rate: float, count: int) -> dict[str, float]
         fields = time.process_time() - begun
         rot = system.rot.share(reached.state.rot)
         begun = time.process_time()
-        balance = body.settled(body.state(water_lost(params, extent(params), reached.day), rot), balance)
+        balance = body.settled(body.state(reached.state.water, rot), balance)
         moved = time.process_time() - begun
         begun = time.process_time()
         folds = skin.at(balance, folds)

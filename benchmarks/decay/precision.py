@@ -211,9 +211,9 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 def main(path: Path, python: str | None) -> None:
-    params = SOLVER.parse({}, "apple")
+    params = SOLVER.parse({}, "apple-paper")
     assert isinstance(params, DecayParams)
-    rates = daily(params.rot, params)
+    rates = daily(params.rot, params, 1.0)
     rows = []
     for where in ("plane", "sphere"):
         round_ = where == "sphere"

@@ -24,7 +24,7 @@ from solver.decay.settings import choose
 
 _CELLS = 16
 #: Spores fall often, so that seeds differ by more than their patches of nutrient.
-_SETTING = {"growth_rate": 50.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
+_SETTING = {"climate": "paper", "growth_rate": 50.0, "propagation_rate": 8.0, "spawning": 1.0, "rot_spawning": 6.0}
 
 
 def ends(seeds: range, rate: int, days: float) -> NDArray[np.float64]:

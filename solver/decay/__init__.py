@@ -31,7 +31,7 @@ def _cost(params: DecayParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="decay",
-    version="4",
+    version="5",
     title="Decay of fruits: rot and mould",
     params=DecayParams,
     fields=ALL,
