@@ -96,7 +96,7 @@ class Sheet:
         self.rows: list[list[str]] = []
         print(markdown(self.head, []))
 
-    def add(self, cells: Sequence[object], **run: Any) -> None:
+    def add(self, cells: Sequence[object], /, **run: Any) -> None:
         """Print a row; `run` is what was measured, unrounded, for the record (without: the cells)."""
         row = [str(cell) for cell in cells]
         self.rows.append(row)

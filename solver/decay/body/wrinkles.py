@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
+from scipy import sparse
 
 from ...arrays import Floats
 from ...contract import Context
@@ -53,4 +55,10 @@ class Wrinkles:
 
     def on_surface(self, folds: Floats) -> Floats:
         """Return what `at` found on the vertices of the fields' surface (v, 3)."""
-        return shares_at(*geodesic(self._cells), geodesic(self._fields)[0]) @ folds
+        return np.asarray(_between(self._cells, self._fields) @ folds)
+
+
+@lru_cache(maxsize=4)
+def _between(cells: int, finer: int) -> sparse.csr_array:
+    """Return the matrix that takes a field of one geodesic sphere to the points of another."""
+    return shares_at(*geodesic(cells), geodesic(finer)[0])

@@ -44,14 +44,17 @@ def march(
     length, since = longest / 4, _EVERY
     every = _EVERY if system.steady else 1
     last = days[-1]
+    tried: _Tried | None = None
     for wanted in days:
         while day < wanted:
             context.check_cancelled()
             rooting = system.next_root(state, day + length)
             dt = min(length, rooting - day)
             if since >= every:
-                # two halves, compared with the whole; the halves are kept
-                halves, error = _doubled(system, state, day, dt)
+                # two halves, compared with the whole; the halves are kept, also for the next stage within this step
+                if tried is None or (tried.day, tried.dt) != (day, dt):
+                    tried = _doubled(system, state, day, dt)
+                _, _, halves, error = tried
                 ratio = error / tolerance
                 if ratio > 1 and dt > _SHORTEST:
                     length = dt * max(0.9 * ratio ** (-1 / 3), 0.25)
@@ -83,7 +86,16 @@ def march(
         yield Reached(wanted, shown, steps, worst)
 
 
-def _doubled(system: System, state: Both, day: float, dt: float) -> tuple[Both, float]:
+class _Tried(NamedTuple):
+    """A step from a day, done in two halves, and the error of these."""
+
+    day: float
+    dt: float
+    halves: Both
+    error: float
+
+
+def _doubled(system: System, state: Both, day: float, dt: float) -> _Tried:
     halves = system.advance(system.advance(state, day, dt / 2), day + dt / 2, dt / 2)
     # of second order: the halves' own error is a third of the difference
-    return halves, system.distance(system.advance(state, day, dt), halves) / 3
+    return _Tried(day, dt, halves, system.distance(system.advance(state, day, dt), halves) / 3)
