@@ -97,7 +97,11 @@ register(
     body_steps=Quantity("1", "Newton steps of the body in this stage", "n"),
     skin_residual=Quantity("1", "out-of-balance force of the skin over the forces in it, relative L2", "|r|/|f|"),
     skin_steps=Quantity("1", "quasi-Newton steps of the skin in this stage", "n"),
-    water_lost=Quantity("1", "water lost by transpiration, over the fresh weight", "w"),
+    mass=Quantity("1", "weight of the fruit, over the fresh weight", "m"),
+    juice_lost=Quantity("1", "juice that leaked from collapsed rot, over the fresh weight", "j"),
+    respired=Quantity("1", "flesh that rot turned to carbon dioxide, over the fresh weight", "c"),
+    density=Quantity("1", "weight over volume of the surface, over that of the fresh fruit", "rho"),
+    water_lost=Quantity("1", "water evaporated from skin, wounds and rot, over the fresh weight", "w"),
 )
 
 # triangle meshes of a solver's own (see `solver.meshes`)

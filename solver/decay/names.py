@@ -5,11 +5,13 @@ from __future__ import annotations
 from ..contract import Need
 from .params import DecayParams
 
-__all__ = ["ALL", "BODY", "DEFAULT", "FIELDS", "MOULD", "ROT", "VECTORS", "completed"]
+__all__ = ["ALL", "BODY", "DEFAULT", "FIELDS", "MASSES", "MOULD", "ROT", "VECTORS", "completed"]
 
 _SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutrient", "budget_error", "water_lost")
+#: Where the fresh weight is.
+MASSES = ("mass", "juice_lost", "respired", "density")
 ALL = (
-    *("position", "displacement", "mesh_position", "triangle", "volume", "least_jacobian"),
+    *("position", "displacement", "mesh_position", "triangle", "volume", "least_jacobian", *MASSES),
     *("rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
 )
 #: What a run keeps of a need that names nothing; see `completed`.
@@ -18,7 +20,7 @@ DEFAULT = ("rot", "mould", "mould_active", "nutrient", *_SHARES)
 ROT = frozenset({"rot", "substrate", "rotten_share", "mean_rot"})
 MOULD = frozenset({"mould", "mould_active", "nutrient", "mouldy_share", "mean_mould", "mean_nutrient"})
 #: What a body has to be settled for, if the fruit has one; `position` is where the surface is.
-BODY = frozenset({"position", "displacement", "volume", "least_jacobian", "mesh_position"})
+BODY = frozenset({"position", "displacement", "volume", "least_jacobian", "mesh_position", *MASSES})
 FIELDS = ("position", "displacement", "rot", "substrate", "mould", "mould_active", "nutrient")
 VECTORS = ("position", "displacement")
 

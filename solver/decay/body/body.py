@@ -67,7 +67,9 @@ class Body:
         if rot is not None:
             at = _inwards(self._cells, self._layers) @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
             inside = at[solid.tets].mean(axis=1)
-        state = softened(flesh, self._params.firmness, water, inside, solid.stone)
+        fleshy = float(solid.volume[~solid.stone].sum() / solid.volume.sum())
+        wet = self._params.water_content / 100 / fleshy
+        state = softened(flesh, self._params.firmness, water, inside, solid.stone, solid.volume, wet)
         return pressed(state, self._params, solid)
 
     def settled(

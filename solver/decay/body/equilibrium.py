@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...contract import NotConverged
+from .flesh import Booked
 from .loads import Loads, Touch, below, drop, pushes, touches
 from .material import Blocks, energy, forces, hessian, inverse_edges
 from .sparse import solve, times
@@ -44,7 +45,7 @@ class Balance(NamedTuple):
     """A settled shape: points, out-of-balance force over the forces in it, Newton steps, least J, what carries it.
 
     reaction: upward force of floor and neighbours [Pa r1^2]; pushes (b, 3): force of each neighbour.
-    even: length of a cube as large as the rest shape, over the fresh one.
+    even: length of a cube as large as the rest shape, over the fresh one. booked: where the fresh weight is.
     """
 
     points: Floats
@@ -54,6 +55,7 @@ class Balance(NamedTuple):
     reaction: float
     even: float = 1.0
     pushes: Floats = np.empty((0, 3))
+    booked: Booked | None = None
 
 
 def rested(points: Floats, tets: Ints, shrinkage: Floats, young: Floats, poisson: float) -> Rest:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ...arrays import Bools, Floats
 
-__all__ = ["Flesh", "Skin", "Softened", "Swing", "softened"]
+__all__ = ["Booked", "Flesh", "Skin", "Softened", "Swing", "softened"]
 
 
 class Flesh(BaseModel):
@@ -33,6 +33,9 @@ class Flesh(BaseModel):
     softening: float = Field(1.0, ge=0, le=10, description="c of the change of stiffness: (1 - X)^c is left [1]")
     rot_depth: float = Field(0.5, gt=0, le=3, description="Depth at which the skin's rot has faded out [r1]")
     rot_collapse: float = Field(0.25, ge=0, le=0.7, description="Share of its length that rotten flesh loses [1]")
+    rot_respired: float = Field(
+        0.02, ge=0, le=0.1, description="Share of rotten flesh's weight that leaves as carbon dioxide; a choice [1]"
+    )
     rot_softness: float = Field(0.98, ge=0, le=0.999, description="Share of its stiffness that rotten flesh loses [1]")
     gravity: float = Field(9.81, ge=0, le=100, description="Gravity; 0 is a fruit that floats [m/s2]")
 
@@ -62,23 +65,56 @@ class Swing(BaseModel):
     damping: float = Field(20.0, ge=0, le=1000, description="Damping of all motion [1/s]")
 
 
+class Booked(NamedTuple):
+    """Where the fresh weight is, as shares of it: in the fruit, in the air as water, on the ground as juice, in the air
+    as carbon dioxide.
+    """
+
+    mass: float
+    evaporated: float
+    juice: float
+    respired: float
+
+
 class Softened(NamedTuple):
-    """Per tetrahedron (t): lengths over fresh ones, Young's modulus [Pa], mass over fresh mass."""
+    """Per tetrahedron (t): lengths over fresh ones, Young's modulus [Pa], mass over fresh mass; and what was booked."""
 
     shrinkage: Floats
     young: Floats
     mass: Floats
+    booked: Booked
 
 
-def softened(flesh: Flesh, firmness: float, water: float, rot: Floats, stone: Bools) -> Softened:
-    """Return the state of tetrahedra after a share of the weight has gone as water; rot (t), 0 to 1.
+#: Least share of its volume that flesh keeps besides what rot takes.
+_LEFT = 0.015
 
-    A stone neither shrinks nor rots.
+
+def softened(
+    flesh: Flesh, firmness: float, water: float, rot: Floats, stone: Bools, volume: Floats, wet: float = 1.0
+) -> Softened:
+    """Return the state of tetrahedra of fresh volumes (t); rot (t), 0 to 1. A stone neither shrinks nor rots.
+
+    water: evaporated, over the fresh weight. Rotten flesh collapses and its juice leaks: what it loses in volume it
+    loses in weight. What evaporates comes evenly from the flesh that holds its juice, at most a share `wet` of it; some
+    of the rotten flesh is respired. Weight and volume are fresh ones of one density.
     """
-    left = 1 - flesh.shrinkage * water
+    share = np.where(stone, 0.0, volume) / np.sum(volume)
+    kept = (1 - flesh.rot_collapse * rot) ** 3
+    held = float(np.sum(share * kept))
+    dry = min(water / max(held, 1e-12), wet, 1 - _LEFT - flesh.rot_respired)
+    gone = flesh.rot_respired * rot
+    left = 1 - flesh.shrinkage * dry - gone
     young = flesh.unit * firmness
+    mass = np.where(stone, 1.0, kept * (1 - dry - gone))
+    soft = (1 - flesh.shrinkage * dry) ** flesh.softening * (1 - flesh.rot_softness * rot)
     return Softened(
-        np.where(stone, 1.0, np.cbrt(left) * (1 - flesh.rot_collapse * rot)),
-        np.where(stone, young * flesh.stone, young * left**flesh.softening * (1 - flesh.rot_softness * rot)),
-        np.where(stone, 1.0, 1 - water),
+        np.where(stone, 1.0, np.cbrt(kept * left)),
+        young * np.where(stone, flesh.stone, soft),
+        mass,
+        Booked(
+            float(np.sum(volume * mass) / np.sum(volume)),
+            dry * held,
+            float(np.sum(share * (1 - kept))),
+            float(np.sum(share * kept * gone)),
+        ),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Floats, Ints32
 from ...contract import Context, InvalidInput, Need
 from ...fruit import lattice, window
+from ..body.flesh import Booked
 from ..environment import water_lost
 from ..fields.system import laid
 from ..names import BODY
@@ -42,7 +43,7 @@ class Shape:
         self._params, self._need = params, need
         self._wanted = set(need.fields)
         moves = moved(params, self._wanted)
-        meshed = not {"volume", "mesh_position", "triangle"}.isdisjoint(self._wanted)
+        meshed = not {"volume", "density", "mesh_position", "triangle"}.isdisjoint(self._wanted)
         self._dries = params.body == "table" and not BODY.isdisjoint(self._wanted)
         self._rays = geodesic(settings.cells)[0] if self._dries and meshed else None
         own = params.mesh is not None
@@ -97,10 +98,16 @@ class Shape:
         """
         wanted, need = self._wanted, self._need
         row: dict[str, Any] = {}
-        if "water_lost" in wanted:
-            row["water_lost"] = water
         (balance, folds), found = self._settled(water, rot, context)
         row |= found
+        booked = balance.booked if balance and balance.booked else Booked(1 - water, water, 0.0, 0.0)
+        if "water_lost" in wanted:
+            row["water_lost"] = booked.evaporated
+        row |= {
+            name: value
+            for name, value in (("mass", booked.mass), ("juice_lost", booked.juice), ("respired", booked.respired))
+            if name in wanted
+        }
         if "least_jacobian" in wanted:
             row["least_jacobian"] = balance.least_jacobian if balance else 1.0
         if wanted & {"position", "displacement"}:
@@ -115,7 +122,7 @@ class Shape:
             for name, values in (("position", fresh + gone), ("displacement", gone)):
                 if name in wanted:
                     row[name] = values[inside].astype(need.dtype)
-        if wanted & {"mesh_position", "volume"}:
+        if wanted & {"mesh_position", "volume", "density"}:
             assert self.surface is not None
             points = self.surface.points
             if self._body and balance:
@@ -126,10 +133,13 @@ class Shape:
                 points = points + dried.at_rays(self._dried(water, dried.ROWS, context), self._rays)
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
+            # an imported mesh may be wound either way, and an open one has none
+            own = self._extent if self._params.mesh is not None else None
             if "volume" in wanted:
-                # an imported mesh may be wound either way
-                own = self._closed if self._params.mesh is not None else None
                 row["volume"] = own.volume if own else _volume(points, self.surface)
+            if "density" in wanted:
+                fresh_volume = _volume(self.surface.points, self.surface)
+                row["density"] = booked.mass * (1.0 if own else fresh_volume / _volume(points, self.surface))
         return row
 
     def follow(self, water: float, rot: Floats | None, context: Context) -> None:
@@ -146,7 +156,8 @@ class Shape:
         if self._body is None:
             return _Settled(None, None), {}
         watch, before = context.check_cancelled, self._node
-        balance = self._body.settled(self._body.state(water, rot), before.balance, watch)
+        state = self._body.state(water, rot)
+        balance = self._body.settled(state, before.balance, watch)._replace(booked=state.booked)
         row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
         folds = None
         if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:

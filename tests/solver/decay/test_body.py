@@ -120,7 +120,7 @@ def test_eq_1_shrinks_a_free_body_evenly_without_energy(lost):
     """Settled from the fresh shape; many small losses come to one large one."""
     solid = fill(Fruit(), 4)
     none = np.zeros(len(solid.tets))
-    state = softened(Flesh(), 80.0, lost, none, none > 0)
+    state = softened(Flesh(), 80.0, lost, none, none > 0, solid.volume)
     length, volume = 1.0, 1.0
     for _ in range(1000):
         part = (lost / 1000) / volume
