@@ -22,6 +22,7 @@ from .equilibrium import Balance, rested, settle
 from .flesh import Softened, softened
 from .loads import Loads
 from .material import blocks
+from .obstacles import Obstacles
 from .pressure import pressed
 from .solid import ball, fill
 from .springs import knit, swung
@@ -95,6 +96,13 @@ class Body:
         found = settle(start, rest, loads, self._pattern, self._tolerance, watch)
         return found._replace(even=even)
 
+    @property
+    def obstacles(self) -> Obstacles:
+        """What it rests on: the floor, unless a neighbour carries it, and the neighbours; nothing without a weight."""
+        if self._pressure == 0:
+            return Obstacles(None, np.empty((0, 4)))
+        return Obstacles(None if self._carried else float(self.solid.points[:, 1].min()), self._balls)
+
     def _loads(self, state: Softened, start: Floats, fresh: float) -> Loads:
         solid, count = self.solid, len(self.solid.points)
         zero = np.zeros(count)
@@ -111,8 +119,7 @@ class Body:
         volume = np.bincount(solid.tets.ravel(), shared, count)
         tether = np.where(core, _TETHER * fresh * volume, 0.0)
         # a fruit that lies on another one does not reach the floor
-        floor = None if self._carried else float(solid.points[:, 1].min())
-        return Loads(self._pressure * mass, floor, contact, tether, start, self._balls)
+        return Loads(self._pressure * mass, self.obstacles.floor, contact, tether, start, self._balls)
 
     def on_lattice(self, balance: Balance, resolution: int) -> Floats:
         """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""

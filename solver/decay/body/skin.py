@@ -32,6 +32,7 @@ from ...shell.dissection import Fronts
 from ...shell.inverse import Inverse, fronts_of, inverse_of
 from ...shell.normals import normals
 from .flesh import Skin
+from .obstacles import Obstacles
 
 __all__ = ["Model", "Settled", "Shell"]
 
@@ -39,6 +40,9 @@ __all__ = ["Model", "Settled", "Shell"]
 _STEPS, _HALVINGS, _MEMORY = 1500, 30, 20
 #: Steps that one inverse serves.
 _STALE = 20
+#: Stiffness of floor and neighbours over that of the springs: folds of a twentieth of r1 enter them by less than 1e-3.
+_FIRM = 100.0
+_NOTHING = Obstacles(None, np.empty((0, 4)))
 #: Random height that a flat skin starts from, over its thickness: without one it would stay flat.
 _UNEVEN = 1e-2
 
@@ -76,25 +80,26 @@ class Shell:
     def wrinkled(
         self,
         carried: Floats,
-        share: float,
+        share: float | Floats,
         start: Floats,
         tolerance: float,
         model: Model | None = None,
         watch: Callable[[], None] = lambda: None,
+        obstacles: Obstacles = _NOTHING,
     ) -> Settled:
-        """Return the skin where the body carries it to `carried` (v, 3).
+        """Return the skin where the body carries it to `carried` (v, 3), out of obstacles.
 
-        share: the skin's lengths over its fresh ones. start (v, 3): from where it settles; see `uneven`. model: of
-        a skin that lay about there; None starts from the fresh one's.
+        share: the skin's lengths over its fresh ones, of each face (f) or of all. start (v, 3): from where it settles;
+        see `uneven`. model: of a skin that lay about there; None starts from the fresh one's.
 
         Raises:
             NotConverged: there were too many steps.
 
         """
-        g = self._metric * share**2
+        g = self._metric * np.reshape(np.asarray(share, float) ** 2, (-1, 1))
         stiffness = hinge_stiffness(g, self._mesh, self._material.flexural)
         x = start.copy()
-        slope, now = self._slope(x, carried, g, stiffness)
+        slope, now = self._slope(x, carried, g, stiffness, obstacles)
         residual = np.inf
         inverse, moves = model or Model(self._fresh, ())
         for step in range(_STEPS):
@@ -106,11 +111,11 @@ class Shell:
             if residual <= tolerance:
                 return Settled(x, residual, step, Model(inverse, moves))
             if step and step % _STALE == 0:
-                inverse = self._inverse(x, g, stiffness)
+                inverse = self._inverse(x, g, stiffness, obstacles)
             d = _direction(slope, inverse, moves)
             down, part = float(np.sum(slope * d)), 1.0
             for _ in range(_HALVINGS):
-                found, then = self._slope(x + part * d, carried, g, stiffness)
+                found, then = self._slope(x + part * d, carried, g, stiffness, obstacles)
                 if then <= now + 1e-4 * part * down + 1e-14:
                     break
                 part /= 2
@@ -139,12 +144,15 @@ class Shell:
     def _fronts(self) -> Fronts:
         return fronts_of(self._mesh, self._points)
 
-    def _inverse(self, x: Floats, g: Floats, stiffness: Floats) -> Inverse:
+    def _inverse(self, x: Floats, g: Floats, stiffness: Floats, obstacles: Obstacles = _NOTHING) -> Inverse:
         """Return an approximate inverse of the tangent at x."""
         blocks = np.zeros((self._pattern.blocks, 3, 3))
         membrane_tangent(x, self._faces, g, self._material.lame, self._pattern.of_triangles, blocks)
         bending_tangent(x, self._mesh.hinges, stiffness, self._pattern.of_hinges, blocks)
         blocks[self._pattern.diagonal] += self._hold[:, None, None] * np.eye(3)
+        for inside, _, way in obstacles.depths(x):
+            firm = _FIRM * self._hold[inside, None, None]
+            np.add.at(blocks, self._pattern.diagonal[inside], firm * way[:, :, None] * way[:, None, :])
         pieces = inverse_of(self._fronts, self._pattern, blocks, normals(x, self._faces), np.zeros(len(x), np.bool_))
         while True:
             try:
@@ -152,11 +160,17 @@ class Shell:
             except StopIteration as end:
                 return cast(Inverse, end.value)
 
-    def _slope(self, x: Floats, carried: Floats, g: Floats, stiffness: Floats) -> tuple[Floats, float]:
+    def _slope(
+        self, x: Floats, carried: Floats, g: Floats, stiffness: Floats, obstacles: Obstacles
+    ) -> tuple[Floats, float]:
         gradient = self._hold[:, None] * (x - carried)
         total = float(np.sum(gradient * (x - carried))) / 2
         total += membrane(x, self._faces, g, self._material.lame, gradient)
         total += bending(x, self._mesh.hinges, self._angles, stiffness, gradient)
+        for inside, depth, way in obstacles.depths(x):
+            push = _FIRM * self._hold[inside] * depth
+            total += float(np.sum(push * depth)) / 2
+            np.subtract.at(gradient, inside, push[:, None] * way)
         return gradient, total
 
 

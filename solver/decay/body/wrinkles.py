@@ -10,6 +10,7 @@ from scipy import sparse
 
 from ...arrays import Floats
 from ...contract import Context
+from ...shell import metric
 from ..params import DecayParams
 from ..settings import Settings
 from ..surfaces.surface import geodesic, lay, sampler, shares_at
@@ -30,6 +31,8 @@ class Wrinkles:
         surface = lay(params, settings.skin)
         self._points = surface.points
         self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
+        fresh = metric(surface.points, surface.faces)
+        self._faces, self._square = surface.faces, fresh[:, 0] * fresh[:, 2] - fresh[:, 1] ** 2
         self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness)
 
     def at(self, balance: Balance, near: Settled | None = None, watch: Callable[[], None] = lambda: None) -> Settled:
@@ -43,11 +46,19 @@ class Wrinkles:
         """
         even, rest = self._body.parted(balance)
         carried = (1 + even) * self._points + self._body.onto(self._cells) @ rest
-        share = 1 + self._skin.shrinkage * even
+        share = (1 + self._skin.shrinkage * even) * self._joined(carried, 1 + even)
         folds = near.points if near else self._shell.uneven(self._normals, Context.generator(self._seed))
         model = near.model if near else None
-        found = self._shell.wrinkled(carried, share, carried + folds, self._tolerance, model, watch)
+        found = self._shell.wrinkled(
+            carried, share, carried + folds, self._tolerance, model, watch, self._body.obstacles
+        )
         return found._replace(points=found.points - carried)
+
+    def _joined(self, carried: Floats, even: float) -> Floats:
+        """Return how far the skin of each face (f) has shrunk with its place alone, over the body's even shrinkage."""
+        there = metric(carried, self._faces)
+        area = np.sqrt(np.maximum(there[:, 0] * there[:, 2] - there[:, 1] ** 2, 0) / self._square)
+        return np.asarray(1 - self._skin.joining * (1 - np.minimum(np.sqrt(area) / even, 1.0)))
 
     def on_lattice(self, folds: Floats, resolution: int) -> Floats:
         """Return what `at` found on the common lattice (n, 2 n, 3)."""

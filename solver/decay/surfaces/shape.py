@@ -119,6 +119,8 @@ class Shape:
                 gone = self._dried(water, need.resolution, context)
             if self._wrinkles and folds is not None:
                 gone = gone + self._wrinkles.on_lattice(folds.points, need.resolution)
+            if self._body and balance:
+                gone = self._body.obstacles.laid((fresh + gone).reshape(-1, 3)).reshape(fresh.shape) - fresh
             for name, values in (("position", fresh + gone), ("displacement", gone)):
                 if name in wanted:
                     row[name] = values[inside].astype(need.dtype)
@@ -129,6 +131,8 @@ class Shape:
                 points = points + self._body.on_surface(balance)
             if self._wrinkles and folds is not None:
                 points = points + self._wrinkles.on_surface(folds.points)
+            if self._body and balance:
+                points = self._body.obstacles.laid(points)
             if self._rays is not None:
                 points = points + dried.at_rays(self._dried(water, dried.ROWS, context), self._rays)
             if "mesh_position" in wanted:

@@ -6,9 +6,11 @@ import pytest
 from solver.contract import Context, Need
 from solver.decay import SOLVER
 from solver.decay.body.flesh import Skin
+from solver.decay.body.obstacles import Obstacles
 from solver.decay.body.skin import Shell
 from solver.decay.surfaces.surface import lay
 from solver.fruit import Fruit
+from solver.shell import hinge_stiffness
 
 THICKNESS, RADIUS, POISSON = 0.06, 1.06, 0.3
 
@@ -113,3 +115,63 @@ def test_wrinkles_come_on_top_of_the_body_and_only_with_a_skin():
     assert 0.01 < np.abs(apart).max() < 0.3
     again = SOLVER.solve(SOLVER.parse({**values, "skin": {}}, "orange"), need)
     assert np.array_equal(again.displacement, skinned.displacement)
+
+
+def test_a_skin_rests_on_the_floor_and_on_its_neighbours():
+    """Measured on what is handed over: the lattice and the vertices, against plane and balls as they were given."""
+    beside = [{"position": (1.95, 0.1, 0.0), "radius": 0.95}]
+    values = {"body": "quasi-static", "skin": {}, "te": 0.03, "firmness": 5.0, "neighbours": beside}
+    params = SOLVER.parse({**values, "stone": (0, 0), "temperature": 24.0}, "tomato")
+    need = Need(fields=("position", "mesh_position", "mean_rot"), stages=(0.0, 3.0, 5.0), quality="preview")
+    run = SOLVER.solve(params, need)
+    theta = np.linspace(0, np.pi, 2001)
+    floor = params.surface(theta, 0 * theta)[:, 1].min()
+    assert run.mean_rot.values[-1] > 0.1
+    for name in ("position", "mesh_position"):
+        points = run[name].values.astype(float).reshape(3, -1, 3)
+        assert points[..., 1].min() > floor - 1e-3
+        assert (np.linalg.norm(points - beside[0]["position"], axis=2) - 0.95).min() > -1e-3
+    # and it does rest on them
+    assert (run.mesh_position.values[-1, :, 1] < floor + 5e-3).mean() > 0.005
+
+
+def test_a_flat_skin_is_pushed_off_a_floor_in_balance(sphere):
+    """A skin whose body lets it hang 0.05 through a floor: the energy's slope is that of differences, and it leaves."""
+    shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS)
+    height = float(sphere.points[:, 1].min()) + 0.05
+    floor = Obstacles(height, np.empty((0, 4)))
+    found, residual, *_ = shell.wrinkled(sphere.points, 1.0, sphere.points.copy(), 1e-5, obstacles=floor)
+    assert residual <= 1e-5
+    assert 0 < floor.deepest(found) < 1e-3
+    assert floor.deepest(floor.laid(found)) == 0
+    x = found + 1e-3 * np.random.default_rng(0).normal(size=found.shape)
+    d = np.random.default_rng(1).normal(size=found.shape)
+    g = shell._metric
+    stiffness = hinge_stiffness(g, shell._mesh, shell._material.flexural)
+
+    def slope(at):
+        return shell._slope(at, sphere.points, g, stiffness, floor)
+
+    differences = (slope(x + 1e-6 * d)[1] - slope(x - 1e-6 * d)[1]) / 2e-6
+    assert np.sum(slope(x)[0] * d) == pytest.approx(differences, rel=1e-5)
+
+
+def test_skin_over_collapsed_rot_shrinks_with_it():
+    """Rot that takes a quarter of its lengths: a skin that joins has no more area than the flesh below by a little."""
+
+    def excess(joining):
+        values = {"body": "quasi-static", "skin": {"joining": joining}, "te": 0.03, "flesh": {"gravity": 0}}
+        params = SOLVER.parse({**values, "temperature": 24.0, "stone": (0, 0)}, "tomato")
+        need = Need(fields=("mesh_position", "triangle"), stages=(4.0,), quality="preview")
+        run = SOLVER.solve(params, need)
+        bare = SOLVER.solve(params.model_copy(update={"skin": None}), need)
+        faces = run.triangle.values
+
+        def area(points):
+            a, b, c = (points[faces[:, k]].astype(float) for k in range(3))
+            return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+
+        return area(run.mesh_position.values[0]) / area(bare.mesh_position.values[0])
+
+    assert excess(1.0) < excess(0.0) - 0.01
+    assert excess(1.0) < 1.05
