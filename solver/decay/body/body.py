@@ -92,9 +92,10 @@ class Body:
             start = near.points * even / near.even
         if self._params.body == "paper":
             network = knit(solid, state, self._inertia)
-            return swung(solid, start, network, loads, self._params.swing, watch)._replace(even=even)
+            found = swung(solid, start, network, loads, self._params.swing, watch)
+            return found._replace(even=even, booked=state.booked, dried=state.dried)
         found = settle(start, rest, loads, self._pattern, self._tolerance, watch)
-        return found._replace(even=even)
+        return found._replace(even=even, booked=state.booked, dried=state.dried)
 
     @property
     def obstacles(self) -> Obstacles:

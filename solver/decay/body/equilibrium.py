@@ -46,6 +46,7 @@ class Balance(NamedTuple):
 
     reaction: upward force of floor and neighbours [Pa r1^2]; pushes (b, 3): force of each neighbour.
     even: length of a cube as large as the rest shape, over the fresh one. booked: where the fresh weight is.
+    dried: lengths over fresh ones where nothing rots.
     """
 
     points: Floats
@@ -56,6 +57,7 @@ class Balance(NamedTuple):
     even: float = 1.0
     pushes: Floats = np.empty((0, 3))
     booked: Booked | None = None
+    dried: float = 1.0
 
 
 def rested(points: Floats, tets: Ints, shrinkage: Floats, young: Floats, poisson: float) -> Rest:

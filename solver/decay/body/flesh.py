@@ -51,7 +51,9 @@ class Skin(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     stiffness: float = Field(50.0, gt=0, le=10000, description="Young's modulus of the skin, over the flesh's [1]")
-    shrinkage: float = Field(0.0, ge=0, le=1, description="Share of the body's even shrinkage that the skin joins [1]")
+    shrinkage: float = Field(
+        0.0, ge=0, le=1, description="Share of the drying body's shrinkage that the skin joins [1]"
+    )
     joining: float = Field(
         0.7, ge=0, le=1, description="Share that it joins of what its place shrinks beyond that: rot takes skin too [1]"
     )
@@ -80,12 +82,16 @@ class Booked(NamedTuple):
 
 
 class Softened(NamedTuple):
-    """Per tetrahedron (t): lengths over fresh ones, Young's modulus [Pa], mass over fresh mass; and what was booked."""
+    """Per tetrahedron (t): lengths over fresh ones, Young's modulus [Pa], mass over fresh mass.
+
+    booked: where the weight is. dried: lengths over fresh ones where nothing rots.
+    """
 
     shrinkage: Floats
     young: Floats
     mass: Floats
     booked: Booked
+    dried: float = 1.0
 
 
 #: Least share of its volume that flesh keeps besides what rot takes.
@@ -120,4 +126,5 @@ def softened(
             float(np.sum(share * (1 - kept))),
             float(np.sum(share * kept * gone)),
         ),
+        float(np.cbrt(1 - flesh.shrinkage * dry)),
     )

@@ -46,7 +46,7 @@ class Wrinkles:
         """
         even, rest = self._body.parted(balance)
         carried = (1 + even) * self._points + self._body.onto(self._cells) @ rest
-        share = (1 + self._skin.shrinkage * even) * self._joined(carried, 1 + even)
+        share = (1 + self._skin.shrinkage * (balance.dried - 1)) * self._joined(carried, balance.dried)
         folds = near.points if near else self._shell.uneven(self._normals, Context.generator(self._seed))
         model = near.model if near else None
         found = self._shell.wrinkled(
@@ -54,11 +54,11 @@ class Wrinkles:
         )
         return found._replace(points=found.points - carried)
 
-    def _joined(self, carried: Floats, even: float) -> Floats:
-        """Return how far the skin of each face (f) has shrunk with its place alone, over the body's even shrinkage."""
+    def _joined(self, carried: Floats, dried: float) -> Floats:
+        """Return lengths of the skin of each face (f), over those where nothing rots: it joins its place's collapse."""
         there = metric(carried, self._faces)
         area = np.sqrt(np.maximum(there[:, 0] * there[:, 2] - there[:, 1] ** 2, 0) / self._square)
-        return np.asarray(1 - self._skin.joining * (1 - np.minimum(np.sqrt(area) / even, 1.0)))
+        return np.asarray(1 - self._skin.joining * (1 - np.minimum(np.sqrt(area) / dried, 1.0)))
 
     def on_lattice(self, folds: Floats, resolution: int) -> Floats:
         """Return what `at` found on the common lattice (n, 2 n, 3)."""

@@ -160,8 +160,7 @@ class Shape:
         if self._body is None:
             return _Settled(None, None), {}
         watch, before = context.check_cancelled, self._node
-        state = self._body.state(water, rot)
-        balance = self._body.settled(state, before.balance, watch)._replace(booked=state.booked)
+        balance = self._body.settled(self._body.state(water, rot), before.balance, watch)
         row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
         folds = None
         if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:
