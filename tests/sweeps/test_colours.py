@@ -54,7 +54,7 @@ def test_a_run_without_maps_has_no_colours() -> None:
 def test_a_solved_run_is_drawn_with_its_mould() -> None:
     solver = registry.get("decay")
     need = Need(quality="preview", resolution=24, stages=(0.0,), fields=("position", "rot", "mould", "mould_active"))
-    params = solver.parse({"wounds": [{"colatitude": 60, "azimuth": 35, "radius": 0.6}]}, "apple")
+    params = solver.parse({"wounds": [{"colatitude": 60, "azimuth": 35, "radius": 0.6}]}, "apple-paper")
     result = solver.solve(params, need)
     shapes = [outputs.of_result(result, {}, 0)]
     drawn = []

@@ -90,7 +90,7 @@ class Softened(NamedTuple):
     shrinkage: Floats
     young: Floats
     mass: Floats
-    booked: Booked
+    booked: Booked = Booked(1.0, 0.0, 0.0, 0.0)
     dried: float = 1.0
 
 

@@ -88,7 +88,7 @@ def test_what_frames_learnt_saves_the_next_ones_steps_and_changes_no_balance(sph
 
 
 def test_a_march_settles_each_stage_alike_whatever_else_is_asked_for():
-    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "skin": {}, "march": 1.0}
+    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "skin": {}, "march": 1.0, "transpiration": 8.48}
 
     def at(*days):
         need = Need(fields=("displacement",), stages=days, quality="preview", resolution=64)
@@ -106,7 +106,7 @@ def test_a_march_settles_each_stage_alike_whatever_else_is_asked_for():
 
 def test_wrinkles_come_on_top_of_the_body_and_only_with_a_skin():
     need = Need(fields=("displacement",), stages=(3.0,), quality="preview", resolution=64)
-    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "flesh": {"gravity": 0}}
+    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "flesh": {"gravity": 0}, "transpiration": 8.48}
     bare = SOLVER.solve(SOLVER.parse(values, "orange"), need)
     skinned = SOLVER.solve(SOLVER.parse({**values, "skin": {}}, "orange"), need)
     assert "skin_residual" not in bare
