@@ -31,7 +31,7 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
     wood = state.wood
     m = wood.motion
     free = m.held == 0
-    stiffness = Stiffness(wood.rods, wood.bonds, free)
+    stiffness = Stiffness(m.x, wood.rods, wood.bonds, free)
     order = dissected(m.x[free], stiffness.indptr, stiffness.indices)
     done, increment = 0.0, 1.0
     share = np.linalg.norm(full) or 1.0

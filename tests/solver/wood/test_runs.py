@@ -7,6 +7,7 @@ from solver.contract import InvalidGeometry, InvalidInput, Need, SolverError
 from solver.wood import SOLVER
 from solver.wood.fracture import break_worst
 from solver.wood.model.bundle import lay
+from solver.wood.model.curves import held
 from solver.wood.stepping.moment import begin
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
@@ -85,7 +86,7 @@ def test_breaks_keep_mass_and_momentum_and_hand_bonds_over():
     assert now.bonds.s.sum() == pytest.approx(stiffness, rel=1e-14)
     # bonds pull at the places where they pulled
     x, r, b = now.motion.x, now.rods, now.bonds
-    d = x[b.i] - (1 - b.share)[:, None] * x[r.a[b.j]] - b.share[:, None] * x[r.b[b.j]]
+    d = x[b.i] - held(x, r, b.j, b.share)[0]
     assert np.linalg.norm(d, axis=1) == pytest.approx(b.rest, rel=1e-9)
     assert r.alive[b.j].all()
 
