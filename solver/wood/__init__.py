@@ -40,7 +40,7 @@ _NUMBERS = (
 
 SOLVER = Solver(
     name="wood",
-    version="2",
+    version="3",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside"),

@@ -46,34 +46,27 @@ def gather(x: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray
         row[0, n] = x[i, 0]
         row[1, n] = x[i, 1]
         row[2, n] = x[i, 2]
-    ax, ay, az = row[3], row[4], row[5]
-    ex, ey, ez = row[6], row[7], row[8]
-    px, py, pz = row[9], row[10], row[11]
-    qx, qy, qz = row[12], row[13], row[14]
-    for q in range(len(lane) - 1):
-        # lanes of the next edge are written over: cheaper than loops of some seven
-        for n in range(int(lane[q]), int(lane[q + 1]), _WIDE):
-            _spread(ax[n:], edge[0, q])
-            _spread(ay[n:], edge[1, q])
-            _spread(az[n:], edge[2, q])
-            _spread(ex[n:], edge[20, q])
-            _spread(ey[n:], edge[21, q])
-            _spread(ez[n:], edge[22, q])
-            _spread(px[n:], edge[23, q])
-            _spread(py[n:], edge[24, q])
-            _spread(pz[n:], edge[25, q])
-            _spread(qx[n:], edge[26, q])
-            _spread(qy[n:], edge[27, q])
-            _spread(qz[n:], edge[28, q])
+    _over(lane, edge, 0, row[3], row[4], row[5])
+    _over(lane, edge, 20, row[6], row[7], row[8])
+    _over(lane, edge, 23, row[9], row[10], row[11])
+    _over(lane, edge, 26, row[12], row[13], row[14])
 
 
 @njit(cache=True, error_model="numpy")
-def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces (12, w) [N] of `count` bonds on their vertices, and on edges, p and q; first ends bear the rest.
+def _over(lane: np.ndarray, edge: np.ndarray, first: int, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> None:
+    """Spread three rows of edges from `first` over the lanes of their bonds. More rows at once spill registers."""
+    ex, ey, ez = edge[first], edge[first + 1], edge[first + 2]
+    for q in range(len(lane) - 1):
+        # lanes of the next edge are written over: cheaper than loops of some seven
+        for n in range(int(lane[q]), int(lane[q + 1]), _WIDE):
+            _spread(x[n:], ex[q])
+            _spread(y[n:], ey[q])
+            _spread(z[n:], ez[q])
 
-    law (5, w): as in `Plan`; row: as `gather` leaves it. No two arguments may be slices with steps: the loop would not
-    be vectorised.
-    """
+
+@njit(cache=True, error_model="numpy")
+def _reach(count: int, law: np.ndarray, row: np.ndarray) -> None:
+    """Overwrite the rows 0 to 5 of bonds by d and t."""
     for n in range(count):
         u = law[SHARE, n]
         v = min(max(u, 0.0), 1.0)
@@ -86,12 +79,20 @@ def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> Non
         ex, ey, ez = row[6, n], row[7, n], row[8, n]
         px, py, pz = row[9, n], row[10, n], row[11, n]
         qx, qy, qz = row[12, n], row[13, n], row[14, n]
-        dx = row[0, n] - row[3, n] - u * ex - a * px - b * qx
-        dy = row[1, n] - row[4, n] - u * ey - a * py - b * qy
-        dz = row[2, n] - row[5, n] - u * ez - a * pz - b * qz
-        tx = ex + a1 * px + b1 * qx
-        ty = ey + a1 * py + b1 * qy
-        tz = ez + a1 * pz + b1 * qz
+        row[0, n] = row[0, n] - row[3, n] - u * ex - a * px - b * qx
+        row[1, n] = row[1, n] - row[4, n] - u * ey - a * py - b * qy
+        row[2, n] = row[2, n] - row[5, n] - u * ez - a * pz - b * qz
+        row[3, n] = ex + a1 * px + b1 * qx
+        row[4, n] = ey + a1 * py + b1 * qy
+        row[5, n] = ez + a1 * pz + b1 * qz
+
+
+@njit(cache=True, error_model="numpy")
+def _pull(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
+    """Write -dE/dd and -dE/dt of bonds to the rows 0 to 5 of force."""
+    for n in range(count):
+        dx, dy, dz = row[0, n], row[1, n], row[2, n]
+        tx, ty, tz = row[3, n], row[4, n], row[5, n]
         d = np.sqrt(max(dx * dx + dy * dy + dz * dz, _TINY))
         away = 1.0 / d
         dx *= away
@@ -99,31 +100,19 @@ def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> Non
         dz *= away
         slope = tx * dx + ty * dy + tz * dz
         turn = law[SHEAR, n] * (slope - law[COSINE, n])
-        pull = -law[SPRING, n] * (d * law[RATE, n] - 1.0) - turn * slope * away
         shear = turn * away
-        fx = pull * dx + shear * tx  # -dE/dd
-        fy = pull * dy + shear * ty
-        fz = pull * dz + shear * tz
-        dx *= turn  # -dE/dt
-        dy *= turn
-        dz *= turn
-        force[0, n] = fx
-        force[1, n] = fy
-        force[2, n] = fz
-        force[3, n] = dx - u * fx
-        force[4, n] = dy - u * fy
-        force[5, n] = dz - u * fz
-        force[6, n] = a1 * dx - a * fx
-        force[7, n] = a1 * dy - a * fy
-        force[8, n] = a1 * dz - a * fz
-        force[9, n] = b1 * dx - b * fx
-        force[10, n] = b1 * dy - b * fy
-        force[11, n] = b1 * dz - b * fz
+        pull = -law[SPRING, n] * (d * law[RATE, n] - 1.0) - shear * slope
+        force[0, n] = pull * dx + shear * tx
+        force[1, n] = pull * dy + shear * ty
+        force[2, n] = pull * dz + shear * tz
+        force[3, n] = turn * dx
+        force[4, n] = turn * dy
+        force[5, n] = turn * dz
 
 
 @njit(cache=True, error_model="numpy")
-def bound(count: int, law: np.ndarray, row: np.ndarray, own: np.ndarray) -> None:
-    """Write the energy (w,) [J] of each of `count` bonds; arguments as of `bind`."""
+def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces on p and q to the rows 6 to 11, and on the edge over those by t."""
     for n in range(count):
         u = law[SHARE, n]
         v = min(max(u, 0.0), 1.0)
@@ -132,13 +121,38 @@ def bound(count: int, law: np.ndarray, row: np.ndarray, own: np.ndarray) -> None
         b = max(u - 1.0, 0.0) - v * v * w
         a1 = w * (1.0 - 3.0 * v)
         b1 = v * (3.0 * v - 2.0)
-        dx = row[0, n] - row[3, n] - u * row[6, n] - a * row[9, n] - b * row[12, n]
-        dy = row[1, n] - row[4, n] - u * row[7, n] - a * row[10, n] - b * row[13, n]
-        dz = row[2, n] - row[5, n] - u * row[8, n] - a * row[11, n] - b * row[14, n]
-        tx = row[6, n] + a1 * row[9, n] + b1 * row[12, n]
-        ty = row[7, n] + a1 * row[10, n] + b1 * row[13, n]
-        tz = row[8, n] + a1 * row[11, n] + b1 * row[14, n]
+        fx, fy, fz = force[0, n], force[1, n], force[2, n]
+        tx, ty, tz = force[3, n], force[4, n], force[5, n]
+        force[3, n] = tx - u * fx
+        force[4, n] = ty - u * fy
+        force[5, n] = tz - u * fz
+        force[6, n] = a1 * tx - a * fx
+        force[7, n] = a1 * ty - a * fy
+        force[8, n] = a1 * tz - a * fz
+        force[9, n] = b1 * tx - b * fx
+        force[10, n] = b1 * ty - b * fy
+        force[11, n] = b1 * tz - b * fz
+
+
+@njit(cache=True, error_model="numpy")
+def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces (12, w) [N] of `count` bonds on their vertices, and on edges, p and q; first ends bear the rest.
+
+    law (5, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In three loops: where
+    more rows are written than six, LLVM gives up asking which overlap, and nothing is vectorised. For the same reason
+    no two arguments may be slices with steps.
+    """
+    _reach(count, law, row)
+    _pull(count, law, row, force)
+    _share(count, law, force)
+
+
+@njit(cache=True, error_model="numpy")
+def bound(count: int, law: np.ndarray, row: np.ndarray, own: np.ndarray) -> None:
+    """Write the energy (w,) [J] of each of `count` bonds; arguments as of `bind`, which must have been called."""
+    for n in range(count):
+        dx, dy, dz = row[0, n], row[1, n], row[2, n]
         d = np.sqrt(max(dx * dx + dy * dy + dz * dz, _TINY))
         strain = d * law[RATE, n] - 1.0
-        off = (tx * dx + ty * dy + tz * dz) / d - law[COSINE, n]
+        off = (row[3, n] * dx + row[4, n] * dy + row[5, n] * dz) / d - law[COSINE, n]
         own[n] = 0.5 * law[SPRING, n] * strain * strain / law[RATE, n] - 0.5 * law[SHEAR, n] * off * off
