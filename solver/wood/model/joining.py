@@ -103,7 +103,13 @@ def bonded(
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
     cosine = (slope * d).sum(1) / length if len(i) else np.zeros(0)
-    volume = np.pi * params.radius**2 * params.length / max(len(i), 1)
+    # the wood of a bond: by the length that its vertex stands for
+    gap = np.diff(s, axis=1)
+    own = np.zeros_like(s)
+    own[:, :-1] += gap / 2
+    own[:, 1:] += gap / 2
+    part = own.ravel()[np.searchsorted(grid.ravel(), i)]
+    volume = np.pi * params.radius**2 * params.length * part / max(float(part.sum()), 1e-300)
     middle = rest[i] - d / 2
     stiff = grain.factor(middle, params.grain.stiffness)
     strength = strong.factor(middle, params.grain.strength)
