@@ -97,7 +97,7 @@ def _bears(state: State, params: WoodParams, time: float) -> None:
     what = f"a rod is strained to {rods:.2g} times" if rods >= bonds else f"a bond is loaded to {bonds:.2g} times"
     raise NotConverged(
         f"at {time:.3g} times the loads {what} what it bears, and equilibria break nothing.",
-        advice="Apply smaller loads, set fracture none for the unbroken shape, or take the explicit mode: there it breaks.",
+        advice="Apply smaller loads, set fracture none for the unbroken shape, or let it break in mode explicit.",
         residual=max(rods, bonds) - 1,
     )
 

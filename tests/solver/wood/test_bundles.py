@@ -30,7 +30,7 @@ def sag(length: float, load: float) -> float:
 
 @pytest.mark.parametrize("quality", ["preview", "default"])
 @pytest.mark.parametrize("unevenness", [0.0, 0.3])
-@pytest.mark.parametrize(("slender", "rods"), [(10, 40), (30, 20), (100, 20), (100, 50)])
+@pytest.mark.parametrize(("slender", "rods"), [(10, 40), (30, 20), (100, 20), (100, 100)])
 def test_a_bundle_is_as_stiff_as_timoshenko_s_beam(slender, rods, unevenness, quality):
     length = slender * RADIUS
     load = 1e-3 * E * SECOND / length**2
