@@ -79,7 +79,7 @@ def collect(
     """
     jobs = _named(store, solver, keys) if keys is not None else _done(store, solver, plan)
     if not jobs and plan is None:
-        store.ledger.rebuild(store)
+        store.ledger.rebuild(store.results())
         jobs = _done(store, solver, plan)
     jobs = [job for job in jobs if _fits(job, quality, version)]
     if plan is None:
@@ -131,7 +131,7 @@ def _done(store: Store, solver: str, plan: str | None) -> list[Job]:
 def _named(store: Store, solver: str, keys: Collection[str]) -> list[Job]:
     missing = set(keys) - {job.key for job in _done(store, solver, None)}
     if missing:
-        store.ledger.rebuild(store)
+        store.ledger.rebuild(store.results())
         missing = set(keys) - {job.key for job in _done(store, solver, None)}
     if missing:
         raise UnknownJob(
