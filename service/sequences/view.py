@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.fruit import lattice as angles
+from solver.lattice import lattice as angles
 from store.surfaces import spectra
 from sweeps.pictures import colours
 
@@ -73,7 +73,7 @@ class Seam(NamedTuple):
 class Sequence:
     """Stages of a result, made one at a time. `kept`: all have the same triangles.
 
-    colour: `auto` (layers of skin, rot and mould where the result has them), `none`, or a field's name.
+    colour: `auto` (the solver's own looks where the result has fields for them), `none`, or a field's name.
     unit: metres per unit of length, 0 where nobody knows. observe: told the share that is done.
     """
 
@@ -167,7 +167,7 @@ class Sequence:
         if self.colour == "none":
             return bare
         if self.colour == "auto":
-            skin = colours.layered(bare.fields, self.params)
+            skin = colours.painted(self.run, bare.fields)
             if skin is None:
                 return bare
             return bare._replace(colour=skin.colour.astype("f4"), roughness=skin.roughness.astype("f4"))
@@ -228,9 +228,11 @@ def _positions(run: xr.Dataset, index: int) -> NDArray[Any]:
         return run["position"].values[index]
     from solver import registry
 
-    params: Any = registry.get(str(run.attrs["solver"])).parse(json.loads(run.attrs["params"]))
-    fresh = params.surface(*angles(run.sizes["colatitude"])).astype("f4")
-    return fresh + run["displacement"].values[index] if "displacement" in run else fresh
+    fresh = registry.get(str(run.attrs["solver"])).fresh(json.loads(run.attrs["params"]))
+    if fresh is None:
+        raise UnfitFormat("nobody knows the shape of this result.", advice="Solve again with the field 'position'.")
+    start = fresh.points(*angles(run.sizes["colatitude"])).astype("f4")
+    return start + run["displacement"].values[index] if "displacement" in run else start
 
 
 def _flat(values: NDArray[Any]) -> Floats:

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.fruit import Fruit
+from solver.contract import Fresh, Surface
 
 from ..canonical import canonical
 from ..errors import EmptyTable, MixedSamples, UnknownJob
 from ..jobs import Job
 from ..store import Store
 
-__all__ = ["Axes", "Samples", "collect", "default_axes", "insert", "read_axes"]
+__all__ = ["Axes", "Samples", "collect", "insert", "read_axes"]
 
 #: Scalar axis name -> (field of the parameters, index in it or None), as in `Params.axes`.
 Axes = Mapping[str, tuple[str, int | None]]
@@ -45,23 +45,17 @@ class Samples(NamedTuple):
         names = self.varying
         return np.array([[values[name] for name in names] for values in self.values]) if names else None
 
-    def fruits(self) -> list[Fruit] | None:
-        """Return the fruit of each sample, whose fresh shape is known; None where they are no fruits."""
-        found = []
-        for values in self.values:
-            params = insert(self.template, self.axes, values)
-            try:
-                radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
-            except KeyError:
-                return None
-            found.append(Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te))
-        return found
+    def fresh(self, surface: Surface | None) -> list[Fresh] | None:
+        """Return the fresh shape of each sample; None where it does not follow from the parameters."""
+        if surface is None or any(name not in self.template for name in surface.fields):
+            return None
+        return [surface.of(insert(self.template, self.axes, values)) for values in self.values]
 
 
 def collect(
     store: Store,
     solver: str,
-    axes: Axes | None,
+    axes: Axes,
     plan: str | None = None,
     quality: str | None = None,
     version: str | None = None,
@@ -97,7 +91,6 @@ def collect(
     for name in needs[0]:
         hint = "Build with quality=" if name == "quality" else "Build from one plan with plan="
         _refuse_mixed(name, {canonical(need.get(name)) for need in needs}, f"{hint}, or run the odd ones again.")
-    axes = dict(axes or default_axes(jobs[0].params))
     flat = [read_axes(job.params, axes) for job in jobs]
     rests = [_rest(job.params, axes) for job in jobs]
     for name in {name for rest in rests for name in rest}:
@@ -116,7 +109,7 @@ def collect(
     return Samples(
         keys=tuple(job.key for job, _ in chosen),
         values=tuple(values for _, values in chosen),
-        axes=axes,
+        axes=dict(axes),
         fixed={**constant, **rests[0]},
         template=insert(first.params, axes, {name: min(v[name] for _, v in chosen) for name in axes}),
         need={**first.need, "fields": sorted(common)},
@@ -155,17 +148,6 @@ def _refuse_mixed(name: str, found: set[Any], advice: str) -> None:
     if len(found) > 1:
         shown = ", ".join(sorted(v.decode() if isinstance(v, bytes) else str(v) for v in found)[:4])
         raise MixedSamples(f"the results differ in {name}: {shown}.", advice)
-
-
-def default_axes(params: Mapping[str, Any]) -> dict[str, tuple[str, int | None]]:
-    """Return axes for parameters whose own are not known: the fruit's, and every other real number by its name."""
-    fruit = {name: place for name, place in Fruit.axes.items() if place[0] in params}
-    taken = {field for field, _ in fruit.values()} | {"seed"}
-    return fruit | {
-        name: (name, None)
-        for name, value in params.items()
-        if name not in taken and isinstance(value, int | float) and not isinstance(value, bool)
-    }
 
 
 def read_axes(params: Mapping[str, Any], axes: Axes) -> dict[str, float]:

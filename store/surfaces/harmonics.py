@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.fruit import colatitudes
+from solver.lattice import colatitudes
 
 __all__ = ["LOWEST", "area", "degrees", "legendre", "low_series", "power", "shares", "without_low"]
 

@@ -133,10 +133,9 @@ def solve(
     from solver.contract import Context, Need
     from store import shards
 
-    from .. import outputs
-    from ..dried import dried
+    from .. import outputs, tabled
     from ..formats import Made
-    from ..plan import job, units_of
+    from ..plan import job
     from . import progress
     from .words import per_stage, show_run
 
@@ -154,13 +153,11 @@ def solve(
     need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})))
     if out is not None:
         outputs.check_suffix(out, True, len(need.stages))
-        need = chosen.settle(
-            need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen.fields))})
-        )
+        need = chosen.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen))}))
     spec = job(chosen, params, need)
     start = time.perf_counter()
     with progress.one_run(solver) as observe, progress.stopping() as stop:
-        result = chosen.solve(params, need, Context(observe, stop.is_set, dried=dried))
+        result = chosen.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
     seconds = time.perf_counter() - start
     document = {
         "key": spec.key,
@@ -178,7 +175,7 @@ def solve(
         axes = {name: params.axis(name) for name in params.axes}
         shapes = [outputs.of_result(result, axes, i) for i in range(len(need.stages))] if "position" in result else []
         title = f"{chosen.title}: {preset or (params_file.stem if params_file else solver)}"
-        symbol, units = chosen.stages.symbol, units_of(solver)
+        symbol, units = chosen.stages.symbol, chosen.axis_units()
         made = Made(
             shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key, cut=cut
         )

@@ -45,19 +45,8 @@ def build(
     from store import tables
     from store.store import Store
 
-    from ..plan import units_of
-
     opened, chosen = Store.open(store), registry.get(solver)
-    made = tables.build(
-        opened,
-        name,
-        solver,
-        axes=chosen.params.axes,
-        units=units_of(solver),
-        plan=plan,
-        quality=quality,
-        resolution=resolution,
-    )
+    made = tables.build(opened, chosen, name, plan=plan, quality=quality, resolution=resolution)
     _show_table(made, tables.path_of(opened, made), as_json)
 
 
@@ -108,6 +97,7 @@ def score(
 
     wizen table score --store demo --held-out other-store --methods idw,linear+LL+env --json
     """
+    from solver import registry
     from store import seal, starter
     from store.blending import methods
     from store.lookup import ShapeTable
@@ -119,7 +109,7 @@ def score(
         raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
     names = methods.NAMED if methods_ is None else [str(methods.parse(part)) for part in methods_.split(",")]
     opened = Store.open(store or starter.ROOT)
-    table = ShapeTable.open(opened, name)
+    table = ShapeTable.open(opened, name, surfaces=registry.surface)
     cases, pairs = scores.cases(opened, table, held_out)
     report = scores.score(table, cases, pairs, names, held_out is not None)
     if picture is not None:
