@@ -70,7 +70,7 @@ class Plan:
         written = planfile.parse(tables)
         try:
             solver = registry.get(written.solver)
-            need = solver.settle(Need.parse(written.need))
+            need = solver.settle(Need.parse(written.need), written.preset)
         except InvalidInput as error:
             raise PlanError(error.message, error.advice) from None
         _check_names(written, solver)

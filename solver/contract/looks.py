@@ -53,11 +53,19 @@ class Looks:
     """Colours by field, and words.
 
     layers: fields that `paint` makes colours of, given any of them by name (...) and the run's parameters; it returns
-    None where these say no colours. labels: by axis or stage symbol. shades and places: by their names on pages.
+    None where these say no colours. labels: by axis or stage symbol. advance: the word for going along the stage axis.
+    shades and places: by their names on pages.
     """
 
     layers: tuple[str, ...] = ()
     paint: Callable[[Mapping[str, Array], Mapping[str, Any]], Skin | None] | None = None
     labels: Mapping[str, Label] = field(default_factory=dict)
+    advance: str = "Play"
     shades: Mapping[str, Shade] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what a page wants to know, as JSON values."""
+        named = {"labels": self.labels, "shades": self.shades, "places": self.places}
+        said = {key: {name: value._asdict() for name, value in values.items()} for key, values in named.items()}
+        return {"layers": list(self.layers), "advance": self.advance, **said}

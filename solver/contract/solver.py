@@ -112,8 +112,8 @@ class Solver:
             return None
         return self.surface.of(params)
 
-    def settle(self, need: Need) -> Need:
-        """Fill in the defaults of `need` and refuse what this solver cannot give, before any work.
+    def settle(self, need: Need, preset: str | None = None) -> Need:
+        """Fill in the defaults of `need`, those of a preset if one is named; refuse what this solver cannot give.
 
         Raises:
             InvalidInput: unknown field, stage off the axis, a tolerance finer than the measured table.
@@ -127,7 +127,7 @@ class Solver:
                 f"{self.name} has no field {unknown[0]!r}.", advice=f"{hint}Known: {', '.join(self.fields)}."
             )
         axis = self.stages
-        stages = need.stages or axis.default
+        stages = need.stages or self.preset_stages.get(preset or "", axis.default)
         for stage in stages:
             if not axis.lowest <= stage <= axis.highest:
                 raise InvalidInput(

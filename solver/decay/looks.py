@@ -55,6 +55,7 @@ def _smooth(x: Array) -> Array:
 LOOKS = Looks(
     layers=_LAYERS,
     paint=_paint,
+    advance="Rot",
     labels={
         "t": Label("t", "Days"),
         "temperature": Label("T", "Temperature"),

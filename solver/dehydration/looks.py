@@ -23,6 +23,7 @@ LOOKS = Looks(
         "rs2": Label("rₛ₂", "Stone, across"),
         **{f"r{i}": Label("r" + "₂₃₄₅₆₇₈"[i - 2], f"Radius {i}") for i in range(2, 9)},
     },
+    advance="Dry",
     shades=_SHADES,
     places={
         "Fresh": Place({"te": 0.5, "gamma": 0.5}, 0.0),

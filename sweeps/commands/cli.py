@@ -150,7 +150,7 @@ def solve(
     if seed is not None:
         values["seed"] = seed
     params = chosen.parse(values, preset)
-    need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})))
+    need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})), preset)
     if out is not None:
         outputs.check_suffix(out, True, len(need.stages))
         need = chosen.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen))}))
