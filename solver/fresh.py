@@ -7,15 +7,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .contract import Fresh, Surface
 from .fruit import Fruit
 from .lattice import azimuths, colatitudes
 
 __all__ = ["SURFACE", "FreshFruit"]
-
-Array = NDArray[Any]
 
 
 class FreshFruit(Fresh):

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from .arrays import Floats
 from .contract import Params
 from .lattice import azimuths, colatitudes, directions, lattice, window
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PRESETS", "Fruit", "azimuths", "colatitudes", "directions", "lattice", "window"]
 
-Array = NDArray[np.float64]
 
 #: Deepest dent of the outline that is accepted, in units of r1. Jujube 1 of Table 1 has 0.037; the columns of the
 #: mesh run along rays from the centre, and flesh folded deeper than this is no longer the paper's kind of fruit.
@@ -123,7 +122,7 @@ class Fruit(Params):
         """Whether the equator is a circle."""
         return self.radii[3] == self.radii[7]
 
-    def generatrix(self, colatitude: Array) -> tuple[Array, Array]:
+    def generatrix(self, colatitude: Floats) -> tuple[Floats, Floats]:
         """Return (x, y) of the sarcocarp's generatrix (Eq. 8) at colatitudes [radian], shapes as given.
 
         Equal radii are the paper's spherical fruit and give an exact circle, which the cubic spline through its
@@ -136,19 +135,19 @@ class Fruit(Params):
         x, y = np.moveaxis(spline(phi), -1, 0)
         return x, y
 
-    def sarcocarp(self, colatitude: Array, azimuth: Array) -> Array:
+    def sarcocarp(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return points of the sarcocarp's surface, shape (..., 3), at colatitude and azimuth [radian]."""
         x, y = self.generatrix(colatitude)
         squash = self.radii[7] / self.radii[3]
         return np.stack(np.broadcast_arrays(x * np.cos(azimuth), y, squash * x * np.sin(azimuth)), axis=-1)
 
-    def surface(self, colatitude: Array, azimuth: Array) -> Array:
+    def surface(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return points of the fruit's fresh outer surface X, shape (..., 3): r_e = r_f + te along each ray."""
         inner = self.sarcocarp(colatitude, azimuth)
         distance = np.linalg.norm(inner, axis=-1, keepdims=True)
         return inner * (1 + self.exocarp_thickness / distance)
 
-    def stone_distance(self, rays: Array) -> Array:
+    def stone_distance(self, rays: Floats) -> Floats:
         """Return the distance (...) from the centre to the stone's surface along unit rays (..., 3), 0 without one."""
         if not self.has_stone:
             return np.zeros(rays.shape[:-1])
@@ -156,7 +155,7 @@ class Fruit(Params):
         axes = np.array([across, along, across * self.radii[7] / self.radii[3]])
         return 1 / np.linalg.norm(rays / axes, axis=-1)
 
-    def _outline(self) -> Array:
+    def _outline(self) -> Floats:
         x, y = self.generatrix(np.linspace(np.pi, 0, 361))
         return np.stack([x, y], axis=-1)
 
@@ -172,7 +171,7 @@ def _spline(radii: tuple[float, ...]) -> CubicSpline:
     return CubicSpline(knots, points, bc_type=ends)
 
 
-def _dent(outline: Array) -> float:
+def _dent(outline: Floats) -> float:
     """Return how far the closed outline (n, 2) stays behind its convex hull at the worst place."""
     from scipy.spatial import ConvexHull
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.contract import Fresh
 from solver.lattice import lattice
 from store import keys
@@ -29,7 +29,6 @@ from .plan import Plan
 
 __all__ = ["Case", "Report", "Row", "cases", "picture", "score"]
 
-Array = NDArray[Any]
 
 #: Parameters of a run that change its pattern but not what it is like.
 _SEED = "seed"

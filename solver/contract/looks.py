@@ -6,11 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from numpy.typing import NDArray
+from ..arrays import Array
 
 __all__ = ["Label", "Looks", "Place", "Shade", "Skin"]
-
-Array = NDArray[Any]
 
 
 class Skin(NamedTuple):
@@ -66,6 +64,6 @@ class Looks:
 
     def to_json(self) -> dict[str, Any]:
         """Return what a page wants to know, as JSON values."""
-        named = {"labels": self.labels, "shades": self.shades, "places": self.places}
+        named: dict[str, Mapping[str, Any]] = {"labels": self.labels, "shades": self.shades, "places": self.places}
         said = {key: {name: value._asdict() for name, value in values.items()} for key, values in named.items()}
         return {"layers": list(self.layers), "advance": self.advance, **said}

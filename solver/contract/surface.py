@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..lattice import azimuths, colatitudes
 
 __all__ = ["Fresh", "Surface"]
-
-Array = NDArray[Any]
 
 
 class Fresh:

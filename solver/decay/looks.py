@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..contract import Label, Looks, Skin
 
 __all__ = ["LOOKS"]
-
-Array = NDArray[Any]
 
 _LAYERS = ("rot", "mould", "mould_active")
 #: Rotten flesh under the skin, and the rim of mould that still grows; linear light.

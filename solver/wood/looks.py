@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..contract import Looks, Skin
 
 __all__ = ["LOOKS"]
-
-Array = NDArray[Any]
 
 #: Bark and fresh wood, linear light; roughness chosen by eye.
 _BARK = np.array([0.105, 0.062, 0.036])

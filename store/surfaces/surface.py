@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.contract import Fresh
 
 from . import spectra
 from .window import WHOLE, Patch
 
 __all__ = ["add_fresh", "normals"]
-
-Array = NDArray[Any]
 
 
 def add_fresh(fresh: Fresh, displacement: Array, patch: Patch | None = None) -> Array:

@@ -9,7 +9,8 @@ The trilinear pressure is not inf-sup stable in general; the tests show displace
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Floats
 
 __all__ = [
     "NODES",
@@ -21,8 +22,6 @@ __all__ = [
     "shape",
     "shape_gradients",
 ]
-
-Floats = NDArray[np.float64]
 
 
 def _parabolas(t: Floats) -> tuple[Floats, Floats]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.dehydration.kernel.algebra import (
     CORE_WEIGHTS,
@@ -21,7 +20,7 @@ from solver.dehydration.kernel.algebra import (
     modes_of,
 )
 
-Floats: TypeAlias = NDArray[np.float64]
+from ...arrays import Floats
 
 CORNERS = np.array([[1.0 if a & bit else -1.0 for bit in (XI, ETA, ZETA)] for a in range(8)])
 """Local coordinates of the eight nodes, (8, 3)."""
