@@ -2,6 +2,7 @@
 
     root/tables/<name>/<digest>.h5    a generation, netCDF-4/HDF5, sealed
     root/tables/<name>/current.json   which one is current, and what is in it
+    root/tables/<name>/scalars.nc     numbers of the runs over their axes, see `scalars`
 
 A new generation becomes current by renaming the manifest; whoever has the old one open keeps it until it reopens,
 even when it is pruned.
@@ -20,7 +21,7 @@ from . import seal
 from .errors import EmptyTable, MixedSamples
 from .generations import generate, generation
 from .generations.manifest import TableInfo, directory, read_manifest, write_manifest
-from .generations.samples import Samples, collect
+from .generations.samples import Choice, Samples, collect
 from .store import Store
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def build(
         StorageFull: the disk is full; the old generation stays current.
 
     """
-    samples = collect(store, solver.name, solver.params.axes, plan, quality, version, keys)
+    samples = collect(store, solver.name, solver.params.axes, Choice(plan, quality, version, keys))
     return _write(store, solver, name, samples, resolution, dtype)
 
 
@@ -123,7 +124,7 @@ def rebuild(
     if now.solver != solver.name:
         raise MixedSamples(f"table {name!r} is of {now.solver}, not of {solver.name}.", "Build one under another name.")
     precision: Precision = dtype or ("float64" if now.dtype == "float64" else "float32")
-    samples = collect(store, solver.name, now.places, keys={*now.keys, *more})
+    samples = collect(store, solver.name, now.places, Choice(keys={*now.keys, *more}))
     return _write(store, solver, name, samples, resolution or now.resolution, precision)
 
 

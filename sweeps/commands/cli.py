@@ -245,6 +245,7 @@ def status(store: StorePath, as_json: As_json = False) -> None:
 
     wizen status --store demo --json | jq '.failed[].error'
     """
+    from store import scalars
     from store.store import Store
 
     opened = Store.open(store)
@@ -257,6 +258,7 @@ def status(store: StorePath, as_json: As_json = False) -> None:
         "running": [{"key": j.key, "plan": j.plan, "worker": j.worker, "progress": j.progress} for j in running],
         "failed": [{"key": j.key, "plan": j.plan, "params": dict(j.params), "error": j.error} for j in failed],
         "tables": opened.table_names(),
+        "scalars": scalars.names(opened),
     }
 
     def show(console: Any) -> None:
@@ -267,7 +269,9 @@ def status(store: StorePath, as_json: As_json = False) -> None:
             error = j.error or {}
             console.print(f"failed  {j.key[:12]} {error.get('message')} {error.get('advice')}", markup=False)
         console.print(
-            f"{document['results']} results, tables: {', '.join(opened.table_names()) or 'none'}", markup=False
+            f"{document['results']} results, tables of shapes: {', '.join(document['tables']) or 'none'}, "
+            f"of numbers: {', '.join(document['scalars']) or 'none'}",
+            markup=False,
         )
 
     emit(document, as_json, show)
