@@ -36,6 +36,7 @@ def swept(folder: Path, solver: str, store: Path) -> None:
     assert f"wizen table build --store {store}" in ended.output
 
 
+@pytest.mark.timeout(900)  # kernels are compiled where this is the first test to need them
 @pytest.mark.parametrize("solver", sorted(TINY))
 def test_a_tiny_sweep_ends_in_a_table(solver: str, tmp_path: Path) -> None:
     store = tmp_path / "store"
