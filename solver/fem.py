@@ -16,11 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
+
+from .arrays import Floats
 
 __all__ = ["HEX8", "HEX27", "QUAD9", "Box", "gauss", "lobatto", "segment", "tetrahedron_gradients"]
-
-Floats = NDArray[np.float64]
 
 #: scikit-fem's interval and ours have the same middle; an interval of ours is twice as long.
 _LENGTH = 2.0

@@ -12,9 +12,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from .arrays import Floats
 from .contract import Params, Region
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PRESETS", "Fruit", "azimuths", "colatitudes", "directions", "lattice", "window"]
 
-Array = NDArray[np.float64]
 
 #: Deepest dent of the outline that is accepted, in units of r1. Jujube 1 of Table 1 has 0.037; the columns of the
 #: mesh run along rays from the centre, and flesh folded deeper than this is no longer the paper's kind of fruit.
@@ -123,7 +122,12 @@ class Fruit(Params):
         """Whether the equator is a circle."""
         return self.radii[3] == self.radii[7]
 
-    def generatrix(self, colatitude: Array) -> tuple[Array, Array]:
+    @property
+    def keeps_shape(self) -> bool:
+        """Whether a run leaves the surface where it is fresh, so that a result without a position has that one."""
+        return False
+
+    def generatrix(self, colatitude: Floats) -> tuple[Floats, Floats]:
         """Return (x, y) of the sarcocarp's generatrix (Eq. 8) at colatitudes [radian], shapes as given.
 
         Equal radii are the paper's spherical fruit and give an exact circle, which the cubic spline through its
@@ -136,19 +140,19 @@ class Fruit(Params):
         x, y = np.moveaxis(spline(phi), -1, 0)
         return x, y
 
-    def sarcocarp(self, colatitude: Array, azimuth: Array) -> Array:
+    def sarcocarp(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return points of the sarcocarp's surface, shape (..., 3), at colatitude and azimuth [radian]."""
         x, y = self.generatrix(colatitude)
         squash = self.radii[7] / self.radii[3]
         return np.stack(np.broadcast_arrays(x * np.cos(azimuth), y, squash * x * np.sin(azimuth)), axis=-1)
 
-    def surface(self, colatitude: Array, azimuth: Array) -> Array:
+    def surface(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return points of the fruit's fresh outer surface X, shape (..., 3): r_e = r_f + te along each ray."""
         inner = self.sarcocarp(colatitude, azimuth)
         distance = np.linalg.norm(inner, axis=-1, keepdims=True)
         return inner * (1 + self.exocarp_thickness / distance)
 
-    def stone_distance(self, rays: Array) -> Array:
+    def stone_distance(self, rays: Floats) -> Floats:
         """Return the distance (...) from the centre to the stone's surface along unit rays (..., 3), 0 without one."""
         if not self.has_stone:
             return np.zeros(rays.shape[:-1])
@@ -156,7 +160,7 @@ class Fruit(Params):
         axes = np.array([across, along, across * self.radii[7] / self.radii[3]])
         return 1 / np.linalg.norm(rays / axes, axis=-1)
 
-    def _outline(self) -> Array:
+    def _outline(self) -> Floats:
         x, y = self.generatrix(np.linspace(np.pi, 0, 361))
         return np.stack([x, y], axis=-1)
 
@@ -172,7 +176,7 @@ def _spline(radii: tuple[float, ...]) -> CubicSpline:
     return CubicSpline(knots, points, bc_type=ends)
 
 
-def _dent(outline: Array) -> float:
+def _dent(outline: Floats) -> float:
     """Return how far the closed outline (n, 2) stays behind its convex hull at the worst place."""
     from scipy.spatial import ConvexHull
 
@@ -184,18 +188,18 @@ def _dent(outline: Array) -> float:
 # --- the lattice that all surface fields live on ----------------------------------------------------------------
 
 
-def colatitudes(resolution: int) -> Array:
+def colatitudes(resolution: int) -> Floats:
     """Return `resolution` colatitudes [radian] at cell centres, so that no sample sits on a pole."""
     return (np.arange(resolution) + 0.5) * np.pi / resolution
 
 
-def azimuths(resolution: int) -> Array:
+def azimuths(resolution: int) -> Floats:
     """Return the 2 * `resolution` azimuths [radian] that go with `colatitudes(resolution)`."""
     return np.arange(2 * resolution) * np.pi / resolution
 
 
 @lru_cache(maxsize=8)
-def lattice(resolution: int) -> tuple[Array, Array]:
+def lattice(resolution: int) -> tuple[Floats, Floats]:
     """Return the broadcast (colatitude, azimuth) grids [radian], each of shape (resolution, 2 * resolution)."""
     theta, phi = np.meshgrid(colatitudes(resolution), azimuths(resolution), indexing="ij")
     for grid in (theta, phi):
@@ -217,7 +221,7 @@ def window(resolution: int, region: Region | None) -> tuple[slice, slice]:
     return slices[0], slices[1]
 
 
-def directions(colatitude: Array, azimuth: Array) -> Array:
+def directions(colatitude: Floats, azimuth: Floats) -> Floats:
     """Return points of the parametric unit sphere, shape (..., 3): y is the pole, azimuth runs from x to z."""
     s = np.sin(colatitude)
     return np.stack(np.broadcast_arrays(s * np.cos(azimuth), np.cos(colatitude), s * np.sin(azimuth)), axis=-1)

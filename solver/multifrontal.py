@@ -14,13 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
+
+from .arrays import Floats, Ints
 
 __all__ = ["Analysis", "Factor", "Front", "analyse", "extend", "factorise", "gather"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEAF = 2
 """Stacks in the smallest part."""

@@ -124,7 +124,6 @@ register(
     elastic_energy=Quantity("J", "energy of stretching, bending, twist, bonds and contacts", "E_e"),
     lost_energy=Quantity("J", "energy lost by breaks, friction and damping since the start", "E_l"),
     work=Quantity("J", "work of loads, weight, grips and bodies since the start", "W"),
-    dissipated_energy=Quantity("J", "energy that an implicit scheme has taken on its own account", "E_d"),
     broken_rods=Quantity("1", "breaks of rods since the start", "n_r"),
     broken_bonds=Quantity("1", "bonds broken or left without a rod since the start", "n_b"),
     impulse=Quantity("N s", "impulse that the rigid bodies received from the rods since the start", "J"),

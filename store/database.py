@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,8 +13,6 @@ from .errors import CorruptLedger, ReadOnlyStore, StorageFull
 
 __all__ = ["Database"]
 
-#: Version of the schema, kept in the file.
-_VERSION = 1
 #: Seconds to wait for another process's transaction; each lasts milliseconds.
 _PATIENCE = 60.0
 
@@ -25,12 +23,15 @@ _inherited: list[sqlite3.Connection] = []
 class Database:
     """A connection that opens itself on first use, in every process anew.
 
-    `schema` is a list of statements that may be said again: `CREATE ... IF NOT EXISTS`.
+    `schema` is a list of statements that may be said again: `CREATE ... IF NOT EXISTS`. `upgrades` make a file of an
+    earlier version one of the next; the version is kept in the file.
     """
 
-    def __init__(self, path: Path, schema: str) -> None:
+    def __init__(self, path: Path, schema: str, upgrades: Mapping[int, str]) -> None:
         self._path = path
         self._schema = schema
+        self._upgrades = upgrades
+        self._version = 1 + max(upgrades, default=0)
         self._pid = os.getpid()
         self._lock = threading.RLock()
         self._connection: sqlite3.Connection | None = None
@@ -99,13 +100,13 @@ class Database:
             connection.execute("PRAGMA synchronous = FULL")  # what was reported as done survives a power cut
             connection.execute("BEGIN IMMEDIATE")
             found = connection.execute("PRAGMA user_version").fetchone()[0]
-            if found not in (0, _VERSION):
-                raise self._unreadable(f"has version {found}, this program reads {_VERSION}")
+            if found > self._version:
+                raise self._unreadable(f"has version {found}, this program reads {self._version}")
+            changes = [self._upgrades[old] for old in range(found, self._version)] if found else []
             # what is there already stays: a table that a later program added appears in older files too
-            for statement in self._schema.split(";"):
+            for statement in ";".join([*changes, self._schema]).split(";"):
                 connection.execute(statement)
-            if found == 0:
-                connection.execute(f"PRAGMA user_version = {_VERSION}")
+            connection.execute(f"PRAGMA user_version = {self._version}")
             connection.execute("COMMIT")
         except BaseException:
             connection.close()

@@ -45,7 +45,9 @@ class JobSpec:
 class Job(JobSpec):
     """A job in the ledger. Times are seconds since the epoch; `seconds` is the wall time of a finished run.
 
-    `message` is what its run said last, where it says anything.
+    `message` is what its run said last, where it says anything. `lease_until` is a reading of `clock`, which counts
+    seconds without a date. `claims` numbers the claims of a job and never goes back, as `attempts` does: with
+    `worker`, it tells one claim from every other.
     """
 
     plan: str
@@ -59,6 +61,9 @@ class Job(JobSpec):
     created: float
     updated: float
     progress: float
+    claims: int = 0
+    clock: str | None = None
+    lease: float | None = None
     message: str = ""
 
 

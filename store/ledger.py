@@ -2,18 +2,22 @@
 
 SQLite in WAL mode, safe among threads and processes of one machine (not on a network file system: there, only the
 coordinating process opens it). The shards are the truth; the ledger can be rebuilt from them.
+
+A claim is fenced: the job that `claim` returned, with its worker and the number of the claim, goes with every word
+about it. A worker whose job was taken over or cancelled meanwhile changes nothing, and is told so.
 """
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from sqlite3 import Connection
 from typing import TYPE_CHECKING, Any
 
 from .canonical import canonical
+from .clock import Clock
 from .database import Database
 from .errors import CorruptShard, UnknownJob
 from .jobs import STATES, Job, JobSpec, State, read_row
@@ -25,13 +29,16 @@ __all__ = ["Job", "JobSpec", "Ledger", "State"]
 
 #: A job that took its worker down this often (out of memory, a crash) is given up.
 MAX_LOST = 5
+#: Seconds without a sign after which a job is taken over whose lease was noted before leases had clocks.
+_OLD_LEASE = 60.0
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS jobs (
     key TEXT PRIMARY KEY, solver TEXT NOT NULL, version TEXT NOT NULL, params TEXT NOT NULL, need TEXT NOT NULL,
     plan TEXT NOT NULL DEFAULT '', state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, worker TEXT,
     lease_until REAL, digest TEXT, error TEXT, seconds REAL, created REAL NOT NULL, updated REAL NOT NULL,
-    progress REAL NOT NULL DEFAULT 0
+    progress REAL NOT NULL DEFAULT 0,
+    claims INTEGER NOT NULL DEFAULT 0, clock TEXT, lease REAL
 );
 CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
 -- a job may belong to several plans, of which jobs.plan is the one that asked first
@@ -39,6 +46,15 @@ CREATE TABLE IF NOT EXISTS plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) 
 -- what a running job says of itself
 CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) WITHOUT ROWID
 """
+
+#: What older files lack: by the version that they have, how they become the next.
+_UPGRADES = {
+    1: "ALTER TABLE jobs ADD COLUMN claims INTEGER NOT NULL DEFAULT 0; "
+    "ALTER TABLE jobs ADD COLUMN clock TEXT; ALTER TABLE jobs ADD COLUMN lease REAL"
+}
+
+#: The claim that a job's worker holds, or gave back without anybody having taken the job since.
+_HELD = "key = ? AND claims = ? AND (worker = ? OR worker IS NULL AND state = 'wanted')"
 
 #: Reads whole jobs.
 SELECT = "SELECT jobs.*, notes.message FROM jobs LEFT JOIN notes ON notes.key = jobs.key"
@@ -51,11 +67,17 @@ _LOST = {
 
 
 class Ledger:
-    """Jobs by key. A job moves wanted -> running -> done, or back to wanted, or to failed or cancelled."""
+    """Jobs by key. A job moves wanted -> running -> done, or back to wanted, or to failed or cancelled.
 
-    def __init__(self, path: Path | str) -> None:
+    `clock` measures the leases.
+    """
+
+    def __init__(self, path: Path | str, clock: Clock | None = None) -> None:
         self.path = Path(path)
-        self.database = Database(self.path, _SCHEMA)
+        self.database = Database(self.path, _SCHEMA, _UPGRADES)
+        self._clock = clock or Clock.of_host()
+        #: Leases by another clock than ours: what was last seen of them, and when, by our clock.
+        self._watched: dict[str, tuple[tuple[Any, ...], float]] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path,)
@@ -80,89 +102,102 @@ class Ledger:
         """Take the oldest job that waits, or whose worker let its lease run out; None if there is none.
 
         `lease` [s] is how long the job is `worker`'s unless renewed; `keys` restricts the choice. No two claims ever
-        return the same job while its lease lasts.
+        return the same job while its lease lasts. What is returned is the claim: `renew`, `done`, `failed` and
+        `release` want it back.
         """
         now = time.time()
         among = "" if keys is None else "AND key IN (SELECT value FROM json_each(?))"
         listed = () if keys is None else (json.dumps(sorted(keys)),)
         with self.database.write() as connection:
+            late = json.dumps(self._late(connection))
             connection.execute(
                 "UPDATE jobs SET state = 'failed', error = ?, worker = NULL, lease_until = NULL, updated = ? "
-                "WHERE state = 'running' AND lease_until < ? AND attempts >= ?",
-                (json.dumps(_LOST), now, now, MAX_LOST),
+                "WHERE key IN (SELECT value FROM json_each(?)) AND attempts >= ?",
+                (json.dumps(_LOST), now, late, MAX_LOST),
             )
             row = connection.execute(
-                f"SELECT key FROM jobs WHERE (state = 'wanted' OR state = 'running' AND lease_until < ?) {among} "
-                "ORDER BY created, rowid LIMIT 1",
-                (now, *listed),
+                "SELECT key FROM jobs WHERE (state = 'wanted' OR state = 'running' AND key IN "
+                f"(SELECT value FROM json_each(?))) {among} ORDER BY created, rowid LIMIT 1",
+                (late, *listed),
             ).fetchone()
             if row is None:
                 return None
             connection.execute(
-                "UPDATE jobs SET state = 'running', worker = ?, lease_until = ?, attempts = attempts + 1, "
-                "progress = 0, updated = ? WHERE key = ?",
-                (worker, now + lease, now, row["key"]),
+                "UPDATE jobs SET state = 'running', worker = ?, clock = ?, lease = ?, lease_until = ?, "
+                "attempts = attempts + 1, claims = claims + 1, progress = 0, updated = ? WHERE key = ?",
+                (worker, self._clock.name, lease, self._clock.now() + lease, now, row["key"]),
             )
             connection.execute("DELETE FROM notes WHERE key = ?", (row["key"],))
             return get(connection, row["key"])
 
-    def renew(self, key: str, worker: str, lease: float, progress: float | None = None, message: str = "") -> bool:
+    def _late(self, connection: Connection) -> list[str]:
+        """Return the running jobs whose workers let their leases run out.
+
+        The lease of a worker that counts by another clock (another boot) is watched: it has run out when nothing was
+        heard of it for its whole length by our own.
+        """
+        now, late, watched = self._clock.now(), list[str](), dict[str, tuple[tuple[Any, ...], float]]()
+        rows = connection.execute("SELECT key, claims, clock, lease, lease_until FROM jobs WHERE state = 'running'")
+        for key, *sign in rows:
+            _, clock, lease, until = sign
+            if clock != self._clock.name:
+                seen, since = self._watched.get(key, ((), now))
+                watched[key] = tuple(sign), since if seen == tuple(sign) else now
+                until = watched[key][1] + (lease or _OLD_LEASE)
+            if until < now:
+                late.append(key)
+        self._watched = watched
+        return late
+
+    def renew(self, job: Job, lease: float, progress: float | None = None, message: str = "") -> bool:
         """Keep a claimed job for `lease` [s] more and note its progress, 0 to 1, and what it says.
 
-        False means that the job is no longer `worker`'s (cancelled, or taken over): it should stop.
+        False means that the job is no longer its claimant's (cancelled, or taken over): it should stop.
         """
-        now = time.time()
         with self.database.write() as connection:
             changed = connection.execute(
-                "UPDATE jobs SET lease_until = ?, progress = coalesce(?, progress), updated = ? "
-                "WHERE key = ? AND worker = ? AND state = 'running'",
-                (now + lease, progress, now, key, worker),
+                "UPDATE jobs SET clock = ?, lease = ?, lease_until = ?, progress = coalesce(?, progress), updated = ? "
+                f"WHERE {_HELD} AND state = 'running'",
+                (self._clock.name, lease, self._clock.now() + lease, progress, time.time(), *_held(job)),
             ).rowcount
             if changed and message:
-                connection.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (key, message))
+                connection.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (job.key, message))
         return changed == 1
 
-    def done(self, key: str, digest: str, seconds: float) -> None:
-        """Note that the result is stored. Call it only after the shard is on the disk.
+    def done(self, job: Job, digest: str, seconds: float) -> bool:
+        """Note that the result of a claimed job is stored. Call it only after the shard is on the disk.
 
-        Raises:
-            UnknownJob: nobody asked for it.
-
+        False means that the job is no longer its claimant's, and is left alone: whoever has it finds the shard.
         """
-        self._set(key, "state = 'done', digest = ?, seconds = ?, progress = 1, error = NULL", digest, seconds)
+        return self._end(
+            job, "state = 'done', digest = ?, seconds = ?, progress = 1, error = NULL, worker = NULL", digest, seconds
+        )
 
-    def failed(self, key: str, error: dict[str, Any], max_attempts: int = 2) -> State:
-        """Note a failure (`code`, `message`, `advice`) and return the job's new state.
+    def failed(self, job: Job, error: Mapping[str, Any], max_attempts: int = 2) -> State | None:
+        """Note a failure (`code`, `message`, `advice`) of a claimed job and return the job's new state.
 
-        It waits again until it was tried `max_attempts` times, then it is failed for good.
-
-        Raises:
-            UnknownJob: nobody asked for it.
-
+        It waits again until it was tried `max_attempts` times, then it is failed for good. What its claimant noted as
+        done before stays done. None means that the job is no longer its claimant's, and is left alone.
         """
         with self.database.write() as connection:
-            job = get(connection, key)
-            if job.state not in ("running", "wanted"):
-                return job.state
-            state: State = "failed" if job.attempts >= max_attempts else "wanted"
-            connection.execute(
-                "UPDATE jobs SET state = ?, error = ?, worker = NULL, lease_until = NULL, updated = ? WHERE key = ?",
-                (state, json.dumps(error), time.time(), key),
-            )
-        return state
+            found = get(connection, job.key)
+            if found.state == "done" and found.claims == job.claims:
+                return "done"
+            state: State = "failed" if found.attempts >= max_attempts else "wanted"
+            changed = connection.execute(
+                "UPDATE jobs SET state = ?, error = ?, worker = NULL, lease_until = NULL, updated = ? "
+                f"WHERE {_HELD} AND state = 'running'",
+                (state, json.dumps(error), time.time(), *_held(job)),
+            ).rowcount
+        return state if changed else None
 
-    def release(self, key: str) -> None:
-        """Put a claimed job back as if it had not been claimed: its worker was asked to stop.
+    def release(self, job: Job) -> bool:
+        """Put a claimed job back as if it had not been claimed: its worker was asked to stop, or is dead.
 
-        Raises:
-            UnknownJob: nobody asked for it.
-
+        False means that the job is no longer its claimant's, and is left alone.
         """
-        self._set(
-            key,
-            "state = 'wanted', attempts = max(attempts - 1, 0), progress = 0",
-            only="running",
-        )
+        change = "state = 'wanted', attempts = max(attempts - 1, 0), progress = 0, worker = NULL"
+        return self._end(job, change, only="state = 'running'")
 
     def cancel(self, keys: Iterable[str]) -> int:
         """Give up jobs that wait or run; return how many. A running worker learns of it when it renews."""
@@ -193,6 +228,12 @@ class Ledger:
             where, values = f"{where} AND state = ?", (*values, state)
         with self.database.read() as connection:
             rows = connection.execute(f"{SELECT} WHERE {where} ORDER BY created, jobs.rowid", values)
+            return [read_row(row) for row in rows]
+
+    def running(self, worker: str) -> list[Job]:
+        """Return the jobs that a worker holds."""
+        with self.database.read() as connection:
+            rows = connection.execute(f"{SELECT} WHERE state = 'running' AND worker = ?", (worker,))
             return [read_row(row) for row in rows]
 
     def counts(self, plan: str | None = None) -> dict[str, int]:
@@ -243,15 +284,19 @@ class Ledger:
             )
         return len(good)
 
-    def _set(self, key: str, change: str, *values: Any, only: State | None = None) -> None:
-        """Apply `change` to one job, which thereby has no worker any more."""
+    def _end(self, job: Job, change: str, *values: Any, only: str = "1") -> bool:
+        """Apply `change` to a job that is still as `job`, the claim, says; return whether it is."""
         with self.database.write() as connection:
-            job = get(connection, key)
-            if only is None or job.state == only:
-                connection.execute(
-                    f"UPDATE jobs SET {change}, worker = NULL, lease_until = NULL, updated = ? WHERE key = ?",
-                    (*values, time.time(), key),
-                )
+            changed = connection.execute(
+                f"UPDATE jobs SET {change}, lease_until = NULL, updated = ? WHERE {_HELD} AND {only}",
+                (*values, time.time(), *_held(job)),
+            ).rowcount
+        return changed == 1
+
+
+def _held(job: Job) -> tuple[Any, ...]:
+    """Return the values of `_HELD`."""
+    return job.key, job.claims, job.worker
 
 
 def enter(connection: Connection, job: JobSpec, plan: str, revived: Sequence[State]) -> int:

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.fruit import Fruit, azimuths, colatitudes
 from solver.quantities import QUANTITIES
 
@@ -38,7 +38,6 @@ from .tables import info, path_of
 
 __all__ = ["ShapeTable"]
 
-Array = NDArray[Any]
 
 #: Fields that a query may ask for.
 FIELDS = ("position", "displacement")

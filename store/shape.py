@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
-from numpy.typing import NDArray
+from solver.arrays import Array
 
 from .errors import OutsideTable
 from .surfaces import surface
 
 __all__ = ["Shape"]
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Floats
 from solver.contract import InvalidInput
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["dried"]
 
 
-def dried(fruit: Mapping[str, float], shrinkage: float, resolution: int) -> NDArray[np.float64]:
+def dried(fruit: Mapping[str, float], shrinkage: float, resolution: int) -> Floats:
     """Return the displacement (n, 2 n, 3) [r1] on the lattice of a fruit, named by the axes of dehydration.
 
     Raises:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-__all__ = ["BAD_INPUT", "InvalidOption", "PlanError", "SweepError", "describe", "exit_code"]
+__all__ = ["BAD_INPUT", "InvalidOption", "PlanError", "SweepError", "describe", "exit_code", "installing"]
 
 #: Codes that mean "what was asked for is wrong", as opposed to "it could not be done".
 BAD_INPUT = frozenset(
@@ -60,3 +60,8 @@ def describe(error: BaseException) -> dict[str, Any]:
 def exit_code(error: BaseException) -> int:
     """Return 2 for bad input, 1 for everything else. Subclasses of a bad-input error are bad input."""
     return 2 if any(getattr(kind, "code", None) in BAD_INPUT for kind in type(error).__mro__) else 1
+
+
+def installing(extra: str) -> str:
+    """Return how to install what the extra of that name brings; wizen is on no index, so there is only its checkout."""
+    return f"Run `pip install -e '.[{extra}]'` in wizen's checkout."

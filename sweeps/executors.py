@@ -5,19 +5,19 @@ Workers of one machine share its cores: each gets `cores // workers` threads, se
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from .errors import InvalidOption, SweepError
+from .errors import InvalidOption, SweepError, installing
+from .processes import Processes
 
-__all__ = ["Workers", "choose", "cores", "dask_cluster", "dask_local", "processes", "serial"]
+__all__ = ["SchedulerLost", "Workers", "choose", "cores", "dask_cluster", "dask_local", "processes", "serial"]
 
 #: What numerical libraries read, once, when they are loaded.
 _THREADS = (
@@ -38,6 +38,19 @@ class NoScheduler(SweepError):
     code = "no-scheduler"
 
 
+class SchedulerLost(SweepError):
+    """The Dask scheduler went away in the middle."""
+
+    code = "scheduler-lost"
+
+    def __init__(self, where: str = "") -> None:
+        at = f" at {where}" if where else ""
+        super().__init__(
+            f"the Dask scheduler{at} does not answer any more.",
+            "What is stored stays; run the same command again when it is back.",
+        )
+
+
 def _call(fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
     return fn(*args, **kwargs)
 
@@ -55,24 +68,26 @@ def _call_on_dask(fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
 
 
 class Workers(Executor):
-    """An executor that knows how many jobs it takes at once, and that can replace its lost processes.
+    """An executor that knows how many jobs it takes at once, and how its jobs are ended.
 
-    `shares_ledger` is false where workers are on other hosts and must not open the ledger.
+    `shares_ledger` is false where workers are on other hosts and must not open the ledger. `ends_itself` is true where
+    nobody here can kill a worker that does not stop when it should.
     """
 
     def __init__(
         self,
-        make: Callable[[], Executor],
+        inner: Executor,
         width: Callable[[], int],
         title: str,
         shares_ledger: bool = True,
+        ends_itself: bool = False,
         wrap: Callable[..., Any] = _call,
     ) -> None:
-        self._make = make
-        self._inner = make()
+        self._inner = inner
         self._width = width
         self.title = title
         self.shares_ledger = shares_ledger
+        self.ends_itself = ends_itself
         self._wrap = wrap
 
     @property
@@ -84,10 +99,10 @@ class Workers(Executor):
         """Run `fn` on a worker."""
         return self._inner.submit(self._wrap, fn, *args, **kwargs)
 
-    def restart(self) -> None:
-        """Replace an executor whose processes died; its futures have all failed already."""
-        self._inner.shutdown(wait=False, cancel_futures=True)
-        self._inner = self._make()
+    def end(self, future: Future[Any]) -> None:
+        """Kill the process of a call that does not stop when it should, where it is a process of ours."""
+        if isinstance(self._inner, Processes):
+            self._inner.end(future)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Let the workers go."""
@@ -104,8 +119,11 @@ def cores() -> int:
 
 @contextmanager
 def serial() -> Iterator[Workers]:
-    """One job at a time with all cores, in a thread of this process, so that Ctrl-C is heard at once."""
-    with Workers(partial(ThreadPoolExecutor, 1, "wizen-solver"), lambda: 1, "this process") as workers:
+    """One job at a time with all cores, in a thread of this process, for programs that have nothing else to do.
+
+    A thread cannot be killed: a job that is taken back ends when its solver looks up.
+    """
+    with Workers(ThreadPoolExecutor(1, "wizen-solver"), lambda: 1, "this process") as workers:
         yield workers
 
 
@@ -118,11 +136,8 @@ def processes(count: int) -> Iterator[Workers]:
 
     """
     _positive(count)
-
-    def make() -> Executor:
-        return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=_settle_in)
-
-    with _environment(_threads(count)), Workers(make, lambda: count, f"{count} processes") as workers:
+    title = "one process" if count == 1 else f"{count} processes"
+    with _environment(_threads(count)), Workers(Processes(count), lambda: count, title) as workers:
         yield workers
 
 
@@ -150,8 +165,8 @@ def dask_local(count: int) -> Iterator[Workers]:
         )
     with cluster, _client(cluster) as client:
         title = f"{count} Dask workers, dashboard {cluster.dashboard_link}"
-        make = partial(client.get_executor, pure=False)
-        with Workers(make, lambda: count, title, wrap=_call_on_dask) as workers:
+        inner = client.get_executor(pure=False)
+        with Workers(inner, lambda: count, title, ends_itself=True, wrap=_call_on_dask) as workers:
             yield workers
 
 
@@ -167,15 +182,15 @@ def dask_cluster(address: str) -> Iterator[Workers]:
     """
     _need_dask()
     with _client(address) as client:
-        make = partial(client.get_executor, pure=False)
-        title = f"Dask scheduler {address}"
-        with Workers(make, lambda: len(client.nthreads()), title, shares_ledger=False, wrap=_call_on_dask) as workers:
+        inner, title = client.get_executor(pure=False), f"Dask scheduler {address}"
+        width = partial(_width, client)
+        with Workers(inner, width, title, shares_ledger=False, ends_itself=True, wrap=_call_on_dask) as workers:
             yield workers
 
 
 @contextmanager
 def choose(workers: int | None = None, dask: bool = False, scheduler: str | None = None) -> Iterator[Workers]:
-    """The workers that the command line's options name; one worker needs no process of its own.
+    """The workers that the command line's options name: processes, which can be ended at any moment.
 
     Raises:
         InvalidOption: options that contradict each other.
@@ -191,7 +206,7 @@ def choose(workers: int | None = None, dask: bool = False, scheduler: str | None
     elif dask:
         opened = dask_local(count)
     else:
-        opened = serial() if count == 1 else processes(count)
+        opened = processes(count)
     with opened as chosen:
         yield chosen
 
@@ -233,27 +248,24 @@ def _deaf_children() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _settle_in() -> None:
-    """Make a new worker process ignore Ctrl-C (the runner tells it what to do) and end with its parent.
+def _width(client: Any) -> int:
+    """Return how many threads a cluster has.
 
-    A parent that is killed cannot end its children, which would wait for work for ever and hold on to their job.
+    Raises:
+        SweepError: its scheduler does not answer any more.
+
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-
-        def follow() -> None:
-            parent.join()
-            os._exit(1)
-
-        threading.Thread(target=follow, name="wizen-follow-parent", daemon=True).start()
+    try:
+        return len(client.nthreads())
+    except Exception as error:  # distributed has a dozen ways to say that a connection is gone
+        raise SchedulerLost(where=client.scheduler.address if client.scheduler else "") from error
 
 
 def _need_dask() -> None:
     try:
         import distributed  # noqa: F401
     except ImportError:
-        raise NoScheduler("Dask is not installed.", "Install it with `pip install -e '.[cluster]'`.") from None
+        raise NoScheduler("Dask is not installed.", installing("cluster")) from None
 
 
 @contextmanager

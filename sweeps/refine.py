@@ -12,13 +12,12 @@ import itertools
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 from scipy.stats import qmc
 
+from solver.arrays import Array
 from solver.contract import InvalidGeometry, Params
 from store import tables
 from store.blending.methods.weights import Samples
@@ -33,7 +32,6 @@ from .plan import Plan
 
 __all__ = ["Proposal", "State", "check", "name_of", "propose", "read", "with_samples"]
 
-Array = NDArray[Any]
 
 #: Points of the box among which the next sample is chosen.
 _CANDIDATES = 2048

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.fruit import Fruit, lattice
 from store import keys
 from store.blending import methods
@@ -28,7 +28,6 @@ from .plan import Plan
 
 __all__ = ["Case", "Report", "Row", "cases", "picture", "score"]
 
-Array = NDArray[Any]
 
 #: Parameters of a run that change its pattern but not what it is like.
 _SEED = "seed"

@@ -1,11 +1,13 @@
 """What a worker does with one job: solve it, put the shard on the disk, and say so. Runs in any process, on any host.
 
 The shard is on the disk before anything is reported, so that nothing reported can be lost. A worker that loses its
-job (cancelled, or taken over by another) finds out at its next heartbeat and stops through the solver's `Context`.
+claim (cancelled, or taken over by another) finds out at its next heartbeat and stops through the solver's `Context`;
+one whose solver does not listen is ended: by its runner where that can, else by itself.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 import traceback
@@ -19,28 +21,31 @@ from solver import registry
 from solver.contract import Cancelled, Context, InvalidInput, Need, Solver, SolverError, finish
 from store import shards
 from store.errors import CorruptShard, StoreError
-from store.ledger import JobSpec
+from store.ledger import Job, JobSpec
 from store.store import Store
 
 from .dried import dried
 from .errors import SweepError, describe
 
-__all__ = ["Outcome", "Task", "beat", "quarantine_path", "stop_mark", "work"]
+__all__ = ["GRACE", "Hold", "Outcome", "Task", "beat", "quarantine_path", "stop_mark", "work"]
+
+#: Seconds that a solver gets to stop by itself once it was asked to.
+GRACE = 1.0
 
 
 @dataclass(frozen=True)
 class Task:
-    """One claimed job. `run` names the sweep that claimed it; `lease` [s] is how long it stays claimed.
+    """One claimed job, as the ledger handed it out; `lease` [s] is how long it stays claimed.
 
     `shares_ledger` is false on other hosts, where SQLite's locks do not reach: there the claiming process keeps the
-    books, and asks to stop by a mark beside the shards.
+    books, and asks to stop by a mark beside the shards. `ends_itself`: nobody else can kill the worker's process.
     """
 
     root: Path
-    job: JobSpec
-    run: str
+    job: Job
     lease: float
     shares_ledger: bool = True
+    ends_itself: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,9 +72,9 @@ def beat(lease: float) -> float:
     return min(0.5, lease / 4)
 
 
-def stop_mark(root: Path, name: str) -> Path:
-    """Return the file whose presence asks the workers of a run, or that of a job's key, to stop."""
-    return root / "stopping" / name
+def stop_mark(root: Path, job: Job) -> Path:
+    """Return the file whose presence asks the worker of one claim to stop."""
+    return root / "stopping" / f"{job.key}-{job.claims}"
 
 
 def quarantine_path(root: Path, key: str) -> Path:
@@ -87,13 +92,16 @@ def work(task: Task) -> Outcome:
     """
     store = Store(task.root)
     job, start = task.job, time.perf_counter()
+    hold = Hold(task, store)
     try:
+        if not hold.keep():
+            return Outcome(job.key, "stopped")  # it was taken back while it waited here
         digest = _stored(store, job.key)
         if digest is not None:
-            return _report(store, task, Outcome(job.key, "done", digest, reused=True))
-        with _Heart(task, store) as heart:
+            return hold.report(Outcome(job.key, "done", digest, reused=True))
+        with _Heart(task, hold) as heart:
             digest = store.put(job.key, _solve(task, heart, store))
-        return _report(store, task, Outcome(job.key, "done", digest, time.perf_counter() - start))
+        return hold.report(Outcome(job.key, "done", digest, time.perf_counter() - start))
     except Cancelled:
         return Outcome(job.key, "stopped")
     except SolverError as error:
@@ -141,12 +149,6 @@ def _solve(task: Task, heart: _Heart, store: Store) -> xr.Dataset:
     return solver.solve(solver.parse(task.job.params), Need.parse(task.job.need), context)
 
 
-def _report(store: Store, task: Task, outcome: Outcome) -> Outcome:
-    if task.shares_ledger:
-        store.ledger.done(outcome.key, outcome.digest, outcome.seconds)
-    return outcome
-
-
 def _quarantine(task: Task, partial: xr.Dataset, reason: str) -> str:
     """Keep the stages that converged, with the reason, where no table looks for them; return the path in the store."""
     solver, path = registry.get(task.job.solver), quarantine_path(task.root, task.job.key)
@@ -159,11 +161,31 @@ def _quarantine(task: Task, partial: xr.Dataset, reason: str) -> str:
     return str(path.relative_to(task.root))
 
 
-class _Heart:
-    """A thread that keeps the lease while the solver works, and learns when the job is lost."""
+class Hold:
+    """The claim on a job as its worker has it."""
 
     def __init__(self, task: Task, store: Store) -> None:
         self._task, self._store = task, store
+
+    def keep(self, progress: float | None = None, message: str = "") -> bool:
+        """Renew the lease; return whether the claim is still ours."""
+        task = self._task
+        if not task.shares_ledger:
+            return not stop_mark(task.root, task.job).exists()
+        return self._store.ledger.renew(task.job, task.lease, progress, message)
+
+    def report(self, outcome: Outcome) -> Outcome:
+        """Note that the result is stored; return the outcome, which is "stopped" where the claim was lost meanwhile."""
+        if not self._task.shares_ledger or self._store.ledger.done(self._task.job, outcome.digest, outcome.seconds):
+            return outcome
+        return Outcome(outcome.key, "stopped")
+
+
+class _Heart:
+    """A thread that keeps the lease while the solver works, and learns when the job is lost."""
+
+    def __init__(self, task: Task, hold: Hold) -> None:
+        self._task, self._hold = task, hold
         self._said = 0.0, ""
         self._finished = threading.Event()
         self._thread = threading.Thread(target=self._run, name="wizen-heartbeat", daemon=True)
@@ -184,14 +206,11 @@ class _Heart:
     def _run(self) -> None:
         while not self._finished.wait(beat(self._task.lease)):
             try:
-                if not self._alive():
-                    self.lost.set()
-                    return
+                if self._hold.keep(*self._said):
+                    continue
             except Exception:  # a ledger that cannot be written now may be writable at the next beat
                 continue
-
-    def _alive(self) -> bool:
-        task = self._task
-        if not task.shares_ledger:
-            return not any(stop_mark(task.root, name).exists() for name in (task.run, task.job.key))
-        return self._store.ledger.renew(task.job.key, task.run, task.lease, *self._said)
+            self.lost.set()
+            if self._task.ends_itself and not self._finished.wait(GRACE):
+                os._exit(1)  # whatever it does is of no use to anybody; nothing half-written is ever visible
+            return

@@ -6,7 +6,7 @@ import json
 import struct
 from typing import Any
 
-from numpy.typing import NDArray
+from solver.arrays import Array
 
 __all__ = ["FLOAT", "INDICES", "UINT", "USHORT", "VERTICES", "Buffer", "bounds", "pack"]
 
@@ -15,7 +15,7 @@ FLOAT, USHORT, UINT = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963
 
 
-def bounds(points: NDArray[Any]) -> dict[str, list[float]]:
+def bounds(points: Array) -> dict[str, list[float]]:
     """Return the least and the largest of each column, as accessors of positions must say them."""
     # column by column: numpy's reduction along the short last axis takes twenty times as long
     columns = [points[:, i] for i in range(points.shape[1])]
@@ -33,7 +33,7 @@ class Buffer:
 
     def add(
         self,
-        array: NDArray[Any],
+        array: Array,
         component: int,
         kind: str,
         target: int | None = None,

@@ -17,21 +17,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Singles, Words32
+
 if TYPE_CHECKING:
     from store.shape import Shape
 
 __all__ = ["normals", "seam", "seam_triangles", "surface", "texture", "triangles", "vertices"]
 
-Floats = NDArray[np.float32]
-Indices = NDArray[np.uint32]
 
-
-def _frozen(array: Indices) -> Indices:
+def _frozen(array: Words32) -> Words32:
     array.flags.writeable = False
     return array
 
 
-def _join(rows: Indices, first: Indices, last: Indices) -> Indices:
+def _join(rows: Words32, first: Words32, last: Words32) -> Words32:
     """Return triangles (4n^2, 3) between rows (n, 2n + 1) whose last column closes the seam, and two pole fans."""
     upper, lower = rows[:-1], rows[1:]
     a, b, c, d = upper[:, :-1], upper[:, 1:], lower[:, :-1], lower[:, 1:]
@@ -42,7 +41,7 @@ def _join(rows: Indices, first: Indices, last: Indices) -> Indices:
 
 
 @lru_cache(maxsize=8)
-def triangles(n: int) -> Indices:
+def triangles(n: int) -> Words32:
     """Return the closed mesh's triangles (4n^2, 3): indices into the 2n^2 + 2 vertices of `vertices`."""
     rows = np.arange(2 * n * n, dtype=np.uint32).reshape(n, 2 * n)
     rows = np.concatenate([rows, rows[:, :1]], axis=1)
@@ -51,7 +50,7 @@ def triangles(n: int) -> Indices:
 
 
 @lru_cache(maxsize=8)
-def seam_triangles(n: int) -> Indices:
+def seam_triangles(n: int) -> Words32:
     """Return the same triangles in the same order, as indices into the vertices of `seam` and `texture`."""
     rows = np.arange(n * (2 * n + 1), dtype=np.uint32).reshape(n, 2 * n + 1)
     pole = rows.size + np.arange(2 * n, dtype=np.uint32)
@@ -69,7 +68,7 @@ def seam(n: int) -> NDArray[np.intp]:
 
 
 @lru_cache(maxsize=8)
-def texture(n: int) -> Floats:
+def texture(n: int) -> Singles:
     """Return the texture coordinates (n (2n + 1) + 4n, 2) of the cut-open mesh's vertices."""
     u, v = np.meshgrid(np.arange(2 * n + 1) / (2 * n), (np.arange(n) + 0.5) / n)
     fan = (np.arange(2 * n) + 0.5) / (2 * n)  # the middle of the fan's triangle: no sample is stretched over the pole
@@ -91,12 +90,12 @@ def surface(shape: Shape) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     return shape.position, shape.poles
 
 
-def vertices(lattice: NDArray[np.floating], poles: NDArray[np.floating]) -> Floats:
+def vertices(lattice: NDArray[np.floating], poles: NDArray[np.floating]) -> Singles:
     """Return a lattice field (n, 2n, 3) and its values (2, 3) at the poles as one array (2n^2 + 2, 3)."""
     return np.concatenate([lattice.reshape(-1, 3), poles], dtype=np.float32)
 
 
-def normals(position: NDArray[np.floating]) -> tuple[Floats, Floats]:
+def normals(position: NDArray[np.floating]) -> tuple[Singles, Singles]:
     """Return outward unit normals of a lattice surface (n, 2n, 3), and those (2, 3) of its poles.
 
     Central differences of the drawn mesh, where a row's neighbour across the pole is the same row half a turn further
@@ -123,7 +122,7 @@ def _cross(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float
     return out
 
 
-def _unit(vector: NDArray[np.floating], fallback: NDArray[np.floating]) -> Floats:
+def _unit(vector: NDArray[np.floating], fallback: NDArray[np.floating]) -> Singles:
     length = np.sqrt(np.einsum("...i,...i->...", vector, vector))[..., None]
     tiny = length < 1e-20
     if tiny.any():

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from . import mesh
 from .about import LENGTH_UNIT, About, extras
@@ -45,7 +46,7 @@ def _head(shape: Shape, about: About) -> bytes:
     return "\n".join([*lines, f"o {about.solver or 'shape'}", ""]).encode()
 
 
-def _lines(word: bytes, array: NDArray[np.generic]) -> bytes:
+def _lines(word: bytes, array: Array) -> bytes:
     """Return one line per row: the word and the row's numbers.
 
     orjson writes the shortest digits that read back as the same float32, a third of the time that %-formatting takes

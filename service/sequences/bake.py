@@ -6,14 +6,11 @@ Rows beyond a pole are those of the other side, so nothing is clamped there, and
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 __all__ = ["baked"]
-
-Array = NDArray[Any]
 
 
 def baked(field: Array, size: int) -> Array:

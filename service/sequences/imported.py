@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array, Ints
+from sweeps.errors import installing
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
 from .nearest import nearest
@@ -28,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "Bound", "bind", "load"]
 
-Array = NDArray[Any]
 
 KINDS = (".obj", ".ply", ".glb", ".stl")
 Binding = Literal["nearest", "direction"]
@@ -44,7 +45,7 @@ class Bound:
     """
 
     points: Array
-    corners: NDArray[np.int64]
+    corners: Ints
     shares: Array
     gain: Array
     scale: float
@@ -84,7 +85,7 @@ def load(path: Path) -> tuple[Array, Array]:
     try:
         import trimesh
     except ImportError:
-        raise Unavailable("meshes need the package trimesh.", advice="pip install 'wizen[formats]'.") from None
+        raise Unavailable("meshes need the package trimesh.", advice=installing("formats")) from None
     try:
         mesh: Any = trimesh.load(path, force="mesh", process=False)
         points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)

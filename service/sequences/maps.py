@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sweeps.errors import installing
+
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
 from .bake import baked
 from .options import Options
@@ -96,7 +98,7 @@ def exr(sequence: Sequence, options: Options) -> bytes:
     try:
         import OpenEXR
     except ImportError:
-        raise Unavailable("EXR needs the package OpenEXR.", advice="pip install 'wizen[formats]'.") from None
+        raise Unavailable("EXR needs the package OpenEXR.", advice=installing("formats")) from None
     channels = {name: baked(field, options.size) for name, field in fields.items()}
     head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     head["wizen"] = json.dumps({"stage": sequence.stages[0], "solver": sequence.about["solver"]})

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
+
+from solver.arrays import Array, Ints
 
 __all__ = ["Nearest", "nearest"]
 
-Array = NDArray[Any]
 
 #: Triangles tried first; whoever could still have a nearer one than these tries all within reach.
 _FIRST = 8
@@ -20,12 +20,12 @@ _CHUNK = 20_000
 class Nearest(NamedTuple):
     """Where each point was bound: a triangle (p), shares of its corners (p, 3), and how far away it is (p)."""
 
-    face: NDArray[np.int64]
+    face: Ints
     shares: Array
     distance: Array
 
 
-def nearest(points: Array, vertices: Array, triangles: NDArray[Any]) -> Nearest:
+def nearest(points: Array, vertices: Array, triangles: Array) -> Nearest:
     """Return the nearest point of a mesh (v, 3), (f, 3) for every point (p, 3)."""
     from trimesh.triangles import points_to_barycentric
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweeps.errors import installing
+
 from ..errors import Unavailable
 from .options import Options
 
@@ -32,7 +34,7 @@ def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
     try:
         from pxr import Usd, UsdGeom
     except ImportError:
-        raise Unavailable("USD needs the package usd-core.", advice="pip install 'wizen[usd]'.") from None
+        raise Unavailable("USD needs the package usd-core.", advice=installing("usd")) from None
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, sequence.unit or 1.0)

@@ -2,8 +2,9 @@
 
 A result holds either the fruit's lattice (`position` or `displacement` on colatitude x azimuth; topology and texture
 coordinates of `service.formats.mesh`) or meshes (`solver.meshes`).
-Fields without a shape are shown on the fresh fruit. Lengths are in the result's own unit; y is up, and a result whose
-attribute `up` is z is turned about x. Nothing else is turned, or scaled but by `Sequence.scale`.
+Fields without a shape are shown on the fresh fruit if it keeps its shape, and refused if it moves. Lengths are in the
+result's own unit; y is up, and a result whose attribute `up` is z is turned about x. Nothing else is turned, or scaled
+but by `Sequence.scale`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Array, Singles, Words32
 from solver.fruit import lattice as angles
 from store.surfaces import spectra
 from sweeps.pictures import colours
@@ -29,9 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Seam", "Sequence", "Surface", "of_run"]
 
-Floats = NDArray[np.float32]
-Indices = NDArray[np.uint32]
-
 
 class Surface(NamedTuple):
     """One stage: vertices (v, 3), triangles (f, 3) counter-clockwise from outside, fields of the vertices (v).
@@ -40,13 +39,13 @@ class Surface(NamedTuple):
     """
 
     stage: float
-    vertices: Floats
-    triangles: Indices
-    fields: Mapping[str, Floats]
-    colour: Floats | None = None
-    roughness: Floats | None = None
+    vertices: Singles
+    triangles: Words32
+    fields: Mapping[str, Singles]
+    colour: Singles | None = None
+    roughness: Singles | None = None
 
-    def normals(self) -> Floats:
+    def normals(self) -> Singles:
         """Return outward unit normals (v, 3), weighted by area; (0, 1, 0) where no triangle has any."""
         a, b, c = (self.vertices[self.triangles[:, k]].astype(float) for k in range(3))
         areas = np.cross(b - a, c - a)
@@ -64,9 +63,9 @@ class Seam(NamedTuple):
     triangles: (f, 3), the mesh's own in the same order, as indices into the w copies.
     """
 
-    uv: Floats
+    uv: Singles
     copies: NDArray[np.intp]
-    triangles: Indices
+    triangles: Words32
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,9 +211,9 @@ def of_run(run: xr.Dataset) -> Sequence:
     )
 
 
-def lattice_fields(run: xr.Dataset, index: int) -> dict[str, NDArray[Any]]:
+def lattice_fields(run: xr.Dataset, index: int) -> dict[str, Array]:
     """Return the scalar fields (n, 2n) of one stage on the lattice; vectors as name_x, name_y, name_z."""
-    found: dict[str, NDArray[Any]] = {}
+    found: dict[str, Array] = {}
     for name, variable in run.data_vars.items():
         if variable.dims == ("stage", "colatitude", "azimuth"):
             found[str(name)] = variable.values[index]
@@ -223,16 +222,21 @@ def lattice_fields(run: xr.Dataset, index: int) -> dict[str, NDArray[Any]]:
     return found
 
 
-def _positions(run: xr.Dataset, index: int) -> NDArray[Any]:
+def _positions(run: xr.Dataset, index: int) -> Array:
     if "position" in run:
         return run["position"].values[index]
     from solver import registry
 
     params: Any = registry.get(str(run.attrs["solver"])).parse(json.loads(run.attrs["params"]))
+    if "displacement" not in run and not params.keeps_shape:
+        raise UnfitFormat(
+            "this result holds fields of a surface that moves, and not where it is.",
+            advice="Solve again with the field 'position': `wizen solve` keeps it, a plan names it under [need].",
+        )
     fresh = params.surface(*angles(run.sizes["colatitude"])).astype("f4")
     return fresh + run["displacement"].values[index] if "displacement" in run else fresh
 
 
-def _flat(values: NDArray[Any]) -> Floats:
+def _flat(values: Array) -> Singles:
     """Return a field (n, 2n) at the closed mesh's vertices; a pole has the mean of its row."""
     return np.concatenate([values.ravel(), [values[0].mean(), values[-1].mean()]]).astype("f4")

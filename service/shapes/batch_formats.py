@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from store.lookup import ShapeTable
 from store.shape import Shape
 from store.surfaces.window import Window
@@ -147,7 +147,7 @@ def _head(shape: tuple[int, ...], dtype: np.dtype[Any]) -> bytes:
     return file.getvalue()
 
 
-def _bytes(array: NDArray[Any], dtype: np.dtype[Any]) -> bytes:
+def _bytes(array: Array, dtype: np.dtype[Any]) -> bytes:
     return array.astype(dtype, copy=False).tobytes()
 
 
@@ -156,7 +156,7 @@ class _Rows:
 
     def __init__(self) -> None:
         self._rows: list[dict[str, Any]] = []
-        self._poles: list[NDArray[Any]] = []
+        self._poles: list[Array] = []
         self._last: Shape | None = None
 
     def add(self, shape: Shape) -> None:
@@ -177,11 +177,11 @@ class _Rows:
             }
         )
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
+    def arrays(self) -> dict[str, Array]:
         """Return the columns; what a shape does not know (descriptors next to the fresh one) is NaN."""
         assert self._last is not None
         names = dict.fromkeys(name for row in self._rows for name in row)
-        found: dict[str, NDArray[Any]] = {"colatitude": self._last.colatitude, "azimuth": self._last.azimuth}
+        found: dict[str, Array] = {"colatitude": self._last.colatitude, "azimuth": self._last.azimuth}
         if self._poles:
             found["poles"] = np.stack(self._poles)
         return found | {name: np.array([row.get(name, np.nan) for row in self._rows]) for name in names}

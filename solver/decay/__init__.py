@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
+from .names import ALL, DEFAULT
 from .params import DecayParams, Weather
 from .presets import PRESETS
 from .surfaces.places import Wound
@@ -28,18 +29,13 @@ def _cost(params: DecayParams, need: Need) -> Cost:
     return expected_cost(params, need)
 
 
-_SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutrient", "budget_error", "water_lost")
-
 SOLVER = Solver(
     name="decay",
-    version="3",
+    version="4",
     title="Decay of fruits: rot and mould",
     params=DecayParams,
-    fields=(
-        *("position", "displacement", "mesh_position", "triangle", "volume", "least_jacobian"),
-        *("rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
-    ),
-    default_fields=("rot", "mould", "mould_active", "nutrient", *_SHARES),
+    fields=ALL,
+    default_fields=DEFAULT,
     stages=StageAxis("t", "time since the wounds", "day", 0.0, 120.0, (5.0, 10.0, 15.0, 20.0)),
     default_resolution={"preview": 64, "default": 128, "fine": 256},
     # error of the mould's density, apple, day 10, against a mesh of 384 cells (docs/decay.md)

@@ -10,14 +10,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from .params import DecayParams
 from .surfaces.surface import Extent
 
 __all__ = ["air", "damping", "deficit", "reference_radius", "saturation", "water_lost"]
 
-Array = NDArray[np.float64]
 
 _STEAM_POINT = 373.16
 #: The ice point of the formula's own temperature scale, on which 100 degC is 373.16 K; 273.15 is off by 0.07 %.
@@ -29,7 +28,7 @@ _SECONDS = 86400.0
 _DENSITY = 1e6
 
 
-def saturation(celsius: float | Array) -> Any:
+def saturation(celsius: float | Floats) -> Any:
     """Return the saturation vapour pressure over water [Pa], Goff and Gratch 1946, at temperatures [degC]."""
     ratio = _STEAM_POINT / (np.asarray(celsius, dtype=float) + _ICE_POINT)
     exponent = (
@@ -41,7 +40,7 @@ def saturation(celsius: float | Array) -> Any:
     return _STEAM_PRESSURE * 10**exponent
 
 
-def air(params: DecayParams, day: float | Array) -> tuple[Any, Any]:
+def air(params: DecayParams, day: float | Floats) -> tuple[Any, Any]:
     """Return temperature [degC] and relative humidity [percent] at times [day]."""
     if not params.weather:
         return params.temperature + 0 * day, params.humidity + 0 * day
@@ -50,7 +49,7 @@ def air(params: DecayParams, day: float | Array) -> tuple[Any, Any]:
     return temperature, np.interp(day, days, [w.humidity for w in params.weather])
 
 
-def deficit(params: DecayParams, day: float | Array = 0.0) -> Any:
+def deficit(params: DecayParams, day: float | Floats = 0.0) -> Any:
     """Return P_s - P_a [Pa] at times [day], at least 0: fruit and air share one temperature, and no dew falls."""
     celsius, humidity = air(params, day)
     return np.maximum(saturation(celsius) * (_ACTIVITY - humidity / 100), 0.0)

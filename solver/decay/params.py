@@ -196,6 +196,11 @@ class DecayParams(Fruit):
         json_schema_extra={"units": "1"},
     )
 
+    @property
+    def keeps_shape(self) -> bool:
+        """Whether the surface stays where it is fresh."""
+        return self.body == "none"
+
     @model_validator(mode="after")
     def _fits_the_mesh(self) -> Self:
         count = len(self.mesh.points) if self.mesh else 0

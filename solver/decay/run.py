@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
 from .environment import deficit
 from .fields.stepping import Reached, march
 from .fields.system import System
+from .names import FIELDS, MOULD, VECTORS, completed
 from .params import DecayParams
-from .settings import FIELDS, MOULD, VECTORS, choose, nodes, stepped
+from .settings import choose, nodes, stepped
 from .surfaces.shape import Shape
 from .surfaces.surface import sampler
 
@@ -36,8 +37,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
         Cancelled: the observer asked to stop.
 
     """
-    if params.mesh is not None:
-        need = need.model_copy(update={"fields": _on_mesh(need.fields)})
+    need = completed(params, need)
     settings = choose(params, need.quality)
     begun = time.perf_counter()
     wanted = set(need.fields)
@@ -87,18 +87,11 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     return _dataset(rows, need, attrs, shape)
 
 
-def _on_mesh(fields: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the fields of a run on an imported mesh: those of vertices come with the mesh, and so does a position."""
-    if not {*FIELDS} & set(fields):
-        return fields
-    return tuple(sorted({*fields, "mesh_position", "triangle"} - {"position"}))
-
-
 def _finish(
     rows: list[dict[str, Any]],
     row: dict[str, Any],
     shape: Shape,
-    rot: NDArray[np.float64] | None,
+    rot: Floats | None,
     begun: float,
     need: Need,
     context: Context,

@@ -6,30 +6,11 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from ..contract import Cost, Need, Quality
+from .names import BODY, FIELDS, MOULD, ROT, VECTORS, completed
 from .params import DecayParams
 from .surfaces.seeds import seeds
 
-__all__ = [
-    "BODY",
-    "FIELDS",
-    "MOULD",
-    "ROT",
-    "VECTORS",
-    "Settings",
-    "choose",
-    "expected_cost",
-    "moved",
-    "nodes",
-    "stepped",
-]
-
-#: What has a layer to be stepped for.
-ROT = frozenset({"rot", "substrate", "rotten_share", "mean_rot"})
-MOULD = frozenset({"mould", "mould_active", "nutrient", "mouldy_share", "mean_mould", "mean_nutrient"})
-#: What a body has to be settled for, if the fruit has one; `position` is where the surface is.
-BODY = frozenset({"position", "displacement", "volume", "least_jacobian", "mesh_position"})
-FIELDS = ("position", "displacement", "rot", "substrate", "mould", "mould_active", "nutrient")
-VECTORS = ("position", "displacement")
+__all__ = ["Settings", "choose", "expected_cost", "moved", "nodes", "stepped"]
 
 
 @dataclass(frozen=True)
@@ -105,7 +86,7 @@ def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
 
 def expected_cost(params: DecayParams, need: Need) -> Cost:
     """Return what a run is expected to take."""
-    settings = choose(params, need.quality)
+    settings, need = choose(params, need.quality), completed(params, need)
     wanted = set(need.fields)
     organisms = 2 if MOULD & wanted else 1 if stepped(params, wanted) else 0
     steps = need.stages[-1] * _clock(params) / _STEP + len(need.stages)

@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints32
 from .fresh.loading import Loading
 from .fresh.mesh import FruitMesh
 from .kernel import Layout, place, positions
@@ -17,7 +17,6 @@ from .params import DehydrationParams
 
 __all__ = ["Drive"]
 
-Array = NDArray[np.float64]
 
 #: Largest shrinkage between two updates of targets and inner nodes. Halves and tenths move the surface by 1e-7 r1.
 _PIECE = 1e-3
@@ -53,14 +52,14 @@ class Drive:
             return layout
         return reload(layout, self._fresh, self.loading.fd(self._centres, shrinkage) / (1 - shrinkage))
 
-    def lead(self, state: NDArray[np.int32], shrinkage: float) -> None:
+    def lead(self, state: Ints32, shrinkage: float) -> None:
         """Put the inner nodes of `state` (nodes, 4) where they are at `shrinkage`."""
         if not self.idle:
             part = np.zeros((len(self._inner), 4), np.int32)
             place(part, self.loading.held(self._points[self._inner], shrinkage))
             state[self._inner] = part
 
-    def smooth(self, shrinkage: float) -> Array:
+    def smooth(self, shrinkage: float) -> Floats:
         """Return smooth positions (nn, 3) at `shrinkage`: incompressible along each ray, exact for a sphere.
 
         r^3 = r_0^3 + sum over the layers of det(Fd) (R_k+1^3 - R_k^3), r_0 being the inner node's distance. In a fruit
@@ -77,5 +76,5 @@ class Drive:
         cubes[:, 1:] = np.cumsum(share * np.diff(cubes, axis=1), axis=1) + cubes[:, :1] * stretch.prod()
         cubes[:, 0] *= stretch.prod()
         moved = columns * (np.cbrt(cubes / stretch.prod()) / distance)[..., None] * stretch
-        where: Array = moved.reshape(-1, 3)
+        where: Floats = moved.reshape(-1, 3)
         return where

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Singles
 from ..contract import Context, Unstable
 from .drive import Drive
 from .fresh.imperfection import heights
@@ -36,9 +37,7 @@ from .settings import Settings
 
 __all__ = ["Motion"]
 
-Array = NDArray[np.float64]
 Fixed = NDArray[np.int32]
-Single = NDArray[np.float32]
 
 #: Factor on the scaled masses.
 _SAFETY = 2.0
@@ -75,7 +74,7 @@ class Motion:
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)
         self._moduli = mu, settings.march_kappa_ratio * mu
         self.rest = np.ones(len(mu))
-        self._made: tuple[Array, Layout] | None = None
+        self._made: tuple[Floats, Layout] | None = None
         self.layout = build_layout(
             bumpy,
             mesh.connectivity,
@@ -115,11 +114,11 @@ class Motion:
         """Number of steps between two looks at the observer."""
         return _SLICE // self.elements
 
-    def surface(self, state: Fixed) -> Array:
+    def surface(self, state: Fixed) -> Floats:
         """Return the nodes of the sector's outer surface, in column order."""
         return positions(state[self.sector.mesh.surface_nodes])
 
-    def smooth(self, shrinkage: float) -> tuple[Fixed, Single]:
+    def smooth(self, shrinkage: float) -> tuple[Fixed, Singles]:
         """Return the smooth start at `shrinkage`, at rest."""
         return new_state(self.layout, self.drive.smooth(shrinkage))
 
@@ -132,13 +131,13 @@ class Motion:
     def advance(
         self,
         state: Fixed,
-        velocity: Single,
-        rest: Array,
+        velocity: Singles,
+        rest: Floats,
         count: int,
         a: float,
         b: float,
         damping: float,
-    ) -> Array:
+    ) -> Floats:
         """March from shrinkage a to b under rest volumes `rest`, and return those that go with the new pressures."""
         self.run(state, velocity, rest, count, a, b, damping)
         settings = self.settings
@@ -148,14 +147,14 @@ class Motion:
         goal = rests(dilatations(loaded, state, 1 - b), settings.march_kappa_ratio, settings.kappa_ratio)
         # volumes ring for 2 / damping steps; following faster than that feeds what rings
         share = 1 - np.exp(-_FOLLOW * damping * count)
-        following: Array = rest * (goal / rest) ** share
+        following: Floats = rest * (goal / rest) ** share
         return following
 
     def run(
         self,
         state: Fixed,
-        velocity: Single,
-        rest: Array,
+        velocity: Singles,
+        rest: Floats,
         count: int,
         a: float,
         b: float,
@@ -189,19 +188,19 @@ class Motion:
                 advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             )
 
-    def _ready(self, layout: Layout, shrinkage: float, rest: Array) -> Layout:
+    def _ready(self, layout: Layout, shrinkage: float, rest: Floats) -> Layout:
         """Return `layout` with the targets at `shrinkage` and the rest volumes; the last one made is kept."""
         if self._made is None or self._made[0] is not rest or not self.drive.loading.uniform:
             self._made = rest, rested(self.drive.loaded(self.layout, shrinkage), rest)
         planes = self._made[1]
         return dataclasses.replace(planes, mass=layout.mass, inverse_mass=layout.inverse_mass)
 
-    def report(self, state: Fixed, rest: Array, shrinkage: float) -> ElementReport:
+    def report(self, state: Fixed, rest: Floats, shrinkage: float) -> ElementReport:
         """Return energies and volume ratios of the elements."""
         layout = self._ready(self.layout, shrinkage, rest)
         return element_report(layout, state, 1 - shrinkage, one_point=True)
 
-    def residual(self, state: Fixed, rest: Array, shrinkage: float, layout: Layout, damping: float) -> float:
+    def residual(self, state: Fixed, rest: Floats, shrinkage: float, layout: Layout, damping: float) -> float:
         """Return the out-of-balance force, contact included: what one step from rest does to the momentum.
 
         Relative to the root of the sum of squares of all elements' nodal forces. A step moves the nodes before contact
@@ -219,7 +218,7 @@ class Motion:
         return float(np.sqrt(np.square(momentum).sum())) / max(scale, self._least_force)
 
 
-def _unit_force(layout: Layout, mu: Array) -> float:
+def _unit_force(layout: Layout, mu: Floats) -> float:
     """Root of the sum of squares of the elements' nodal forces at about unit strain: mu times the mean face."""
     corners = positions(layout.fresh)[layout.connectivity]
     size = np.linalg.norm(corners[:, 7] - corners[:, 0], axis=1) / np.sqrt(3)

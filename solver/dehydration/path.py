@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Singles
 from ..contract import Context
 from .fresh.mesh import FruitMesh
 from .kernel import new_state
@@ -19,9 +20,7 @@ from .settle import State, settle
 
 __all__ = ["Path", "State"]
 
-Array = NDArray[np.float64]
 Fixed = NDArray[np.int32]
-Single = NDArray[np.float32]
 
 #: Shrinkage after which the scaled masses are taken anew.
 _REWEIGH = 0.01
@@ -78,7 +77,9 @@ class Path:
         """Return the shrinkage after `place` steps of the march."""
         return self._settings.start + place * self._settings.pace
 
-    def _pressed(self, state: Fixed, velocity: Single, rest: Array, shrinkage: float) -> tuple[Fixed, Single, Array]:
+    def _pressed(
+        self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float
+    ) -> tuple[Fixed, Singles, Floats]:
         """Let rest volumes catch up with the pressure: a march's lag by 0.03 of shrinkage, a smooth start's know none.
 
         Returns state, velocity (both changed in place) and rest volumes.
@@ -105,5 +106,5 @@ class Path:
             self._place += chunk
             self._context.report(b / last if last else 1.0, f"shrinkage s = {b:.3f}")
 
-    def _settle(self, state: Fixed, velocity: Single, rest: Array, shrinkage: float) -> State:
+    def _settle(self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> State:
         return settle(self.motion, state, velocity, rest, shrinkage, self._with_release)

@@ -7,8 +7,8 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..contract import Cost, Need
 from .fresh.closed_form import flat_film_wavelength, onset_estimate
 from .fresh.loading import Loading
@@ -33,7 +33,7 @@ class Settings:
     """
 
     n: int
-    core: NDArray[np.float64]
+    core: Floats
     kappa_ratio: float
     march_kappa_ratio: float
     pace: float

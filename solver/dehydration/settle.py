@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Singles
 from ..contract import Unstable
 from .motion import Motion
 
 __all__ = ["State", "settle"]
 
-Array = NDArray[np.float64]
 Fixed = NDArray[np.int32]
-Single = NDArray[np.float32]
 
 #: Looks at the kinetic energy per swing, and those between two weighings: what moves that fast folds meanwhile, and
 #: on masses that are 800 steps old it can blow up.
@@ -33,7 +32,7 @@ class State:
     released: by how much settling lowered it, where that was asked for.
     """
 
-    surface: Array
+    surface: Floats
     shrinkage: float
     residual: float
     drift: float
@@ -44,7 +43,7 @@ class State:
 
 
 def settle(
-    motion: Motion, state: Fixed, velocity: Single, rest: Array, shrinkage: float, with_release: bool = False
+    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, with_release: bool = False
 ) -> State:
     """Hold the shrinkage until forces balance *and* the surface has come to rest.
 
@@ -96,7 +95,7 @@ def settle(
     return State(whole, shrinkage, residual, drift, motion.steps, least, copies * energy, released)
 
 
-def _swing(motion: Motion, state: Fixed, velocity: Single, rest: Array, shrinkage: float) -> None:
+def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> None:
     """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy."""
     settings = motion.settings
     count = settings.swing_steps // _LOOKS

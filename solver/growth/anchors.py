@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
 
 __all__ = ["Anchors", "Corners", "corners_of", "on_surface", "place"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import shell
+from ..arrays import Floats
 from .state import State
 
 __all__ = ["forgotten"]
-
-Floats = NDArray[np.float64]
 
 
 def forgotten(state: State, k: float, threshold: float) -> Floats:

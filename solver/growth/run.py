@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from .. import shell
+from ..arrays import Floats
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
 from .engine import Engine
@@ -81,7 +81,7 @@ def _row(
     return row
 
 
-def _strain(state: State) -> NDArray[np.float64]:
+def _strain(state: State) -> Floats:
     """Return the mean elastic stretch less 1 of each vertex's triangles (n,)."""
     t = state.mesh.triangles
     ratio = np.sqrt(shell.areas(shell.metric(state.x, t)) / shell.areas(state.g)) - 1

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay
+
+from ..arrays import Floats, Ints
 
 __all__ = ["Mesh", "Shape", "start"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Shape = Literal["sphere", "disc", "half_disc", "strip", "square", "tube"]
 
 

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import shell
+from ..arrays import Bools, Floats
 from .anchors import Anchors
 
 __all__ = ["Spot", "State"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,7 @@ class State:
     g: Floats
     rest: Floats
     shares: dict[int, Floats]
-    held: NDArray[np.bool_]
+    held: Bools
     spots: dict[int, tuple[Spot, ...]]
     curves: dict[int, Anchors]
     forces: float = 0.0

@@ -10,14 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from .topology import Topology
 
 __all__ = ["angles", "bending", "bending_tangent", "hinge_stiffness"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def hinge_stiffness(g: Floats, mesh: Topology, flexural: float) -> Floats:

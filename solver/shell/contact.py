@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.spatial import KDTree
 
+from ..arrays import Floats, Ints
 from .topology import Topology
 
 __all__ = ["candidates", "contact", "contact_diagonal"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def candidates(x: Floats, mesh: Topology, distance: float, rings: int = 2) -> Ints:

@@ -9,14 +9,12 @@ three angles for three numbers. A hinge's rest angle is the sum of both sides.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from .membrane import areas
 from .topology import Topology
 
 __all__ = ["added_angles", "from_angles", "to_angles"]
-
-Floats = NDArray[np.float64]
 
 
 def _heights(g: Floats) -> Floats:

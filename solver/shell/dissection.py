@@ -10,14 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from .topology import distinct
 
 __all__ = ["Fronts", "dissect"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Hinges in the smallest front: fewer make more fronts, more make them fuller.
 _LEAF = 80

@@ -9,15 +9,13 @@ from collections.abc import Generator
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints, Singles
 from .dissection import Fronts
 from .pattern import Pattern
 
 __all__ = ["factor"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Multiplications of one piece of a factorisation: some milliseconds.
 _PIECE = 5_000_000
@@ -25,7 +23,7 @@ _PIECE = 5_000_000
 _FLOOR = 1e-8
 
 
-def factor(fronts: Fronts, pattern: Pattern, data: Floats) -> Generator[None, None, NDArray[np.float32]]:
+def factor(fronts: Fronts, pattern: Pattern, data: Floats) -> Generator[None, None, Singles]:
     """Factor the matrix with entries `data` (nnz,) on a pattern; the generator's value is the columns, end to end.
 
     Raises:
@@ -77,7 +75,7 @@ def _eliminate(
     data: Floats,
     place: Ints,
     complements: Floats,
-    values: NDArray[np.float32],
+    values: Singles,
 ) -> bool:
     """Eliminate fronts first to last - 1; returns whether all pivots were finite. place (n,): -1 on entry and exit.
 

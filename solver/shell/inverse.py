@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ..arrays import Bools, Floats, Ints, Singles
 from .dissection import Fronts, dissect
 from .factor import factor
 from .pattern import Pattern
@@ -23,8 +23,6 @@ from .topology import Topology
 
 __all__ = ["Inverse", "fronts_of", "inverse_of"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Entries beyond are those of triangles without area [mu].
 _MOST = 1e12
@@ -52,8 +50,8 @@ class Inverse:
 
     fronts: Fronts
     normals: Floats
-    across: NDArray[np.float32]
-    within: NDArray[np.float32]
+    across: Singles
+    within: Singles
     parents: tuple[Ints, ...] = ()
 
     def apply(self, right: Floats) -> Floats:
@@ -77,7 +75,7 @@ class Inverse:
 
 
 def inverse_of(
-    fronts: Fronts, pattern: Pattern, blocks: Floats, n: Floats, held: NDArray[np.bool_]
+    fronts: Fronts, pattern: Pattern, blocks: Floats, n: Floats, held: Bools
 ) -> Generator[None, None, Inverse]:
     """Factor the tangent with `blocks` (nnz, 3, 3), n: normals (n, 3); yields after pieces of bounded work.
 
@@ -100,7 +98,7 @@ def _gathered(right: Floats, pairs: Ints, count: int) -> Floats:
 
 @njit(cache=True)
 def _reduce(
-    blocks: Floats, n: Floats, indptr: Ints, indices: Ints, held: NDArray[np.bool_], across: Floats, within: Floats
+    blocks: Floats, n: Floats, indptr: Ints, indices: Ints, held: Bools, across: Floats, within: Floats
 ) -> None:
     """Write n_i K n_j and the trace of P_i K P_j / 2 of each block."""
     for i in range(len(n)):

@@ -11,16 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from .bending import _hinge, _squares
 from .membrane import areas
 from .topology import Topology
 
 __all__ = ["mean_bending", "mean_stiffness"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def mean_stiffness(g: Floats, mesh: Topology, flexural: float) -> tuple[Floats, Floats]:

@@ -10,14 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..contract import InvalidGeometry
 
 __all__ = ["areas", "membrane", "membrane_tangent", "metric", "metric_of_lengths"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def metric(x: Floats, triangles: Ints) -> Floats:

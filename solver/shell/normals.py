@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
 
 __all__ = ["normals"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def normals(x: Floats, triangles: Ints) -> Floats:

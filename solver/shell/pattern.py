@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ..arrays import Ints
 from .topology import Topology, distinct
 
 __all__ = ["Pattern", "pattern"]
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints, Singles
 
 __all__ = ["substitute"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
@@ -20,8 +18,8 @@ def substitute(
     starts: Ints,
     own: Ints,
     widest: int,
-    across: NDArray[np.float32],
-    within: NDArray[np.float32],
+    across: Singles,
+    within: Singles,
     found: Floats,
 ) -> None:
     """Solve both systems for `right` (v, 3) into `found`; n (v, 3): normals. The rest: `Fronts` and both factors."""

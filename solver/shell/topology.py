@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Ints
 from ..contract import InvalidGeometry
 
 __all__ = ["Topology", "distinct", "part_of", "topology"]
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,6 @@ _NUMBERS = (
     "elastic_energy",
     "lost_energy",
     "work",
-    "dissipated_energy",
     "broken_rods",
     "broken_bonds",
     "impulse",
@@ -41,7 +40,7 @@ _NUMBERS = (
 
 SOLVER = Solver(
     name="wood",
-    version="1",
+    version="2",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside"),

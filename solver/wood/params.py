@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ..contract import Params
 
@@ -212,18 +212,25 @@ class WoodParams(Params):
         "sqrt of it longer; fragments as a whole keep their real mass",
         json_schema_extra={"units": "1"},
     )
-    mode: Literal["explicit", "implicit", "static"] = Field(
+    mode: Literal["explicit", "static"] = Field(
         "explicit",
-        description="Explicit (the truth), implicit (BDF2, for long runs), or equilibrium at every stage",
+        description="Explicit in time, or equilibrium at every stage",
         json_schema_extra={"units": "1"},
     )
     step: float | None = Field(
         None,
         gt=0,
         le=10,
-        description="Step; explicit runs shorten one that is not stable. By default it follows from the quality",
+        description="Step; one that is not stable is shortened. By default it follows from the quality",
         json_schema_extra={"units": "s"},
     )
+
+    @field_validator("mode", mode="before")
+    @classmethod
+    def _known(cls, value: object) -> object:
+        if value == "implicit":
+            raise ValueError("implicit steps are gone: set mode explicit, for slow loads with a mass_scaling of 1e4")
+        return value
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -233,9 +240,9 @@ class WoodParams(Params):
             raise ValueError("the axis is curved more sharply than the bundle is thick: take a smaller curvature")
         if abs(self.curvature) * self.length > 6.28:
             raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
-        if self.mode != "explicit" and (self.twist or self.curvature):
+        if self.mode == "static" and (self.twist or self.curvature):
             raise ValueError("twist and curved axes need the explicit mode: set mode explicit")
-        if self.mode != "explicit" and self.mass_scaling > 1:
+        if self.mode == "static" and self.mass_scaling > 1:
             raise ValueError("mass scaling is for the explicit mode: set mode explicit, or mass_scaling 1")
         if self.mode == "static" and self.rod_contact:
             raise ValueError("equilibria know no contact of rods: set rod_contact false, or another mode")

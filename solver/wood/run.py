@@ -33,7 +33,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     Raises:
         InvalidInput: the need names a part of a fruit's surface.
         Unstable: the run blew up; carries the stages before.
-        NotConverged: an implicit step or an equilibrium was not found; carries the stages before.
+        NotConverged: an equilibrium was not found; carries the stages before.
         Cancelled: the observer asked to stop.
 
     """
@@ -64,11 +64,6 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         wood = touchable(wood, dt, contact)
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context)
-    elif params.mode == "implicit":
-        from .stepping.implicit import implicit
-
-        attrs["step"] = settings.step
-        marching = implicit(wood, params, need.stages, settings, balance, context)
     else:
         from .stepping.static import static
 
@@ -94,7 +89,7 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
     """Return what is wanted of a stage."""
     state = reached.state
     wood = state.wood
-    moving, elastic, lost, work, dissipated, _ = reached.energy
+    moving, elastic, lost, work, _ = reached.energy
     ends = wood.grid[:, -1]
     weight = wood.rods.radius[np.searchsorted(wood.rod, np.arange(len(wood.grid)))] ** 2
     found: dict[str, Any] = {
@@ -102,7 +97,6 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
         "elastic_energy": elastic,
         "lost_energy": lost,
         "work": work,
-        "dissipated_energy": dissipated,
         "broken_rods": state.rods,
         "broken_bonds": state.bonds,
         "impulse": state.impulse.sum(0),

@@ -12,34 +12,25 @@ __all__ = ["Settings", "choose", "expected_cost"]
 
 @dataclass(frozen=True)
 class Settings:
-    """vertices: of a rod. courant: explicit step over the longest stable one. step: implicit [s].
-
-    tolerance: residual that an implicit step leaves, over that of standing still.
-    """
+    """vertices: of a rod. courant: explicit step over the longest stable one."""
 
     vertices: int
     courant: float
-    step: float
-    tolerance: float
 
 
-_QUALITIES: dict[Quality, tuple[float, float, float, float]] = {
-    "preview": (0.5, 0.8, 1 / 120, 1e-2),
-    "default": (1.0, 0.4, 1 / 480, 1e-3),
-    "fine": (2.0, 0.2, 1 / 1920, 1e-4),
-}
-#: Measured on one busy core: seconds per vertex and explicit step, and per vertex and implicit step.
-_EXPLICIT, _IMPLICIT = 8e-8, 4e-5
-#: Bytes of all arrays per vertex, bonds included; explicit, and with the implicit scheme's factors.
+_QUALITIES: dict[Quality, tuple[float, float]] = {"preview": (0.5, 0.8), "default": (1.0, 0.4), "fine": (2.0, 0.2)}
+#: Measured on one busy core: seconds per vertex and explicit step, and per vertex and stage at rest.
+_EXPLICIT, _STATIC = 8e-8, 8e-4
+#: Bytes of all arrays per vertex, bonds included; explicit, and with an equilibrium's factor.
 _BYTES, _FACTORS = 3000, 30_000
 _FEWEST = 3
 
 
 def choose(params: WoodParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
-    share, courant, step, tolerance = _QUALITIES[quality]
+    share, courant = _QUALITIES[quality]
     edges = max(round(share * (params.vertices - 1)), _FEWEST - 1)
-    return Settings(edges + 1, courant, params.step or step, tolerance)
+    return Settings(edges + 1, courant)
 
 
 def expected_cost(params: WoodParams, need: Need) -> Cost:
@@ -48,9 +39,8 @@ def expected_cost(params: WoodParams, need: Need) -> Cost:
     count = params.rods * settings.vertices
     width = 8 if need.dtype == "float64" else 4
     fixed = 6 * width * count * len(need.stages) if "rod_position" in need.fields else 0
-    if params.mode != "explicit":
-        steps = need.stages[-1] / settings.step if params.mode == "implicit" else 20 * len(need.stages)
-        return Cost(1.0 + steps * count * _IMPLICIT, count * _FACTORS + fixed)
+    if params.mode == "static":
+        return Cost(1.0 + len(need.stages) * count * _STATIC, count * _FACTORS + fixed)
     # the stretch waves of the mean edge bound the step within a factor of two
     speed = (params.stiffness / params.density) ** 0.5
     step = settings.courant * 0.3 * params.length / settings.vertices / speed * params.mass_scaling**0.5

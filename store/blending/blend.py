@@ -6,10 +6,11 @@ import itertools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from ..surfaces import harmonics, window
 from ..surfaces.window import Patch
@@ -19,7 +20,6 @@ from .methods.weights import Samples
 
 __all__ = ["Blend", "Blender", "complex_view", "powers"]
 
-Array = NDArray[Any]
 
 #: What the harmonics of order 0, which alone reach the poles, are there: sqrt(2 l + 1), and (-1)^l times that.
 _AT_POLES = np.array([[np.sqrt(2 * d + 1), (-1) ** d * np.sqrt(2 * d + 1)] for d in range(harmonics.LOWEST)])

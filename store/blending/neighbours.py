@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 __all__ = ["SAME", "Neighbours", "Weighted"]
 
-Array = NDArray[Any]
 
 #: Scaled distance below which a query is the sample itself: round-off of parameters that went through text.
 SAME = 1e-9

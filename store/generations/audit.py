@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from solver import quantities
+from solver.arrays import Array
 
 from .. import seal
 from ..errors import CorruptShard, CorruptTable, MixedSamples, UnknownJob
@@ -142,7 +142,7 @@ def _trust(opened: xr.Dataset) -> Iterator[str]:
             yield f"{name} is not finite everywhere. {_REBUILD}"
 
 
-def _result(store: Store, table: TableInfo, key: str, noted: str | None, block: NDArray[Any] | None) -> Iterator[str]:
+def _result(store: Store, table: TableInfo, key: str, noted: str | None, block: Array | None) -> Iterator[str]:
     """Check one result behind the table, and that the table holds its waves."""
     try:
         result = store.get(key)

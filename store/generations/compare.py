@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from .. import seal
 from ..blending.blend import complex_view
@@ -141,7 +142,7 @@ def _points(opened: xr.Dataset, axes: list[str]) -> dict[tuple[float, ...], int]
     return {tuple(float(f"{value:.{_DIGITS}g}") for value in row): i for i, row in enumerate(rows)}
 
 
-def _stages(a: NDArray[Any], b: NDArray[Any]) -> list[tuple[float, int, int]]:
+def _stages(a: Array, b: Array) -> list[tuple[float, int, int]]:
     """Return the common stages, with their place on both sides."""
     near = [(float(stage), i, int(np.abs(b - stage).argmin())) for i, stage in enumerate(a)]
     return [(stage, i, j) for stage, i, j in near if abs(b[j] - stage) < 1e-9]

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import h5netcdf  # type: ignore[import-untyped]
 import numpy as np
-from numpy.typing import NDArray
 
 from solver import quantities
+from solver.arrays import Array
 from solver.fruit import Fruit
 
 from ..blending import methods
@@ -92,7 +92,7 @@ def write(
     return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
 
 
-def spectra_of(result: xr.Dataset, key: str, need: Mapping[str, Any], band: int) -> NDArray[Any]:
+def spectra_of(result: xr.Dataset, key: str, need: Mapping[str, Any], band: int) -> Array:
     """Return (stage, component, m, k, part) in float64 of a result.
 
     Raises:
@@ -151,7 +151,7 @@ def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Ma
     return xr.Dataset(data, coords, attrs)
 
 
-def _judge(stored: NDArray[Any], samples: Samples) -> dict[str, xr.Variable]:
+def _judge(stored: Array, samples: Samples) -> dict[str, xr.Variable]:
     """Return what look-ups want to know of the spectra: power by degree, errors, likeness of neighbours."""
     import xarray as xr
 
@@ -186,13 +186,13 @@ def _judge(stored: NDArray[Any], samples: Samples) -> dict[str, xr.Variable]:
     return found | {"neighbour_correlation": xr.Variable("stage", _rounded(likeness), about)}
 
 
-def _rounded(values: NDArray[Any]) -> NDArray[Any]:
+def _rounded(values: Array) -> Array:
     """Keep five digits: the last bits of sums differ between processors, and the digest should not."""
     scale = 10.0 ** (4 - np.floor(np.log10(np.maximum(np.abs(values), 1e-300))))
     return (np.round(values * scale) / scale).astype(np.float32)
 
 
-def _axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, NDArray[Any], dict[str, str]]:
+def _axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, Array, dict[str, str]]:
     field, index = samples.axes[name]
     where = field if index is None else f"{field}[{index}]"
     attrs = {"long_name": f"parameter {where}"}

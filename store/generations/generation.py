@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from .. import shards
 from ..canonical import canonical
@@ -47,7 +48,7 @@ _ADVICE = "Rebuild the table from the shards."
 class Column(NamedTuple):
     """A small variable of a generation."""
 
-    values: NDArray[Any]
+    values: Array
     attrs: Mapping[str, Any]
 
 
@@ -113,7 +114,7 @@ def judged(path: Path) -> Judged:
     return Judged(found[1] if found else None, tuple(likeness.values.tolist()) if likeness else None)
 
 
-def map_spectra(path: Path) -> NDArray[Any]:
+def map_spectra(path: Path) -> Array:
     """Map the spectra (sample, stage, component, m, k, part) of a generation, read-only.
 
     The mapping outlives the file's name. `path` must have been verified: HDF5 only tells where the values lie.
@@ -150,7 +151,7 @@ def digest(path: Path) -> str:
     return combined(small, total.hexdigest())
 
 
-def left_out(opened: Mapping[str, Column]) -> tuple[NDArray[Any], str] | None:
+def left_out(opened: Mapping[str, Column]) -> tuple[Array, str] | None:
     """Return the measures (sample, stage, measure) of samples predicted from the others, and by which method.
 
     None for a table that holds none: of one sample, or of no fruits.

@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.fruit import Fruit
 
 from ..canonical import canonical
@@ -40,7 +40,7 @@ class Samples(NamedTuple):
         """Names of the axes that take more than one value."""
         return [name for name in self.axes if name not in self.fixed]
 
-    def points(self) -> NDArray[Any] | None:
+    def points(self) -> Array | None:
         """Return the samples' places (sample, axes) on the varying axes; None for a single one."""
         names = self.varying
         return np.array([[values[name] for name in names] for values in self.values]) if names else None

@@ -7,11 +7,10 @@ and is extrapolated. Both err more than a query between the samples does, never 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.fruit import Fruit, lattice
 
 from ..blending.blend import Blend, Blender, complex_view
@@ -24,8 +23,6 @@ from ..surfaces.measures import LATTICE, Measures, Surface, compare
 from ..surfaces.window import WHOLE
 
 __all__ = ["Trust", "correlations", "errors", "fresh", "leave_one_out", "refuse", "surface_of"]
-
-Array = NDArray[Any]
 
 
 def errors(found: Measures) -> dict[str, float]:

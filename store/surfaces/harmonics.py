@@ -9,16 +9,14 @@ normalised to mean square 1 over the unit sphere, so that powers add up to the f
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.fruit import colatitudes
 
 __all__ = ["LOWEST", "area", "degrees", "legendre", "low_series", "power", "shares", "without_low"]
 
-Array = NDArray[Any]
 
 #: Degrees below this are the shape of the fruit (size, shift, ellipticity), not wrinkles.
 LOWEST = 3

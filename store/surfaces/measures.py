@@ -7,16 +7,16 @@ whether a surface looks like the truth, and the last three whether it is the tru
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from . import harmonics, spectra, surface
 
 __all__ = ["UNITS", "Measures", "Surface", "compare", "mean"]
 
-Array = NDArray[Any]
 
 #: Lattice on which spectra are compared.
 LATTICE = 64

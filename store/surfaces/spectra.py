@@ -14,16 +14,13 @@ the half-cell offset of the colatitudes is in the half-cell transforms (DCT and 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from . import transforms
 
 __all__ = ["band_of", "fill", "gradient", "poles", "spectrum", "synthesize", "truncate"]
-
-Array = NDArray[Any]
 
 
 def spectrum(field: Array) -> Array:

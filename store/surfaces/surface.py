@@ -6,16 +6,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.fruit import Fruit, azimuths, colatitudes
 
 from . import spectra
 from .window import WHOLE, Patch
 
 __all__ = ["add_fresh", "fresh_poles", "normals"]
-
-Array = NDArray[Any]
 
 
 def add_fresh(fruit: Fruit, displacement: Array, patch: Patch | None = None) -> Array:

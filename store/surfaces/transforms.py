@@ -17,7 +17,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 # pyfftw would import all of dask and scipy's older transforms, for interfaces that are not used here: up to a second
 _hidden = [name for name in ("dask", "scipy.fftpack", "scipy.fft") if name not in sys.modules]
@@ -32,7 +33,6 @@ finally:
 
 __all__ = ["Synthesis", "analyse", "backend", "borrow"]
 
-Array = NDArray[Any]
 
 #: Bytes of idle plans that are kept, over all shapes; a plan for 256 x 512 x 3 in float32 holds 4 MB.
 _IDLE = 128 << 20

@@ -11,16 +11,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from . import spectra, transforms
 
 __all__ = ["WHOLE", "Patch", "Window", "around", "down", "planes", "series"]
 
-Array = NDArray[Any]
 
 #: Operations of the matrices that take as long as the fast transforms' work on one point of the lattice, measured.
 _PER_POINT = 110

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidOption
+from ..errors import InvalidOption, installing
 
 __all__ = ["KINDS", "read"]
 
@@ -28,7 +28,7 @@ def read(path: Path) -> dict[str, Any]:
     try:
         import trimesh
     except ImportError:
-        raise InvalidOption("meshes need the package trimesh.", "pip install 'wizen[formats]'.") from None
+        raise InvalidOption("meshes need the package trimesh.", installing("formats")) from None
     try:
         mesh: Any = trimesh.load(path, force="mesh", process=False)
         mesh.merge_vertices(merge_tex=True, merge_norm=True)

@@ -10,14 +10,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array, Bytes
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["LAYERS", "MESH_LAYERS", "Skin", "by_field", "encoded", "layered", "of_run"]
 
-Array = NDArray[Any]
 
 #: Fields that make layers.
 LAYERS = ("rot", "mould", "mould_active")
@@ -82,7 +82,7 @@ def by_field(values: Array, low: float, high: float) -> Array:
     return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
 
 
-def encoded(linear: Array) -> NDArray[np.uint8]:
+def encoded(linear: Array) -> Bytes:
     """Return linear light, 0 to 1, as the bytes of an sRGB picture (IEC 61966-2-1)."""
     x = np.clip(linear, 0, 1)
     display = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array, Bools
 
 __all__ = ["finer", "normals", "rasterise"]
-
-Array = NDArray[Any]
 
 
 def finer(values: Array, faces: Array, longest: float) -> tuple[Array, Array]:
@@ -39,9 +36,7 @@ def normals(vertices: Array, faces: Array) -> Array:
     return total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-300)
 
 
-def rasterise(
-    points: Array, depth: Array, faces: Array, side: int, both: bool
-) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def rasterise(points: Array, depth: Array, faces: Array, side: int, both: bool) -> tuple[Array, Array, Array, Bools]:
     """Return (pixel index, face, barycentric weights, seen from behind) of what is nearest to the eye in each pixel.
 
     both: triangles that turn away from the eye are drawn too.

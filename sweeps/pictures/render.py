@@ -6,12 +6,11 @@ Lattices are resampled through their spectrum, other triangles are cut in four u
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from solver.arrays import Array
 from store.surfaces import spectra
 
 from .raster import finer, normals, rasterise
@@ -19,7 +18,6 @@ from .shading import floor_shadow, relief, shade
 
 __all__ = ["View", "mesh", "render", "render_triangles"]
 
-Array = NDArray[Any]
 
 _SUPERSAMPLES = 2
 #: Resolution at which surfaces are drawn: one lattice cell of it covers about a pixel of a large picture.

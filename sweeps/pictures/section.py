@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import io
 import json
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from solver import meshes
+from solver.arrays import Array
 from solver.fruit import Fruit
 
 from ..errors import InvalidOption
@@ -24,7 +24,6 @@ from .shading import BACKGROUND
 
 __all__ = ["Plane", "cut", "picture", "plane"]
 
-Array = NDArray[Any]
 
 _INK, _FLESH, _STONE = "#3a2a24", "#efe3c8", "#8a6a4c"
 _PLAIN = np.array([0.36, 0.10, 0.06])

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
+
+from solver.arrays import Array
 
 __all__ = ["BACKGROUND", "floor_shadow", "relief", "shade"]
 
-Array = NDArray[Any]
 
 #: Paper-white behind the fruits; linear light, 0 to 1.
 BACKGROUND = np.array([0.93, 0.91, 0.88])

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from .render import View, render, render_triangles
 from .shading import BACKGROUND
@@ -28,15 +29,15 @@ class Panel:
     view: where it is seen from in place of the sheet's direction.
     """
 
-    position: NDArray[Any]
-    poles: NDArray[Any] | None = None
+    position: Array
+    poles: Array | None = None
     note: str = ""
-    colour: NDArray[Any] | None = None
-    triangles: NDArray[Any] | None = None
+    colour: Array | None = None
+    triangles: Array | None = None
     up: str = "y"
     view: View | None = None
 
-    def image(self, pixels: int, view: View) -> NDArray[Any]:
+    def image(self, pixels: int, view: View) -> Array:
         """Return the picture (pixels, pixels, 3)."""
         if self.triangles is None:
             return render(self.position, self.poles, pixels, view, self.colour)

@@ -33,8 +33,9 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> tuple[Store, str]:
     need = solver.settle(Need(quality="preview", resolution=12, stages=(0.0, 0.1), fields=("rot", "mould")))
     spec = job(solver, params, need)
     store.ledger.want([spec], "test")
-    assert store.ledger.claim("tester", 60) is not None
-    store.ledger.done(spec.key, store.put(spec.key, solver.solve(params, need)), 0.1)
+    claimed = store.ledger.claim("tester", 60)
+    assert claimed is not None
+    store.ledger.done(claimed, store.put(spec.key, solver.solve(params, need)), 0.1)
     return store, spec.key
 
 
@@ -129,8 +130,9 @@ def test_the_service_says_what_a_changing_mesh_cannot_be(tmp_path: Path) -> None
     need = solver.settle(Need(stages=(0.0,)))
     spec = job(solver, solver.parse({}), need)
     store.ledger.want([spec], "test")
-    store.ledger.claim("tester", 60)
-    store.ledger.done(spec.key, store.put(spec.key, splitting()), 0.1)
+    claimed = store.ledger.claim("tester", 60)
+    assert claimed is not None
+    store.ledger.done(claimed, store.put(spec.key, splitting()), 0.1)
     with client_of(store.root, jobs_workers=0, max_export_samples=200) as client:
         url = f"/v1/jobs/{spec.key}/result"
         large = checked(client.get(url, params={"format": "animation"}), 422, "invalid-query")

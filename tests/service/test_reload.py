@@ -117,7 +117,7 @@ def test_choosing(own: Store) -> None:
 @pytest.mark.slow
 def test_twenty_generations_under_load(tmp_path: Path) -> None:
     """The benchmark's 200 swaps in little: 16 connections, and every swap waits until it is answered from."""
-    from benchmarks.service import swaps
+    from benchmarks.service.__main__ import swaps
 
     store = Store.open(tmp_path / "store", create=True)
     fill(store, te=[0.02, 0.06], gamma=[10.0, 60.0])

@@ -204,7 +204,7 @@ def test_what_is_refused_can_be_run(own: Store, queue_only: httpx.Client, change
     assert waiting.key == job["id"]
     # once it is done, the same question leads to the shape
     run = answer(asked, Need.model_validate(job["need"]))
-    own.ledger.done(waiting.key, own.put(waiting.key, run), 1.0)
+    own.ledger.done(own.ledger.claim("tester", 60, [waiting.key]), own.put(waiting.key, run), 1.0)
     shape = queue_only.get(
         SHAPE,
         params={**QUERY, **change, "exact": "run", "format": "npz"},

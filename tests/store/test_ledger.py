@@ -5,12 +5,15 @@ import pickle
 import sqlite3
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from store import clock
+from store.clock import Clock
 from store.errors import CorruptLedger, UnknownJob
-from store.ledger import MAX_LOST, JobSpec, Ledger
+from store.ledger import MAX_LOST, Job, JobSpec, Ledger
 from store.store import Store
 
 from .conftest import fill, python, spec
@@ -20,6 +23,12 @@ ERROR = {"code": "unstable", "message": "blew up.", "advice": "Smaller steps."}
 
 def job(name: str) -> JobSpec:
     return JobSpec(name, "dehydration", "1", {"te": 0.04}, {"stages": [0.1]})
+
+
+def claim(ledger: Ledger, lease: float = 60.0, worker: str = "w") -> Job:
+    found = ledger.claim(worker, lease)
+    assert found is not None
+    return found
 
 
 @pytest.fixture
@@ -34,10 +43,10 @@ def test_a_job_s_life(ledger: Ledger) -> None:
     assert first is not None
     assert (first.key, first.state, first.worker, first.attempts) == ("a", "running", "w1", 1)
     assert (first.params, first.need) == ({"te": 0.04}, {"stages": [0.1]})
-    assert ledger.renew("a", "w1", 60.0, progress=0.5)
-    assert not ledger.renew("a", "w2", 60.0)
+    assert ledger.renew(first, 60.0, progress=0.5)
+    assert not ledger.renew(replace(first, worker="w2"), 60.0)
     assert ledger.get("a").progress == 0.5
-    ledger.done("a", "digest", 2.5)
+    assert ledger.done(first, "digest", 2.5)
     done = ledger.get("a")
     assert (done.state, done.digest, done.seconds, done.progress, done.worker) == ("done", "digest", 2.5, 1.0, None)
     assert ledger.counts("p") == {"wanted": 1, "running": 0, "done": 1, "failed": 0, "cancelled": 0}
@@ -48,33 +57,43 @@ def test_a_job_s_life(ledger: Ledger) -> None:
 
 def test_failures_are_tried_again_and_then_given_up(ledger: Ledger) -> None:
     ledger.want([job("a")])
-    ledger.claim("w", 60.0)
-    assert ledger.failed("a", ERROR) == "wanted"
-    assert ledger.claim("w", 60.0) is not None
-    assert ledger.failed("a", ERROR) == "failed"
+    assert ledger.failed(claim(ledger), ERROR) == "wanted"
+    assert ledger.failed(claim(ledger), ERROR) == "failed"
     assert ledger.claim("w", 60.0) is None
     assert ledger.get("a").error == ERROR
     assert ledger.want([job("a")]) == 0
     assert ledger.want([job("a")], again=True) == 1
-    again = ledger.claim("w", 60.0)
-    assert again is not None
-    assert (again.attempts, again.error) == (1, None)
-    ledger.done("a", "d", 1.0)
-    assert ledger.failed("a", ERROR) == "done"
+    again = claim(ledger)
+    assert (again.attempts, again.claims, again.error) == (1, 3, None)
+    assert ledger.done(again, "d", 1.0)
+    assert ledger.failed(again, ERROR) == "done"
 
 
 def test_release_and_cancel(ledger: Ledger) -> None:
     ledger.want([job("a"), job("b")])
-    ledger.claim("w", 60.0)
-    ledger.release("a")
+    assert ledger.release(claim(ledger))
     assert (ledger.get("a").state, ledger.get("a").attempts) == ("wanted", 0)
-    ledger.claim("w", 60.0)
+    again = claim(ledger)
     assert ledger.cancel(["a", "b", "unknown"]) == 2
-    assert not ledger.renew("a", "w", 60.0)
-    ledger.release("a")
-    assert ledger.failed("a", ERROR) == "cancelled"
+    assert not ledger.renew(again, 60.0)
+    assert not ledger.release(again)
+    assert ledger.failed(again, ERROR) is None
+    assert not ledger.done(again, "d", 1.0)
+    assert ledger.get("a").state == "cancelled"
     assert ledger.claim("w", 60.0) is None
     assert ledger.want([job("a")]) == 1
+
+
+def test_what_was_given_back_and_then_finished_counts_unless_it_was_taken(ledger: Ledger) -> None:
+    ledger.want([job("a"), job("b")])
+    first, second = claim(ledger), claim(ledger)
+    assert ledger.release(first)
+    assert ledger.done(first, "d", 1.0)
+    assert ledger.get("a").state == "done"
+    assert ledger.release(second)
+    third = claim(ledger)
+    assert not ledger.done(second, "d", 1.0)
+    assert ledger.get("b").worker == third.worker
 
 
 def test_leases_run_out(ledger: Ledger) -> None:
@@ -84,7 +103,71 @@ def test_leases_run_out(ledger: Ledger) -> None:
     taken = ledger.claim("w2", 60.0)
     assert taken is not None
     assert (taken.worker, taken.attempts) == ("w2", 2)
-    assert not ledger.renew("a", "w1", 60.0)
+
+
+@pytest.mark.parametrize("name", ["w", "v"])
+def test_a_stale_claim_changes_nothing(ledger: Ledger, name: str) -> None:
+    """Also where both claims are those of one worker."""
+    ledger.want([job("a")])
+    stale = claim(ledger, 0.0)
+    time.sleep(0.01)
+    taken = claim(ledger, 60.0, name)
+    before = ledger.get("a")
+    assert not ledger.renew(stale, 60.0, 0.5, "still at it")
+    assert not ledger.release(stale)
+    assert ledger.failed(stale, ERROR) is None
+    assert not ledger.done(stale, "d", 1.0)
+    assert ledger.get("a") == before == taken
+
+
+class Counter:
+    """A clock that stands still unless told otherwise."""
+
+    def __init__(self, name: str, seconds: float = 0.0) -> None:
+        self.seconds = seconds
+        self.clock = Clock(name, lambda: self.seconds)
+
+
+def test_the_date_moves_no_lease(ledger: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
+    ledger.want([job("a")])
+    held = claim(ledger)
+    now = time.time
+    for step in (-86400.0, 3600.0, 1e9):
+        monkeypatch.setattr(time, "time", lambda step=step: now() + step)
+        assert Ledger(ledger.path).claim("other", 60.0) is None
+        assert ledger.renew(held, 60.0)
+
+
+def test_a_lease_by_another_boot_s_clock_is_watched(ledger: Ledger) -> None:
+    """Neither counter says anything of the other; a sign of life within the lease does."""
+    theirs, ours = Counter("before", 1e6), Counter("since", 5.0)
+    alive, watcher = Ledger(ledger.path, theirs.clock), Ledger(ledger.path, ours.clock)
+    ledger.want([job("a")])
+    held = claim(alive, 30.0)
+    assert watcher.claim("new", 30.0) is None
+    for _ in range(3):
+        ours.seconds, theirs.seconds = ours.seconds + 29.0, theirs.seconds + 29.0
+        assert watcher.claim("new", 30.0) is None
+        assert alive.renew(held, 30.0)
+    assert watcher.claim("new", 30.0) is None
+    ours.seconds += 29.0
+    assert watcher.claim("new", 30.0) is None
+    ours.seconds += 2.0
+    taken = watcher.claim("new", 30.0)
+    assert taken is not None
+    assert not alive.renew(held, 30.0)
+
+
+def test_a_time_namespace_shares_its_host_s_clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    offsets = tmp_path / "timens_offsets"
+    offsets.write_text("monotonic        1000   500000000\nboottime  7  0\n")
+    before = Clock.of_host().now()
+    monkeypatch.setattr(clock, "_OFFSETS", offsets)
+    clock._namespace_offset.cache_clear()
+    try:
+        assert Clock.of_host().now() - before == pytest.approx(-1000.5, abs=1)
+    finally:
+        clock._namespace_offset.cache_clear()
 
 
 def test_a_job_that_kills_its_workers_is_given_up(ledger: Ledger) -> None:
@@ -111,9 +194,8 @@ def test_claims_among_keys_and_plans_that_share_jobs(ledger: Ledger) -> None:
 
 
 def test_unknown_jobs(ledger: Ledger) -> None:
-    for call in (ledger.get, ledger.release, lambda k: ledger.done(k, "", 0.0), lambda k: ledger.failed(k, ERROR)):
-        with pytest.raises(UnknownJob):
-            call("nobody")
+    with pytest.raises(UnknownJob):
+        ledger.get("nobody")
 
 
 def test_want_is_all_or_nothing(ledger: Ledger) -> None:
@@ -132,7 +214,7 @@ from store.ledger import Ledger
 ledger = Ledger(sys.argv[1])
 while (job := ledger.claim(sys.argv[2], 600.0)) is not None:
     print(job.key, flush=True)
-    ledger.done(job.key, "d", 0.0)
+    ledger.done(job, "d", 0.0)
 """
 
 
@@ -180,7 +262,7 @@ for worker in range(2):
     child = os.fork()
     if child == 0:
         while (job := ledger.claim(str(worker), 60.0)) is not None:
-            ledger.done(job.key, "d", 0.0)
+            ledger.done(job, "d", 0.0)
         os._exit(0)
     children.append(child)
 codes = [os.waitpid(child, 0)[1] for child in children]
@@ -233,3 +315,35 @@ def test_an_older_file_gains_what_was_added_since(tmp_path: Path) -> None:
     with contextlib.closing(sqlite3.connect(path)) as connection:
         connection.execute("DROP TABLE notes")
     assert Ledger(path).jobs() == []
+
+
+#: The table of jobs as it was before claims were numbered.
+_FIRST = """
+CREATE TABLE jobs (
+    key TEXT PRIMARY KEY, solver TEXT NOT NULL, version TEXT NOT NULL, params TEXT NOT NULL, need TEXT NOT NULL,
+    plan TEXT NOT NULL DEFAULT '', state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, worker TEXT,
+    lease_until REAL, digest TEXT, error TEXT, seconds REAL, created REAL NOT NULL, updated REAL NOT NULL,
+    progress REAL NOT NULL DEFAULT 0
+);
+INSERT INTO jobs (key, solver, version, params, need, state, attempts, worker, lease_until, created, updated) VALUES
+    ('a', 's', '1', '{}', '{}', 'done', 1, NULL, NULL, 1, 2),
+    ('b', 's', '1', '{}', '{}', 'running', 1, 'old:1:2', 9e9, 1, 2);
+PRAGMA user_version = 1;
+"""
+
+
+def test_a_ledger_of_the_first_version_is_upgraded(tmp_path: Path) -> None:
+    path, counter = tmp_path / "ledger.sqlite", Counter("here")
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.executescript(_FIRST)
+    upgraded = Ledger(path, counter.clock)
+    assert [(j.key, j.state, j.claims) for j in upgraded.jobs()] == [("a", "done", 0), ("b", "running", 0)]
+    # its leases were dates: they are watched, like those of another clock
+    assert upgraded.claim("w", 30.0) is None
+    counter.seconds = 100.0
+    assert claim(upgraded).key == "b"
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        assert connection.execute("PRAGMA user_version").fetchone() == (2,)
+        connection.execute("PRAGMA user_version = 3")
+    with pytest.raises(CorruptLedger, match="version 3"):
+        Ledger(path).counts()

@@ -94,9 +94,9 @@ def work(first, report):
     for i in range(10**6):
         asked = {"te": 0.02 + 1e-6 * (first + i), "resolution": 8}
         store.ledger.want([spec(**asked)])
-        store.ledger.claim("w", 60.0)
         name, dataset = make(**asked)
-        store.ledger.done(name, store.put(name, dataset), 0.1)
+        claimed = store.ledger.claim("w", 60.0, [name])
+        store.ledger.done(claimed, store.put(name, dataset), 0.1)
         os.write(report, name.encode())
 
 store = Store.open(sys.argv[1], create=True)

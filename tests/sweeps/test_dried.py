@@ -83,7 +83,8 @@ def test_a_job_finds_the_table_too(tmp_path):
     need = SOLVER.settle(Need(fields=("position",), stages=(1.0,), resolution=16))
     spec = job(SOLVER, params, need)
     store.ledger.want([spec], "test")
-    assert store.ledger.claim("tester", 60) is not None
-    assert work(Task(store.root, spec, "tester", 60.0)).state == "done"
+    claimed = store.ledger.claim("tester", 60)
+    assert claimed is not None
+    assert work(Task(store.root, claimed, 60.0)).state == "done"
     theirs = solve(fields=("position",), stages=(1.0,), resolution=16).position.values
     assert np.array_equal(store.get(spec.key)["position"].values, theirs)

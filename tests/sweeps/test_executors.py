@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
@@ -57,10 +59,38 @@ def test_dask_stores_the_same(shrinking: Solves, tmp_path: Path, write_plan: Wri
     assert digests(stores[0]) == digests(stores[1]) == digests(stores[2])
 
 
-def test_one_worker_needs_no_process() -> None:
+def test_one_worker_is_a_process_that_can_be_killed() -> None:
     with executors.choose() as workers:
         assert workers.width == 1
-        assert workers.submit(os.getpid).result() == os.getpid()
+        first = workers.submit(os.getpid).result()
+        assert first != os.getpid()
+        begin = time.monotonic()
+        stuck = workers.submit(time.sleep, 60)
+        while not stuck.running():
+            time.sleep(0.01)
+        workers.end(stuck)
+        assert isinstance(stuck.exception(10), BrokenExecutor)
+        assert time.monotonic() - begin < 10
+        # another one takes its place
+        assert workers.submit(os.getpid).result() not in (first, os.getpid())
+
+
+def test_errors_come_back_from_a_process_whatever_they_are() -> None:
+    with executors.processes(1) as workers:
+        with pytest.raises(ZeroDivisionError):
+            workers.submit(divmod, 1, 0).result()
+        with pytest.raises(RuntimeError, match="Stubborn: no"):
+            workers.submit(_stubborn).result()
+        assert workers.submit(abs, -3).result() == 3
+
+
+class Stubborn(Exception):
+    def __reduce__(self) -> str:
+        raise TypeError("this one does not travel")
+
+
+def _stubborn() -> None:
+    raise Stubborn("no")
 
 
 def test_options_that_contradict_each_other() -> None:

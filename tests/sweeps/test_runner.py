@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from conftest import Solves
 
 from store.store import Store
 from sweeps import executors
+from sweeps.place import Place
 from sweeps.plan import Plan
 from sweeps.report import Event
 from sweeps.runner import run_jobs, run_plan
@@ -172,9 +174,19 @@ def test_a_dead_runner_is_noticed_at_once(shrinking: Solves, store: Store, write
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     store.ledger.want(plan.jobs())
-    store.ledger.claim(f"{os.uname().nodename}:{gone.pid}:0", lease=3600)
+    store.ledger.claim(Place.here().sign(gone.pid), lease=3600)
     with executors.serial() as workers:
         assert run_plan(plan, store, workers).complete
+
+
+def test_nothing_is_guessed_of_processes_elsewhere() -> None:
+    here, nobody = Place.here(), 2**22 + 1  # Linux numbers processes up to 2^22
+    assert here.knows_dead(here.sign(nobody))
+    assert not here.knows_dead(here.sign())
+    for elsewhere in (replace(here, namespace="4026532000"), replace(here, boot="another")):
+        assert not here.knows_dead(elsewhere.sign(nobody))
+    for name in (None, "", "tester", f"{here.host}:{nobody}:0123"):
+        assert not here.knows_dead(name)
 
 
 def test_a_lease_that_ran_out_is_taken_over(shrinking: Solves, store: Store, write_plan: Write) -> None:

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ...arrays import Floats, Ints
 from ...contract import InvalidInput
 from ...fruit import directions, lattice
 from ..environment import reference_radius
@@ -28,7 +28,6 @@ from .springs import knit, swung
 
 __all__ = ["Body"]
 
-Array = NDArray[np.float64]
 
 #: Density of fresh fruit [kg/m^3].
 _DENSITY = 1000.0
@@ -61,7 +60,7 @@ class Body:
         self._balls, self._carried = _balls(params), carried(params)
         self._pressure, self._inertia = _DENSITY * params.flesh.gravity * r1, _DENSITY * r1**2
 
-    def state(self, water: float, rot: Array | None) -> Softened:
+    def state(self, water: float, rot: Floats | None) -> Softened:
         """Return the flesh after a share of the weight has gone as water; rot: on the surface's vertices (v)."""
         solid, flesh = self.solid, self._params.flesh
         inside = np.zeros(len(solid.tets))
@@ -94,13 +93,13 @@ class Body:
         found = settle(start, rest, loads, self._pattern, self._tolerance, watch)
         return found._replace(even=even)
 
-    def _loads(self, state: Softened, start: Array, fresh: float) -> Loads:
+    def _loads(self, state: Softened, start: Floats, fresh: float) -> Loads:
         solid, count = self.solid, len(self.solid.points)
         zero = np.zeros(count)
         if self._pressure == 0:
             return Loads(zero, None, zero, zero, start)
         shared = np.repeat(solid.volume / 4, 4)
-        mass: Array = np.bincount(solid.tets.ravel(), shared * np.repeat(state.mass, 4), count).astype(float)
+        mass: Floats = np.bincount(solid.tets.ravel(), shared * np.repeat(state.mass, 4), count).astype(float)
         corners = solid.points[solid.skin[solid.faces]]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
         contact = zero.copy()
@@ -113,13 +112,13 @@ class Body:
         floor = None if self._carried else float(solid.points[:, 1].min())
         return Loads(self._pressure * mass, floor, contact, tether, start, self._balls)
 
-    def on_lattice(self, balance: Balance, resolution: int) -> Array:
+    def on_lattice(self, balance: Balance, resolution: int) -> Floats:
         """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""
         even, rest = self.parted(balance)
         fresh = self._params.surface(*lattice(resolution))
         return even * fresh + (_outwards(self._layers, resolution) @ rest).reshape(fresh.shape)
 
-    def on_surface(self, balance: Balance) -> Array:
+    def on_surface(self, balance: Balance) -> Floats:
         """Return the displacement of the surface's vertices (v, 3)."""
         even, rest = self.parted(balance)
         return even * self._surface.points + self.onto(self._cells) @ rest
@@ -128,7 +127,7 @@ class Body:
         """Return the matrix that takes a field (s) of the body's skin to the vertices of a sphere of so many cells."""
         return _onto(cells, self._layers)
 
-    def parted(self, balance: Balance) -> tuple[float, Array]:
+    def parted(self, balance: Balance) -> tuple[float, Floats]:
         """Return the even part of the skin's displacement, over its place, and the rest (s, 3), which is interpolated.
 
         Facets would take the even part as shrinking chords; taken apart, a fruit that shrinks evenly stays exact.
@@ -140,7 +139,7 @@ class Body:
         return even, moved - even * fresh
 
 
-def _balls(params: DecayParams) -> Array:
+def _balls(params: DecayParams) -> Floats:
     """Return centres and radii (b, 4) of the balls that the fruit can meet in place of its neighbours."""
     found = []
     for number, other in enumerate(params.neighbours):
@@ -160,7 +159,7 @@ def _balls(params: DecayParams) -> Array:
     return np.array(found).reshape(-1, 4)
 
 
-def _skin(layers: int) -> tuple[Array, NDArray[np.int64]]:
+def _skin(layers: int) -> tuple[Floats, Ints]:
     rays, _, _, skin, faces = ball(layers)
     return rays[skin], faces
 

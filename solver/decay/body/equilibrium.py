@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from ...contract import NotConverged
 from .loads import Loads, Touch, below, drop, pushes, touches
 from .material import Blocks, energy, forces, hessian, inverse_edges
@@ -15,8 +15,6 @@ from .sparse import solve, times
 
 __all__ = ["Balance", "Rest", "rested", "settle"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 #: Newton steps and halvings of a step before giving up; iterations of the linear solver in one step.
 _STEPS, _HALVINGS, _ITERATIONS = 200, 40, 400
@@ -35,11 +33,11 @@ _ROUND_OFF = 1e-14
 class Rest(NamedTuple):
     """A rest shape: inverse edges (t, 3, 3) [1/r1], volumes (t) [r1^3] and Lame constants (t) [Pa]."""
 
-    tets: Index
-    inverse: Array
-    volume: Array
-    mu: Array
-    lam: Array
+    tets: Ints
+    inverse: Floats
+    volume: Floats
+    mu: Floats
+    lam: Floats
 
 
 class Balance(NamedTuple):
@@ -49,16 +47,16 @@ class Balance(NamedTuple):
     even: length of a cube as large as the rest shape, over the fresh one.
     """
 
-    points: Array
+    points: Floats
     residual: float
     steps: int
     least_jacobian: float
     reaction: float
     even: float = 1.0
-    pushes: Array = np.empty((0, 3))
+    pushes: Floats = np.empty((0, 3))
 
 
-def rested(points: Array, tets: Index, shrinkage: Array, young: Array, poisson: float) -> Rest:
+def rested(points: Floats, tets: Ints, shrinkage: Floats, young: Floats, poisson: float) -> Rest:
     """Return the rest shape of tetrahedra whose lengths have shrunk to a share (t), with Young's moduli (t) [Pa]."""
     inverse = inverse_edges(points, tets)
     volume = shrinkage**3 / (6 * np.linalg.det(inverse))
@@ -68,7 +66,7 @@ def rested(points: Array, tets: Index, shrinkage: Array, young: Array, poisson: 
 
 
 def settle(
-    start: Array,
+    start: Floats,
     rest: Rest,
     loads: Loads,
     pattern: Blocks,
@@ -125,7 +123,7 @@ def settle(
     )
 
 
-def _direction(x: Array, rest: Rest, loads: Loads, pattern: Blocks, asked: float) -> Array:
+def _direction(x: Floats, rest: Rest, loads: Loads, pattern: Blocks, asked: float) -> Floats:
     """Return Newton's direction (p, 3); that of the cut Hessian where the exact one does not curve upwards.
 
     The floor is no part of the quadratic model but kept as it is, and neighbours as the planes that they are near a
@@ -147,8 +145,8 @@ def _direction(x: Array, rest: Rest, loads: Loads, pattern: Blocks, asked: float
 
 
 def _carried(
-    x: Array, g: Array, a: Array, own: Array, loads: Loads, near: Touch, pattern: Blocks, asked: float
-) -> tuple[Array, bool]:
+    x: Floats, g: Floats, a: Floats, own: Floats, loads: Loads, near: Touch, pattern: Blocks, asked: float
+) -> tuple[Floats, bool]:
     """Return the least of the model g.d + d.a d / 2 and the contacts' potential, and whether `a` curved upwards.
 
     own: the diagonal blocks of `a`, which are written to it with the contacts' stiffness.
@@ -195,14 +193,14 @@ def _carried(
     return d, True
 
 
-def _pressed(x: Array, d: Array, loads: Loads, near: Touch) -> float:
+def _pressed(x: Floats, d: Floats, loads: Loads, near: Touch) -> float:
     """Return the model's potential of floor and neighbours after a move d (p, 3)."""
     deep = np.maximum(near.depth - np.einsum("ki,ki->k", near.out, d[near.point]), 0.0)
     floor = np.sum(loads.contact * below(x + d, loads) ** 2)
     return float(floor + np.sum(loads.contact[near.point] * deep**2)) / 2
 
 
-def _potential(x: Array, rest: Rest, loads: Loads) -> float:
+def _potential(x: Floats, rest: Rest, loads: Loads) -> float:
     aside, near = (x - loads.held)[:, ::2], touches(x, loads)
     return (
         energy(x, *rest)
@@ -213,7 +211,7 @@ def _potential(x: Array, rest: Rest, loads: Loads) -> float:
     )
 
 
-def _slope(x: Array, rest: Rest, loads: Loads) -> tuple[Array, Array, float, float]:
+def _slope(x: Floats, rest: Rest, loads: Loads) -> tuple[Floats, Floats, float, float]:
     """Return gradient (p, 3), sizes of the forces in it (p), least J and the upward force of what carries it."""
     g, scale = np.zeros_like(x), np.zeros(len(x))
     least = forces(x, *rest, g, scale)

@@ -10,12 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Flesh", "Skin", "Softened", "Swing", "softened"]
+from ...arrays import Bools, Floats
 
-Array = NDArray[np.float64]
+__all__ = ["Flesh", "Skin", "Softened", "Swing", "softened"]
 
 
 class Flesh(BaseModel):
@@ -66,12 +65,12 @@ class Swing(BaseModel):
 class Softened(NamedTuple):
     """Per tetrahedron (t): lengths over fresh ones, Young's modulus [Pa], mass over fresh mass."""
 
-    shrinkage: Array
-    young: Array
-    mass: Array
+    shrinkage: Floats
+    young: Floats
+    mass: Floats
 
 
-def softened(flesh: Flesh, firmness: float, water: float, rot: Array, stone: NDArray[np.bool_]) -> Softened:
+def softened(flesh: Flesh, firmness: float, water: float, rot: Floats, stone: Bools) -> Softened:
     """Return the state of tetrahedra after a share of the weight has gone as water; rot (t), 0 to 1.
 
     A stone neither shrinks nor rots.

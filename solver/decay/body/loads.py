@@ -10,14 +10,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from ...contract import NotConverged
 
 __all__ = ["Loads", "Touch", "below", "drop", "pushes", "touches"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 #: Longest stride in the search for the height at which neighbours carry a body, and how far it is searched [r1].
 _STRIDE, _FAR = 0.05, 4.0
@@ -32,12 +30,12 @@ class Loads(NamedTuple):
     balls (b, 4) [r1]: centres and radii of the neighbours, which push with the contact's stiffness too.
     """
 
-    weight: Array
+    weight: Floats
     floor: float | None
-    contact: Array
-    tether: Array
-    held: Array
-    balls: Array = np.empty((0, 4))
+    contact: Floats
+    tether: Floats
+    held: Floats
+    balls: Floats = np.empty((0, 4))
 
     @property
     def carries(self) -> bool:
@@ -48,13 +46,13 @@ class Loads(NamedTuple):
 class Touch(NamedTuple):
     """Pairs of a point and a ball: numbers (k) of both, depth in the ball (k), unit way out of it (k, 3)."""
 
-    point: Index
-    ball: Index
-    depth: Array
-    out: Array
+    point: Ints
+    ball: Ints
+    depth: Floats
+    out: Floats
 
 
-def touches(x: Array, loads: Loads, margin: float = 0.0) -> Touch:
+def touches(x: Floats, loads: Loads, margin: float = 0.0) -> Touch:
     """Return which points (p, 3) are in balls, or within a margin [r1] of them: there depths are negative."""
     skin = np.flatnonzero(loads.contact > 0) if len(loads.balls) else np.empty(0, np.int64)
     way = x[skin][:, None] - loads.balls[:, :3]
@@ -64,12 +62,12 @@ def touches(x: Array, loads: Loads, margin: float = 0.0) -> Touch:
     return Touch(skin[i], ball, depth[i, ball], way[i, ball] / np.maximum(far[i, ball], 1e-300)[:, None])
 
 
-def below(x: Array, loads: Loads) -> Array:
+def below(x: Floats, loads: Loads) -> Floats:
     """Return how far points are below the floor (p) [r1]."""
     return np.zeros(len(x)) if loads.floor is None else np.maximum(loads.floor - x[:, 1], 0.0)
 
 
-def pushes(x: Array, loads: Loads) -> Array:
+def pushes(x: Floats, loads: Loads) -> Floats:
     """Return the force of each ball on the body (b, 3) [Pa r1^2]."""
     found = np.zeros((len(loads.balls), 3))
     near = touches(x, loads)
@@ -77,7 +75,7 @@ def pushes(x: Array, loads: Loads) -> Array:
     return found
 
 
-def drop(x: Array, loads: Loads) -> float:
+def drop(x: Floats, loads: Loads) -> float:
     """Return how far to lift points so that a rigid body of their shape is carried: then some always touch.
 
     Raises:
@@ -115,7 +113,7 @@ def drop(x: Array, loads: Loads) -> float:
     return (low + high) / 2
 
 
-def _onto_floor(x: Array, loads: Loads) -> float:
+def _onto_floor(x: Floats, loads: Loads) -> float:
     """Return the lift at which the floor alone carries the body."""
     assert loads.floor is not None
     weight = float(loads.weight.sum())

@@ -11,15 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy import sparse
 
+from ...arrays import Floats, Ints
 from ...fem import tetrahedron_gradients
 
 __all__ = ["Blocks", "blocks", "energy", "forces", "hessian", "inverse_edges"]
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 class Blocks:
@@ -29,7 +26,7 @@ class Blocks:
     two corners of a tetrahedron stands; own (p): where the diagonal blocks stand.
     """
 
-    def __init__(self, tets: Index, count: int) -> None:
+    def __init__(self, tets: Ints, count: int) -> None:
         rows, columns = np.repeat(tets, 4, axis=1).ravel(), np.tile(tets, 4).ravel()
         graph = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
         graph.sort_indices()
@@ -39,19 +36,19 @@ class Blocks:
         self.own = np.searchsorted(keys, np.arange(count) * (count + 1))
 
 
-def blocks(tets: Index, count: int) -> Blocks:
+def blocks(tets: Ints, count: int) -> Blocks:
     """Return the sparsity of tetrahedra on `count` points."""
     return Blocks(tets, count)
 
 
-def inverse_edges(points: Array, tets: Index) -> Array:
+def inverse_edges(points: Floats, tets: Ints) -> Floats:
     """Return the inverses (t, 3, 3) of the edge matrices, whose columns are the edges from the first corner."""
     edges = np.einsum("tai,ak->tik", points[tets], tetrahedron_gradients())
     return np.asarray(np.linalg.inv(edges), dtype=np.float64)
 
 
 @njit(cache=True)
-def _gradient(x: Array, corners: Array, inverse: Array, f: Array) -> None:
+def _gradient(x: Floats, corners: Floats, inverse: Floats, f: Floats) -> None:
     """Write the deformation gradient of one tetrahedron with four corners to f (3, 3)."""
     for i in range(3):
         for j in range(3):
@@ -61,7 +58,7 @@ def _gradient(x: Array, corners: Array, inverse: Array, f: Array) -> None:
 
 
 @njit(cache=True)
-def _cofactor(f: Array, c: Array) -> float:
+def _cofactor(f: Floats, c: Floats) -> float:
     """Write the cofactors of f to c and return the determinant."""
     for i in range(3):
         p, q = (i + 1) % 3, (i + 2) % 3
@@ -72,7 +69,7 @@ def _cofactor(f: Array, c: Array) -> float:
 
 
 @njit(cache=True)
-def energy(x: Array, tets: Index, inverse: Array, volume: Array, mu: Array, lam: Array) -> float:
+def energy(x: Floats, tets: Ints, inverse: Floats, volume: Floats, mu: Floats, lam: Floats) -> float:
     """Return the energy of points x (p, 3); infinite if a tetrahedron is flat or inverted. mu, lam: (t)."""
     f, c = np.empty((3, 3)), np.empty((3, 3))
     total = 0.0
@@ -92,7 +89,7 @@ def energy(x: Array, tets: Index, inverse: Array, volume: Array, mu: Array, lam:
 
 @njit(cache=True)
 def forces(
-    x: Array, tets: Index, inverse: Array, volume: Array, mu: Array, lam: Array, g: Array, scale: Array
+    x: Floats, tets: Ints, inverse: Floats, volume: Floats, mu: Floats, lam: Floats, g: Floats, scale: Floats
 ) -> float:
     """Add the energy's gradient to g (p, 3) and the sizes of its shares to scale (p); return the least J."""
     f, c, stress = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -127,7 +124,7 @@ def forces(
 
 
 @njit(cache=True)
-def _longest(f: Array) -> float:
+def _longest(f: Floats) -> float:
     """Return the largest singular value of f: the largest root of the characteristic cubic of f^T f."""
     a = np.zeros((3, 3))
     for i in range(3):
@@ -151,7 +148,7 @@ def _longest(f: Array) -> float:
 
 @njit(cache=True)
 def hessian(
-    x: Array, tets: Index, inverse: Array, volume: Array, mu: Array, lam: Array, slot: Index, out: Array, cut: bool
+    x: Floats, tets: Ints, inverse: Floats, volume: Floats, mu: Floats, lam: Floats, slot: Ints, out: Floats, cut: bool
 ) -> None:
     """Add the Hessian to blocks out (b, 3, 3); `cut` keeps it from being indefinite (else it is the exact one)."""
     f, c = np.empty((3, 3)), np.empty((3, 3))

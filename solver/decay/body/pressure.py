@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..params import DecayParams
 from ..surfaces.places import painted
@@ -11,8 +10,6 @@ from .flesh import Softened
 from .solid import Solid
 
 __all__ = ["pressed"]
-
-Array = NDArray[np.float64]
 
 
 def pressed(state: Softened, params: DecayParams, solid: Solid) -> Softened:

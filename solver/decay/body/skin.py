@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from ...contract import NotConverged
 from ...shell import (
     Material,
@@ -35,8 +35,6 @@ from .flesh import Skin
 
 __all__ = ["Model", "Settled", "Shell"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _STEPS, _HALVINGS, _MEMORY = 1500, 30, 20
 #: Steps that one inverse serves.
@@ -49,13 +47,13 @@ class Model(NamedTuple):
     """What L-BFGS knows of the energy's curvature: an inverse, and the last moves with the slope's changes (v, 3)."""
 
     inverse: Inverse
-    moves: tuple[tuple[Array, Array], ...]
+    moves: tuple[tuple[Floats, Floats], ...]
 
 
 class Settled(NamedTuple):
     """Points (v, 3) of a skin, residual, steps, and what the last of them knew of the curvature."""
 
-    points: Array
+    points: Floats
     residual: float
     steps: int
     model: Model
@@ -64,7 +62,7 @@ class Settled(NamedTuple):
 class Shell:
     """A skin on fresh points (v, 3) with faces (f, 3), of one thickness [r1]; area: of each vertex (v) [r1^2]."""
 
-    def __init__(self, points: Array, faces: Index, area: Array, skin: Skin, thickness: float) -> None:
+    def __init__(self, points: Floats, faces: Ints, area: Floats, skin: Skin, thickness: float) -> None:
         self._points, self._faces = points, faces
         self._material = Material(thickness)
         self._mesh = topology(faces, len(points))
@@ -77,9 +75,9 @@ class Shell:
 
     def wrinkled(
         self,
-        carried: Array,
+        carried: Floats,
         share: float,
-        start: Array,
+        start: Floats,
         tolerance: float,
         model: Model | None = None,
         watch: Callable[[], None] = lambda: None,
@@ -126,7 +124,7 @@ class Shell:
             advice="Make the skin thicker or softer, or let it shrink with the body (skin.shrinkage).",
         )
 
-    def uneven(self, normals: Array, generator: np.random.Generator) -> Array:
+    def uneven(self, normals: Floats, generator: np.random.Generator) -> Floats:
         """Return a small random height (v, 3) along normals (v, 3), without which a flat skin would stay flat."""
         return _UNEVEN * self._material.thickness * generator.standard_normal((len(normals), 1)) * normals
 
@@ -141,7 +139,7 @@ class Shell:
     def _fronts(self) -> Fronts:
         return fronts_of(self._mesh, self._points)
 
-    def _inverse(self, x: Array, g: Array, stiffness: Array) -> Inverse:
+    def _inverse(self, x: Floats, g: Floats, stiffness: Floats) -> Inverse:
         """Return an approximate inverse of the tangent at x."""
         blocks = np.zeros((self._pattern.blocks, 3, 3))
         membrane_tangent(x, self._faces, g, self._material.lame, self._pattern.of_triangles, blocks)
@@ -154,7 +152,7 @@ class Shell:
             except StopIteration as end:
                 return cast(Inverse, end.value)
 
-    def _slope(self, x: Array, carried: Array, g: Array, stiffness: Array) -> tuple[Array, float]:
+    def _slope(self, x: Floats, carried: Floats, g: Floats, stiffness: Floats) -> tuple[Floats, float]:
         gradient = self._hold[:, None] * (x - carried)
         total = float(np.sum(gradient * (x - carried))) / 2
         total += membrane(x, self._faces, g, self._material.lame, gradient)
@@ -162,7 +160,7 @@ class Shell:
         return gradient, total
 
 
-def _direction(slope: Array, inverse: Inverse, moves: tuple[tuple[Array, Array], ...]) -> Array:
+def _direction(slope: Floats, inverse: Inverse, moves: tuple[tuple[Floats, Floats], ...]) -> Floats:
     """Return the direction (v, 3) of L-BFGS that starts from an inverse in place of a multiple of one.
 
     The tangent leaves compression out: alone it is too stiff for buckles, which past moves teach it.
@@ -179,6 +177,6 @@ def _direction(slope: Array, inverse: Inverse, moves: tuple[tuple[Array, Array],
     return d if _dot(slope, d) < 0 else -slope
 
 
-def _dot(a: Array, b: Array) -> float:
+def _dot(a: Floats, b: Floats) -> float:
     # no BLAS, whose sums depend on its threads
     return float(np.einsum("vi,vi->", a, b))

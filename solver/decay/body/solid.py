@@ -13,16 +13,13 @@ from functools import lru_cache
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidGeometry
 from ...fruit import Fruit
 from ..surfaces.surface import GOLDEN_ICOSAHEDRON, GOLDEN_POINTS
 
 __all__ = ["Solid", "ball", "fill", "volumes"]
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +31,17 @@ class Solid:
     skin (s): numbers of the points on the surface; faces (f, 3): its triangles, wound outwards, numbered within `skin`.
     """
 
-    points: Array
-    tets: Index
-    volume: Array
-    stone: NDArray[np.bool_]
-    rays: Array
-    depth: Array
-    skin: Index
-    faces: Index
+    points: Floats
+    tets: Ints
+    volume: Floats
+    stone: Bools
+    rays: Floats
+    depth: Floats
+    skin: Ints
+    faces: Ints
 
 
-def volumes(points: Array, tets: Index) -> Array:
+def volumes(points: Floats, tets: Ints) -> Floats:
     """Return the signed volumes (t) of tetrahedra."""
     a, b, c = (points[tets[:, k]] - points[tets[:, 0]] for k in (1, 2, 3))
     return np.einsum("ti,ti->t", np.cross(a, b), c) / 6
@@ -80,7 +77,7 @@ def fill(fruit: Fruit, layers: int) -> Solid:
 
 
 @lru_cache(maxsize=4)
-def ball(k: int) -> tuple[Array, Index, Index, Index, Index]:
+def ball(k: int) -> tuple[Floats, Ints, Ints, Ints, Ints]:
     """Return rays (p, 3), shells (p), tets (t, 4), skin (s) and faces (f, 3) of a ball of k shells."""
     cones = np.sort(np.array(GOLDEN_ICOSAHEDRON).reshape(20, 3), axis=1)
     a, b, c = (g.ravel() for g in np.meshgrid(*[np.arange(k + 1)] * 3, indexing="ij"))

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from ...arrays import Floats, Ints
 
 __all__ = ["solve", "times"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
 
 @njit(cache=True)
-def _times(start: Index, near: Index, a: Array, p: Array, y: Array) -> float:
+def _times(start: Ints, near: Ints, a: Floats, p: Floats, y: Floats) -> float:
     """Write a p to y and return p . a p."""
     total = 0.0
     for i in range(len(p)):
@@ -31,8 +29,8 @@ def _times(start: Index, near: Index, a: Array, p: Array, y: Array) -> float:
 
 @njit(cache=True)
 def solve(
-    start: Index, near: Index, own: Index, a: Array, b: Array, tolerance: float, most: int
-) -> tuple[Array, int, bool]:
+    start: Ints, near: Ints, own: Ints, a: Floats, b: Floats, tolerance: float, most: int
+) -> tuple[Floats, int, bool]:
     """Return x (p, 3) with a x = b, the iterations it took, and whether `a` curved upwards in every direction met.
 
     |b - a x| <= tolerance |b| in the preconditioner's norm.
@@ -75,7 +73,7 @@ def solve(
     return x, most, True
 
 
-def times(start: Index, near: Index, a: Array, x: Array) -> Array:
+def times(start: Ints, near: Ints, a: Floats, x: Floats) -> Floats:
     """Return a x (p, 3)."""
     y = np.empty_like(x)
     _times(start, near, a, x, y)

@@ -14,10 +14,10 @@ from itertools import combinations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
+from ...arrays import Floats, Ints
 from ...contract import Unstable
 from .equilibrium import Balance
 from .flesh import Softened, Swing
@@ -26,8 +26,6 @@ from .solid import Solid, volumes
 
 __all__ = ["Network", "knit", "longest_step", "swing", "swung"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 #: RK4 is stable on the imaginary axis up to this.
 _LIMIT = 8**0.5
@@ -42,10 +40,10 @@ class Network:
     mass (p) [Pa s2 r1]: force over it is r1 per second squared.
     """
 
-    ends: Index
-    length: Array
-    stiffness: Array
-    mass: Array
+    ends: Ints
+    length: Floats
+    stiffness: Floats
+    mass: Floats
 
 
 def knit(solid: Solid, state: Softened, inertia: float) -> Network:
@@ -61,7 +59,7 @@ def knit(solid: Solid, state: Softened, inertia: float) -> Network:
     return Network(ends, length, stiffness, np.asarray(inertia * mass, dtype=np.float64))
 
 
-def longest_step(x: Array, network: Network, loads: Loads) -> float:
+def longest_step(x: Floats, network: Network, loads: Loads) -> float:
     """Return the longest stable step [s] about points x (p, 3), every contact and tether counted."""
     i, j = network.ends.T
     along = x[j] - x[i]
@@ -89,7 +87,7 @@ def longest_step(x: Array, network: Network, loads: Loads) -> float:
 
 def swung(
     solid: Solid,
-    start: Array,
+    start: Floats,
     network: Network,
     loads: Loads,
     rule: Swing,
@@ -123,12 +121,14 @@ def swung(
     return Balance(x, residual, steps, least, up, pushes=pushes(x, loads))
 
 
-def swing(x: Array, v: Array, network: Network, loads: Loads, step: float, damping: float, count: int) -> None:
+def swing(x: Floats, v: Floats, network: Network, loads: Loads, step: float, damping: float, count: int) -> None:
     """Move points x and velocities v (p, 3) on by `count` steps [s]; damping of all motion [1/s]."""
     _march(x, v, *_arrays(network, loads), network.mass, step, damping, count)
 
 
-def _arrays(network: Network, loads: Loads) -> tuple[Index, Array, Array, Array, float, Array, Array, Array, Array]:
+def _arrays(
+    network: Network, loads: Loads
+) -> tuple[Ints, Floats, Floats, Floats, float, Floats, Floats, Floats, Floats]:
     floor = -np.inf if loads.floor is None else loads.floor
     return (
         *(network.ends, network.length, network.stiffness),
@@ -138,18 +138,18 @@ def _arrays(network: Network, loads: Loads) -> tuple[Index, Array, Array, Array,
 
 @njit(cache=True)
 def _pull(
-    x: Array,
-    ends: Index,
-    length: Array,
-    stiffness: Array,
-    weight: Array,
+    x: Floats,
+    ends: Ints,
+    length: Floats,
+    stiffness: Floats,
+    weight: Floats,
     floor: float,
-    contact: Array,
-    tether: Array,
-    held: Array,
-    balls: Array,
-    pull: Array,
-    size: Array,
+    contact: Floats,
+    tether: Floats,
+    held: Floats,
+    balls: Floats,
+    pull: Floats,
+    size: Floats,
 ) -> float:
     """Write the forces on points x to pull (p, 3), add the sizes of their shares to size (p); return what carries."""
     total = 0.0
@@ -192,18 +192,18 @@ def _pull(
 
 @njit(cache=True)
 def _march(
-    x: Array,
-    v: Array,
-    ends: Index,
-    length: Array,
-    stiffness: Array,
-    weight: Array,
+    x: Floats,
+    v: Floats,
+    ends: Ints,
+    length: Floats,
+    stiffness: Floats,
+    weight: Floats,
     floor: float,
-    contact: Array,
-    tether: Array,
-    held: Array,
-    balls: Array,
-    mass: Array,
+    contact: Floats,
+    tether: Floats,
+    held: Floats,
+    balls: Floats,
+    mass: Floats,
     step: float,
     damping: float,
     count: int,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...contract import Context
 from ..params import DecayParams
 from ..settings import Settings
@@ -17,8 +17,6 @@ from .flesh import Skin
 from .skin import Settled, Shell
 
 __all__ = ["Wrinkles"]
-
-Array = NDArray[np.float64]
 
 
 class Wrinkles:
@@ -49,10 +47,10 @@ class Wrinkles:
         found = self._shell.wrinkled(carried, share, carried + folds, self._tolerance, model, watch)
         return found._replace(points=found.points - carried)
 
-    def on_lattice(self, folds: Array, resolution: int) -> Array:
+    def on_lattice(self, folds: Floats, resolution: int) -> Floats:
         """Return what `at` found on the common lattice (n, 2 n, 3)."""
         return (sampler(self._cells, resolution) @ folds).reshape(resolution, -1, 3)
 
-    def on_surface(self, folds: Array) -> Array:
+    def on_surface(self, folds: Floats) -> Floats:
         """Return what `at` found on the vertices of the fields' surface (v, 3)."""
         return shares_at(*geodesic(self._cells), geodesic(self._fields)[0]) @ folds

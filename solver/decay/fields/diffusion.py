@@ -16,12 +16,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from .gate import gate
 
 __all__ = ["Links", "linked", "listed_around", "rkl2", "stages_for"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Link = NDArray[np.int32]
 
 
@@ -31,9 +30,9 @@ class Links(NamedTuple):
     share: weight times mean coefficient over the row's area [1/r1^2 times c].
     """
 
-    first: Index
+    first: Ints
     to: Link
-    share: Array
+    share: Floats
 
 
 def stages_for(dt: float, radius: float) -> int:
@@ -47,7 +46,7 @@ def stages_for(dt: float, radius: float) -> int:
 
 
 @njit(cache=True)
-def listed_around(u: Array, cut: float, rings: int, start: Index, near: Index) -> Index:
+def listed_around(u: Floats, cut: float, rings: int, start: Ints, near: Ints) -> Ints:
     """Return, in order, the vertices with u > cut and all within so many rings about them."""
     count = len(u)
     ring = np.full(count, -1, np.int64)
@@ -74,7 +73,7 @@ def listed_around(u: Array, cut: float, rings: int, start: Index, near: Index) -
 
 
 @njit(cache=True)
-def linked(c: Array, rot: Array, listed: Index, start: Index, near: Index, weight: Array, area: Array) -> Links:
+def linked(c: Floats, rot: Floats, listed: Ints, start: Ints, near: Ints, weight: Floats, area: Floats) -> Links:
     """Return the edges among the listed vertices that have a coefficient c > 0 at both ends: its harmonic mean.
 
     rot (v): map that opens the gate, at both ends and in the middle; without one (empty) there is no gate.
@@ -115,7 +114,7 @@ def _potential(y: float, cap: float) -> float:
 
 
 @njit(cache=True)
-def rkl2(y: Array, links: Links, scale: float, cap: float, dt: float, stages: int, listed: Index, area: Array) -> None:
+def rkl2(y: Floats, links: Links, scale: float, cap: float, dt: float, stages: int, listed: Ints, area: Floats) -> None:
     """Advance y by dt in place on the listed vertices; others neither change nor take part.
 
     Phi(y) = scale y^2 (1/2 - y / (3 cap)) up to cap, or scale y if cap <= 0. What undershoots zero is taken from the

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from ...arrays import Floats
 
 __all__ = ["SHUT", "gate", "gates"]
 
-Array = NDArray[np.float64]
 
 #: Rot map where the gate starts to open and where it is open; below the first the mould does not enter. Ten times more
 #: makes young colonies hang on how thin their rot is, and errors of the mesh four times larger.
@@ -28,7 +28,7 @@ def gate(rot: float) -> float:
 
 
 @njit(cache=True)
-def gates(rot: Array) -> Array:
+def gates(rot: Floats) -> Floats:
     """Return the gate at the values of a rot map (v)."""
     found = np.empty_like(rot)
     for i in range(len(rot)):

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from ..surfaces.surface import Surface
 from .diffusion import Links, linked, listed_around, rkl2, stages_for
 from .rates import Rates
@@ -19,28 +19,27 @@ from .reaction import react
 
 __all__ = ["Layer", "State"]
 
-Array = NDArray[np.float64]
 
 #: Rings about what lives that a step may reach; beyond them densities fall doubly exponentially (D ~ u).
 _RINGS = 3
 #: Density below which nothing lives, over d2.
 _CUT = 1e-8
-_NO_ROT: Array = np.empty(0)
+_NO_ROT: Floats = np.empty(0)
 
 
 class State(NamedTuple):
     """Active u, inactive v and nutrient n, each (v), and the mean density that was added from outside."""
 
-    u: Array
-    v: Array
-    n: Array
+    u: Floats
+    v: Floats
+    n: Floats
     added: float
 
 
 class Layer:
     """An organism on a surface. `coarse` (v) is the random factor 1 + delta on motility, Eq. 5."""
 
-    def __init__(self, surface: Surface, rates: Rates, fresh: Array, coarse: Array) -> None:
+    def __init__(self, surface: Surface, rates: Rates, fresh: Floats, coarse: Floats) -> None:
         self.surface, self.rates = surface, rates
         self._coarse = coarse
         self._all = np.arange(len(fresh))
@@ -49,11 +48,11 @@ class Layer:
         self.fresh = State(zero, zero, fresh, 0.0)
         self._store = rates.theta * surface.mean(fresh)
 
-    def share(self, state: State) -> Array:
+    def share(self, state: State) -> Floats:
         """Return u + v over what the nutrient n = 1 can feed: the organism's map, 0 to 1."""
         return np.minimum((state.u + state.v) / self.rates.theta, 1.0)
 
-    def advance(self, state: State, dt: float, rot: Array = _NO_ROT, rates: Rates | None = None) -> State:
+    def advance(self, state: State, dt: float, rot: Floats = _NO_ROT, rates: Rates | None = None) -> State:
         """Return the state dt [day] later. rot (v): the map whose gate says where the organism may spread.
 
         rates: those of this step, where the weather changes them.
@@ -71,12 +70,12 @@ class Layer:
 
     def _half(
         self,
-        u: Array,
-        v: Array,
-        n: Array,
-        listed: NDArray[np.int64],
+        u: Floats,
+        v: Floats,
+        n: Floats,
+        listed: Ints,
         dt: float,
-        rot: Array,
+        rot: Floats,
         rates: Rates,
     ) -> None:
         s = self.surface
@@ -89,11 +88,11 @@ class Layer:
         rkl2(u, self._linked(c, rot, listed), rates.mobility, rates.cap, dt, stages, listed, s.area)
         react(u, v, n, listed, dt / 2, rates)
 
-    def _linked(self, c: Array, rot: Array, listed: NDArray[np.int64]) -> Links:
+    def _linked(self, c: Floats, rot: Floats, listed: Ints) -> Links:
         s = self.surface
         return linked(c, rot, listed, s.start, s.near, s.weight, s.area)
 
-    def seeded(self, state: State, centre: Array, radius: float, gate: Array | None = None) -> State:
+    def seeded(self, state: State, centre: Floats, radius: float, gate: Floats | None = None) -> State:
         """Return the state with a new colony: a smooth bump of height d2 about a point (3), times the gate.
 
         Its total does not depend on the mesh; a mesh coarser than the bump takes it all at the nearest vertex.
@@ -108,7 +107,7 @@ class Layer:
         bump *= self.rates.cap * np.pi * radius**2 / 3 / whole
         return state._replace(u=state.u + bump, added=state.added + self.surface.mean(bump))
 
-    def painted(self, state: State, share: Array) -> State:
+    def painted(self, state: State, share: Floats) -> State:
         """Return the state with colonies of height d2 where share (v), 0 to 1, is 1."""
         more = self.rates.cap * share
         return state._replace(u=state.u + more, added=state.added + self.surface.mean(more))

@@ -7,17 +7,17 @@ an even distribution. Two meshes of one fruit see the same field; noise per vert
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
+
+from ...arrays import Floats
 
 __all__ = ["patches"]
 
-Array = NDArray[np.float64]
 
 _WAVES = 64
 
 
-def patches(points: Array, size: float, generator: np.random.Generator) -> Array:
+def patches(points: Floats, size: float, generator: np.random.Generator) -> Floats:
     """Return values in (-1, 1), evenly distributed, at points (v, 3), correlated over `size` (same unit)."""
     waves = generator.normal(size=(_WAVES, 3)) / size
     phases = generator.uniform(0, 2 * np.pi, _WAVES)

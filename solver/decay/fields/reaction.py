@@ -10,19 +10,16 @@ second order (Burchard, Deleersnijder and Meister 2003) keeps that to round-off 
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from .rates import Rates
 
 __all__ = ["react"]
 
-Array = NDArray[np.float64]
-
 
 @njit(cache=True)
-def react(u: Array, v: Array, n: Array, listed: NDArray[np.int64], dt: float, rates: Rates) -> None:
+def react(u: Floats, v: Floats, n: Floats, listed: Ints, dt: float, rates: Rates) -> None:
     """Advance the listed vertices by dt [day] in place."""
     for i in listed:
         u0, n0 = u[i], n[i]

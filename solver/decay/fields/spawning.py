@@ -10,11 +10,11 @@ import heapq
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Floats
 
 __all__ = ["Landing", "Spawner"]
 
-Array = NDArray[np.float64]
 
 #: Colonies of a kind on one fruit: by then they have run into one another, and no more clocks are started.
 _MOST = 200
@@ -24,7 +24,7 @@ class Landing(NamedTuple):
     """When [day] and at which unit direction (3) a spore comes down; a mark in [0, 1) to weigh against a chance."""
 
     day: float
-    direction: Array
+    direction: Floats
     mark: float
     stray: bool
 
@@ -35,7 +35,7 @@ class Spawner:
     def __init__(self, per_colony: float, strays: float, reach: float, generator: np.random.Generator) -> None:
         self._per_colony, self._strays, self._reach = per_colony, strays, reach
         self._generator = generator
-        self._parents: list[Array] = []
+        self._parents: list[Floats] = []
         self._clocks: list[tuple[float, int]] = []
         if strays > 0:
             self._wind(0.0, -1)
@@ -45,7 +45,7 @@ class Spawner:
         """When the next spore lands [day]; infinite if none ever does."""
         return self._clocks[0][0] if self._clocks else np.inf
 
-    def settle(self, direction: Array, day: float) -> None:
+    def settle(self, direction: Floats, day: float) -> None:
         """Start the clock of a new colony at a unit direction (3)."""
         self._parents.append(direction)
         if self._per_colony > 0 and len(self._parents) <= _MOST:

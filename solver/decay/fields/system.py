@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from ...arrays import Floats
 from ...contract import Context
 from ...fruit import directions
 from ..params import DecayParams
@@ -28,7 +28,6 @@ from .spawning import Landing, Spawner
 
 __all__ = ["Both", "System", "laid"]
 
-Array = NDArray[np.float64]
 
 #: Radius of a spawned colony [r1], and the share of the map above which a place is taken already.
 _SPORE = 0.06
@@ -117,7 +116,7 @@ class System:
         """Whether nothing from outside changes in time."""
         return not self._params.weather
 
-    def gate(self, rot: State) -> Array:
+    def gate(self, rot: State) -> Floats:
         """Return where the mould may spread, 0 to 1 (v)."""
         return gates(self.rot.share(rot))
 
@@ -176,7 +175,7 @@ class System:
         self._mould_spawner.settle(landing.direction, landing.day)
         return state._replace(mould=self.mould.seeded(state.mould, place, _SPORE, self.gate(state.rot)))
 
-    def _place(self, ray: Array) -> Array:
+    def _place(self, ray: Floats) -> Floats:
         """Return the point (3) of the skin in a unit direction; of an imported mesh the vertex nearest to it."""
         if self._params.mesh is not None:
             return np.asarray(self.surface.points[int(self._tree.query(ray)[1])])

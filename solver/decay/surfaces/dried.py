@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from ...arrays import Floats
 from ...contract import Context, InvalidInput, Need
 from ...fruit import Fruit
 from ..body.flesh import Skin
@@ -13,7 +13,6 @@ from ..params import DecayParams
 
 __all__ = ["at_rays", "check", "displaced", "shrinkage"]
 
-Array = NDArray[np.float64]
 
 #: Rows of the lattice that a mesh is moved by where no lattice was asked for: the table's own.
 ROWS = 64
@@ -37,7 +36,7 @@ def shrinkage(params: DecayParams, water: float) -> float:
     return float(1 - np.cbrt(1 - params.flesh.shrinkage * water))
 
 
-def displaced(params: DecayParams, water: float, resolution: int, context: Context) -> Array:
+def displaced(params: DecayParams, water: float, resolution: int, context: Context) -> Floats:
     """Return the displacement (n, 2 n, 3) [r1] on the lattice after a share of the weight has gone as water.
 
     The skin's stiffness over the flesh's is that of `skin`, given or not.
@@ -51,7 +50,7 @@ def displaced(params: DecayParams, water: float, resolution: int, context: Conte
     return np.asarray(context.dried(fruit, shrinkage(params, water), resolution), float)
 
 
-def at_rays(values: Array, rays: Array) -> Array:
+def at_rays(values: Floats, rays: Floats) -> Floats:
     """Return a lattice's vectors (n, 2 n, 3) at unit rays (v, 3), by cubic splines across poles and seam."""
     n, rim = len(values), 8
     # beyond a pole the rows go on on the other side

@@ -9,14 +9,12 @@ from __future__ import annotations
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ...arrays import Floats
 from .surface import Extent, Surface
 
 __all__ = ["Mesh", "extent_of", "rays_from"]
-
-Array = NDArray[np.float64]
 
 
 class Mesh(BaseModel):
@@ -48,7 +46,7 @@ class Mesh(BaseModel):
         return self
 
 
-def rays_from(points: Array) -> Array:
+def rays_from(points: Floats) -> Floats:
     """Return unit directions (v, 3) of points (v, 3) from the middle of the sphere that fits them best."""
     about = points - points.mean(axis=0)
     # |x|^2 = 2 c.x + k, least squares; of a flat mesh the least c

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from scipy import ndimage
 
+from ...arrays import Floats
+
 __all__ = ["Neighbour", "Painted", "Place", "Pressure", "PressureMap", "Wound", "painted"]
 
-Array = NDArray[np.float64]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -99,7 +99,7 @@ class Neighbour(BaseModel):
     )
 
 
-def painted(rows: tuple[tuple[float, ...], ...], rays: Array) -> Array:
+def painted(rows: tuple[tuple[float, ...], ...], rays: Floats) -> Floats:
     """Return a painted map at unit rays (v, 3), bilinear; beyond a pole the rows go on on the other side."""
     values = np.array(rows, dtype=float)
     n, m = values.shape
@@ -107,5 +107,5 @@ def painted(rows: tuple[tuple[float, ...], ...], rays: Array) -> Array:
     down = np.arccos(np.clip(rays[:, 1], -1, 1)) * n / np.pi + 0.5
     along = np.arctan2(rays[:, 2], rays[:, 0]) % (2 * np.pi) * m / (2 * np.pi)
     padded = np.concatenate([padded, padded[:, :1]], axis=1)
-    found: Array = ndimage.map_coordinates(padded, [down, along], order=1, mode="nearest")
+    found: Floats = ndimage.map_coordinates(padded, [down, along], order=1, mode="nearest")
     return found

@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints32
 from ...contract import Context, InvalidInput, Need
 from ...fruit import lattice, window
 from ..environment import water_lost
 from ..fields.system import laid
+from ..names import BODY
 from ..params import DecayParams
-from ..settings import BODY, Settings, moved
+from ..settings import Settings, moved
 from . import dried
 from .imported import extent_of
 from .surface import Surface, extent, geodesic
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from ..body.skin import Settled
 
 __all__ = ["Shape"]
-
-Array = NDArray[np.float64]
 
 
 class _Settled(NamedTuple):
@@ -83,12 +82,12 @@ class Shape:
             dried.displaced(self._params, self._lost(self._need.stages[-1]), 4, context)
 
     @property
-    def triangles(self) -> NDArray[np.int32]:
+    def triangles(self) -> Ints32:
         """Faces (f, 3) of the surface whose vertices are `mesh_position`."""
         assert self.surface is not None
         return self.surface.faces.astype(np.int32)
 
-    def at(self, day: float, rot: Array | None, context: Context) -> dict[str, Any]:
+    def at(self, day: float, rot: Floats | None, context: Context) -> dict[str, Any]:
         """Return the wanted shape of a day, with rot (v) on the surface's vertices.
 
         Raises:
@@ -133,7 +132,7 @@ class Shape:
                 row["volume"] = own.volume if own else _volume(points, self.surface)
         return row
 
-    def follow(self, day: float, rot: Array | None, context: Context) -> None:
+    def follow(self, day: float, rot: Floats | None, context: Context) -> None:
         """Settle a day of the march: later days, stages among them, start from its shape.
 
         Raises:
@@ -142,7 +141,7 @@ class Shape:
         """
         self._node, _ = self._settled(day, rot, context)
 
-    def _settled(self, day: float, rot: Array | None, context: Context) -> tuple[_Settled, dict[str, Any]]:
+    def _settled(self, day: float, rot: Floats | None, context: Context) -> tuple[_Settled, dict[str, Any]]:
         """Return the moved shape of a day, and what is kept of how it was found."""
         if self._body is None:
             return _Settled(None, None), {}
@@ -155,13 +154,13 @@ class Shape:
             row["skin_residual"], row["skin_steps"] = folds.residual, folds.steps
         return _Settled(balance, folds), row
 
-    def _dried(self, day: float, resolution: int, context: Context) -> Array:
+    def _dried(self, day: float, resolution: int, context: Context) -> Floats:
         return dried.displaced(self._params, self._lost(day), resolution, context)
 
     def _lost(self, day: float) -> float:
         return water_lost(self._params, self._extent, day)
 
 
-def _volume(points: Array, surface: Surface) -> float:
+def _volume(points: Floats, surface: Surface) -> float:
     a, b, c = (points[surface.faces[:, k]] for k in range(3))
     return float(np.sum(a * np.cross(b, c))) / 6

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import robust_laplacian
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.spatial import KDTree
 
+from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidGeometry
 from ...fruit import Fruit, directions, lattice
 
@@ -33,7 +33,6 @@ __all__ = [
     "triangulated",
 ]
 
-Array = NDArray[np.float64]
 
 _GOLDEN = (1 + 5**0.5) / 2
 #: Corners of its triangles, of three golden rectangles of four corners each.
@@ -43,7 +42,7 @@ GOLDEN_ICOSAHEDRON = (
 )
 _RECTANGLE = np.array([[-1, _GOLDEN, 0], [1, _GOLDEN, 0], [-1, -_GOLDEN, 0], [1, -_GOLDEN, 0]])
 #: Its corners (12, 3), of length 1.
-GOLDEN_POINTS: Array = np.concatenate([np.roll(_RECTANGLE, k, axis=1) for k in range(3)]) / np.hypot(1, _GOLDEN)
+GOLDEN_POINTS: Floats = np.concatenate([np.roll(_RECTANGLE, k, axis=1) for k in range(3)]) / np.hypot(1, _GOLDEN)
 
 
 class Extent(NamedTuple):
@@ -62,25 +61,25 @@ class Surface:
     stiffest: upper bound of the spectral radius of the Laplacian with unit diffusivity [1/r1^2] (Gershgorin).
     """
 
-    points: Array
-    faces: NDArray[np.int64]
-    area: Array
-    start: NDArray[np.int64]
-    near: NDArray[np.int64]
-    weight: Array
+    points: Floats
+    faces: Ints
+    area: Floats
+    start: Ints
+    near: Ints
+    weight: Floats
     stiffest: float
 
-    def mean(self, field: Array | NDArray[np.bool_]) -> float:
+    def mean(self, field: Floats | Bools) -> float:
         """Return the area-weighted mean of a field (v)."""
         return self.total(field) / self.total(1.0)
 
-    def total(self, field: Array | NDArray[np.bool_] | float) -> float:
+    def total(self, field: Floats | Bools | float) -> float:
         """Return the integral over the surface of a field (v) [r1^2]; the same whatever the number of threads."""
         return float(np.sum(self.area * field))  # a BLAS product would sum by threads
 
 
 @lru_cache(maxsize=4)
-def geodesic(cells: int) -> tuple[Array, NDArray[np.int64]]:
+def geodesic(cells: int) -> tuple[Floats, Ints]:
     """Return unit directions (10 cells^2 + 2, 3) and faces (20 cells^2, 3), wound outwards, of a geodesic sphere.
 
     cells: edges along one of the icosahedron's. Its triangles are cut evenly by the odd part of the number, then
@@ -107,7 +106,7 @@ def geodesic(cells: int) -> tuple[Array, NDArray[np.int64]]:
     return points, faces
 
 
-def _cut(cells: int) -> tuple[Array, NDArray[np.int64]]:
+def _cut(cells: int) -> tuple[Floats, Ints]:
     """Return the icosahedron, each triangle cut evenly into cells^2 and its points put on the sphere."""
     faces = np.array(GOLDEN_ICOSAHEDRON).reshape(20, 3)
     if cells == 1:
@@ -130,7 +129,7 @@ def _cut(cells: int) -> tuple[Array, NDArray[np.int64]]:
     return points / np.linalg.norm(points, axis=1, keepdims=True), np.array(cut)
 
 
-def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
+def triangulated(points: Floats, faces: Ints) -> Surface:
     """Return the surface of a triangle mesh, closed or open: nothing flows over an open border.
 
     Raises:
@@ -162,7 +161,7 @@ def triangulated(points: Array, faces: NDArray[np.int64]) -> Surface:
     )
 
 
-def _cotangents(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array] | None:
+def _cotangents(points: Floats, faces: Ints) -> tuple[Any, Floats] | None:
     """Return Laplacian and lumped areas (v) of a mesh whose own triangles are Delaunay; None of any other."""
     count = len(points)
     rows, columns, values = [], [], []
@@ -188,7 +187,7 @@ def _cotangents(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array] | 
     return laplacian, np.bincount(faces.ravel(), np.repeat(doubled / 6, 3), count).astype(float)
 
 
-def _robust(points: Array, faces: NDArray[np.int64]) -> tuple[Any, Array]:
+def _robust(points: Floats, faces: Ints) -> tuple[Any, Floats]:
     laplacian, mass = robust_laplacian.mesh_laplacian(np.asarray(points, float), np.asarray(faces, np.int64))
     return laplacian, mass.diagonal()
 
@@ -198,7 +197,7 @@ def lay(fruit: Fruit, cells: int) -> Surface:
     return triangulated(_laid(fruit, cells), geodesic(cells)[1])
 
 
-def _laid(fruit: Fruit, cells: int) -> Array:
+def _laid(fruit: Fruit, cells: int) -> Floats:
     rays, _ = geodesic(cells)
     return fruit.surface(np.arccos(np.clip(rays[:, 1], -1, 1)), np.arctan2(rays[:, 2], rays[:, 0]))
 
@@ -209,7 +208,7 @@ def extent(fruit: Fruit) -> Extent:
     return Extent(*((4 * fine - coarse) / 3).tolist())
 
 
-def _facets(points: Array, faces: NDArray[np.int64]) -> Array:
+def _facets(points: Floats, faces: Ints) -> Floats:
     a, b, c = (points[faces[:, k]] for k in range(3))
     return np.array([np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2, np.sum(a * np.cross(b, c)) / 6])
 
@@ -220,7 +219,7 @@ def sampler(cells: int, resolution: int) -> sparse.csr_array:
     return shares_at(*geodesic(cells), directions(*lattice(resolution)).reshape(-1, 3))
 
 
-def shares_at(rays: Array, faces: NDArray[np.int64], wanted: Array) -> sparse.csr_array:
+def shares_at(rays: Floats, faces: Ints, wanted: Floats) -> sparse.csr_array:
     """Return the matrix (w rows) that takes a field on a triangulated sphere of unit rays to wanted rays (w, 3)."""
     corners = rays[faces]
     _, candidates = KDTree(corners.mean(axis=1)).query(wanted, k=4)

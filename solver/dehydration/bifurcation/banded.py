@@ -8,14 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded, solve_banded
 
-__all__ = ["Factor", "Pattern", "pattern"]
+from ...arrays import Bools, Floats, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+__all__ = ["Factor", "Pattern", "pattern"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,26 +24,26 @@ class Pattern:
     stored entries. places: (ne n n,) stored entry of each element entry, the last one a bin for held ones.
     """
 
-    unknowns: Indices
+    unknowns: Ints
     size: int
-    rows: Indices
-    columns: Indices
-    places: Indices
+    rows: Ints
+    columns: Ints
+    places: Ints
 
-    def assemble(self, elements: Array) -> Array:
+    def assemble(self, elements: Floats) -> Floats:
         """Return stored entries (nnz,) of the sum of element matrices (ne, n, n)."""
         return np.bincount(self.places, elements.ravel(), len(self.rows) + 1)[:-1].astype(float, copy=False)
 
-    def vector(self, elements: Array) -> Array:
+    def vector(self, elements: Floats) -> Floats:
         """Return the sum (size,) of element vectors (ne, n)."""
         place = np.where(self.unknowns < 0, self.size, self.unknowns).ravel()
         return np.bincount(place, elements.ravel(), self.size + 1)[:-1].astype(float, copy=False)
 
-    def matrix(self, entries: Array) -> sparse.csr_array:
+    def matrix(self, entries: Floats) -> sparse.csr_array:
         """Return stored entries as a sparse matrix (size, size)."""
         return sparse.csr_array((entries, (self.rows, self.columns)), shape=(self.size, self.size))
 
-    def hold(self, entries: Array, held: NDArray[np.bool_], diagonal: float) -> Array:
+    def hold(self, entries: Floats, held: Bools, diagonal: float) -> Floats:
         """Return entries without the rows and columns of `held` (size,) unknowns, which get `diagonal`."""
         touched = held[self.rows] | held[self.columns]
         return np.where(touched, np.where(self.rows == self.columns, diagonal, 0.0), entries)
@@ -55,7 +53,7 @@ class Pattern:
         """Number of subdiagonals."""
         return int((self.rows - self.columns).max())
 
-    def factor(self, entries: Array) -> Factor | None:
+    def factor(self, entries: Floats) -> Factor | None:
         """Return the Cholesky factor, or None if the matrix is not positive definite."""
         lower = self.rows >= self.columns
         band = np.zeros((self.bandwidth + 1, self.size))
@@ -65,7 +63,7 @@ class Pattern:
         except LinAlgError:
             return None
 
-    def solve(self, entries: Array, right: Array) -> Array:
+    def solve(self, entries: Floats, right: Floats) -> Floats:
         """Return the solution (size,) of a system that need not be positive definite."""
         factor = self.factor(entries)
         if factor is not None:
@@ -80,14 +78,14 @@ class Pattern:
 class Factor:
     """A banded Cholesky factor."""
 
-    band: Array
+    band: Floats
 
-    def solve(self, right: Array) -> Array:
+    def solve(self, right: Floats) -> Floats:
         """Return the solution (size,) for the right-hand side (size,)."""
         return cho_solve_banded((self.band, True), right, check_finite=False)
 
 
-def pattern(unknowns: Indices, size: int) -> Pattern:
+def pattern(unknowns: Ints, size: int) -> Pattern:
     """Return the pattern of element matrices whose unknowns are numbered `unknowns` (ne, n), -1 for held ones."""
     count, n = unknowns.shape
     rows = np.broadcast_to(unknowns[:, :, None], (count, n, n)).ravel()

@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ...arrays import Floats
 from ...contract import Context, InvalidInput, NotConverged
 from ..params import DehydrationParams
 from .banded import Pattern, pattern
@@ -18,7 +18,6 @@ from .meridional_mesh import PER_WAVELENGTH, MeridionalMesh, build
 
 __all__ = ["BaseState", "Meridian", "base_state"]
 
-Array = NDArray[np.float64]
 
 #: Bulk over shear modulus that stands for incompressible; s_cr is off by about 2 / PENALTY, relative.
 PENALTY = 1e6
@@ -48,7 +47,7 @@ class Meridian:
         self.free = free
         self.pattern: Pattern = pattern(number[mesh.nodes].reshape(len(mesh.nodes), 18), int(free.sum()))
 
-    def compliance(self, s: float) -> Array:
+    def compliance(self, s: float) -> Floats:
         """Return the inverse (ne, 3, 3) of the pressures' mass matrix over the bulk modulus."""
         mesh = self.mesh
         scale = mesh.weight * mesh.shrunk(s) / (self.bulk * mesh.shear[:, None])
@@ -122,8 +121,8 @@ class BaseState:
 
     meridian: Meridian
     s: float
-    moved: Array
-    pressures: Array
+    moved: Floats
+    pressures: Floats
 
     @cached_property
     def _spline(self) -> tuple[CubicSpline, CubicSpline]:
@@ -138,13 +137,13 @@ class BaseState:
             CubicSpline(mesh.colatitude, shift[..., 1], bc_type=even),
         )
 
-    def __call__(self, points: Array) -> Array:
+    def __call__(self, points: Floats) -> Floats:
         """Return where fresh points (n, 3) [r1] of the fruit are in this state, (n, 3); inside the stone they stay."""
         points = np.asarray(points, dtype=float)
         parts = [self._move(points[i : i + _CHUNK]) for i in range(0, len(points), _CHUNK)]
         return np.concatenate(parts) if parts else points.copy()
 
-    def _move(self, points: Array) -> Array:
+    def _move(self, points: Floats) -> Floats:
         mesh, params = self.meridian.mesh, self.meridian.params
         radius = np.hypot(points[:, 0], points[:, 2])
         distance = np.hypot(radius, points[:, 1])
@@ -169,11 +168,11 @@ class BaseState:
         return points + shift
 
 
-def _parametric(params: DehydrationParams, polar: Array) -> Array:
+def _parametric(params: DehydrationParams, polar: Floats) -> Floats:
     """Return the parametric colatitude whose ray has the polar angle `polar` [radian], both (n,)."""
     fine = np.linspace(0, np.pi, 2001)
 
-    def angle(at: Array) -> Array:
+    def angle(at: Floats) -> Floats:
         x, y = params.generatrix(at)
         return np.arctan2(np.maximum(x, 0.0), y)
 

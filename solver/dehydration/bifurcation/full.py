@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import sph_harm_y
 
+from ...arrays import Floats
 from ...contract import Context, NotConverged
 from ...fem import HEX27
 from ..fresh.closed_form import flat_film_wavelength, onset_estimate
@@ -26,7 +26,6 @@ from .result import FieldMode, Method, Onset, Tie
 
 __all__ = ["onset_full"]
 
-Floats = NDArray[np.float64]
 
 #: Quadratic elements per wrinkle of the flat film on a unit sphere: s_cr of the sphere with te = 0.04 comes out 3.0,
 #: 1.7 and 0.9 % high with 1.5, 2 and 2.5 of them.

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...contract import Context, NotConverged
 from ..fresh.closed_form import flat_film_wavelength, onset_estimate
@@ -26,7 +25,6 @@ from .search import Valley
 
 __all__ = ["onset_meridional"]
 
-Array = NDArray[np.float64]
 
 #: Elements per flat-film wavelength of the scanning mesh.
 _SCAN = 3.0

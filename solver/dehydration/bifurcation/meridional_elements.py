@@ -10,8 +10,8 @@ the axis always, Q = 0 unless m = 1, and c = 0 unless m = 0.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from .meridional_mesh import MeridionalMesh
 
 __all__ = [
@@ -25,7 +25,6 @@ __all__ = [
     "volume_rates",
 ]
 
-Array = NDArray[np.float64]
 
 # H in the order rR rY rPhi yR yY yPhi phiR phiY phiPhi
 _T0, _T1 = np.zeros((9, 9)), np.zeros((9, 9))
@@ -34,7 +33,7 @@ _T0[2, 5] = -1.0
 _T1[[2, 5, 8], [2, 8, 5]] = [-1.0, -1.0, 1.0]
 
 
-def deformation(mesh: MeridionalMesh, moved: Array) -> Array:
+def deformation(mesh: MeridionalMesh, moved: Floats) -> Floats:
     """Return F (ne, 9, 3, 3), rows (r, y, phi), columns (R, Y, Phi), of nodes moved to (nodes, 2)."""
     f = np.zeros((*mesh.weight.shape, 3, 3))
     f[..., :2, :2] = np.einsum("eqkn,eni->eqik", mesh.gradient[:, :, :2], moved[mesh.nodes])
@@ -42,7 +41,7 @@ def deformation(mesh: MeridionalMesh, moved: Array) -> Array:
     return f
 
 
-def _parts(mesh: MeridionalMesh, f: Array, s: float) -> tuple[Array, Array, Array, Array]:
+def _parts(mesh: MeridionalMesh, f: Floats, s: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Return J, I1, the isochoric factor mu Jd J^(-2/3) (all (ne, 9)) and F^-T."""
     plane = f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
     volume = plane * f[..., 2, 2]
@@ -54,7 +53,7 @@ def _parts(mesh: MeridionalMesh, f: Array, s: float) -> tuple[Array, Array, Arra
     return volume, (f * f).sum(axis=(-1, -2)), factor, inverse
 
 
-def forces(mesh: MeridionalMesh, f: Array, p: Array, s: float) -> tuple[Array, Array]:
+def forces(mesh: MeridionalMesh, f: Floats, p: Floats, s: float) -> tuple[Floats, Floats]:
     """Return element forces (ne, 9, 2) and the volume gained over its target, (ne, 3). `p`: (ne, 9) pressure."""
     volume, i1, factor, inverse = _parts(mesh, f, s)
     stress = factor[..., None, None] * (f - (i1 / 3)[..., None, None] * inverse)
@@ -65,7 +64,7 @@ def forces(mesh: MeridionalMesh, f: Array, p: Array, s: float) -> tuple[Array, A
     return force, (mesh.weight * (volume - mesh.shrunk(s))) @ mesh.pressure
 
 
-def moduli(mesh: MeridionalMesh, f: Array, p: Array, s: float) -> Array:
+def moduli(mesh: MeridionalMesh, f: Floats, p: Floats, s: float) -> Floats:
     """Return d2 Psi / dF2 (ne, 9, 9, 9) at fixed pressure, times the quadrature weight."""
     volume, i1, factor, inverse = _parts(mesh, f, s)
     shape = (*volume.shape, 9)
@@ -81,7 +80,7 @@ def moduli(mesh: MeridionalMesh, f: Array, p: Array, s: float) -> Array:
     return out
 
 
-def stress_moduli(mesh: MeridionalMesh, stress: Array) -> Array:
+def stress_moduli(mesh: MeridionalMesh, stress: Floats) -> Floats:
     """Return the geometric part H_iJ S_JK H_iK of `stress` (ne, 9, 3, 3), times the quadrature weight."""
     weighted = stress * mesh.weight[..., None, None]
     out = np.zeros((*mesh.weight.shape, 3, 3, 3, 3))
@@ -90,7 +89,7 @@ def stress_moduli(mesh: MeridionalMesh, stress: Array) -> Array:
     return out.reshape(*mesh.weight.shape, 9, 9)
 
 
-def volume_rates(mesh: MeridionalMesh, f: Array) -> tuple[Array, Array]:
+def volume_rates(mesh: MeridionalMesh, f: Floats) -> tuple[Floats, Floats]:
     """Return (b0, b1), each (ne, 3, 27): b0 + m b1 maps nodal (P, Q, c) to the pressures' volume changes."""
     volume, _, _, inverse = _parts(mesh, f, 0.0)
     g = (inverse * (volume * mesh.weight)[..., None, None]).reshape(*volume.shape, 9)
@@ -102,7 +101,7 @@ def volume_rates(mesh: MeridionalMesh, f: Array) -> tuple[Array, Array]:
     return both[0], both[1]
 
 
-def tangents(mesh: MeridionalMesh, second: Array) -> tuple[Array, Array, Array]:
+def tangents(mesh: MeridionalMesh, second: Floats) -> tuple[Floats, Floats, Floats]:
     """Return (K0, K1, K2), each (ne, 27, 27) on nodal (P, Q, c): the form `second` (ne, 9, 9, 9) at wavenumber m.
 
     It is K0 + m K1 + m^2 K2, averaged over azimuth, times two.
@@ -115,7 +114,7 @@ def tangents(mesh: MeridionalMesh, second: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def axisymmetric_tangent(mesh: MeridionalMesh, second: Array) -> Array:
+def axisymmetric_tangent(mesh: MeridionalMesh, second: Floats) -> Floats:
     """Return the tangent (ne, 18, 18) of the form `second` on axisymmetric nodal displacements (a, c)."""
     form = _T0.T @ second @ _T0
     chosen = np.array([0, 1, 2, 6, 7, 8])
@@ -123,7 +122,7 @@ def axisymmetric_tangent(mesh: MeridionalMesh, second: Array) -> Array:
     return blocks.transpose(0, 3, 1, 4, 2).reshape(len(blocks), 18, 18)
 
 
-def axisymmetric_volume_rate(mesh: MeridionalMesh, f: Array) -> Array:
+def axisymmetric_volume_rate(mesh: MeridionalMesh, f: Floats) -> Floats:
     """Return b (ne, 3, 18), which maps axisymmetric nodal displacements (a, c) to the pressures' volume changes."""
     volume, _, _, inverse = _parts(mesh, f, 0.0)
     g = inverse * (volume * mesh.weight)[..., None, None]
@@ -133,12 +132,12 @@ def axisymmetric_volume_rate(mesh: MeridionalMesh, f: Array) -> Array:
     return rate.reshape(len(g), 3, 18)
 
 
-def _integrate(mesh: MeridionalMesh, forms: Array) -> Array:
+def _integrate(mesh: MeridionalMesh, forms: Floats) -> Floats:
     out = _circular(_circular(_blocks(mesh, forms), axis=1), axis=2)
     return out.transpose(0, 3, 1, 4, 2).reshape(len(out), 27, 27)
 
 
-def _blocks(mesh: MeridionalMesh, forms: Array) -> Array:
+def _blocks(mesh: MeridionalMesh, forms: Floats) -> Floats:
     """Return (ne, fields, fields, 9, 9): forms (ne, 9, 3 fields, 3 fields) integrated over shape derivatives."""
     count, fields = len(mesh.nodes), forms.shape[-1] // 3
     left = mesh.gradient.reshape(count, 27, 9).swapaxes(1, 2)
@@ -152,7 +151,7 @@ def _blocks(mesh: MeridionalMesh, forms: Array) -> Array:
     return out
 
 
-def _circular(values: Array, axis: int) -> Array:
+def _circular(values: Floats, axis: int) -> Floats:
     """Turn components (a, b, c) along `axis` into (P, Q, c)."""
     a, b, c = np.moveaxis(values, axis, 0)
     return np.stack([(a + b) / np.sqrt(2), (a - b) / np.sqrt(2), c], axis=axis)

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Bools, Floats, Ints
 from ...fem import QUAD9, gauss
 from ..fresh.closed_form import flat_film_wavelength
 from ..fresh.mesh import layer_fractions
@@ -15,8 +15,6 @@ from ..params import DehydrationParams
 
 __all__ = ["PER_WAVELENGTH", "MeridionalMesh", "build"]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Elements along the surface per flat-film wavelength.
 PER_WAVELENGTH = {"preview": 4.0, "default": 6.0, "fine": 9.0}
@@ -39,22 +37,22 @@ class MeridionalMesh:
     at the quadrature points. weight: (ne, 9) with R. pressure: (9, 3). core: (ne,). shear: (ne,) over the core's.
     """
 
-    colatitude: Array
-    depth: Array
-    position: Array
-    nodes: Indices
-    gradient: Array
-    weight: Array
-    pressure: Array
-    core: NDArray[np.bool_]
-    shear: Array
+    colatitude: Floats
+    depth: Floats
+    position: Floats
+    nodes: Ints
+    gradient: Floats
+    weight: Floats
+    pressure: Floats
+    core: Bools
+    shear: Floats
 
     @property
     def levels(self) -> int:
         """Nodes along a column."""
         return len(self.depth)
 
-    def shrunk(self, s: float) -> Array:
+    def shrunk(self, s: float) -> Floats:
         """Return Jd (ne, 1) at shrinkage `s`."""
         return np.where(self.core, (1 - s) ** 3, 1.0)[:, None]
 

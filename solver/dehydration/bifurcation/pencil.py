@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
+from ...arrays import Bools, Floats
 from ...contract import NotConverged
 from .banded import Pattern, pattern
 from .base import BaseState, Meridian
@@ -17,8 +17,7 @@ from .meridional_elements import deformation, moduli, stress_moduli, tangents, v
 
 __all__ = ["Critical", "Pencil", "Perturbations", "Tangent", "UnstableStart"]
 
-Array = NDArray[np.float64]
-Terms = tuple[Array, Array, Array]
+Terms = tuple[Floats, Floats, Floats]
 
 
 class UnstableStart(Exception):
@@ -30,7 +29,7 @@ class Critical:
     """A mode: where it starts, and the height of its buckles (columns,) along the outward normal, largest one 1."""
 
     s: float
-    profile: Array
+    profile: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +65,7 @@ class Perturbations:
         normal = np.stack([-along[:, 1], along[:, 0]], axis=-1)
         self._normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
-    def held(self, m: int) -> NDArray[np.bool_]:
+    def held(self, m: int) -> Bools:
         """Return which unknowns vanish on the axis for wavenumber `m`, (size of whole,)."""
         held = np.zeros(self.whole.size, dtype=bool)
         for component, carried in enumerate((m + 1, m - 1, m)):
@@ -109,14 +108,14 @@ class Perturbations:
             tuple(self.condensed.assemble(k) for k in parts),  # type: ignore[arg-type]
         )
 
-    def profile(self, vector: Array) -> Array:
+    def profile(self, vector: Floats) -> Floats:
         """Return the height of a mode over the surface's columns, largest one 1."""
         p, q, c = vector[self._surface].T
         height = self._normal[:, 0] * (p + q) / np.sqrt(2) + self._normal[:, 1] * c
         return height / height[np.argmax(np.abs(height))]
 
 
-def _saddle(stiff: Array, rate: Array, mass: Array) -> Array:
+def _saddle(stiff: Floats, rate: Floats, mass: Floats) -> Floats:
     out = np.empty((len(stiff), 30, 30))
     out[:, :27, :27], out[:, 27:, 27:] = stiff, mass
     out[:, 27:, :27], out[:, :27, 27:] = rate, rate.swapaxes(1, 2)
@@ -134,7 +133,7 @@ class Pencil:
     at: tuple[float, ...]
     terms: tuple[Terms, ...]
     condensed: Terms
-    compliance: Array
+    compliance: Floats
 
     @classmethod
     def exact(cls, space: Perturbations, states: Sequence[BaseState]) -> Pencil:
@@ -178,7 +177,7 @@ class Pencil:
         fall = (matrices[0] - matrices[-1]) / (self.at[-1] - self.at[0])
         rate = matrices[0][space.size :, : space.size]
 
-        def step(right: Array) -> Array:
+        def step(right: Floats) -> Floats:
             load = fall @ right.ravel()
             force, gain = load[: space.size], load[space.size :]
             gain = np.einsum("eab,eb->ea", self.compliance, gain.reshape(-1, 3)).ravel()
@@ -203,7 +202,7 @@ class Pencil:
         none = [Critical(np.inf, np.zeros(len(space.meridian.mesh.colatitude)))]
         return sorted(modes, key=lambda mode: mode.s) or none
 
-    def _root(self, vector: Array, matrices: Sequence[sparse.csr_array], near: float) -> float:
+    def _root(self, vector: Floats, matrices: Sequence[sparse.csr_array], near: float) -> float:
         """Return where the mode's own energy vanishes: its error is the square of the mode's."""
         if len(matrices) == 2:
             return near
@@ -214,5 +213,5 @@ class Pencil:
         return float(real[np.argmin(np.abs(real - near))]) if len(real) else near
 
 
-def _at(terms: Terms, m: int) -> Array:
+def _at(terms: Terms, m: int) -> Floats:
     return terms[0] + m * terms[1] + m * m * terms[2]

@@ -7,7 +7,6 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh, eigvalsh
 from scipy.optimize import brentq
 from scipy.special import eval_legendre
@@ -21,7 +20,6 @@ from .search import Valley
 
 __all__ = ["SEARCHED", "onset_radial", "short_wave_reason", "stable_reason"]
 
-Array = NDArray[np.float64]
 
 #: Largest shrinkage that is looked at, the end of the stage axis.
 SEARCHED = 0.6

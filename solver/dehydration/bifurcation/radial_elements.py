@@ -15,16 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from ...arrays import Bools, Floats, Ints
 from ...contract import NotConverged
 from ...fem import gauss, lobatto, segment
 from ..fresh.closed_form import flat_film_wavelength, sphere_radius
 
 __all__ = ["RadialMesh", "RadialState", "linear_tangents", "radial_mesh", "smooth", "tangent"]
 
-Array = NDArray[np.float64]
 
 #: Core layer at the interface in flat-film wavelengths, and how fast layers grow inwards.
 _FIRST, _GROWTH = 0.2, 2.0
@@ -41,17 +40,17 @@ class RadialMesh:
     """
 
     stone: float
-    breaks: Array
-    at: NDArray[np.int64]
-    position: Array
-    radius: Array
-    weight: Array
-    strain: Array
-    pressure: Array
-    core: NDArray[np.bool_]
-    shear: Array
+    breaks: Floats
+    at: Ints
+    position: Floats
+    radius: Floats
+    weight: Floats
+    strain: Floats
+    pressure: Floats
+    core: Bools
+    shear: Floats
 
-    def shrunk(self, s: float) -> Array:
+    def shrunk(self, s: float) -> Floats:
         """Return Jd (ne, 1) at shrinkage `s`."""
         return np.where(self.core, (1 - s) ** 3, 1.0)[:, None]
 
@@ -77,7 +76,7 @@ def radial_mesh(stone: float, thickness: float, gamma: float, order: int = 8) ->
     position = np.empty(count * k + 1)
     position[at] = middle + half * lobatto(k)
     core = np.arange(count) < count - 2
-    pressure: Array = np.asarray(legendre.legvander(x, k - 1), dtype=float)
+    pressure: Floats = np.asarray(legendre.legvander(x, k - 1), dtype=float)
     shear = np.where(core, 1.0, gamma)[:, None]
     return RadialMesh(stone, breaks, at, position, radius, w * half * radius**2, strain, pressure, core, shear)
 
@@ -87,14 +86,14 @@ class RadialState:
     """The smooth state at shrinkage `s`: radii (nodes,) and pressures (ne, k), with stretches and p at quadrature."""
 
     s: float
-    radii: Array
-    pressures: Array
-    lr: Array
-    lt: Array
-    p: Array
+    radii: Floats
+    pressures: Floats
+    lr: Floats
+    lt: Floats
+    p: Floats
 
 
-def _state(mesh: RadialMesh, s: float, radii: Array, pressures: Array) -> RadialState:
+def _state(mesh: RadialMesh, s: float, radii: Floats, pressures: Floats) -> RadialState:
     k = mesh.at.shape[1]
     lr, lt = np.einsum("eqij,ej->ieq", mesh.strain[:, :, :2, :k], radii[mesh.at])
     return RadialState(s, radii, pressures, lr, lt, pressures @ mesh.pressure.T)
@@ -147,7 +146,7 @@ def smooth(mesh: RadialMesh, s: float, kappa_ratio: float | None, guess: RadialS
     )
 
 
-def _matrices(mesh: RadialMesh, state: RadialState, degree: int, size: int) -> tuple[Array, Array]:
+def _matrices(mesh: RadialMesh, state: RadialState, degree: int, size: int) -> tuple[Floats, Floats]:
     """Return element stiffness (ne, size, size) at fixed pressure, and coupling (ne, k, size) of p with volume."""
     lr, lt = state.lr, state.lt
     big, wave = float(degree * (degree + 1)), np.sqrt(degree * (degree + 1.0))
@@ -176,7 +175,7 @@ def _matrices(mesh: RadialMesh, state: RadialState, degree: int, size: int) -> t
     return stiff.sum(axis=1), np.einsum("qa,eqj->eaj", mesh.pressure, dilation)
 
 
-def tangent(mesh: RadialMesh, state: RadialState, degree: int, kappa_ratio: float | None) -> Array:
+def tangent(mesh: RadialMesh, state: RadialState, degree: int, kappa_ratio: float | None) -> Floats:
     """Return the symmetric tangent (n, n) on perturbations of `degree` with the stone fixed.
 
     Compressible layers condense their pressure; incompressible ones leave the perturbations that keep every volume,
@@ -190,7 +189,7 @@ def tangent(mesh: RadialMesh, state: RadialState, degree: int, kappa_ratio: floa
     return basis.T @ _assemble(mesh, stiff) @ basis
 
 
-def linear_tangents(mesh: RadialMesh, degree: int, kappa_ratio: float | None) -> tuple[Array, Array]:
+def linear_tangents(mesh: RadialMesh, degree: int, kappa_ratio: float | None) -> tuple[Floats, Floats]:
     """Return the fresh sphere's tangent and the geometric stiffness of the stress per unit shrinkage, both (n, n).
 
     Liu et al. 2014, Eq. 11: the fresh shape would buckle where (first + s second) turns singular.
@@ -213,7 +212,7 @@ def linear_tangents(mesh: RadialMesh, degree: int, kappa_ratio: float | None) ->
     return basis.T @ _assemble(mesh, stiff) @ basis, basis.T @ _assemble(mesh, elements) @ basis
 
 
-def _stress_rate(mesh: RadialMesh, fresh: RadialState, kappa_ratio: float | None) -> tuple[Array, Array]:
+def _stress_rate(mesh: RadialMesh, fresh: RadialState, kappa_ratio: float | None) -> tuple[Floats, Floats]:
     """Return radial and hoop stress (ne, nq) per unit shrinkage at the fresh sphere."""
     # central differences of the exact state: off by 1e-12, far below round-off of what follows
     small = 1e-6
@@ -228,28 +227,28 @@ def _size(mesh: RadialMesh, degree: int) -> int:
     return mesh.at.shape[1] * (1 if degree == 0 else 2)
 
 
-def _bulk(mesh: RadialMesh, coupling: Array, jd: Array, kappa_ratio: float) -> Array:
+def _bulk(mesh: RadialMesh, coupling: Floats, jd: Floats, kappa_ratio: float) -> Floats:
     mass = np.einsum("eq,qa,qb->eab", mesh.weight * jd / mesh.shear, mesh.pressure, mesh.pressure)
     return kappa_ratio * coupling.swapaxes(1, 2) @ np.linalg.solve(mass, coupling)
 
 
-def _places(mesh: RadialMesh, size: int) -> tuple[NDArray[np.int64], int]:
+def _places(mesh: RadialMesh, size: int) -> tuple[Ints, int]:
     fields = size // mesh.at.shape[1]
     return np.concatenate([mesh.at * fields + f for f in range(fields)], axis=1), fields
 
 
-def _assemble(mesh: RadialMesh, elements: Array) -> Array:
+def _assemble(mesh: RadialMesh, elements: Floats) -> Floats:
     at, fields = _places(mesh, elements.shape[1])
     full = np.zeros((len(mesh.position) * fields,) * 2)
     np.add.at(full, (at[:, :, None], at[:, None, :]), elements)
     return full[fields:, fields:]
 
 
-def _volume_preserving(mesh: RadialMesh, coupling: Array) -> Array:
+def _volume_preserving(mesh: RadialMesh, coupling: Floats) -> Floats:
     """Return an orthonormal basis (n, n - ne k) of the perturbations without any volume change."""
     count, k, size = coupling.shape
     at, fields = _places(mesh, size)
     rows = np.zeros((count * k, len(mesh.position) * fields))
     rows[np.arange(count * k).reshape(count, k)[:, :, None], at[:, None, :]] = coupling
-    basis: Array = np.asarray(qr(rows[:, fields:].T)[0], dtype=float)
+    basis: Floats = np.asarray(qr(rows[:, fields:].T)[0], dtype=float)
     return basis[:, count * k :]

@@ -8,15 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.special import sph_harm_y
 
+from ...arrays import Floats
 from ...fruit import directions as on_unit_sphere
 
 __all__ = ["AxisymmetricMode", "FieldMode", "Method", "Onset", "Road", "SurfaceMode", "Tie", "dominant_degree"]
 
-Array = NDArray[np.float64]
 Method = Literal["exact", "linear"]
 Road = Literal["radial", "meridional", "full"]
 
@@ -28,10 +27,10 @@ class SurfaceMode(ABC):
     """
 
     @abstractmethod
-    def __call__(self, directions: Array) -> Array:
+    def __call__(self, directions: Floats) -> Floats:
         """Return heights (n,) at unit `directions` (n, 3) of the parametric sphere."""
 
-    def on(self, colatitude: Array, azimuth: Array) -> Array:
+    def on(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return heights at colatitude and azimuth [radian], of their common (broadcast) shape."""
         points = on_unit_sphere(colatitude, azimuth)
         return self(points.reshape(-1, 3)).reshape(points.shape[:-1])
@@ -44,8 +43,8 @@ class AxisymmetricMode(SurfaceMode):
     colatitude: (n,) increasing from 0 to pi [radian]. profile: (n,) heights on it, largest magnitude 1.
     """
 
-    colatitude: Array
-    profile: Array
+    colatitude: Floats
+    profile: Floats
     wavenumber: int
 
     def __post_init__(self) -> None:
@@ -54,14 +53,14 @@ class AxisymmetricMode(SurfaceMode):
         ends: Any = ((order, 0.0), (order, 0.0))
         object.__setattr__(self, "_spline", CubicSpline(self.colatitude, self.profile, bc_type=ends))
 
-    def __call__(self, directions: Array) -> Array:
+    def __call__(self, directions: Floats) -> Floats:
         """Return heights (n,) at unit `directions` (n, 3) of the parametric sphere."""
         colatitude = np.arctan2(np.hypot(directions[:, 0], directions[:, 2]), directions[:, 1])
         return self.on(colatitude, np.arctan2(directions[:, 2], directions[:, 0]))
 
-    def on(self, colatitude: Array, azimuth: Array) -> Array:
+    def on(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return heights at colatitude and azimuth [radian], of their common (broadcast) shape."""
-        spline: Callable[[Array], Array] = self._spline  # type: ignore[attr-defined]
+        spline: Callable[[Floats], Floats] = self._spline  # type: ignore[attr-defined]
         return spline(np.asarray(colatitude)) * np.cos(self.wavenumber * np.asarray(azimuth))
 
 
@@ -69,9 +68,9 @@ class AxisymmetricMode(SurfaceMode):
 class FieldMode(SurfaceMode):
     """Any field over the parametric sphere: `heights` maps unit directions (n, 3) to (n,)."""
 
-    heights: Callable[[Array], Array]
+    heights: Callable[[Floats], Floats]
 
-    def __call__(self, directions: Array) -> Array:
+    def __call__(self, directions: Floats) -> Floats:
         """Return heights (n,) at unit `directions` (n, 3) of the parametric sphere."""
         return self.heights(directions)
 

@@ -8,14 +8,13 @@ Derived from Liu et al. 2014, Eq. 1-4, with F_d = theta I in the core; verified 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Floats
 
 __all__ = ["flat_film_strain", "flat_film_wavelength", "onset_estimate", "sphere_radius"]
 
-Array = NDArray[np.float64]
 
-
-def sphere_radius(fresh: Array, theta: float, stone: float, interface: float = 1.0) -> Array:
+def sphere_radius(fresh: Floats, theta: float, stone: float, interface: float = 1.0) -> Floats:
     """Return the deformed distance from the centre of points at `fresh` distance, any shape, in units of r1."""
     moved_interface3 = stone**3 + theta**3 * (interface**3 - stone**3)
     core = stone**3 + theta**3 * (fresh**3 - stone**3)

@@ -7,22 +7,21 @@ thickness or moduli, so that neighbours in parameter space start from the same b
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...contract import Cancelled, Context, InvalidInput
 from ..params import DehydrationParams
 from .loading import Loading
 
 __all__ = ["bumps", "heights"]
 
-Array = NDArray[np.float64]
 
 WAVES = 400
 #: Wavenumbers on the unit sphere: from the coarsest buckles in use to those of a skin of 0.005.
 LOWEST, HIGHEST = 5.0, 130.0
 
 
-def heights(params: DehydrationParams, directions: Array, context: Context, highest: float = HIGHEST) -> Array:
+def heights(params: DehydrationParams, directions: Floats, context: Context, highest: float = HIGHEST) -> Floats:
     """Return the heights (n,) of `params.imperfection_kind` at unit `directions` (n, 3), magnitude about one at most.
 
     "waves": see `bumps`. "mode": the first buckling mode (Liu et al. 2014, Eq. 11), as it is; no seed enters.
@@ -59,7 +58,7 @@ def heights(params: DehydrationParams, directions: Array, context: Context, high
     return found.mode(directions)
 
 
-def bumps(directions: Array, generator: np.random.Generator, highest: float = HIGHEST) -> Array:
+def bumps(directions: Floats, generator: np.random.Generator, highest: float = HIGHEST) -> Floats:
     """Return heights (n,) with magnitude at most about one at unit `directions` (n, 3).
 
     Waves shorter than wavenumber `highest` (what the mesh can carry) are left out; the rest do not depend on it.

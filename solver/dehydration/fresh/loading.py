@@ -11,15 +11,14 @@ does there if nothing but hydrostatic pressure reaches the centre, as in a smoot
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...contract import InvalidInput
 from ...fruit import lattice
 from ..params import DehydrationParams
 
 __all__ = ["Loading"]
 
-Array = NDArray[np.float64]
 
 #: Bounds of the diagonal of Fd: flesh shrunk further has no volume left, swollen further leaves the kernel's range.
 LEAST, MOST = 0.05, 2.5
@@ -45,16 +44,16 @@ class Loading:
         self._size = float(np.linalg.norm(params.sarcocarp(*_GRID), axis=-1).max()) + params.exocarp_thickness
         self._has_stone = params.has_stone
 
-    def local(self, points: Array, shrinkage: float) -> Array:
+    def local(self, points: Floats, shrinkage: float) -> Floats:
         """Return the local shrinkage s (1 - g . X), shape (n,), at fresh points (n, 3) in units of r1."""
         # not `@`: BLAS rounds differently with another number of threads
         return shrinkage * (1 - np.einsum("ni,i->n", points, self._gradient))
 
-    def fd(self, points: Array, shrinkage: float) -> Array:
+    def fd(self, points: Floats, shrinkage: float) -> Floats:
         """Return the diagonal of Fd, shape (n, 3), at fresh points (n, 3) of the flesh."""
         return 1 - self.local(points, shrinkage)[:, None] * self._factors
 
-    def held(self, points: Array, shrinkage: float) -> Array:
+    def held(self, points: Floats, shrinkage: float) -> Floats:
         """Return where the inner nodes are, (n, 3), from their fresh places (n, 3): they stay on a stone, or follow."""
         if self._has_stone:
             return points

@@ -11,9 +11,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
+from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidGeometry
 from ...fruit import Fruit, directions, lattice
 
@@ -32,8 +32,6 @@ __all__ = [
     "layer_fractions",
 ]
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: The six faces: outward axis, first and second tangent, each triple right-handed.
 _FACES = np.array(
@@ -62,9 +60,9 @@ class CubedSphere:
     """
 
     n: int
-    directions: Array
-    faces: Indices
-    quads: Indices
+    directions: Floats
+    faces: Ints
+    quads: Ints
 
 
 @lru_cache(maxsize=4)
@@ -97,11 +95,11 @@ class FruitMesh:
     """
 
     sphere: CubedSphere
-    positions: Array
-    connectivity: Indices
-    is_exocarp: NDArray[np.bool_]
-    rays: Array
-    depth: Array
+    positions: Floats
+    connectivity: Ints
+    is_exocarp: Bools
+    rays: Floats
+    depth: Floats
 
     @property
     def levels(self) -> int:
@@ -109,17 +107,17 @@ class FruitMesh:
         return len(self.depth)
 
     @property
-    def surface_nodes(self) -> Indices:
+    def surface_nodes(self) -> Ints:
         """(nc,) nodes of the outer surface, in column order."""
         return np.arange(len(self.rays)) * self.levels + self.levels - 1
 
     @property
-    def fixed(self) -> NDArray[np.bool_]:
+    def fixed(self) -> Bools:
         """(nn,) nodes that sit on the rigid stone, or on the ball that follows the loading (`loading.Loading.held`)."""
         return np.tile(np.arange(self.levels) == 0, len(self.rays))
 
 
-def layer_fractions(flesh: float, first: float, growth: float) -> Array:
+def layer_fractions(flesh: float, first: float, growth: float) -> Floats:
     """Return breakpoints 0..1 from stone to interface of layers that grow inwards by at most `growth`.
 
     `first` is the thickness wanted at the interface, `flesh` the distance to the stone, both in units of r1.
@@ -132,7 +130,7 @@ def layer_fractions(flesh: float, first: float, growth: float) -> Array:
     return 1 - outside_in[::-1]
 
 
-def inner_distance(fruit: Fruit, rays: Array) -> Array:
+def inner_distance(fruit: Fruit, rays: Floats) -> Floats:
     """Return the distance (...) along unit rays (..., 3) at which the mesh begins: the stone, or the central ball."""
     if fruit.has_stone:
         return fruit.stone_distance(rays)
@@ -148,7 +146,7 @@ def flesh_span(fruit: Fruit) -> tuple[float, float]:
     return float(flesh.min()), float(flesh.max())
 
 
-def corner_ratios(positions: Array, connectivity: Indices) -> Array:
+def corner_ratios(positions: Floats, connectivity: Ints) -> Floats:
     """Return least over largest corner Jacobian of each element, (ne,): 1 for a brick, not positive if inverted.
 
     positions (nn, 3), connectivity (ne, 8) with bits xi = 4, eta = 2, zeta = 1.
@@ -159,11 +157,11 @@ def corner_ratios(positions: Array, connectivity: Indices) -> Array:
         # the neighbour along each axis differs in one bit; the sign turns the edge to point along the axis
         edges = [(corners[:, c ^ bit] - corners[:, c]) * (-1 if c & bit else 1) for bit in (4, 2, 1)]
         jacobians[:, c] = np.einsum("ei,ei->e", np.cross(edges[0], edges[1]), edges[2])
-    ratios: Array = jacobians.min(axis=1) / np.abs(jacobians).max(axis=1)
+    ratios: Floats = jacobians.min(axis=1) / np.abs(jacobians).max(axis=1)
     return ratios
 
 
-def build_mesh(fruit: Fruit, n: int, core: Array, exocarp_layers: int = 2) -> FruitMesh:
+def build_mesh(fruit: Fruit, n: int, core: Floats, exocarp_layers: int = 2) -> FruitMesh:
     """Return the mesh of `fruit` with `n` elements per cube edge and core layers at the fractions `core` (0..1).
 
     A fruit without a stone loses a ball of 0.1 r1 at the centre, whose surface is led along with the flesh. Balls of
@@ -224,7 +222,7 @@ class Sampler:
         self._beta = np.arctan2(np.einsum("pi,pi->p", points, axes[:, 2]), height)
         self._knots = np.linspace(-np.pi / 4, np.pi / 4, sphere.n + 1)
 
-    def __call__(self, nodal: Array) -> Array:
+    def __call__(self, nodal: Floats) -> Floats:
         """Return the field (nd, c) or (nd,) at the lattice: (resolution, 2 * resolution, c) or without c."""
         values = nodal.reshape(len(nodal), -1)
         out = np.empty((len(self._face), values.shape[1]))

@@ -7,9 +7,9 @@ cannot be interpolated. Started from one pattern they keep to it for a while (`d
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RectSphereBivariateSpline
 
+from ...arrays import Floats
 from ...contract import Context, InvalidInput
 from ...fruit import azimuths, colatitudes, lattice
 from ..measures.harmonics import remove_low
@@ -17,7 +17,6 @@ from ..params import DehydrationParams
 
 __all__ = ["pattern_heights"]
 
-Array = NDArray[np.float64]
 
 #: Degrees below this are the shape of the other fruit, not its wrinkles.
 _LOWEST_DEGREE = 5
@@ -26,7 +25,7 @@ _LOWEST_DEGREE = 5
 _SAME = 1e-9
 
 
-def pattern_heights(params: DehydrationParams, directions: Array, context: Context) -> Array:
+def pattern_heights(params: DehydrationParams, directions: Floats, context: Context) -> Floats:
     """Return the heights (n,) [r1] of `params.pattern` at unit `directions` (n, 3) of the parametric sphere.
 
     They are the stored displacement along the rays of that fresh fruit, without its low degrees, scaled so that the
@@ -69,5 +68,5 @@ def pattern_heights(params: DehydrationParams, directions: Array, context: Conte
     spline = RectSphereBivariateSpline(colatitudes(n), azimuths(n), wrinkles / highest)
     colatitude = np.arccos(np.clip(directions[:, 1], -1.0, 1.0))
     azimuth = np.arctan2(directions[:, 2], directions[:, 0]) % (2 * np.pi)
-    heights: Array = spline(colatitude, azimuth, grid=False)
+    heights: Floats = spline(colatitude, azimuth, grid=False)
     return pattern.amplitude * params.exocarp_thickness * heights

@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Bools, Floats, Ints
 from .mesh import FruitMesh
 
 __all__ = ["Sector", "cut", "evened"]
 
-Array = NDArray[np.float64]
 
 #: Distance from a plane below which a node of the parametric unit sphere lies on it.
 _ON = 1e-9
@@ -33,16 +32,16 @@ class Sector:
     """
 
     mesh: FruitMesh
-    image: NDArray[np.int64]
-    sign: Array
-    own: NDArray[np.bool_]
-    share: Array
-    planes: NDArray[np.int64]
+    image: Ints
+    sign: Floats
+    own: Bools
+    share: Floats
+    planes: Ints
     copies: int
 
-    def whole(self, surface: Array) -> Array:
+    def whole(self, surface: Floats) -> Floats:
         """Return nodes of the whole surface (nc, 3) from those of the part's, in column order."""
-        mirrored: Array = surface[self.image] * self.sign
+        mirrored: Floats = surface[self.image] * self.sign
         return mirrored
 
 
@@ -56,7 +55,7 @@ def cut(mesh: FruitMesh, mirrors: str) -> Sector:
     directions = np.where(np.abs(mesh.sphere.directions) < _ON, 0.0, mesh.sphere.directions)
     sign = np.ones((columns, 3))
     sign[:, axes] = np.where(directions[:, axes] < 0, -1.0, 1.0)
-    own: NDArray[np.bool_] = np.all(sign > 0, axis=1)
+    own: Bools = np.all(sign > 0, axis=1)
     kept = np.flatnonzero(own)
     number = np.full(columns, -1)
     number[kept] = np.arange(len(kept))
@@ -90,15 +89,15 @@ def cut(mesh: FruitMesh, mirrors: str) -> Sector:
     )
 
 
-def evened(heights: Array, sector: Sector) -> Array:
+def evened(heights: Floats, sector: Sector) -> Floats:
     """Return heights (nc,) made equal on all images of a column, as rough as before: their sum over root of copies."""
     if sector.copies == 1:
         return heights
     total = np.bincount(sector.image, weights=heights)
     count = np.bincount(sector.image)
-    mean: Array = (total / count)[sector.image]
+    mean: Floats = (total / count)[sector.image]
     return mean * np.sqrt(sector.copies)
 
 
-def _rounded(directions: Array) -> NDArray[np.int64]:
+def _rounded(directions: Floats) -> Ints:
     return np.round(directions * 1e7).astype(np.int64)

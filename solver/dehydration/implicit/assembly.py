@@ -19,14 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ...arrays import Bools, Floats, Ints
 from .hexahedron import PRESSURE, SHAPE_GRADIENTS, WEIGHTS
 
 __all__ = ["Assembled", "Pattern", "assemble", "build_pattern"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEAST = 1e-3
 """Je below which the isochoric factor is frozen, so that a crushed trial state stays finite; steps never end there."""
@@ -61,7 +59,7 @@ class Assembled(NamedTuple):
     """(nnz, 3, 3): tangent; empty without"""
 
 
-def build_pattern(connectivity: Ints, fixed: NDArray[np.bool_]) -> Pattern:
+def build_pattern(connectivity: Ints, fixed: Bools) -> Pattern:
     """Return the pattern for elements (ne, 27) and nodes (nn,) that are held in all components."""
     from scipy.sparse import csr_array
 

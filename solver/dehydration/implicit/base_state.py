@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...contract import Context, NotConverged
 from ...fem import HEX27
 from ..params import DehydrationParams
@@ -19,7 +19,6 @@ from .newton import Equilibrium, Loading, Model, build_model, equilibrium
 
 __all__ = ["BaseState", "base_state"]
 
-Floats = NDArray[np.float64]
 logger = logging.getLogger("wizen.dehydration.implicit")
 
 GROWTH = 0.8

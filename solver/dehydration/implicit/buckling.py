@@ -11,17 +11,16 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from ...arrays import Bools, Floats
 from ...multifrontal import Factor
 from .hexahedron import PRESSURE, SHAPE_GRADIENTS, WEIGHTS
 from .newton import Equilibrium, Model, masked
 
 __all__ = ["Crossing", "first_crossing", "parities", "stress_stiffness", "tangent_at"]
 
-Floats = NDArray[np.float64]
 
 LANCZOS_TOLERANCE = 1e-5
 
@@ -34,7 +33,7 @@ class Crossing(NamedTuple):
     parity: tuple[int, ...]
 
 
-def parities(model: Model) -> Iterator[tuple[tuple[int, ...], NDArray[np.bool_]]]:
+def parities(model: Model) -> Iterator[tuple[tuple[int, ...], Bools]]:
     """Yield parity (+1 even, -1 odd) about each of the mesh's planes, and the components (nf, 3) left free by it."""
     mesh = model.mesh
     positions = mesh.positions[model.pattern.free >= 0]
@@ -82,7 +81,7 @@ def stress_stiffness(model: Model, state: Equilibrium) -> Floats:
 
 
 def first_crossing(
-    model: Model, base: Floats, slope: Floats, start: float, parity: tuple[int, ...], free: NDArray[np.bool_],
+    model: Model, base: Floats, slope: Floats, start: float, parity: tuple[int, ...], free: Bools,
     factor: Factor | None = None, guess: Floats | None = None,
 ) -> Crossing | None:  # fmt: skip
     """Return the first singular tangent of base + (s - start) slope beyond `start` in one parity, by Lanczos.

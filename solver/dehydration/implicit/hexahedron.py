@@ -9,13 +9,11 @@ The trilinear pressure is not inf-sup stable in general; the tests show displace
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...fem import HEX27, gauss
 
 __all__ = ["POINTS", "PRESSURE", "SHAPE_GRADIENTS", "WEIGHTS", "pressure_functions"]
-
-Floats = NDArray[np.float64]
 
 
 def pressure_functions(points: Floats) -> Floats:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from ...fem import HEX27
 from ...fruit import directions
 from ..fresh.mesh import _FACES as FACES
@@ -13,8 +13,6 @@ from .mesh import QuadraticMesh
 
 __all__ = ["fold", "locate"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _NUDGE = 1e-9
 """Points on a symmetry plane are looked up this far inside, so that round-off does not put them beyond it."""

@@ -9,16 +9,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidInput
 from ..fresh.mesh import CubedSphere, build_mesh
 from ..params import DehydrationParams
 
 __all__ = ["QuadraticMesh", "Symmetry", "build_quadratic_mesh", "graded_layers", "natural_symmetry"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Symmetry = Literal["octant", "quarter", "whole"]
 
 #: Planes (as normal axes) that bound each part.
@@ -39,7 +37,7 @@ class QuadraticMesh:
     sphere: CubedSphere
     positions: Floats
     connectivity: Ints
-    is_exocarp: NDArray[np.bool_]
+    is_exocarp: Bools
     stacks: Ints
     planes: tuple[int, ...]
     quad_of: Ints

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Bools, Floats
 from ...contract import Context, InvalidInput, NotConverged
 from ...fem import HEX27
 from ...multifrontal import Analysis, Factor, analyse, factorise
@@ -20,7 +20,6 @@ from .mesh import QuadraticMesh
 
 __all__ = ["Equilibrium", "Loading", "Model", "build_model", "equilibrium", "masked"]
 
-Floats = NDArray[np.float64]
 #: (fresh points (n, 3), shrinkage s) -> diagonal of Fd in the core, (n, 3); any shape that broadcasts to it.
 Loading = Callable[[Floats, float], Any]
 
@@ -58,7 +57,7 @@ class Model:
     loading: Loading
     pattern: Pattern
     analysis: Analysis
-    free: NDArray[np.bool_]
+    free: Bools
     gauss: Floats
 
     def stretch(self, shrinkage: float) -> Floats:
@@ -85,12 +84,12 @@ class Model:
         """Return nodal values (nn, 3) at the nodes off the stone, (nf, 3), 0 in held components."""
         return np.where(self.free, nodal[self.pattern.free >= 0], 0.0)
 
-    def factor(self, data: Floats, free: NDArray[np.bool_] | None = None) -> Factor:
+    def factor(self, data: Floats, free: Bools | None = None) -> Factor:
         """Factorise a tangent (nnz, 3, 3) on the free components (default: the model's own)."""
         return factorise(self.analysis, masked(self.pattern, data, self.free if free is None else free))
 
 
-def masked(pattern: Pattern, data: Floats, free: NDArray[np.bool_]) -> Floats:
+def masked(pattern: Pattern, data: Floats, free: Bools) -> Floats:
     """Return the matrix with rows and columns of held components replaced by those of the identity."""
     rows = np.repeat(np.arange(len(free)), np.diff(pattern.indptr))
     result = data * free[rows][:, :, None] * free[pattern.indices][:, None, :]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from solver.dehydration.kernel.elements import energy, one_point_energy
 from solver.dehydration.kernel.fixed_point import positions
 from solver.dehydration.kernel.layout import Layout
 
-Floats: TypeAlias = NDArray[np.float64]
+from ...arrays import Bools, Floats, Ints, Ints32, Singles
 
 CHUNK = 64
 """Blocks handled at once, so that temporaries stay in cache."""
@@ -45,7 +45,7 @@ class ElementReport(NamedTuple):
 
 
 def _chunks(
-    layout: Layout, state: NDArray[np.int32], elements: NDArray[np.int64], planes: NDArray[np.float32]
+    layout: Layout, state: Ints32, elements: Ints, planes: Singles
 ) -> Iterator[tuple[slice, list[list[Floats]], Floats]]:
     """(blocks, positions [8][3] of (n,), planes (planes, n)) of a few blocks at a time, float64."""
     for first in range(0, len(elements), CHUNK):
@@ -56,7 +56,7 @@ def _chunks(
         yield part, nodes, planes[part].transpose(1, 0, 2).reshape(planes.shape[1], -1).astype(np.float64)
 
 
-def _deep(layout: Layout) -> NDArray[np.bool_]:
+def _deep(layout: Layout) -> Bools:
     """(core blocks,) bool: blocks below the layout's full levels."""
     deep = np.zeros(len(layout.core_elements), bool)
     for _, first, cores, _, _ in layout.strips:
@@ -64,7 +64,7 @@ def _deep(layout: Layout) -> NDArray[np.bool_]:
     return deep
 
 
-def element_report(layout: Layout, state: NDArray[np.int32], theta: float, *, one_point: bool = False) -> ElementReport:
+def element_report(layout: Layout, state: Ints32, theta: float, *, one_point: bool = False) -> ElementReport:
     """Strain energy and least J/Jd of every element; state (nodes, 4) int32, see `fixed_point`.
 
     With `one_point` the energy of the deep core is the one-point element's; the ratio is always that of the full rule.
@@ -90,7 +90,7 @@ def element_report(layout: Layout, state: NDArray[np.int32], theta: float, *, on
     return ElementReport(layout.lanes(core_energy, skin_energy), layout.lanes(core_ratio, skin_ratio))
 
 
-def strain_energy(layout: Layout, state: NDArray[np.int32], theta: float, *, one_point: bool = False) -> float:
+def strain_energy(layout: Layout, state: Ints32, theta: float, *, one_point: bool = False) -> float:
     """Total strain energy."""
     return float(element_report(layout, state, theta, one_point=one_point).energy.sum())
 

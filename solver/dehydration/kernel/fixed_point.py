@@ -8,7 +8,9 @@ range of all coordinates, take no more memory, and their differences, all that a
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ...arrays import Floats, Ints32
 
 QUANTUM = 2.0**-29
 """Length of one unit of the state, in units of r1."""
@@ -16,12 +18,12 @@ REACH = 3.9
 """Largest coordinate that leaves room for a fruit to move within +-4."""
 
 
-def positions(state: NDArray[np.int32]) -> NDArray[np.float64]:
+def positions(state: Ints32) -> Floats:
     """State (nn, 4) int32 -> positions (nn, 3) float64."""
     return state[:, :3].astype(np.float64) * QUANTUM
 
 
-def place(state: NDArray[np.int32], where: ArrayLike) -> None:
+def place(state: Ints32, where: ArrayLike) -> None:
     """Set the state (nn, 4) to positions (nn, 3), rounded to the nearest unit. ValueError beyond `REACH`."""
     coordinates = np.asarray(where, dtype=np.float64)
     if not np.all(np.abs(coordinates) <= REACH):
@@ -29,6 +31,6 @@ def place(state: NDArray[np.int32], where: ArrayLike) -> None:
     state[:, :3] = np.rint(coordinates / QUANTUM)
 
 
-def out_of_reach(state: NDArray[np.int32]) -> bool:
+def out_of_reach(state: Ints32) -> bool:
     """Whether a run has blown up: some coordinate ran to the edge of the range."""
     return bool(np.abs(state[:, :3].astype(np.int64)).max() * QUANTUM > REACH)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike
 
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
 from solver.dehydration.kernel.fixed_point import place
@@ -16,8 +16,7 @@ from solver.dehydration.kernel.masses import largest_stiffness
 from solver.dehydration.kernel.metric import element_planes, one_point_planes, refuse_inverted
 from solver.dehydration.kernel.strips import LANES, Strips, assembly_rows, build_strips
 
-Floats: TypeAlias = NDArray[np.float64]
-Singles: TypeAlias = NDArray[np.float32]
+from ...arrays import Array, Bools, Floats, Ints, Ints32, Singles
 
 ALIGNMENT = 64
 ROW = 3
@@ -26,7 +25,7 @@ ALL = 1 << 30
 """More levels than any mesh has."""
 
 
-def aligned_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+def aligned_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> Array:
     """C-contiguous zeros that start on a cache line."""
     item = np.dtype(dtype)
     size = int(np.prod(shape)) * item.itemsize
@@ -35,7 +34,7 @@ def aligned_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     return raw[start : start + size].view(item).reshape(shape)
 
 
-def aligned_copy(values: NDArray[Any], dtype: DTypeLike) -> NDArray[Any]:
+def aligned_copy(values: Array, dtype: DTypeLike) -> Array:
     """C-contiguous copy that starts on a cache line."""
     result = aligned_zeros(values.shape, dtype)
     result[...] = values
@@ -52,9 +51,9 @@ class Layout:
 
     nodes: int
     elements: int
-    strips: NDArray[np.int64]
+    strips: Ints
     """(strips, 5): see `strips.Strips.table`"""
-    face_offsets: NDArray[np.int32]
+    face_offsets: Ints32
     """(faces, 4, 16): 4 * node of each corner and lane, the node's place in the flat (nn, 4) state"""
     core_planes: Singles
     """(core blocks, CORE_PLANES, 16): see `algebra` for the planes"""
@@ -62,25 +61,25 @@ class Layout:
     """(core blocks, ONE_POINT_PLANES, 16); no blocks if built without"""
     exocarp_planes: Singles
     """(exocarp blocks, EXOCARP_PLANES, 16)"""
-    row_start: NDArray[np.int32]
+    row_start: Ints32
     """(nodes + 1,): first entry of each node in ``rows``"""
-    rows: NDArray[np.int32]
+    rows: Ints32
     """place of each contribution in the flat force rows, in the fixed order of summation"""
     inverse_mass: Singles
     """(nodes,): 1 / scaled mass, 0 where fixed"""
-    core_elements: NDArray[np.int64]
+    core_elements: Ints
     """(core blocks, 16): element of each lane; -1 where a lane only fills the vector"""
-    exocarp_elements: NDArray[np.int64]
+    exocarp_elements: Ints
     """(exocarp blocks, 16): likewise"""
-    connectivity: NDArray[np.int64]
+    connectivity: Ints
     """(elements, 8)"""
-    fresh: NDArray[np.int32]
+    fresh: Ints32
     """(nodes, 4): fresh positions as the kernel's state (see `fixed_point`); the fourth column is unused and 0"""
     mass: Floats
     """(nodes,): scaled mass, of fixed nodes too"""
     full_levels: int
     """outermost core levels that are integrated fully even where the one-point core is asked for"""
-    planes: NDArray[np.int32]
+    planes: Ints32
     """places in the flat (nn, 4) state of coordinates that stay 0: nodes on mirror planes"""
 
     @property
@@ -89,7 +88,7 @@ class Layout:
         return self.face_offsets.size * ROW + 1
 
     @property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Bools:
         """(nodes,) bool: nodes that move."""
         return self.inverse_mass > 0
 
@@ -98,7 +97,7 @@ class Layout:
         values = (getattr(self, name) for name in self.__slots__)
         return sum(value.nbytes for value in values if isinstance(value, np.ndarray))
 
-    def lanes(self, core: NDArray[Any], exocarp: NDArray[Any]) -> NDArray[Any]:
+    def lanes(self, core: Array, exocarp: Array) -> Array:
         """Per-lane values of core (core blocks, 16) and exocarp blocks -> one value per element, (elements,)."""
         result = np.empty(self.elements, dtype=np.result_type(core, exocarp))
         for elements, values in ((self.core_elements, core), (self.exocarp_elements, exocarp)):
@@ -107,7 +106,7 @@ class Layout:
         return result
 
 
-def _blocks(elements: NDArray[np.int64], planes_of: Any, planes: int, chunk: int = 256) -> Singles:
+def _blocks(elements: Ints, planes_of: Any, planes: int, chunk: int = 256) -> Singles:
     """Planes of whole blocks, (blocks, planes, 16) float32, computed a few thousand elements at a time."""
     result: Singles = aligned_zeros((len(elements), planes, LANES), np.float32)
     for first in range(0, len(elements), chunk):
@@ -123,7 +122,7 @@ def _checked(
     mu: ArrayLike,
     kappa: ArrayLike,
     fixed: ArrayLike,
-) -> Iterator[NDArray[Any]]:
+) -> Iterator[Array]:
     """Inputs as arrays of the expected type and shape; ValueError names the first that does not fit."""
     nodes, count = len(np.asarray(positions)), len(np.asarray(connectivity))
     expected: tuple[tuple[str, ArrayLike, DTypeLike, tuple[int, ...]], ...] = (
@@ -223,7 +222,7 @@ def build_layout(
     )
 
 
-def _places(mirrored: ArrayLike) -> NDArray[np.int32]:
+def _places(mirrored: ArrayLike) -> Ints32:
     """Places in a state of four numbers per node of coordinates 3 node + axis."""
     chosen = np.asarray(mirrored, np.int64)
     return (chosen // 3 * 4 + chosen % 3).astype(np.int32)

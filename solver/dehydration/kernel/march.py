@@ -23,8 +23,8 @@ from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
 from solver.dehydration.kernel.skin import Skin, keep_apart, search, widen
 
-Floats: TypeAlias = NDArray[np.float64]
-Singles: TypeAlias = NDArray[np.float32]
+from ...arrays import Array, Floats, Ints, Singles
+
 State: TypeAlias = NDArray[np.int32]
 Backend: TypeAlias = Literal["vector", "scalar"]
 
@@ -96,7 +96,7 @@ def _build(stamp: int) -> Callable[..., int]:
         boundscheck=False,
     )
     def advance(
-        steps: int, state: State, velocity: Singles, strips: NDArray[np.int64], face_offsets: State, core: Singles,
+        steps: int, state: State, velocity: Singles, strips: Ints, face_offsets: State, core: Singles,
         one_point: Singles, exocarp: Singles, full: int, row_start: State, rows: State, inverse_mass: Singles,
         theta0: float, theta1: float, damping: float, forces: Singles, record: bool, squares: Singles,
         planes: State, touching: bool, skin: Skin,
@@ -168,7 +168,7 @@ def new_state(layout: Layout, where: ArrayLike | None = None) -> tuple[State, Si
     return state, aligned_zeros((layout.nodes, 4), np.float32)
 
 
-def _flat(name: str, values: NDArray[Any], dtype: DTypeLike, layout: Layout) -> NDArray[Any]:
+def _flat(name: str, values: Array, dtype: DTypeLike, layout: Layout) -> Array:
     if values.shape != (layout.nodes, 4) or values.dtype != dtype or not values.flags.c_contiguous:
         raise ValueError(f"{name} must be C-contiguous {np.dtype(dtype)} of shape {(layout.nodes, 4)}")
     return values.reshape(-1)

@@ -16,10 +16,7 @@ kappa/mu = 1, which only costs steps).
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.dehydration.kernel.algebra import HOURGLASS
 from solver.dehydration.kernel.metric import (
@@ -30,7 +27,7 @@ from solver.dehydration.kernel.metric import (
 )
 from solver.fem import HEX8
 
-Floats: TypeAlias = NDArray[np.float64]
+from ...arrays import Floats
 
 CHUNK = 2048
 """Elements handled at once: bounds the temporaries to a few MB."""

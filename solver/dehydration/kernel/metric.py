@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.dehydration.kernel.algebra import (
     CORE_WEIGHTS,
@@ -22,7 +21,7 @@ from solver.dehydration.kernel.algebra import (
 )
 from solver.fem import HEX8
 
-Floats: TypeAlias = NDArray[np.float64]
+from ...arrays import Floats
 
 CORNERS = HEX8.nodes
 """Local coordinates of the eight nodes, (8, 3): bits of the node's number."""

@@ -13,16 +13,15 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.dehydration.kernel.algebra import GEOMETRY, INVERSE_VOLUME, KAPPA, MU
 from solver.dehydration.kernel.fixed_point import positions
 from solver.dehydration.kernel.layout import Layout, aligned_copy, aligned_zeros
 from solver.dehydration.kernel.metric import one_point_planes
 
-__all__ = ["reload"]
+from ...arrays import Floats, Singles
 
-Floats = NDArray[np.float64]
+__all__ = ["reload"]
 
 
 def reload(layout: Layout, fresh: Layout, target: Floats) -> Layout:
@@ -46,7 +45,7 @@ def reload(layout: Layout, fresh: Layout, target: Floats) -> Layout:
     return dataclasses.replace(layout, core_planes=planes, one_point_planes=_one_point(fresh, lanes))
 
 
-def _one_point(fresh: Layout, lanes: Floats) -> NDArray[np.float32]:
+def _one_point(fresh: Layout, lanes: Floats) -> Singles:
     """Planes of the one-point element; its metric is not linear in X and is taken anew."""
     old = fresh.one_point_planes
     if not len(old):
@@ -54,7 +53,7 @@ def _one_point(fresh: Layout, lanes: Floats) -> NDArray[np.float32]:
     elements = fresh.core_elements.ravel()
     corners = positions(fresh.fresh)[fresh.connectivity[elements]] * lanes.reshape(-1, 1, 3)
     mu, kappa = (old[:, plane].ravel().astype(np.float64) for plane in (MU, KAPPA))
-    planes: NDArray[np.float32] = aligned_zeros(old.shape, np.float32)
+    planes: Singles = aligned_zeros(old.shape, np.float32)
     made = one_point_planes(corners, mu, kappa).reshape(-1, *fresh.core_elements.shape)
     planes[...] = made.transpose(1, 0, 2)
     return planes

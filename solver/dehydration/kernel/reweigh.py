@@ -9,33 +9,32 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.dehydration.kernel.fixed_point import positions
 from solver.dehydration.kernel.layout import Layout
 from solver.dehydration.kernel.masses import largest_stiffness
 
-Floats = NDArray[np.float64]
+from ...arrays import Bools, Floats, Ints32
 
 LEAST_VOLUME = 0.05
 """Elements whose corner Jacobian falls below this share of the largest keep their fresh bound: it has no inverse."""
 
 
-def _sound(corners: Floats) -> NDArray[np.bool_]:
+def _sound(corners: Floats) -> Bools:
     """Whether the Jacobians at all corners of each element (ne, 8, 3) are clearly positive."""
     jacobians = np.empty(corners.shape[:2])
     for c in range(8):
         # the neighbour along each axis differs in one bit; the sign turns the edge to point along the axis
         edges = [(corners[:, c ^ bit] - corners[:, c]) * (1 if not c & bit else -1) for bit in (4, 2, 1)]
         jacobians[:, c] = np.einsum("ei,ei->e", np.cross(edges[0], edges[1]), edges[2])
-    sound: NDArray[np.bool_] = jacobians.min(axis=1) > LEAST_VOLUME * jacobians.max(axis=1)
+    sound: Bools = jacobians.min(axis=1) > LEAST_VOLUME * jacobians.max(axis=1)
     return sound
 
 
 def reweigh(
     layout: Layout,
-    state: NDArray[np.int32],
-    is_exocarp: NDArray[np.bool_],
+    state: Ints32,
+    is_exocarp: Bools,
     mu: Floats,
     kappa: Floats,
     fresh_bound: Floats,
@@ -58,8 +57,8 @@ def reweigh(
 
 def stiffness_bounds(
     layout: Layout,
-    state: NDArray[np.int32],
-    is_exocarp: NDArray[np.bool_],
+    state: Ints32,
+    is_exocarp: Bools,
     mu: Floats,
     kappa: Floats,
     *,

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.generate import load_generated
 from solver.dehydration.kernel.strips import LANES
 
-Ints: TypeAlias = NDArray[np.int32]
-Table: TypeAlias = NDArray[np.int64]
-Singles: TypeAlias = NDArray[np.float32]
+from ...arrays import Ints, Ints32, Singles
 
 _generated = load_generated()
 core_block = _generated.core_block
@@ -36,7 +33,7 @@ VECTORS = 3 * LANES
 
 
 @njit(**OPTIONS)
-def _gather_face(state: Ints, offsets: Ints, face: int, side: int, quanta: Ints) -> None:
+def _gather_face(state: Ints32, offsets: Ints32, face: int, side: int, quanta: Ints32) -> None:
     """Fixed-point positions of a face into the scratch of its side: 0 below, 1 above."""
     for corner in range(4):
         first = (2 * corner + side) * VECTORS
@@ -48,7 +45,7 @@ def _gather_face(state: Ints, offsets: Ints, face: int, side: int, quanta: Ints)
 
 
 @njit(**OPTIONS)
-def _from_first_node(quanta: Ints, positions: Singles) -> None:
+def _from_first_node(quanta: Ints32, positions: Singles) -> None:
     """Positions relative to node 0, in units of length: only differences enter, and in integers they are exact."""
     for node in range(8):
         for k in range(VECTORS):
@@ -80,7 +77,7 @@ def _add_squares(nodal: Singles, face: int, squares: Singles) -> None:
 
 
 @njit(**OPTIONS)
-def _carry_up(quanta: Ints, nodal: Singles, carried: Singles) -> None:
+def _carry_up(quanta: Ints32, nodal: Singles, carried: Singles) -> None:
     """Make the face above the face below; its forces so far are those of the element just done."""
     for corner in range(4):
         low, high, first = 2 * corner * VECTORS, (2 * corner + 1) * VECTORS, corner * VECTORS
@@ -91,9 +88,9 @@ def _carry_up(quanta: Ints, nodal: Singles, carried: Singles) -> None:
 
 @njit(**OPTIONS)
 def strip_forces(
-    state: Ints,
-    offsets: Ints,
-    strips: Table,
+    state: Ints32,
+    offsets: Ints32,
+    strips: Ints,
     strip: int,
     core: Singles,
     one_point: Singles,
@@ -139,10 +136,10 @@ def strip_forces(
 @njit(inline="always")
 def update_node(
     forces: Singles,
-    row_start: Ints,
-    rows: Ints,
+    row_start: Ints32,
+    rows: Ints32,
     inverse_mass: Singles,
-    state: Ints,
+    state: Ints32,
     velocity: Singles,
     keep: float,
     push: float,

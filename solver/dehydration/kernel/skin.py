@@ -6,13 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from solver.dehydration.contact.contact import push_apart
 from solver.dehydration.contact.data import PAIRS, Contact, grow, make_contact
 from solver.dehydration.contact.search import find_pairs
 from solver.dehydration.kernel.fixed_point import QUANTUM, positions
 from solver.dehydration.kernel.layout import Layout
+
+from ...arrays import Bools, Ints32, Singles
 
 OPTIONS: Any = {"error_model": "numpy"}
 """No cache of their own: numba would keep what they inline from other files. The loop that calls them is cached."""
@@ -25,21 +27,21 @@ class Skin(NamedTuple):
 
     contact: Contact
     """in the numbering of the skin: its state is `position`, not the fruit's"""
-    rows: NDArray[np.int32]
+    rows: Ints32
     """(ns,) node of the fruit, or the one that it is a mirror image of"""
-    sign: NDArray[np.float32]
+    sign: Singles
     """(ns, 3) of its coordinates: -1 where it is an image"""
-    own: NDArray[np.bool_]
+    own: Bools
     """(ns,) whether it is that node itself: images are read, never written"""
-    share: NDArray[np.float32]
+    share: Singles
     """(ns,) of its mass that the fruit carries: half on a mirror plane"""
-    position: NDArray[np.float32]
+    position: Singles
     """(ns, 4)"""
-    velocity: NDArray[np.float32]
+    velocity: Singles
     """(ns, 4)"""
-    inverse_mass: NDArray[np.float32]
+    inverse_mass: Singles
     """(ns,)"""
-    deepest: NDArray[np.float32]
+    deepest: Singles
     """(1,) deepest penetration of the last step that had pairs"""
 
 
@@ -91,7 +93,7 @@ def widen(skin: Skin) -> Skin:
 
 
 @njit(**OPTIONS)
-def read_skin(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32]) -> None:
+def read_skin(skin: Skin, state: Ints32, velocity: Singles) -> None:
     """Copy the skin's positions and velocities out of the flat state (4 nn,) int32 and velocity (4 nn,)."""
     for i in range(skin.rows.size):
         first = 4 * np.int64(skin.rows[i])
@@ -101,14 +103,14 @@ def read_skin(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32
 
 
 @njit(**OPTIONS)
-def search(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32]) -> bool:
+def search(skin: Skin, state: Ints32, velocity: Singles) -> bool:
     """Look for pairs that may touch; False if there are more than the contact has room for."""
     read_skin(skin, state, velocity)
     return find_pairs(skin.contact, skin.position) <= skin.contact.pair_nodes.size
 
 
 @njit(**OPTIONS)
-def keep_apart(skin: Skin, state: NDArray[np.int32], velocity: NDArray[np.float32]) -> None:
+def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> None:
     """Push touching skin apart in the step just made."""
     if skin.contact.counts[PAIRS] == 0:
         skin.deepest[0] = 0

@@ -9,12 +9,11 @@ is then a stack of its own.
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Ints: TypeAlias = NDArray[np.int64]
+from ...arrays import Bools, Ints
 
 LANES = 16
 BOTTOM, TOP = [0, 2, 4, 6], [1, 3, 5, 7]
@@ -28,17 +27,17 @@ class Strips(NamedTuple):
     """(strips, 5) int64: first face, first core block, core blocks, first exocarp block, exocarp blocks"""
     faces: Ints
     """(faces, 4, LANES) int64: node at each corner of each lane's face; a strip owns blocks + 1 consecutive faces"""
-    real: NDArray[np.bool_]
+    real: Bools
     """(faces, LANES) bool: False where a lane repeats the strip's last stack only to fill the vector"""
     core: Ints
     """(core blocks, LANES) int64: element of each lane"""
     exocarp: Ints
     """(exocarp blocks, LANES) int64: element of each lane"""
-    core_real: NDArray[np.bool_]
-    exocarp_real: NDArray[np.bool_]
+    core_real: Bools
+    exocarp_real: Bools
 
 
-def _successors(connectivity: Ints, is_exocarp: NDArray[np.bool_]) -> Ints:
+def _successors(connectivity: Ints, is_exocarp: Bools) -> Ints:
     """Element above each element, or -1; one-to-one, and never from exocarp back to core."""
     nodes = int(connectivity.max()) + 1
     bottom, top = connectivity[:, BOTTOM], connectivity[:, TOP]
@@ -52,7 +51,7 @@ def _successors(connectivity: Ints, is_exocarp: NDArray[np.bool_]) -> Ints:
     return np.where(linked, above, -1)
 
 
-def find_stacks(connectivity: Ints, is_exocarp: NDArray[np.bool_]) -> list[Ints]:
+def find_stacks(connectivity: Ints, is_exocarp: Bools) -> list[Ints]:
     """Stacks grouped by make-up: each entry is (stacks, height) int64 of elements from bottom to top."""
     above = _successors(connectivity, is_exocarp)
     has_below = np.zeros(len(above), dtype=np.bool_)
@@ -75,13 +74,13 @@ def find_stacks(connectivity: Ints, is_exocarp: NDArray[np.bool_]) -> list[Ints]
     return groups
 
 
-def build_strips(connectivity: Ints, is_exocarp: NDArray[np.bool_]) -> Strips:
+def build_strips(connectivity: Ints, is_exocarp: Bools) -> Strips:
     """Strips of a mesh; connectivity (ne, 8) int64 with local bits xi = 4, eta = 2, zeta = 1."""
     rows: list[tuple[int, int, int, int, int]] = []
     faces: list[Ints] = []
-    real: list[NDArray[np.bool_]] = []
+    real: list[Bools] = []
     blocks: dict[bool, list[Ints]] = {False: [], True: []}
-    block_real: dict[bool, list[NDArray[np.bool_]]] = {False: [], True: []}
+    block_real: dict[bool, list[Bools]] = {False: [], True: []}
     for group in find_stacks(connectivity, is_exocarp):
         padding = (-len(group)) % LANES
         padded = np.concatenate([group, np.repeat(group[-1:], padding, axis=0)])
@@ -101,7 +100,7 @@ def build_strips(connectivity: Ints, is_exocarp: NDArray[np.bool_]) -> Strips:
     def stacked(parts: list[Ints]) -> Ints:
         return np.stack(parts) if parts else np.empty((0, LANES), dtype=np.int64)
 
-    def masks(parts: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    def masks(parts: list[Bools]) -> Bools:
         return np.stack(parts) if parts else np.empty((0, LANES), dtype=np.bool_)
 
     return Strips(

@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ...arrays import Floats
 from ...fruit import Fruit, lattice
 from ..fresh.mesh import FruitMesh, Sampler
 from .harmonics import analyse, power, quadrature, remove_low
 
 __all__ = ["Descriptors", "Surface"]
 
-Array = NDArray[np.float64]
 
 #: Degrees below this are the shape of the fruit (size, shift, ellipticity), not wrinkles.
 LOWEST_DEGREE = 3
@@ -53,7 +52,7 @@ class Surface:
         self._area = along * around
         self._tree = cKDTree(mesh.rays)
 
-    def describe(self, nodes: Array) -> Descriptors:
+    def describe(self, nodes: Floats) -> Descriptors:
         """Return the descriptors of the deformed surface nodes (nc, 3), units of r1."""
         shift = self._sampler(nodes - self._fresh_nodes)
         position = self._fresh + shift
@@ -79,14 +78,14 @@ class Surface:
             self._anisotropy(wrinkles),
         )
 
-    def _volume(self, nodes: Array) -> float:
+    def _volume(self, nodes: Floats) -> float:
         corners = nodes[self._mesh.sphere.quads]
         # a bilinear quad's flux is that of the mean of its two triangulations
         a, b, c, d = np.moveaxis(corners, 1, 0)
         flux = sum(np.einsum("qi,qi->q", p, np.cross(q, r)) for p, q, r in ((a, b, c), (a, c, d), (a, b, d), (b, c, d)))
         return float(np.sum(flux) / 12)
 
-    def _count(self, nodes: Array, roughness: float, degree: float) -> int:
+    def _count(self, nodes: Floats, roughness: float, degree: float) -> int:
         """Count inward buckles: nodes lowest within a third of a wavelength and below half the rms."""
         depth = np.einsum("ni,ni->n", nodes - self._fresh_nodes, self._mesh.rays)
         depth -= depth.mean()
@@ -95,7 +94,7 @@ class Surface:
         around = self._tree.query_ball_point(self._mesh.rays[low], radius)
         return int(sum(depth[i] <= depth[near].min() for i, near in zip(low, around, strict=True)))
 
-    def _anisotropy(self, wrinkles: Array) -> float:
+    def _anisotropy(self, wrinkles: Floats) -> float:
         along, around = self._metric
         slope_along = np.gradient(wrinkles, np.pi / RESOLUTION, axis=0) / along
         slope_around = _around(wrinkles) / around
@@ -106,7 +105,7 @@ class Surface:
         return (b - a) / (b + a)
 
 
-def _around(field: Array) -> Array:
+def _around(field: Floats) -> Floats:
     """Return the derivative along the periodic azimuth (axis 1)."""
     step = np.pi / RESOLUTION
     return (np.roll(field, -1, axis=1) - np.roll(field, 1, axis=1)) / (2 * step)

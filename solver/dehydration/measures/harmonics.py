@@ -5,18 +5,16 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import sph_harm_y
 
+from ...arrays import Complexes, Floats
 from ...fruit import colatitudes
 
 __all__ = ["analyse", "power", "quadrature", "remove_low"]
 
-Array = NDArray[np.float64]
-
 
 @lru_cache(maxsize=8)
-def quadrature(resolution: int) -> Array:
+def quadrature(resolution: int) -> Floats:
     """Return Fejer weights (resolution,) for the integral over cos(colatitude), summing to 2; exact to degree n - 1."""
     theta = colatitudes(resolution)
     k = np.arange(1, resolution // 2 + 1)
@@ -27,7 +25,7 @@ def quadrature(resolution: int) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _legendre(resolution: int, degree: int) -> Array:
+def _legendre(resolution: int, degree: int) -> Floats:
     """Return orthonormal Y_lm(colatitude, 0) as (m, l, resolution); zero where l < m."""
     theta = colatitudes(resolution)
     table = np.zeros((degree + 1, degree + 1, resolution))
@@ -37,7 +35,7 @@ def _legendre(resolution: int, degree: int) -> Array:
     return table
 
 
-def analyse(field: Array, degree: int) -> NDArray[np.complex128]:
+def analyse(field: Floats, degree: int) -> Complexes:
     """Return coefficients (m, l) of a real field (n, 2n) on the unit sphere, l up to `degree` (at most n - 1).
 
     Exact where l plus the field's own degree is below n; beyond that the finest degrees alias, as in any quadrature.
@@ -48,14 +46,14 @@ def analyse(field: Array, degree: int) -> NDArray[np.complex128]:
     return np.einsum("mlt,tm->ml", _legendre(n, degree), rings * quadrature(n)[:, None])
 
 
-def power(coefficients: NDArray[np.complex128]) -> Array:
+def power(coefficients: Complexes) -> Floats:
     """Return the mean square of the field carried by each degree l (Parseval over the sphere's area 4 pi)."""
     twice = np.full(len(coefficients), 2.0)
     twice[0] = 1.0
     return (twice[:, None] * np.abs(coefficients) ** 2).sum(axis=0) / (4 * np.pi)
 
 
-def remove_low(field: Array, lowest: int) -> Array:
+def remove_low(field: Floats, lowest: int) -> Floats:
     """Return the field (n, 2n) without its degrees l < `lowest`."""
     n = len(field)
     coefficients = analyse(field, lowest - 1)

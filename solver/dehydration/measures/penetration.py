@@ -13,12 +13,12 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ...arrays import Floats, Ints
 
 __all__ = ["penetration", "penetration_depths"]
 
-Doubles = NDArray[np.float64]
-Longs = NDArray[np.int64]
 CREASED = 0.35
 """Length of the mean unit normal around a node below which the node lies in a closed crease: see `_normals`."""
 OPPOSED = -0.25
@@ -28,17 +28,17 @@ LIFT = 0.01
 
 
 @njit(cache=True, error_model="numpy")
-def _dot(a: Doubles, b: Doubles) -> float:
+def _dot(a: Floats, b: Floats) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, error_model="numpy")
-def _cross(a: Doubles, b: Doubles) -> Doubles:
+def _cross(a: Floats, b: Floats) -> Floats:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 @njit(cache=True, error_model="numpy")
-def closest_on_triangle(p: Doubles, a: Doubles, b: Doubles, c: Doubles) -> Doubles:
+def closest_on_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
     """Point of the triangle abc nearest to p, each (3,). Ericson, Real-Time Collision Detection (2005), 5.1.5."""
     ab, ac, ap = b - a, c - a, p - a
     d1, d2 = _dot(ab, ap), _dot(ac, ap)
@@ -65,7 +65,7 @@ def closest_on_triangle(p: Doubles, a: Doubles, b: Doubles, c: Doubles) -> Doubl
 
 
 @njit(cache=True, error_model="numpy")
-def winding_number(p: Doubles, corners: Doubles, centres: Doubles) -> float:
+def winding_number(p: Floats, corners: Floats, centres: Floats) -> float:
     """Signed number of times the skin encloses p (3,); corners (nq, 4, 3), centres (nq, 3).
 
     Solid angles by van Oosterom & Strackee 1983, doi 10.1109/TBME.1983.325207.
@@ -83,7 +83,7 @@ def winding_number(p: Doubles, corners: Doubles, centres: Doubles) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _sort_nodes(positions: Doubles, low: Doubles, cell: float, counts: Longs, starts: Longs, order: Longs) -> None:
+def _sort_nodes(positions: Floats, low: Floats, cell: float, counts: Ints, starts: Ints, order: Ints) -> None:
     """Nodes sorted into a plain grid of cells counts (3,): `order` (ns,) and the first of each cell in `starts`."""
     place = np.empty(positions.shape[0], np.int64)
     for i in range(positions.shape[0]):
@@ -102,18 +102,18 @@ def _sort_nodes(positions: Doubles, low: Doubles, cell: float, counts: Longs, st
 
 @njit(cache=True, error_model="numpy")
 def _depths(
-    positions: Doubles,
-    quads: Longs,
-    corners: Doubles,
-    centres: Doubles,
-    normals: Doubles,
-    low: Doubles,
+    positions: Floats,
+    quads: Ints,
+    corners: Floats,
+    centres: Floats,
+    normals: Floats,
+    low: Floats,
     cell: float,
-    counts: Longs,
+    counts: Ints,
     limit: float,
     lift: float,
     closed: bool,
-    depths: Doubles,
+    depths: Floats,
 ) -> None:
     """Fill depths (ns,); see `penetration_depths`."""
     starts = np.zeros(counts[0] * counts[1] * counts[2] + 1, np.int64)
@@ -158,7 +158,7 @@ def _depths(
             depths[node] = nearest[node] if inside else 0.0
 
 
-def _normals(corners: Doubles, faces: Longs, nodes: int) -> Doubles:
+def _normals(corners: Floats, faces: Ints, nodes: int) -> Floats:
     """Outward nodal normals weighted by the quads' angles at the node (Baerentzen & Aanaes 2005), (nodes, 3).
 
     Weighted by area, the larger wall of a sharp crease would turn them into the smaller one. At the bottom of a closed
@@ -177,7 +177,7 @@ def _normals(corners: Doubles, faces: Longs, nodes: int) -> Doubles:
     return normals * np.where(length > CREASED * angles, 1 / (length + 1e-300), 0.0)[:, None]
 
 
-def penetration_depths(positions: ArrayLike, quads: ArrayLike, limit: float | None = None) -> Doubles:
+def penetration_depths(positions: ArrayLike, quads: ArrayLike, limit: float | None = None) -> Floats:
     """Depth of each surface node inside other parts of the skin, (ns,) in the units of positions; 0 where free.
 
     positions (ns, >= 3), quads (nq, 4) counter-clockwise from outside. Depths beyond limit (one mean edge length unless

@@ -8,18 +8,15 @@ new triangles can have. No kept vertex moves.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Floats, Ints
 from ..state import State
 from .plane import cross, metric
 from .rebuild import FOLD, rebuilt
 from .rest import edge_squares
 
 __all__ = ["collapse"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def collapse(state: State, shortest: float) -> tuple[State, Ints]:

@@ -10,17 +10,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Bools, Floats, Ints
 from ..anchors import corners_of, on_surface
 from ..state import Spot, State
 from .rest import edge_squares
 
 __all__ = ["cut"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Children by cut edges (bit 1: bc, the longest; 2: ca; 4: ab); corners a b c, middles p of bc, q of ca, s of ab.
 _A, _B, _C, _P, _Q, _S = range(6)
@@ -83,7 +81,7 @@ def cut(state: State, longest: float) -> tuple[State, Ints]:
     return found, mesh.edges[marked]
 
 
-def _children(state: State, first: Ints, middles: Ints) -> tuple[Ints, Floats, Floats, NDArray[np.bool_]]:
+def _children(state: State, first: Ints, middles: Ints) -> tuple[Ints, Floats, Floats, Bools]:
     """Return triangles, metrics and second forms (f', 3) after cutting, and which triangles are new."""
     mesh = state.mesh
     forms = np.stack([state.g, shell.from_angles(state.rest, state.g, mesh)])
@@ -118,7 +116,7 @@ def _seen(forms: Floats, u: Floats, v: Floats) -> Floats:
     return np.stack([apply(u, u), apply(u, v), apply(v, v)], -1)
 
 
-def _rest(state: State, new: shell.Topology, g: Floats, b: Floats, touched: NDArray[np.bool_]) -> Floats:
+def _rest(state: State, new: shell.Topology, g: Floats, b: Floats, touched: Bools) -> Floats:
     """Return rest angles: the old ones where both triangles stayed, else those of the second forms."""
     rest = shell.added_angles(b, g, new)
     n = new.vertices

@@ -8,9 +8,9 @@ state; elsewhere it is the nearest one that the new triangles can have. No verte
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Floats, Ints
 from ..state import State
 from .plane import angle, cross, metric
 from .rebuild import FOLD, rebuilt
@@ -18,8 +18,6 @@ from .rest import flat_hinges
 
 __all__ = ["flip"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: How much the angles opposite to an edge must exceed pi together [radian].
 _MARGIN = 0.1

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Floats
 
 __all__ = ["angle", "cross", "metric"]
-
-Floats = NDArray[np.float64]
 
 
 def cross(u: Floats, v: Floats) -> Floats:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Floats, Ints
 from ..anchors import Anchors, corners_of, on_surface
 from ..state import State
 
 __all__ = ["FOLD", "rebuilt"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: The fold beyond which an edge stays [radian].
 FOLD = 0.5

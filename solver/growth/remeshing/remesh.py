@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Ints
 from ..state import State
 from .collapses import collapse
 from .cuts import cut
@@ -14,7 +14,6 @@ from .flips import flip
 
 __all__ = ["remesh"]
 
-Ints = NDArray[np.int64]
 
 #: Rest edges shorter than this share of the longest allowed are removed: a cut leaves no less than half.
 _SHORT = 0.25

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Bools, Floats, Ints
 
 __all__ = ["edge_squares", "flat_hinges"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def edge_squares(g: Floats, mesh: shell.Topology) -> Floats:
@@ -38,7 +35,7 @@ def _edge_squares(g: Floats, face_edges: Ints, found: Floats, count: Floats) -> 
 
 
 @njit(cache=True, error_model="numpy")
-def _flat(g: Floats, hinge_faces: Ints, hinge_corners: Ints, sine: float) -> NDArray[np.bool_]:
+def _flat(g: Floats, hinge_faces: Ints, hinge_corners: Ints, sine: float) -> Bools:
     """Return where the sine of the sum of both angles is below `sine` (h,)."""
     found = np.empty(len(hinge_faces), np.bool_)
     cosines, sines = np.empty(2), np.empty(2)

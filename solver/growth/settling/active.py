@@ -10,18 +10,15 @@ from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Bools, Floats, Ints
 from ..state import State
 from .energy import StepEnergy, Tangent, ahead
 from .minimise import Point
 
 __all__ = ["Habit", "Settled", "settle"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Way = Callable[[StepEnergy, Floats], Iterator[Point]]
 
 #: Rings about what changed that move with it, and the share of the vertices beyond which the whole is no more work.

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Floats, Ints
 from ...shell.dissection import Fronts
 from ...shell.inverse import Inverse, fronts_of, inverse_of
 from ...shell.normals import normals
@@ -17,8 +17,6 @@ from ..state import State
 
 __all__ = ["StepEnergy", "Tangent", "ahead", "elastic"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
 _SHIFT = 1e-5

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...contract import Context, NotConverged, Unstable
 from ...shell.normals import normals
 from ..params import GrowthParams
@@ -17,7 +17,6 @@ from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 
 __all__ = ["balanced", "begun"]
 
-Floats = NDArray[np.float64]
 
 _WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
 #: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.

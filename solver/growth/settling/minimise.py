@@ -10,11 +10,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from ...arrays import Floats
 
 __all__ = ["Energy", "Point", "conjugate_gradients", "lbfgs", "quasi_newton"]
 
-Floats = NDArray[np.float64]
 
 _ARMIJO, _SHORTEST = 1e-4, 1e-9
 #: Least curvature along a step that is learnt, over the model's, and the step below which the model is forgotten.

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
+from ...arrays import Floats, Ints
 from ...contract import InvalidInput
 
 __all__ = ["harmonic", "harmonic_tensors"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def harmonic(x: Floats, triangles: Ints, painted: Ints, values: Floats) -> Floats:

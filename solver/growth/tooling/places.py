@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from scipy.spatial import KDTree
 
+from ...arrays import Floats, Ints
 from ...contract import Context, InvalidInput
 from ..shapes import Mesh
 from .harmonic import harmonic
@@ -29,7 +29,6 @@ __all__ = [
     "share",
 ]
 
-Floats = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
 
 
@@ -143,7 +142,7 @@ def _smooth(values: Floats | float) -> Floats:
     return v * v * (3 - 2 * v)
 
 
-def share(place: Place, mesh: Mesh, border: NDArray[np.int64], seed: int) -> Floats:
+def share(place: Place, mesh: Mesh, border: Ints, seed: int) -> Floats:
     """Return the share (n,) of each vertex; border: vertices of the surface's edge.
 
     Raises:

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import shell
+from ...arrays import Floats, Ints
 from ...contract import Context, InvalidInput
 from ..anchors import Anchors, place
 from ..shapes import Mesh
@@ -18,13 +18,12 @@ from .tools import Apex, HotCurve, HotSpot, HotSurface, Tool
 
 __all__ = ["border", "branched", "started"]
 
-Floats = NDArray[np.float64]
 
 #: Control points of a curve about an apex; and how far ahead a heading is marked, over the spot's radius.
 _AROUND, _AHEAD = 24, 0.2
 
 
-def border(mesh: shell.Topology) -> NDArray[np.int64]:
+def border(mesh: shell.Topology) -> Ints:
     """Return the vertices of the surface's edge."""
     return np.unique(mesh.edges[mesh.border])
 

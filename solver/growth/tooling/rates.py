@@ -6,18 +6,15 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from ... import shell
+from ...arrays import Bools, Floats, Ints
 from ..state import State
 from .reach import within
 from .tools import HotCurve, HotSpot, HotSurface, Tool, intensities
 
 __all__ = ["Rates", "grown", "rates"]
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Rates(NamedTuple):
@@ -91,7 +88,7 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     return g, rest
 
 
-def _nonzero(rates: Floats) -> NDArray[np.bool_]:
+def _nonzero(rates: Floats) -> Bools:
     """Return which rows (m,) of (m, 3) are not all 0; column by column, as numpy is slow along short rows."""
     a, b, c = rates.T
     return np.asarray((a != 0) | (b != 0) | (c != 0))

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from ...arrays import Floats, Ints
 from ..state import State
 
 __all__ = ["ways", "within"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Along the surface, how many radii a tool reaches at most: what is nearer through the air is another part.
 _DETOUR = 1.6

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from ...arrays import Floats
 from ...contract import Context
 
 __all__ = ["Projection", "gray_scott", "laid"]
 
-Floats = NDArray[np.float64]
 Projection = Literal["x", "y", "z", "round"]
 
 

@@ -11,9 +11,9 @@ from string import ascii_uppercase
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from ...arrays import Floats
 from .places import Place
 
 __all__ = ["Apex", "HotCurve", "HotSpot", "HotSurface", "Tool", "intensities", "intensity"]
@@ -158,7 +158,7 @@ def intensity(tool: HotSpot | HotCurve | HotSurface, time: float) -> float:
     return float(intensities(tool, np.array([time - tool.start]))[0])
 
 
-def intensities(tool: HotSpot | HotCurve | HotSurface, since: NDArray[np.float64]) -> NDArray[np.float64]:
+def intensities(tool: HotSpot | HotCurve | HotSurface, since: Floats) -> Floats:
     """Return the intensities at times since the start, of places with clocks of their own; 0 outside the duration."""
     when, value = np.array(tool.activation).T
     return np.where((since >= 0) & (since < tool.duration), np.interp(since, when, value), 0.0)

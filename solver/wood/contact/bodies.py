@@ -1,10 +1,10 @@
 """Contact of edges with rigid bodies on given paths: a penalty with Coulomb friction, impulse and work accounted.
 
 The thesis (3.2.5) reflects vertices as in elastic collisions. A penalty in the depth g has an energy of its own, so
-that what a body puts in can be balanced, and the same force serves the implicit scheme: E = integral of k g^2 / 2
-along the rods, by the midpoint rule at points fixed on every edge. A point c = (1 - u) a + u b gives its force to both
-ends by the same shares, so that momentum is kept. The stiffness grows from nothing over the first part of the depth, so
-that Newton's method does not meet a kink at every point. Of a severed edge only the feet of its stubs touch.
+that what a body puts in can be balanced: E = integral of k g^2 / 2 along the rods, by the midpoint rule at points fixed
+on every edge. A point c = (1 - u) a + u b gives its force to both ends by the same shares: momentum is kept. The
+stiffness grows from nothing over the first part of the depth, so that the force has no kink. Of a severed edge only the
+feet of its stubs touch.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ def pose(bodies: Bodies, time: float, centre: np.ndarray, speed: np.ndarray) -> 
 @njit(cache=True, error_model="numpy")
 def touch(
     kind: int, axis: int, reach: np.ndarray, o0: float, o1: float, o2: float
-) -> tuple[float, float, float, float, float]:
-    """Return depth [m] (0: apart), radius of curvature [m] (0: flat) and outward normal at o from the centre [m]."""
+) -> tuple[float, float, float, float]:
+    """Return depth [m] (0: apart) and outward normal at o from the centre [m]."""
     if kind == 0:
         g0 = reach[0] - abs(o0)
         g1 = reach[1] - abs(o1)
         g2 = reach[2] - abs(o2)
         gap = min(g0, min(g1, g2))
         if gap <= 0.0:
-            return 0.0, 0.0, 0.0, 0.0, 0.0
+            return 0.0, 0.0, 0.0, 0.0
         if gap == g2:
-            return gap, 0.0, 0.0, 0.0, 1.0 if o2 > 0 else -1.0
+            return gap, 0.0, 0.0, 1.0 if o2 > 0 else -1.0
         if gap == g1:
-            return gap, 0.0, 0.0, 1.0 if o1 > 0 else -1.0, 0.0
-        return gap, 0.0, 1.0 if o0 > 0 else -1.0, 0.0, 0.0
+            return gap, 0.0, 1.0 if o1 > 0 else -1.0, 0.0
+        return gap, 1.0 if o0 > 0 else -1.0, 0.0, 0.0
     along = o0 if axis == 0 else (o1 if axis == 1 else o2)
     cap = reach[1] - abs(along)
     c0 = 0.0 if axis == 0 else o0
@@ -61,22 +61,22 @@ def touch(
     away = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
     gap = reach[0] - away
     if cap <= 0.0 or gap <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     if gap > cap and away > 0.0:
         side = 1.0 if along > 0 else -1.0
-        return cap, 0.0, side if axis == 0 else 0.0, side if axis == 1 else 0.0, side if axis == 2 else 0.0
+        return cap, side if axis == 0 else 0.0, side if axis == 1 else 0.0, side if axis == 2 else 0.0
     if away == 0.0:
-        return gap, reach[0], 0.0, 0.0 if axis != 2 else 1.0, 1.0 if axis != 2 else 0.0
-    return gap, away, c0 / away, c1 / away, c2 / away
+        return gap, 0.0, 0.0 if axis != 2 else 1.0, 1.0 if axis != 2 else 0.0
+    return gap, c0 / away, c1 / away, c2 / away
 
 
 @njit(cache=True, error_model="numpy")
-def eased(gap: float, k: float, ease: float) -> tuple[float, float, float]:
-    """Return energy, its slope and second derivative at the depth `gap`, of stiffness k that is gained over `ease`."""
+def eased(gap: float, k: float, ease: float) -> tuple[float, float]:
+    """Return energy and its slope at the depth `gap`, of stiffness k that is gained over `ease`."""
     if gap < ease:
         stiff = k * gap / ease
-        return stiff * gap * gap / 6.0, 0.5 * stiff * gap, stiff
-    return k * (0.5 * gap * (gap - ease) + ease * ease / 6.0), k * (gap - 0.5 * ease), k
+        return stiff * gap * gap / 6.0, 0.5 * stiff * gap
+    return k * (0.5 * gap * (gap - ease) + ease * ease / 6.0), k * (gap - 0.5 * ease)
 
 
 @njit(cache=True, error_model="numpy")
@@ -141,17 +141,13 @@ def press(
     centre: np.ndarray,
     speed: np.ndarray,
     dt: float,
-    rubbing: float,
     push: np.ndarray,
     power: np.ndarray,
-    lagged: np.ndarray,
 ) -> float:
     """Add contact forces to f (v, 3) [N]; return the energy of the contacts [J].
 
     push (r, 3) [N] gets the force on each body; power[0] the power of the bodies, power[1] the power lost by friction
-    [W]. With `rubbing` 0 friction is limited to what stops a point's share of the edge in half a step `dt` [s]. Above
-    0, for the implicit scheme, it follows the points' normal forces `lagged` (r, points) [N] and has its full size
-    beyond this slip [m/s]: then it is the slope of a potential (Li et al. 2020, sec. 5.4).
+    [W]. Friction is limited to what stops a point's share of the edge in half a step `dt` [s].
     """
     energy = 0.0
     for e in range(len(rods.a)):
@@ -180,12 +176,12 @@ def press(
             for q in range(begin, end):
                 u = (q + 0.5) * share if whole else float(q)
                 m = 1.0 - u
-                gap, _, n0, n1, n2 = touch(
+                gap, n0, n1, n2 = touch(
                     bodies.kind[r], bodies.axis[r], bodies.half[r], o0 + u * d0, o1 + u * d1, o2 + u * d2
                 )
                 if gap <= 0.0:
                     continue
-                own, normal, _ = eased(gap, bodies.k[r] * length, bodies.ease[r])
+                own, normal = eased(gap, bodies.k[r] * length, bodies.ease[r])
                 energy += own
                 s0 = m * v[a, 0] + u * v[b, 0] - speed[r, 0]
                 s1 = m * v[a, 1] + u * v[b, 1] - speed[r, 1]
@@ -197,12 +193,8 @@ def press(
                 slip = np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
                 drag = 0.0
                 if bodies.friction[r] > 0.0 and slip > 0.0:
-                    if rubbing > 0.0:
-                        soft = min(slip / rubbing, 1.0)
-                        drag = bodies.friction[r] * lagged[r, bodies.first[e] + q] * soft * (2.0 - soft) / slip
-                    else:
-                        light = share * min(mass[a], mass[b])
-                        drag = min(bodies.friction[r] * normal, 0.5 * light * slip / dt) / slip
+                    light = share * min(mass[a], mass[b])
+                    drag = min(bodies.friction[r] * normal, 0.5 * light * slip / dt) / slip
                 p0 = normal * n0 - drag * s0
                 p1 = normal * n1 - drag * s1
                 p2 = normal * n2 - drag * s2

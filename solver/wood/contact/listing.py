@@ -8,23 +8,18 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..model.arrays import Rods
-from ..model.state import Wood
+from ..model.arrays import Rods, Rubbing
+from ..model.state import State, Wood
 from ..params import WoodParams
-from ..stepping.explicit import LOST, forces
-from ..stepping.moment import State
-from .pairs import approach, distances, pairs
-from .rubbing import Rubbing, none, normals
+from .pairs import pairs
 
 __all__ = ["Listing", "Near", "law"]
 
 #: Thickness over the least distance of rods as laid, and the list's margin over the thickness.
 _THICK, _MARGIN = 0.8, 0.5
 #: Share of an edge's stiffness that a contact of rods has: about as round rods of wood that cross have across the grain
-#: (Hertz). Five times as much makes an implicit step of splinters that snap take six times as long.
+#: (Hertz).
 _CONTACT = 0.02
-#: The longest step of an implicit iteration that is looked at, over the thickness: it goes into the list of pairs.
-_FAR = 4.0
 #: Depth over which a contact of rods gains its stiffness, over the thickness.
 _EASE = 0.05
 
@@ -44,14 +39,11 @@ def law(wood: Wood, params: WoodParams) -> np.ndarray:
 class Near:
     """Pairs that were within the thickness and some slack when they were listed."""
 
-    def __init__(self, wood: Wood, thick: float, slack: float, among: np.ndarray | None = None) -> None:
-        """List all such pairs, or those `among` (p, 2)."""
+    def __init__(self, wood: Wood, thick: float, slack: float) -> None:
+        """List all such pairs."""
         self._x, self._whole = wood.motion.x.copy(), (wood.rods.alive.copy(), wood.parent)
         self._slack = slack
-        if among is None:
-            self.pair = pairs(self._x, wood.rods, wood.rod, thick + slack)
-        else:
-            self.pair = among[distances(self._x, wood.rods, among) < thick + slack]
+        self.pair = pairs(self._x, wood.rods, wood.rod, thick + slack)
 
     def left(self, wood: Wood) -> float:
         """Return the slack that is left [m]; negative if a rod has broken since."""
@@ -68,24 +60,16 @@ class Listing:
         self._law = law(wood, params)
         self._thick, self._margin = float(self._law[0]), _MARGIN * float(self._law[0])
         self.on = params.rod_contact and self._thick > 0
-        self._rubbing = none()
         self._near: Near | None = None
-        self._wide: Near | None = None
+        self._rubbing = Rubbing(np.zeros((0, 2), np.int32), self._law)
 
     def _listed(self, wood: Wood, ahead: float) -> Rubbing:
         """Return pairs that hold until a vertex has moved by `ahead` [m]."""
         if self._near is not None and self._near.left(wood) > 2 * ahead:
             return self._rubbing
         slack = self._margin + 2 * ahead
-        wide = self._wide.pair if self._wide is not None and self._wide.left(wood) >= slack else None
-        self._near = Near(wood, self._thick, slack, wide)
-        old, found, count = self._rubbing, self._near.pair, len(wood.rods.a)
-        lagged = np.zeros(len(found))
-        if len(old.pair):
-            known, wanted = (p[:, 0].astype(np.int64) * count + p[:, 1] for p in (old.pair, found))
-            at = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-            lagged = np.where(known[at] == wanted, old.lagged[at], 0.0)
-        self._rubbing = Rubbing(found, self._law, lagged)
+        self._near = Near(wood, self._thick, slack)
+        self._rubbing = Rubbing(self._near.pair, self._law)
         return self._rubbing
 
     def fitted(self, state: State, ahead: float = 0.0) -> State:
@@ -96,41 +80,3 @@ class Listing:
         if rubbing is state.scratch.rubbing:
             return state
         return state._replace(scratch=state.scratch._replace(rubbing=rubbing))
-
-    def refreshed(self, state: State, ahead: float, time: float, dt: float) -> State:
-        """Return the state with pairs that hold for `ahead` [s] from `time` [s], its energies booked.
-
-        What rods that touch at the start have is booked as taken from what is lost.
-        """
-        m = state.wood.motion
-        fitted = self.fitted(state, ahead * float(np.sqrt((m.v**2).sum(1).max())) if self.on else 0.0)
-        if fitted is state:
-            return state
-        w, before = state.wood, float(state.books[:4].sum())
-        forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, fitted.scratch, w.turning, time, dt, 0.0, state.books)
-        state.books[LOST] += before - float(state.books[:4].sum())
-        return fitted
-
-    def lag(self, state: State) -> None:
-        """Take the normal forces where the state is as those that friction follows."""
-        if self.on:
-            normals(state.wood.motion.x, state.wood.rods, self.fitted(state).scratch.rubbing)
-
-    def near(self, state: State, guess: np.ndarray) -> np.ndarray:
-        """Return the guess (v, 3) [m], or as far on the way to it as passes no rod through another."""
-        m = state.wood.motion
-        way = (guess - m.x) * (m.held == 0)[:, None]
-        share = self.allowed(state, way, 1.0)
-        return guess if share >= 1 else guess - (1 - share) * way
-
-    def allowed(self, state: State, way: np.ndarray, most: float) -> float:
-        """Return the share, up to `most`, of the step `way` (v, 3) [m] that passes no rod through another."""
-        if not self.on:
-            return most
-        wood, longest = state.wood, max(float(np.sqrt((way**2).sum(1).max())), 1e-300)
-        most = min(most, _FAR * self._thick / longest)
-        far = 2 * min(most, 1.0) * longest
-        if self._wide is None or self._wide.left(wood) < far:
-            self._wide = Near(wood, self._thick, self._margin + far)
-        most = min(most, self._wide.left(wood) / (2 * longest))
-        return min(most, float(approach(wood.motion.x, way, wood.rods, self._wide.pair, self._thick)))

@@ -1,4 +1,4 @@
-"""Which edges of different rods are near each other, from a grid; and how far they can move before they meet."""
+"""Which edges of different rods are near each other, from a grid."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numba import njit
 from ..model.arrays import Rods
 from .rubbing import closest
 
-__all__ = ["approach", "distances", "pairs"]
+__all__ = ["distances", "pairs"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -81,37 +81,3 @@ def distances(x: np.ndarray, rods: Rods, pair: np.ndarray) -> np.ndarray:
             apart += g * g
         out[m] = np.sqrt(apart)
     return out
-
-
-@njit(cache=True, error_model="numpy")
-def approach(x: np.ndarray, way: np.ndarray, rods: Rods, pair: np.ndarray, thick: float) -> float:
-    """Return the largest share of the step `way` (v, 3) [m] that brings no pair nearer than it may come.
-
-    That is half its distance, or half the thickness [m] if that is more. Edges are convex: along the direction between
-    their closest points they stay as far apart as their ends do.
-    """
-    most = np.inf
-    for m in range(len(pair)):
-        e = pair[m, 0]
-        w = pair[m, 1]
-        if rods.alive[e] == 0 or rods.alive[w] == 0:
-            continue
-        a, b, c, d = rods.a[e], rods.b[e], rods.a[w], rods.b[w]
-        s, t = closest(x, a, b, c, d, 0.0)
-        apart = 0.0
-        first = 0.0
-        second = 0.0
-        third = 0.0
-        fourth = 0.0
-        for k in range(3):
-            n = (1.0 - s) * x[a, k] + s * x[b, k] - (1.0 - t) * x[c, k] - t * x[d, k]
-            apart += n * n
-            first += n * way[a, k]
-            second += n * way[b, k]
-            third += n * way[c, k]
-            fourth += n * way[d, k]
-        closing = max(third, fourth) - min(first, second)
-        if closing > 0.0 and apart > 0.0:
-            apart = np.sqrt(apart)
-            most = min(most, max(apart - 0.5 * thick, 0.5 * apart) * apart / closing)
-    return most

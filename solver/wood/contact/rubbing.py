@@ -9,32 +9,17 @@ and has the force of the points themselves as its slope.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
-from ..model.arrays import Rods
+from ..model.arrays import Rods, Rubbing
 from .bodies import eased
 
-__all__ = ["Rubbing", "closest", "crossed", "none", "normals", "rub"]
+__all__ = ["closest", "crossed", "rub"]
 
 _TINY = 1e-30
 #: Weight of places away from the middles of edges, over the thickness squared.
 MIDDLE = 0.1
-
-
-class Rubbing(NamedTuple):
-    """Listed pairs, what a contact is made of, and what friction follows."""
-
-    pair: np.ndarray  # (p, 2) int32 edges
-    law: np.ndarray  # (4,) thickness [m], stiffness [N/m], friction [1], depth over which the stiffness grows [m]
-    lagged: np.ndarray  # (p,) normal forces that an implicit step's friction follows [N]
-
-
-def none() -> Rubbing:
-    """Return no pairs."""
-    return Rubbing(np.zeros((0, 2), np.int32), np.zeros(4), np.zeros(0))
 
 
 @njit(cache=True, error_model="numpy")
@@ -94,18 +79,6 @@ def crossed(
 
 
 @njit(cache=True, error_model="numpy")
-def normals(x: np.ndarray, rods: Rods, rubbing: Rubbing) -> None:
-    """Write the normal forces of all pairs to `lagged` [N]."""
-    vertex = np.zeros(4, np.int64)
-    weight = np.zeros(4)
-    way = np.zeros(3)
-    thick = rubbing.law[0]
-    for m in range(len(rubbing.pair)):
-        gap = thick - crossed(x, rods, rubbing.pair[m], thick, vertex, weight, way)
-        rubbing.lagged[m] = eased(gap, rubbing.law[1], rubbing.law[3])[1] if gap > 0.0 else 0.0
-
-
-@njit(cache=True, error_model="numpy")
 def rub(
     x: np.ndarray,
     v: np.ndarray,
@@ -114,13 +87,9 @@ def rub(
     rods: Rods,
     rubbing: Rubbing,
     dt: float,
-    slow: float,
     power: np.ndarray,
 ) -> float:
-    """Add contact forces to f (v, 3) [N] and what friction loses to power[1] [W]; return their energy [J].
-
-    slow: 0, or the slip [m/s] beyond which an implicit scheme's friction has its full size, as in `bodies.press`.
-    """
+    """Add contact forces to f (v, 3) [N] and what friction loses to power[1] [W]; return their energy [J]."""
     thick, stiff, friction, ease = rubbing.law[0], rubbing.law[1], rubbing.law[2], rubbing.law[3]
     energy = 0.0
     n = np.zeros(3)
@@ -132,7 +101,7 @@ def rub(
         gap = thick - apart
         if gap <= 0.0 or apart == 0.0:
             continue
-        own, normal, _ = eased(gap, stiff, ease)
+        own, normal = eased(gap, stiff, ease)
         energy += own
         square = max(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], _TINY)
         along = 0.0
@@ -148,15 +117,11 @@ def rub(
         slip = np.sqrt(slip)
         drag = 0.0
         if slip > 0.0 and friction > 0.0:
-            if slow > 0.0:
-                soft = min(slip / slow, 1.0)
-                drag = friction * rubbing.lagged[m] * soft * (2.0 - soft) / slip
-            else:
-                lightness = 0.0
-                for k in range(4):
-                    lightness += weight[k] * weight[k] / mass[vertex[k]]
-                # no more than what stops the slip in half a step
-                drag = min(friction * normal, 0.5 * slip / (lightness * dt)) / slip
+            lightness = 0.0
+            for k in range(4):
+                lightness += weight[k] * weight[k] / mass[vertex[k]]
+            # no more than what stops the slip in half a step
+            drag = min(friction * normal, 0.5 * slip / (lightness * dt)) / slip
         power[1] += drag * slip * slip
         for c in range(3):
             push = normal * n[c] / apart - drag * slide[c]

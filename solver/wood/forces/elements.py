@@ -14,7 +14,7 @@ from numba import njit
 
 from ..model.arrays import Bonds, Rods
 
-__all__ = ["Elements", "apply", "elements", "spread"]
+__all__ = ["Elements", "elements", "spread"]
 
 _TINY = 1e-30
 
@@ -67,7 +67,6 @@ def _fill(
     x: np.ndarray,
     rods: Rods,
     bonds: Bonds,
-    positive: bool,
     h: np.ndarray,
     vertex: np.ndarray,
     weight: np.ndarray,
@@ -84,8 +83,6 @@ def _fill(
             continue
         length = _unit(x, vertex[n], weight[n, 0], u)
         pull = rods.k[n] * (length / rods.rest[n] - 1.0) / length
-        if positive:
-            pull = max(pull, 0.0)
         for r in range(3):
             for c in range(3):
                 h[n, r, c] = (rods.k[n] / rods.rest[n] - pull) * u[r] * u[c] + (pull if r == c else 0.0)
@@ -105,19 +102,7 @@ def _fill(
         q = _unit(x, vertex[m], weight[m, 1], v)
         more = max(1.0 + u[0] * v[0] + u[1] * v[1] + u[2] * v[2], 1e-9)
         stiff = 4.0 * rods.alpha[n] / rods.span[n]
-        if not positive:
-            _turned(u, v, p, q, -2.0 * stiff / (more * more), 4.0 * stiff / (more * more * more), h[m])
-            continue
-        tight = 2.0 * stiff / max(more, 0.1) ** 2
-        cosine = more - 1.0
-        for r in range(3):
-            for c in range(3):
-                one = 1.0 if r == c else 0.0
-                h[m, r, c] = tight * (one - u[r] * u[c]) / (p * p)
-                h[m, 3 + r, 3 + c] = tight * (one - v[r] * v[c]) / (q * q)
-                across = one - u[r] * u[c] - v[r] * v[c] + cosine * u[r] * v[c]
-                h[m, r, 3 + c] = -tight * across / (p * q)
-                h[m, 3 + c, r] = h[m, r, 3 + c]
+        _turned(u, v, p, q, -2.0 * stiff / (more * more), 4.0 * stiff / (more * more * more), h[m])
     base += len(rods.before)
     for n in range(len(bonds.i)):
         m = base + n
@@ -136,45 +121,18 @@ def _fill(
         q = _unit(x, vertex[m], weight[m, 1], v)
         off = u[0] * v[0] + u[1] * v[1] + u[2] * v[2] - bonds.cosine[n]
         pull = bonds.k[n] * (p / bonds.rest[n] - 1.0) / p
-        if positive:
-            off = 0.0
-            pull = max(pull, 0.0)
         _turned(u, v, p, q, 2.0 * bonds.s[n] * off, 2.0 * bonds.s[n], h[m])
         for r in range(3):
             for c in range(3):
                 h[m, r, c] += (bonds.k[n] / bonds.rest[n] - pull) * u[r] * u[c] + (pull if r == c else 0.0)
 
 
-def elements(x: np.ndarray, rods: Rods, bonds: Bonds, positive: bool = False) -> Elements:
-    """Return the elements at x (v, 3); `positive` keeps Gauss and Newton's part and tension, never negative."""
+def elements(x: np.ndarray, rods: Rods, bonds: Bonds) -> Elements:
+    """Return the elements at x (v, 3)."""
     count = len(rods.a) + len(rods.before) + len(bonds.i)
     out = Elements(np.zeros((count, 6, 6)), np.zeros((count, 3), np.int32), np.zeros((count, 2, 3)))
-    _fill(x, rods, bonds, positive, *out)
+    _fill(x, rods, bonds, *out)
     return out
-
-
-@njit(cache=True, error_model="numpy")
-def apply(parts: Elements, p: np.ndarray, out: np.ndarray) -> None:
-    """Add K p to out, both (v, 3)."""
-    w = np.zeros(6)
-    g = np.zeros(6)
-    for n in range(len(parts.h)):
-        i = parts.vertex[n, 0]
-        j = parts.vertex[n, 1]
-        k = parts.vertex[n, 2]
-        weight = parts.weight[n]
-        for c in range(3):
-            w[c] = weight[0, 0] * p[i, c] + weight[0, 1] * p[j, c] + weight[0, 2] * p[k, c]
-            w[3 + c] = weight[1, 1] * p[j, c] + weight[1, 2] * p[k, c]
-        for r in range(6):
-            value = 0.0
-            for c in range(6):
-                value += parts.h[n, r, c] * w[c]
-            g[r] = value
-        for c in range(3):
-            out[i, c] += weight[0, 0] * g[c]
-            out[j, c] += weight[0, 1] * g[c] + weight[1, 1] * g[3 + c]
-            out[k, c] += weight[0, 2] * g[c] + weight[1, 2] * g[3 + c]
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..model.arrays import Bonds, Rods
-from .elements import Elements, elements, spread
+from .elements import elements, spread
 
 __all__ = ["Stiffness"]
 
@@ -14,8 +14,8 @@ __all__ = ["Stiffness"]
 class Stiffness:
     """K over the free vertices, in blocks; bonds that were handed over need a new one."""
 
-    def __init__(self, rods: Rods, bonds: Bonds, free: np.ndarray, couples: np.ndarray | None = None) -> None:
-        """Fix the pattern for free (v,) bool: vertices that are not held; couples (n, 2): vertices coupled besides."""
+    def __init__(self, rods: Rods, bonds: Bonds, free: np.ndarray) -> None:
+        """Fix the pattern for free (v,) bool: vertices that are not held."""
         p, q = rods.before, rods.after
         edge = np.column_stack([rods.a, rods.b, np.full(len(rods.a), -1)])
         hinge = np.column_stack([rods.a[p], rods.b[p], rods.b[q]])
@@ -29,35 +29,19 @@ class Stiffness:
         columns = np.broadcast_to(of[:, None, :], (len(of), 3, 3))
         inside = (rows >= 0) & (columns >= 0)
         alone = np.arange(self.size, dtype=np.int64) * (self.size + 1)
-        self._number, more = number, number[np.zeros((0, 2), int) if couples is None else couples]
-        more = more[(more >= 0).all(1)]
-        codes = np.concatenate(
-            [rows[inside] * self.size + columns[inside], alone, more @ [self.size, 1], more @ [1, self.size]]
-        )
+        codes = np.concatenate([rows[inside] * self.size + columns[inside], alone])
         unique, at = np.unique(codes, return_inverse=True)
-        self._codes, own = unique, int(inside.sum())
+        own = int(inside.sum())
         self.place = np.full(inside.shape, -1, np.int64)
         self.place[inside] = at[:own]
         self.diagonal = at[own : own + self.size]
         self.indices = unique % max(self.size, 1)
         self.indptr = np.searchsorted(unique, np.arange(self.size + 1, dtype=np.int64) * self.size)
 
-    def at(self, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """Return where the blocks of vertices i and j (n,) are; -1 where they are not coupled, or one is held."""
-        rows, columns = self._number[i], self._number[j]
-        codes = rows * self.size + columns
-        found: np.ndarray = np.minimum(np.searchsorted(self._codes, codes), len(self._codes) - 1)
-        return np.where((rows >= 0) & (columns >= 0) & (self._codes[found] == codes), found, -1)
-
-    def summed(self, parts: Elements) -> np.ndarray:
-        """Return the blocks (nnz, 3, 3) of K [N/m] on the pattern indptr, indices."""
-        out = np.zeros((len(self.indices), 3, 3))
-        spread(parts, self.place, out)
-        return out
-
     def blocks(self, x: np.ndarray, rods: Rods, bonds: Bonds, diagonal: float = 0.0) -> np.ndarray:
         """Return the blocks (nnz, 3, 3) of K [N/m] at x (v, 3) with `diagonal` added."""
-        out = self.summed(elements(x, rods, bonds))
+        out = np.zeros((len(self.indices), 3, 3))
+        spread(elements(x, rods, bonds), self.place, out)
         for c in range(3):
             out[self.diagonal, c, c] += diagonal
         return out

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ...contract import Unstable
-from ..model.state import Wood, scratch_for
+from ..model.motion import CONTACT, LOST, WORK
+from ..model.state import State, Wood, scratch_for
 from ..params import WoodParams
-from .explicit import CONTACT, LOST, WORK, Scratch, forces
+from .explicit import forces
 from .scaling import saved
 
 __all__ = [
     "Energy",
     "Reached",
-    "State",
     "balanced",
     "begin",
-    "copied",
     "floor",
     "kinetic",
     "largest",
@@ -27,30 +26,14 @@ __all__ = [
     "strength",
 ]
 
-#: Kinetic, elastic, lost, work, dissipated and at the start [J].
-Energy = tuple[float, float, float, float, float, float]
-
-
-class State(NamedTuple):
-    """A moment of a run. books (6,) [J] as `explicit` numbers them; impulse (r, 3) [N s]; steps taken.
-
-    dissipated [J]: what an implicit scheme takes on its own account.
-    """
-
-    wood: Wood
-    scratch: Scratch
-    books: np.ndarray
-    impulse: np.ndarray
-    rods: int
-    bonds: int
-    steps: int
-    dissipated: float = 0.0
+#: Kinetic, elastic, lost, work and at the start [J].
+Energy = tuple[float, float, float, float, float]
 
 
 class Reached(NamedTuple):
     """What is reported of a stage.
 
-    energy: (kinetic, elastic, lost, work, dissipated, start) [J]; error: of what ended it.
+    energy: (kinetic, elastic, lost, work, start) [J]; error: of what ended it.
     """
 
     time: float
@@ -87,39 +70,21 @@ def strength(wood: Wood, params: WoodParams) -> float:
 def reached(time: float, state: State, start: float, error: float, sound: bool) -> Reached:
     """Return what is reported of a stage that was solved rather than marched to."""
     elastic, lost, work = float(state.books[: CONTACT + 1].sum()), float(state.books[LOST]), float(state.books[WORK])
-    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, 0.0, start), error, sound)
+    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, start), error, sound)
 
 
 def begin(wood: Wood) -> State:
     """Return the state at time 0, forces known."""
     scratch = scratch_for(wood)
     books = np.zeros(6)
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, 0.0, books)
+    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, books)
     return State(wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), 0, 0, 0)
-
-
-def _again(scratch: Scratch) -> Scratch:
-    """Return a copy; plan and fragments are not written to, but for what a step writes before it reads it."""
-    kept = ("rubbing", "plan", "fragments")
-    fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
-    return scratch._replace(**fresh)
-
-
-def copied(state: State) -> State:
-    """Return a state that can be stepped without touching this one."""
-    wood = state.wood.copied()
-    return state._replace(
-        wood=wood,
-        scratch=_again(state.scratch),
-        books=state.books.copy(),
-        impulse=state.impulse.copy(),
-    )
 
 
 def largest(energy: Energy, scale: float) -> float:
     """Return the largest energy [J] of a run so far: what errors of the balance are held against."""
-    kinetic_, elastic, lost, work, dissipated, start = energy
-    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost) + abs(dissipated))
+    kinetic_, elastic, lost, work, start = energy
+    return max(scale, start, abs(work), kinetic_ + elastic + abs(lost))
 
 
 def balanced(state: State, time: float, start: float, scale: float, tolerance: float) -> Reached:
@@ -131,8 +96,8 @@ def balanced(state: State, time: float, start: float, scale: float, tolerance: f
     """
     elastic = float(state.books[: CONTACT + 1].sum())
     moving = real(state)
-    energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), state.dissipated, start)
-    error = abs(moving + elastic + energy[2] + energy[4] - energy[3] - start) / largest(energy, scale)
+    energy = (moving, elastic, float(state.books[LOST]), float(state.books[WORK]), start)
+    error = abs(moving + elastic + energy[2] - energy[3] - start) / largest(energy, scale)
     # what is not finite is not less, either
     if not error <= 0.5:
         lost = f"the energy balance is off by {100 * error:.0f} percent" if error > 0.5 else "energies are not finite"

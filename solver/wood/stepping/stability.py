@@ -44,7 +44,7 @@ def longest_step(wood: Wood, contact: float = 0.0) -> float:
         difference = np.zeros_like(x)
         for sign in (1.0, -1.0):
             motion.x[:] = x + sign * step
-            forces(motion, wood.rods, wood.bonds, wood.turns, nobody, scratch, wood.turning, 0.0, 1.0, 0.0, books)
+            forces(motion, wood.rods, wood.bonds, wood.turns, nobody, scratch, wood.turning, 0.0, 1.0, books)
             difference -= sign * scratch.f
         p = np.where(free[:, None], difference / (2 * scale) / root, 0.0)
         highest = float(np.linalg.norm(p))

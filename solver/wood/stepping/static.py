@@ -9,11 +9,12 @@ import numpy as np
 from ...contract import Context, NotConverged
 from ...multifrontal import factorise
 from ..forces.hessian import Stiffness
-from ..model.state import Wood
+from ..model.motion import CONTACT, WORK
+from ..model.state import State, Wood, copied
 from ..params import WoodParams
 from .dissection import dissected
-from .explicit import CONTACT, WORK, forces
-from .moment import Reached, State, begin, copied, reached, strength
+from .explicit import forces
+from .moment import Reached, begin, reached, strength
 
 __all__ = ["equilibrium", "static"]
 
@@ -42,7 +43,7 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
         m.load[:] = full * (begun + goal * (factor - begun))
         norm, wanted = np.inf, max(_TOLERANCE * float(np.linalg.norm(m.load)), least)
         for _ in range(30):
-            forces(m, wood.rods, wood.bonds, wood.turns, wood.bodies, state.scratch, False, 0.0, 1.0, 1.0, state.books)
+            forces(m, wood.rods, wood.bonds, wood.turns, wood.bodies, state.scratch, False, 0.0, 1.0, state.books)
             r = state.scratch.f[free].ravel()
             last, norm = norm, float(np.linalg.norm(r))
             if norm <= wanted or not np.isfinite(norm) or norm > 1e6 * max(last, 1e-300):
@@ -62,7 +63,7 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
         if increment < 1e-4:
             raise NotConverged(
                 f"no equilibrium was found beyond {begun + done * (factor - begun):.3g} times the loads.",
-                advice="Apply smaller loads, or take the implicit mode.",
+                advice="Apply smaller loads, or take the explicit mode, with damping.",
                 residual=norm / max(wanted / _TOLERANCE, 1e-300),
             )
     return state, norm / max(float(np.linalg.norm(m.load)), least / _TOLERANCE)

@@ -12,10 +12,11 @@ from __future__ import annotations
 import itertools
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from ...surfaces import harmonics
 from . import poles
@@ -23,7 +24,6 @@ from .weights import Samples
 
 __all__ = ["Bands", "Targets", "add_up", "multiplier"]
 
-Array = NDArray[Any]
 
 #: Bands per doubling of the degree.
 _PER_OCTAVE = 3

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from ...surfaces import harmonics, spectra
 from .bands import Bands
 
 __all__ = ["COARSE", "Cell", "Cells"]
 
-Array = NDArray[Any]
 
 #: Lattice of the envelope: it is smooth, see `_WIDTH`.
 COARSE = 12

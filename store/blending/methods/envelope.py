@@ -11,8 +11,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.fruit import azimuths, colatitudes
 
 from ...surfaces import harmonics, window
@@ -22,7 +22,6 @@ from .cells import COARSE
 
 __all__ = ["apply", "at_poles", "factor", "take_low"]
 
-Array = NDArray[Any]
 
 #: Share of the mean square below which a place counts as smooth, and the power [r1^2] of nothing.
 _FAINT, _NOTHING = 1e-2, 1e-10

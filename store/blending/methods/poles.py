@@ -12,9 +12,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Array
+
 __all__ = ["highest_degree", "multiply"]
 
-Array = NDArray[np.generic]
 
 #: Share of the power that the highest degree in use may leave out.
 _REST = 1e-3

@@ -10,16 +10,14 @@ from __future__ import annotations
 import bisect
 import math
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from solver.arrays import Array
 
 from ..neighbours import SAME, Neighbours, Weighted
 
 __all__ = ["Samples"]
-
-Array = NDArray[Any]
 
 
 class Samples:

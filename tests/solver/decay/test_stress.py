@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.decay_stress import CASES, SLOW
+from benchmarks.decay.stress import CASES, SLOW
 
 
 @pytest.mark.parametrize(

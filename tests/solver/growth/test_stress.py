@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.crossings import crossings
-from benchmarks.growth_stress import CASES, SLOW
+from benchmarks.growth.crossings import crossings
+from benchmarks.growth.stress import CASES, SLOW
 
 
 @pytest.mark.parametrize(

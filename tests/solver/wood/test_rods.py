@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 
 from solver.contract import Context, Need
 from solver.wood import SOLVER
-from solver.wood.forces.elements import apply, elements
 from solver.wood.forces.hessian import Stiffness
 from solver.wood.model.bundle import lay
 from solver.wood.model.state import Wood, scratch_for
@@ -23,7 +22,7 @@ PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 def energies(wood: Wood) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return energies, forces (v, 3) and torques (e,)."""
     scratch, books = scratch_for(wood), np.zeros(6)
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, 0.0, books)
+    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
     return books[:4].copy(), scratch.f, scratch.torque
 
 
@@ -97,21 +96,6 @@ def test_the_stiffness_is_the_forces_difference(values):
     expected = (found[1] - found[0]).ravel() / (2 * h)
     assert np.linalg.norm(k @ way.ravel() - expected) < 1e-6 * np.linalg.norm(expected)
     assert abs(k - k.T).max() < 1e-12 * abs(k).max()
-
-
-def test_products_by_elements_are_the_matrix_s_and_positive_ones_are_positive():
-    wood = shaken(rods=9)
-    m = wood.motion
-    free = m.held == 0
-    pattern = Stiffness(wood.rods, wood.bonds, free)
-    way = np.random.default_rng(2).normal(size=m.x.shape) * free[:, None]
-    out = np.zeros_like(way)
-    apply(elements(m.x, wood.rods, wood.bonds), way, out)
-    expected = pattern.matrix(m.x, wood.rods, wood.bonds) @ way[free].ravel()
-    assert np.abs(out[free].ravel() - expected).max() < 1e-12 * np.abs(expected).max()
-    kept = elements(m.x, wood.rods, wood.bonds, positive=True)
-    lowest, highest = np.linalg.eigvalsh(kept.h).T[[0, -1]]
-    assert (lowest >= -1e-12 * highest.max()).all()
 
 
 @pytest.mark.parametrize("twist", [False, True])

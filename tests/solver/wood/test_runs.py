@@ -1,4 +1,4 @@
-"""Whole runs: the balance of energy, breaks at known loads, contact's books, the implicit scheme, hostile input."""
+"""Whole runs: the balance of energy, breaks at known loads, contact's books, hostile input."""
 
 import numpy as np
 import pytest
@@ -110,35 +110,13 @@ def test_what_a_body_receives_is_what_the_rods_lose():
     assert found.residual.values.max() < 1e-2
 
 
-def test_bdf2_is_of_second_order_and_agrees_with_the_explicit_scheme():
-    # three vertices and a small load: few modes, all resolved
-    values = {**ROD, "vertices": 3, "tip_load": (0.0, 0.0, -1e-2)}
-    time = 4e-3
-    exact = run({**values, "step": 1e-6}, time).tip_position.values[0]
-    off = []
-    for step in (1e-4, 5e-5, 2.5e-5):
-        tip = run({**values, "mode": "implicit", "step": step}, time).tip_position.values[0]
-        off.append(np.linalg.norm(tip - exact))
-    assert np.log2(off[0] / off[1]) == pytest.approx(2, abs=0.4)
-    assert np.log2(off[1] / off[2]) == pytest.approx(2, abs=0.4)
-    assert off[-1] < 0.01 * np.linalg.norm(exact - [0.15, 0, 0])
-
-
-def test_implicit_breaks_near_the_explicit_load():
-    values = {**ROD, "length": 0.1, "clamp": "both", "pull": (0.2, 0, 0), "fracture": "stress", "mode": "implicit"}
-    breaking = 0.01 * 0.1 / 0.2
-    found = run({**values, "step": breaking / 50}, 0.97 * breaking, 1.03 * breaking)
-    assert found.broken_rods.values[0] == 0
-    assert found.broken_rods.values[1] >= 1
-
-
 @pytest.mark.parametrize(
     ("values", "kind"),
     [
         ({"rods": 0}, InvalidInput),
         ({"radius": 0.9}, InvalidGeometry),
         ({"curvature": 90.0, "radius": 0.01}, InvalidGeometry),
-        ({"twist": True, "mode": "implicit"}, InvalidInput),
+        ({"twist": True, "mode": "static"}, InvalidInput),
         ({"notches": [{"position": 1.0, "depth": 0.5}]}, InvalidInput),
         ({"bodies": [{"size": (0, 1, 1), "path": [{"time": 0, "position": (0, 0, 0)}]}]}, InvalidInput),
     ],
@@ -146,6 +124,11 @@ def test_implicit_breaks_near_the_explicit_load():
 def test_impossible_parameters_are_refused(values, kind):
     with pytest.raises(kind):
         SOLVER.parse(values)
+
+
+def test_the_mode_that_is_gone_says_what_to_use_instead():
+    with pytest.raises(InvalidInput, match="mass_scaling of 1e4"):
+        SOLVER.parse({"mode": "implicit"})
 
 
 def test_a_bond_of_no_length_stays_finite():

@@ -6,9 +6,11 @@ import pytest
 from solver.contract import InvalidInput, Need
 from solver.wood import SOLVER
 from solver.wood.model.bundle import lay
-from solver.wood.stepping.explicit import BONDS, STRETCH, march
+from solver.wood.model.fragments import fragments
+from solver.wood.model.motion import BONDS, STRETCH
+from solver.wood.stepping.explicit import march
 from solver.wood.stepping.moment import begin, real
-from solver.wood.stepping.scaling import fragments, rigid
+from solver.wood.stepping.scaling import rigid
 from solver.wood.stepping.stability import longest_step
 
 FREE = {"rods": 7, "vertices": 8, "clamp": "none", "fracture": "none"}
@@ -129,9 +131,9 @@ def test_bodies_do_not_throw_scaled_fragments_off():
     assert found.elastic_energy.values[-1] > 0
 
 
-def test_implicit_runs_need_no_scaling():
+def test_equilibria_need_no_scaling():
     with pytest.raises(InvalidInput, match="mass_scaling 1"):
-        SOLVER.parse({"mode": "implicit", "mass_scaling": 4.0})
+        SOLVER.parse({"mode": "static", "mass_scaling": 4.0})
 
 
 @pytest.mark.parametrize("touching", [False, True])

@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks.wood_rest import fragments
-from benchmarks.wood_stress import CASES, tried
+from benchmarks.wood.rest import fragments
+from benchmarks.wood.stress import CASES, tried
 from solver.wood import SOLVER
 from solver.wood.model.bundle import lay
 

@@ -1,0 +1,1 @@
+"""Benchmarks of rot and mould."""

@@ -1,0 +1,71 @@
+"""The onset of the exact references on both roads: python -m benchmarks.dehydration.onset [--quality Q] [--fruits].
+
+Error is that of s_cr, relative to the reference; seconds are those of one call on this machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from benchmarks.figures import keep
+from solver.dehydration import SOLVER, DehydrationParams
+from solver.dehydration.bifurcation import onset
+
+REFERENCE = Path(__file__).parents[2] / "tests" / "solver" / "core_shell_sphere.json"
+AXISYMMETRIC = ("raisin", "wolfberry", "jujube1", "jujube2")
+
+
+def measure(case: dict[str, Any], quality: str) -> list[dict[str, Any]]:
+    stone, te, gamma = (case[name] for name in ("stone_radius", "exocarp_thickness", "gamma"))
+    params = DehydrationParams.parse({"stone": (stone, stone), "te": te, "gamma": gamma})
+    rows = []
+    for kappa, key in ((None, "s_cr"), (1000.0, "s_cr_kappa_over_mu_1000")):
+        for road in ("radial", "meridional"):
+            found = onset(params, kappa_ratio=kappa, road=road, quality=quality)  # type: ignore[arg-type]
+            assert found.s_cr is not None
+            error = found.s_cr / case[key] - 1
+            row = {"stone": stone, "te": te, "gamma": gamma, "kappa_ratio": kappa, "road": road, "s_cr": found.s_cr}
+            rows.append(row | {"error": error, "degree": found.degree, "seconds": found.seconds})
+            print(
+                f"A {stone:g} te {te:g} gamma {gamma:<3g} kappa/mu {kappa or 'inf':<7} {road:11} s_cr {found.s_cr:.7f} "
+                f"error {error:+9.1e} degree {found.degree:3d} (exact {case['l_cr']}) {found.seconds:7.2f} s",
+                flush=True,
+            )
+    return rows
+
+
+def fruits(quality: str) -> list[dict[str, Any]]:
+    rows = []
+    for name in AXISYMMETRIC:
+        params = SOLVER.parse({}, name)
+        assert isinstance(params, DehydrationParams)
+        for method in ("exact", "linear"):
+            found = onset(params, quality=quality, method=method)  # type: ignore[arg-type]
+            rows.append({"preset": name, **found.summary()})
+            print(
+                f"{name:10} {method:7} s_cr {found.s_cr:.5f} m {found.wavenumber} degree {found.degree} "
+                f"{found.seconds:7.2f} s",
+                flush=True,
+            )
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quality", default="default", choices=("preview", "default", "fine"))
+    parser.add_argument("--fruits", action="store_true", help="the axisymmetric fruits of Table 1, too")
+    asked = parser.parse_args()
+    cases = json.loads(REFERENCE.read_text())["bifurcation"]
+    rows = [row for case in cases for row in measure(case, asked.quality)]
+    for road in ("radial", "meridional"):
+        worst = max(abs(row["error"]) for row in rows if row["road"] == road)
+        print(f"{road}: largest error {worst:.1e}")
+    more = fruits(asked.quality) if asked.fruits else []
+    keep("dehydration-onset", rows, "dehydration", quality=asked.quality, fruits=more)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""The hostile matrix: python -m benchmarks.dehydration.stress [--quick] [--only WORD] [--json FILE].
+
+Each run ends converged, or unconverged and saying so, or in a typed error with the stages that were settled before
+it. Anything else is a violation: a hang (the worker is killed), a crash, an untyped exception, a run that is cancelled
+late, a value that is not finite, a stored stage with inverted elements. Exit code 1 if there is any.
+
+Two worker processes of one thread each. J: least J / Jd at the integration points over all stored stages. Contact:
+deepest penetration of the skin in exocarp thicknesses.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import dataclasses
+import json
+import multiprocessing
+import os
+import queue
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .stress_run import Case, Row
+
+THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+WORKERS = 2
+#: Seconds beyond a case's own limit after which its process is killed: start and compilation are not the run's.
+GRACE = 60.0
+
+
+def _work(pipe: Connection) -> None:
+    from .stress_run import judge
+
+    while (case := pipe.recv()) is not None:
+        pipe.send(judge(case))
+
+
+class _Worker:
+    """A process that runs cases one by one; it is killed where it does not answer, and another one takes over."""
+
+    def __init__(self) -> None:
+        self._process: Any = None
+
+    def run(self, case: Case) -> Row:
+        if self._process is None:
+            context = multiprocessing.get_context("spawn")
+            self._pipe, theirs = context.Pipe()
+            self._process = context.Process(target=_work, args=(theirs,), daemon=True)
+            self._process.start()
+            theirs.close()
+        begun = time.monotonic()
+        try:
+            self._pipe.send(case)
+            if self._pipe.poll(case.limit + GRACE):
+                found: Row = self._pipe.recv()
+                return found
+            outcome, detail = "hang", f"no answer after {case.limit + GRACE:g} s"
+        except (EOFError, OSError):
+            self._process.join()
+            outcome, detail = "crash", f"the process ended with code {self._process.exitcode}"
+        self._process.kill()
+        self._process = None
+        return _lost(case, outcome, detail, time.monotonic() - begun)
+
+    def end(self) -> None:
+        if self._process is not None:
+            self._pipe.send(None)
+            self._process.join()
+
+
+def _lost(case: Case, outcome: str, detail: str, seconds: float) -> Row:
+    from .stress_run import Row
+
+    return Row(case.group, case.what, case.n, outcome, detail, seconds=seconds)
+
+
+def run(cases: Sequence[Case]) -> list[Row]:
+    """Return what each case ended in, in their order."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
+    for i in range(len(cases)):
+        waiting.put(i)
+    rows: dict[int, Row] = {}
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("stress", total=len(cases))
+
+        def serve() -> None:
+            worker = _Worker()
+            while True:
+                try:
+                    i = waiting.get_nowait()
+                except queue.Empty:
+                    return worker.end()
+                rows[i] = row = worker.run(cases[i])
+                broken = sum(not row.good for row in rows.copy().values())
+                if not row.good or not progress.console.is_terminal:
+                    line = f"{len(rows):4d}  {row.group}: {row.what}: {row.outcome} {row.seconds:.1f} s"
+                    progress.console.print(line, markup=False, highlight=False)
+                progress.update(task, advance=1, description=f"stress, {broken} violations")
+
+        threads = [threading.Thread(target=serve) for _ in range(WORKERS)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    return [rows[i] for i in range(len(cases))]
+
+
+def show(rows: Sequence[Row]) -> None:
+    """Print the matrix, the totals, and every violation."""
+    from rich.console import Console
+    from rich.table import Table
+
+    def number(value: float | None, form: str) -> str:
+        return "" if value is None else format(value, form)
+
+    console = Console(width=None if sys.stdout.isatty() else 160)
+    table = Table("what", "n", "last s", "residual", "J", "contact", "outcome", "s")
+    for row in rows:
+        style = "" if row.good else "bold red"
+        cells = (number(row.last, "g"), number(row.residual, ".1e"), number(row.least, ".3f"))
+        place, ended = f"{row.group}: {row.what}", (row.outcome, f"{row.seconds:.1f}")
+        table.add_row(_plain(place), str(row.n), *cells, number(row.penetration, ".2f"), *ended, style=style)
+    console.print(table)
+    totals = collections.Counter(row.outcome for row in rows)
+    for outcome, count in totals.most_common():
+        console.print(f"{count:5d}  {outcome}", markup=False)
+    for row in rows:
+        if not row.good:
+            console.print(f"violation: {row.group}: {row.what}: {row.outcome}: {row.detail}", markup=False)
+
+
+def _plain(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)
+
+
+def main() -> int:
+    """Run the matrix; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="a few seconds' worth of it")
+    parser.add_argument("--only", metavar="WORD", default="", help="cases whose group or name contains this")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
+    asked = parser.parse_args()
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # before numba and BLAS are loaded, here and in the workers
+    from .stress_matrix import matrix
+
+    begun = time.perf_counter()
+    rows = run([case for case in matrix(asked.quick) if asked.only in f"{case.group}: {case.what}"])
+    seconds = time.perf_counter() - begun
+    show(rows)
+    broken = sum(not row.good for row in rows)
+    print(f"{len(rows)} runs, {broken} violations, {seconds:.0f} s")
+    if asked.json:
+        document = {"seconds": seconds, "violations": broken, "rows": [dataclasses.asdict(row) for row in rows]}
+        asked.json.write_text(json.dumps(document, indent=1) + "\n")
+    return 1 if broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

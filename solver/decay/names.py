@@ -1,0 +1,38 @@
+"""Names of the fields of a decay run, by what has to be solved for them, and what a need says without words."""
+
+from __future__ import annotations
+
+from ..contract import Need
+from .params import DecayParams
+
+__all__ = ["ALL", "BODY", "DEFAULT", "FIELDS", "MOULD", "ROT", "VECTORS", "completed"]
+
+_SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutrient", "budget_error", "water_lost")
+ALL = (
+    *("position", "displacement", "mesh_position", "triangle", "volume", "least_jacobian"),
+    *("rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
+)
+#: What a run keeps of a need that names nothing; see `completed`.
+DEFAULT = ("rot", "mould", "mould_active", "nutrient", *_SHARES)
+#: What has a layer to be stepped for.
+ROT = frozenset({"rot", "substrate", "rotten_share", "mean_rot"})
+MOULD = frozenset({"mould", "mould_active", "nutrient", "mouldy_share", "mean_mould", "mean_nutrient"})
+#: What a body has to be settled for, if the fruit has one; `position` is where the surface is.
+BODY = frozenset({"position", "displacement", "volume", "least_jacobian", "mesh_position"})
+FIELDS = ("position", "displacement", "rot", "substrate", "mould", "mould_active", "nutrient")
+VECTORS = ("position", "displacement")
+
+
+def completed(params: DecayParams, need: Need) -> Need:
+    """Return the need with the places that its fields belong to.
+
+    An imported mesh comes along with what lives on its vertices. Who asks for all that a run keeps by default, of a
+    fruit with a body, gets where the surface is too: the shape could not be shown or exported without. Who names
+    fewer fields gets those.
+    """
+    wanted = set(need.fields)
+    if params.mesh is not None and wanted & {*FIELDS}:
+        wanted = wanted - {"position"} | {"mesh_position", "triangle"}
+    elif not params.keeps_shape and wanted >= {*DEFAULT} and wanted.isdisjoint({*VECTORS, "mesh_position"}):
+        wanted |= {"position"}
+    return need.model_copy(update={"fields": tuple(sorted(wanted))})

@@ -1,0 +1,1 @@
+"""Geometry that solvers and checks share: broad phase, crossings."""
