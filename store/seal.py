@@ -17,7 +17,7 @@ from pathlib import Path
 
 from .errors import full_disk
 
-__all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "publish", "scratch", "seal"]
+__all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "make_directory", "publish", "scratch", "seal"]
 
 _MARK = b"wizen\x00\x01\n"
 #: Bytes of the seal at the end of a file.
@@ -28,6 +28,15 @@ _TEMPORARY = ".part"
 _ABANDONED = 3600.0
 
 
+def make_directory(path: Path) -> None:
+    """Make a directory and those above it; what is new is on the disk, name and all, when this returns."""
+    if path.is_dir():
+        return
+    make_directory(path.parent)
+    path.mkdir(exist_ok=True)
+    _sync(path.parent)
+
+
 @contextmanager
 def scratch(path: Path) -> Iterator[Path]:
     """Yield a temporary name beside `path`, and remove what is there on leaving unless `adopt` took it.
@@ -36,9 +45,7 @@ def scratch(path: Path) -> Iterator[Path]:
         StorageFull: the disk is full.
 
     """
-    if not path.parent.is_dir():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _sync(path.parent.parent)
+    make_directory(path.parent)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}{_TEMPORARY}")
     try:
         with full_disk(path):

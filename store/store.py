@@ -39,8 +39,8 @@ class Store:
         """
         store = cls(root)
         if create:
-            store._shards.mkdir(parents=True, exist_ok=True)
-            store.tables_dir.mkdir(exist_ok=True)
+            seal.make_directory(store._shards)
+            seal.make_directory(store.tables_dir)
         elif not store._shards.is_dir():
             raise MissingStore(
                 f"there is no store in {store.root.absolute()}.",

@@ -14,6 +14,7 @@ from solver.dehydration.fresh.closed_form import sphere_radius
 from solver.dehydration.fresh.imperfection import bumps
 from solver.dehydration.path import Path
 from solver.dehydration.settings import choose
+from solver.dehydration.settle import settle
 
 SOLVER = registry.get("dehydration")
 REFERENCE = json.loads((File(__file__).parent / "core_shell_sphere.json").read_text())
@@ -94,3 +95,66 @@ def test_a_fresh_fruit_is_the_exact_shape():
     params = SOLVER.parse({"te": 0.1, "gamma": 3.0, "imperfection": 0.0})
     result = SOLVER.solve(params, Need(stages=(0.0,), quality="preview", resolution=16, fields=("displacement",)))
     assert np.abs(result.displacement).max() < 1e-5
+
+
+QUICK = {"te": 0.2, "gamma": 3.0}
+QUICK_NEED = Need(quality="preview", stages=(0.01,), resolution=16, fields=("displacement",))
+
+
+@pytest.mark.parametrize("restless", ["drift", "residual"])
+def test_a_stage_has_converged_only_if_forces_balance_and_the_surface_rests(monkeypatch, restless):
+    """Both limits are in the attributes: a stage just beyond either has not converged, one just within both has."""
+    settle = Path._settle
+
+    def solved(factor: float) -> bool:
+        def settled(path, *args):
+            state, limits = settle(path, *args), path._settings
+            within = {"drift": 0.99 * limits.drift, "residual": 0.99 * limits.residual}
+            return dataclasses.replace(state, **(within | {restless: factor * getattr(limits, restless)}))
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "_settle", settled)
+            result = SOLVER.solve(SOLVER.parse(QUICK), QUICK_NEED)
+        assert float(result[restless][0]) == pytest.approx(factor * result.attrs[f"{restless}_limit"])
+        return bool(result.converged[0])
+
+    assert solved(0.99)
+    assert not solved(1.01)
+
+
+def test_nothing_is_measured_that_was_not_asked_for(monkeypatch):
+    """Descriptors, penetration and the lattice are each made only for what needs them."""
+
+    def unwanted(*_):
+        raise AssertionError("nobody asked for this")
+
+    params = SOLVER.parse(QUICK)
+    made = {"Surface": ("roughness",), "penetration": ("penetration",), "Sampler": ("displacement",)}
+    for name in made:
+        asked = tuple(field for other, fields in made.items() for field in fields if other != name)
+        with monkeypatch.context() as patch:
+            patch.setattr(run_module, name, unwanted)
+            result = SOLVER.solve(params, QUICK_NEED.model_copy(update={"fields": asked}))
+        assert set(asked) <= set(result.data_vars)
+        assert not set(made[name]) & set(result.data_vars)
+
+
+def test_elements_turned_inside_out_are_never_handed_over():
+    """A stage that may take no steps stays as it was put: turned inside out it is refused, as laid it is not."""
+    params = SOLVER.parse(QUICK)
+    settings = dataclasses.replace(choose(params, "preview"), settle_steps=0)
+
+    def stage(turned: bool):
+        path = Path(params, settings, Context())
+        motion = path.motion
+        state, velocity = motion.smooth(0.01)
+        if turned:
+            # an outer node goes deep into the flesh, past the element's own inner face
+            outer = motion.sector.mesh.surface_nodes[0]
+            state[outer] = state[outer] // 4
+        return settle(motion, state, velocity, motion.rest, 0.01)
+
+    assert stage(False).least_ratio > 0
+    with pytest.raises(Unstable, match="inside out") as caught:
+        stage(True)
+    assert caught.value.advice

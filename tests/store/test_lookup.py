@@ -19,7 +19,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import spectra
 
-from .conftest import GAMMA, TE, amplitude, displacement, fill, make
+from .conftest import GAMMA, TE, amplitude, answer, displacement, fill, make, question, spec
 
 AXES = DehydrationParams.axes
 
@@ -276,6 +276,35 @@ def test_a_fruit_that_cannot_be(store: Store) -> None:
     assert table.at({**thin, "rs2": 0.3}, 0.2).exact
     with pytest.raises(InvalidGeometry, match="stone"):
         table.at({**thin, "rs2": 0.8}, 0.2)
+
+
+def test_a_shape_has_converged_only_where_all_that_it_is_made_of_had(store: Store) -> None:
+    """One stage of one run had not: whatever leans on it says so, and nothing else does."""
+    for te in (0.03, 0.04, 0.05):
+        params, need = question(te=te)
+        job = spec(te=te)
+        result = answer(params, need)
+        if te == 0.04:
+            result["converged"][1] = 0
+        store.ledger.want([job])
+        store.ledger.done(job.key, store.put(job.key, result), 1.0)
+    tables.build(store, axes=AXES)
+    table = ShapeTable.open(store)
+    # te, stage, and whether run 0.04 takes part at stage 0.2
+    for te, stage, leans in [
+        (0.04, 0.2, True),
+        (0.04, 0.25, True),
+        (0.04, 0.15, True),
+        (0.035, 0.2, True),
+        (0.046, 0.17, True),
+        (0.04, 0.1, False),
+        (0.04, 0.05, False),
+        (0.03, 0.2, False),
+        (0.035, 0.3, False),
+        (0.035, 0.0, False),
+    ]:
+        shape = table.at({"te": te}, stage, fields=(), method="linear")
+        assert shape.converged is not leans, (te, stage)
 
 
 def test_no_store(tmp_path: Path) -> None:

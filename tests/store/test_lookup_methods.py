@@ -11,6 +11,7 @@ import pytest
 from solver.fruit import directions, lattice
 from store import starter, tables
 from store.blending import methods
+from store.blending.methods import envelope
 from store.blending.methods.bands import Bands, Targets, add_up, multiplier
 from store.errors import OutsideTable, TooUncertain
 from store.lookup import ShapeTable
@@ -223,3 +224,37 @@ def test_one_axis_and_two_samples(store: Store) -> None:
     table = ShapeTable.open(store)
     assert np.isfinite(table.at({"te": 0.035}, 0.2, max_error=10).position).all()  # type: ignore[arg-type]
     assert set(table.neighbour_correlation) == set(STAGES)
+
+
+# --- the envelope -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("share", "expected"), [(0.5, 2.0), (1.0, 1.0), (2.0, 0.5), (0.4, 2.5), (0.02, 3.0), (50.0, 1 / 3)]
+)
+def test_faint_places_are_strengthened_and_strong_ones_weakened_by_what_they_lack(
+    share: float, expected: float
+) -> None:
+    """Amplitude wanted over amplitude there, at most three times and at least a third.
+
+    A hundredth of the mean square counts as nothing: it moves these factors by less than 3 %.
+    """
+    places = 2 * envelope.COARSE**2
+    wanted = np.full(places, 0.03)
+    assert envelope.factor((share * wanted) ** 2, wanted) == pytest.approx(np.full((12, 24), expected), rel=0.03)
+
+
+def test_each_place_has_its_own_factor_and_the_total_is_settled_elsewhere() -> None:
+    """Half of the places have half the amplitude they should have; with a total only their places count."""
+    places = 2 * envelope.COARSE**2
+    wanted = np.full(places, 0.03)
+    faint = np.arange(places) % 2 == 0
+    mean = np.where(faint, 0.5 * wanted, wanted) ** 2
+    ratio = envelope.factor(mean, wanted).ravel()
+    assert ratio[faint] == pytest.approx(2, rel=0.02)
+    assert ratio[~faint] == pytest.approx(1, rel=0.02)
+    for total in (1e-4, 1e-2):
+        settled = envelope.factor(mean, wanted, total).ravel()
+        # the mean square of all, (1 + 1/4) / 2, is what the total is spread over
+        assert settled[faint] == pytest.approx(2 * np.sqrt(0.625), rel=0.03)
+        assert settled[~faint] == pytest.approx(np.sqrt(0.625), rel=0.03)

@@ -1,0 +1,95 @@
+"""What a break hands on, and Eq. 3.24 on rods bent to circles."""
+
+import numpy as np
+import pytest
+
+from solver.wood import SOLVER
+from solver.wood.fracture import break_worst, overstress
+from solver.wood.model.bundle import lay
+from solver.wood.model.state import Wood
+
+
+def laid(**values) -> Wood:
+    return lay(SOLVER.parse({"rods": 12, "vertices": 12, "clamp": "none", **values}), 12)
+
+
+def split_at(wood: Wood, hinge: int) -> tuple[Wood, int, int]:
+    """Split the vertex of a hinge by a break at the beginning of the edge after it; return with both vertices."""
+    ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
+    edge = wood.rods.after[hinge]
+    ratio[edge] = 2.0
+    old, count = int(wood.rods.a[edge]), len(wood.motion.x)
+    found = break_worst(wood, ratio, place, np.zeros(len(wood.bonds.i)), np.inf)
+    assert (found.rods, found.bonds) == (1, 0)
+    assert len(found.wood.motion.x) == count + 1
+    return found.wood, old, count
+
+
+@pytest.mark.parametrize("which", [7, 40])
+def test_halves_of_a_split_vertex_share_bonds_mass_and_load(which):
+    """All that hung on the vertex hangs on both by the lengths of their edges, and on neither twice."""
+    wood = laid(gravity=9.81, tip_load=(0.0, 0.0, -3.0))
+    before, motion = wood.copied(), wood.motion
+    motion.load[:] = np.random.default_rng(0).normal(size=motion.load.shape)
+    loads, masses = motion.load.copy(), motion.mass.copy()
+    # edges of different lengths, so that halves are no halves
+    r = wood.rods
+    long = r.rest[r.after[which]]
+    r.rest[r.after[which]] = 3 * r.rest[r.before[which]]
+    assert long > 0
+    after, old, new = split_at(wood, which)
+    m, b = after.motion, after.bonds
+    assert m.mass[[old, new]] == pytest.approx(masses[old] * np.array([0.25, 0.75]), rel=1e-12)
+    assert m.load[[old, new]] == pytest.approx(np.outer([0.25, 0.75], loads[old]), rel=1e-12)
+    mine = np.flatnonzero(before.bonds.i == old)
+    assert len(mine) > 2
+    for j, rest in zip(before.bonds.j[mine], before.bonds.rest[mine], strict=True):
+        was = (before.bonds.i == old) & (before.bonds.j == j) & (before.bonds.rest == rest)
+        pair = [np.flatnonzero((b.i == v) & (b.j == j) & (b.rest == rest)) for v in (old, new)]
+        assert [len(p) for p in pair] == [1, 1]
+        for name in ("k", "s", "limit"):
+            shared = [float(getattr(b, name)[p[0]]) for p in pair]
+            assert shared == pytest.approx(float(getattr(before.bonds, name)[was][0]) * np.array([0.25, 0.75]))
+    others = np.flatnonzero(before.bonds.i != old)
+    for name in ("k", "s", "limit", "rest", "share"):
+        assert np.array_equal(getattr(b, name)[others], getattr(before.bonds, name)[others])
+
+
+def bent(circle: float, stretch: float = 0.0, **values) -> tuple[Wood, np.ndarray, np.ndarray]:
+    """Lay one rod on a circle, its edges stretched; return with tangents and inverse lengths."""
+    params = SOLVER.parse(
+        {"rods": 1, "radius": 1e-3, "length": 0.1, "vertices": 60, "clamp": "none", "unevenness": 0.0, **values}
+    )
+    wood = lay(params, 60)
+    x = wood.motion.x
+    s = (x[:, 0] - x[:, 0].min()) * (1 + stretch)
+    # chords of a polygon on the circle are as long as the edges
+    edge = s[1] - s[0]
+    angle = s / edge * 2 * np.arcsin(edge / (2 * circle)) if np.isfinite(circle) else np.zeros_like(s)
+    if np.isfinite(circle):
+        x[:] = np.column_stack([circle * np.sin(angle), np.zeros_like(s), circle * (1 - np.cos(angle))])
+    else:
+        x[:] = np.column_stack([s, np.zeros_like(s), np.zeros_like(s)])
+    e = x[wood.rods.b] - x[wood.rods.a]
+    length = np.linalg.norm(e, axis=1)
+    return wood, e / length[:, None], 1 / length
+
+
+@pytest.mark.parametrize(("circle", "stretch"), [(np.inf, 4e-3), (0.2, 0.0), (0.2, 4e-3), (0.05, 1e-3)])
+@pytest.mark.parametrize("anywhere", [False, True])
+def test_the_outer_fibre_of_a_bent_and_stretched_rod(circle, stretch, anywhere):
+    """Plain geometry: on a circle R the fibre at radius r from the axis is longer by 1 + r / R than the axis is.
+
+    Eq. 3.24 multiplies by a bending ratio that is taken of rest lengths, which counts stretch times bend once more:
+    2e-5 of these strains of 9e-3 and more. A polygon of 60 is off a circle by less.
+    """
+    wood, t, inverse = bent(circle, stretch)
+    count = len(wood.rods.a)
+    strength = np.full_like(wood.strength, 0.01)
+    ratio, place, none = np.zeros(count), np.zeros(count), np.zeros(len(wood.rods.before))
+    top = overstress(wood.rods, t, inverse, strength, np.zeros(count), none, False, anywhere, ratio, place)
+    r = 1e-3
+    expected = (1 + stretch) * (1 + r / circle) - 1
+    tolerance = 1e-3 if anywhere else 3e-3
+    assert top == pytest.approx(expected / 0.01, rel=tolerance)
+    assert ratio[10:50] == pytest.approx(expected / 0.01, rel=tolerance)
