@@ -80,7 +80,7 @@ def page() -> str:
         [
             "# Settings of the service",
             "",
-            "`wizen serve` reads them from the environment; `python -m service.settings > docs/settings.md` writes this page.",
+            "`wizen serve` reads them from the environment. `python -m service.settings` printed this page.",
             "",
             "| variable | default | |",
             "|---|---|---|",
