@@ -257,8 +257,8 @@ def status(store: StorePath, as_json: As_json = False) -> None:
         "results": len(list(opened.keys())),
         "running": [{"key": j.key, "plan": j.plan, "worker": j.worker, "progress": j.progress} for j in running],
         "failed": [{"key": j.key, "plan": j.plan, "params": dict(j.params), "error": j.error} for j in failed],
-        "tables": opened.table_names(),
-        "scalars": scalars.names(opened),
+        "tables": (shapes := opened.table_names()),
+        "scalars": (tabulated := scalars.names(opened)),
     }
 
     def show(console: Any) -> None:
@@ -269,8 +269,8 @@ def status(store: StorePath, as_json: As_json = False) -> None:
             error = j.error or {}
             console.print(f"failed  {j.key[:12]} {error.get('message')} {error.get('advice')}", markup=False)
         console.print(
-            f"{document['results']} results, tables of shapes: {', '.join(document['tables']) or 'none'}, "
-            f"of numbers: {', '.join(document['scalars']) or 'none'}",
+            f"{document['results']} results, tables of shapes: {', '.join(shapes) or 'none'}, "
+            f"of numbers: {', '.join(tabulated) or 'none'}",
             markup=False,
         )
 

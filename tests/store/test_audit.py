@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from solver.dehydration import SOLVER, DehydrationParams
+from solver.dehydration import SOLVER
 from store import seal, tables
 from store.errors import CorruptTable, UnknownJob
 from store.generations import audit, compare, truncation
@@ -16,8 +16,6 @@ from store.generations.manifest import write_manifest
 from store.store import Store
 
 from .conftest import fill
-
-AXES = DehydrationParams.axes
 
 
 def flip(path: Path, place: float) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from solver import registry
 from solver.contract import InvalidGeometry
-from solver.dehydration import SOLVER, DehydrationParams
+from solver.dehydration import SOLVER
 from solver.fruit import Fruit, colatitudes, lattice
 from store import tables
 from store.errors import MissingStore, OutsideTable
@@ -21,8 +21,6 @@ from store.store import Store
 from store.surfaces import spectra
 
 from .conftest import GAMMA, TE, amplitude, answer, displacement, fill, make, question, spec
-
-AXES = DehydrationParams.axes
 
 
 @pytest.fixture(scope="module")
@@ -289,8 +287,8 @@ def test_a_shape_has_converged_only_where_all_that_it_is_made_of_had(store: Stor
             result["converged"][1] = 0
         store.ledger.want([job])
         store.ledger.done(job.key, store.put(job.key, result), 1.0)
-    tables.build(store, axes=AXES)
-    table = ShapeTable.open(store)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     # te, stage, and whether run 0.04 takes part at stage 0.2
     for te, stage, leans in [
         (0.04, 0.2, True),

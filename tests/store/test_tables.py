@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from solver import registry
-from solver.dehydration import SOLVER, DehydrationParams
+from solver.dehydration import SOLVER
 from store import tables
 from store.errors import CorruptShard, CorruptTable, EmptyTable, MixedSamples, StorageFull, UnknownTable
 from store.generations import audit
@@ -19,8 +19,6 @@ from store.lookup import ShapeTable
 from store.store import Store
 
 from .conftest import ROOT, fill, make, spec
-
-AXES = DehydrationParams.axes
 
 
 def test_a_table_explains_itself(filled: Store) -> None:
