@@ -14,7 +14,7 @@ PAGE   := $(VIEWER)/dist/index.html
 NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
 
-.PHONY: demo page test test-slow bench stress lint format clean constraints
+.PHONY: demo page test test-slow bench docs stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -54,6 +54,10 @@ bench: $(STAMP)
 	$(BIN)/python -m benchmarks.dehydration.kernel
 	$(BIN)/python -m benchmarks.service.lookup
 	$(BIN)/python -m benchmarks.dehydration --short --no-peers
+
+## docs: render the documents' figures from benchmarks/results, and say which versions are behind
+docs: $(STAMP)
+	$(BIN)/python -m benchmarks.documents
 
 ## stress: every hostile corner of the parameters on tiny meshes; five minutes on two cores
 stress: $(STAMP)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 
+from .figures import Sheet
+
 __all__ = ["Broken", "show"]
 
 
@@ -12,10 +14,13 @@ class Broken(AssertionError):
     """A try ended as none may."""
 
 
-def show(tries: Mapping[str, Callable[[], str]], chosen: Sequence[str]) -> None:
-    """Print how each try ends, of those whose name holds a chosen word if any is; exit with 1 if one is broken."""
+def show(tries: Mapping[str, Callable[[], str]], chosen: Sequence[str], solver: str) -> None:
+    """Print how each try ends, of those whose name holds a chosen word if any is; exit with 1 if one is broken.
+
+    A whole list is kept as the record SOLVER-stress, broken tries and all.
+    """
     broken = 0
-    print("| try | end | CPU s |\n|---|---|---|")
+    sheet = Sheet(f"{solver}-stress", ("try", "end", "CPU s"), solver)
     for name, case in tries.items():
         if chosen and not any(word in name for word in chosen):
             continue
@@ -24,6 +29,9 @@ def show(tries: Mapping[str, Callable[[], str]], chosen: Sequence[str]) -> None:
             end = case()
         except Broken as error:
             end, broken = f"BROKEN: {error}", broken + 1
-        print(f"| {name} | {end} | {time.process_time() - begun:.1f} |", flush=True)
+        seconds = time.process_time() - begun
+        sheet.add((name, end, f"{seconds:.1f}"), **{"try": name, "end": end, "cpu": seconds})
+    if not chosen:
+        sheet.keep()
     if broken:
         raise SystemExit(1)

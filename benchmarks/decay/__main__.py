@@ -7,13 +7,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from typing import Any
 
 import numpy as np
 
+from benchmarks.figures import Sheet
 from solver.contract import Context
 from solver.decay import SOLVER
 from solver.decay.fields.stepping import march
@@ -46,8 +46,12 @@ def errors(cells: int, run: dict[str, Any], finest: int, reference: dict[str, An
     return found
 
 
+_QUALITY = {32: "preview", 96: "default", 192: "fine"}
+
+
 def main(finest: int = 384, preset: str = "apple", days: float = 10.0) -> None:
     reference = solve(preset, finest, 5e-6, days)
+    sheet = Sheet("decay-mesh", ("quality", "cells", "points", "steps", "seconds", "rot", "mould"), "decay")
     rows = []
     for cells in (24, 32, 48, 64, 96, 128, 192):
         if 2 * cells > finest:
@@ -56,8 +60,12 @@ def main(finest: int = 384, preset: str = "apple", days: float = 10.0) -> None:
         rot, mould = errors(cells, run, finest, reference)
         row = {"cells": cells, "vertices": len(run["densities"][0]), "steps": run["steps"]}
         rows.append(row | {"seconds": round(run["seconds"], 3), "error_rot": rot, "error_mould": mould})
-        print(rows[-1], file=sys.stderr)
-    print(json.dumps({"preset": preset, "days": days, "reference": finest, "runs": rows}, indent=2))
+        sheet.add(
+            (_QUALITY.get(cells, ""), cells, f"{row['vertices']:,}".replace(",", " "), run["steps"],
+             f"{run['seconds']:.2g}", f"{rot:.1e}", f"{mould:.1e}"),
+            preset=preset, days=days, **rows[-1],
+        )  # fmt: skip
+    sheet.keep(reference={"cells": finest, "steps": reference["steps"], "seconds": reference["seconds"]})
     print(f"reference: {reference['steps']} steps, {reference['seconds']:.1f} s", file=sys.stderr)
 
 

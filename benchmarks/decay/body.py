@@ -8,7 +8,6 @@ Milliseconds are CPU time of one thread, the least of three.
 from __future__ import annotations
 
 import dataclasses
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.figures import Sheet
 from solver.contract import Context
 from solver.decay import SOLVER
 from solver.decay.body.body import Body
@@ -50,7 +50,8 @@ def main(preset: str = "apple", day: float = 20.0) -> None:
 
     fine = body(12, 1e-6)
     there = fine.on_surface(fine.settled(fine.state(water, rot)))
-    rows = []
+    head = ("quality", "tetrahedra", "body", "Newton steps", "error", "skin's points", "skin")
+    sheet = Sheet("decay-body", head, "decay")
     for quality in ("preview", "default"):
         settings = dataclasses.replace(choose(params, quality), cells=_CELLS)
         ours = body(settings.layers, settings.balance)
@@ -61,8 +62,13 @@ def main(preset: str = "apple", day: float = 20.0) -> None:
         row["error"] = float(np.sqrt(np.sum(gap**2) / np.sum(there**2)))
         shell = Wrinkles(params, Skin(), ours, settings)
         found, row["skin_ms"] = least(lambda shell=shell, balance=balance: shell.at(balance), 1)  # type: ignore[misc]
-        rows.append(row | {"skin_vertices": len(found[0]), "skin_steps": found[2]})
-    print(json.dumps({"preset": preset, "day": day, "reference_layers": 12, "runs": rows}, indent=2))
+        row |= {"skin_vertices": len(found[0]), "skin_steps": found[2]}
+        sheet.add(
+            (quality, row["tetrahedra"], f"{took:.0f} ms", row["newton"], f"{row['error']:.1e}", row["skin_vertices"],
+             f"{row['skin_ms'] / 1e3:.2g} s"),
+            preset=preset, day=day, quality=quality, **row,
+        )  # fmt: skip
+    sheet.keep(reference_layers=12)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 
+from benchmarks.figures import Sheet
 from solver.decay import DecayParams
 from solver.decay.fields.diffusion import listed_around
 from solver.decay.fields.system import Both, System
@@ -43,19 +44,23 @@ def measured(cells: int, share: float) -> tuple[int, float]:
 def main() -> None:
     """Print the table and the slopes."""
     measured(8, 0.5)
-    print("| points | " + " | ".join(f"{100 * share:g} %" for share in _SHARES) + " | idle + per listed point |")
-    print("|---" * (len(_SHARES) + 2) + "|")
+    shares = [f"{100 * share:g} %" for share in _SHARES]
+    sheet = Sheet("decay-cost", ("points", *shares, "idle + per listed point"), "decay")
     whole = []
     for cells in _CELLS:
         found = [measured(cells, share) for share in _SHARES]
         listed, ms = np.array(found).T
         slope, idle = np.polyfit(listed, ms, 1)
         whole.append(ms)
-        row = " | ".join(f"{m:.2f} ms" for m in ms)
-        print(f"| {10 * cells**2 + 2} | {row} | {idle:.2f} ms + {1e6 * slope:.0f} ns |", flush=True)
+        count = 10 * cells**2 + 2
+        sheet.add(
+            (f"{count:,}".replace(",", " "), *(f"{m:.2g} ms" for m in ms), f"{idle:.2g} ms + {1e6 * slope:.2g} ns"),
+            points=count, listed=listed.tolist(), ms=ms.tolist(), idle_ms=idle, ns_per_listed_point=1e6 * slope,
+        )  # fmt: skip
     points = np.log([10 * cells**2 + 2 for cells in _CELLS])
     slopes = [float(np.polyfit(points, np.log(ms), 1)[0]) for ms in np.array(whole).T]
     print("slope over points: " + ", ".join(f"{slope:.2f}" for slope in slopes))
+    sheet.keep(slope_over_points=slopes)
 
 
 if __name__ == "__main__":

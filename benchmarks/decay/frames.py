@@ -1,6 +1,6 @@
 """Milliseconds of a frame by part: fields, body and skin of an animation, against the paper's 10 s.
 
-    python -m benchmarks.decay.frames [preset] [day] [frames a day] [frames]
+    python -m benchmarks.decay.frames [preset] [day,day ...] [frames a day] [frames]
 
 Default quality; each frame starts from the march's last shape, one a frame behind it. CPU time of one thread, means.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 
+from benchmarks.figures import Sheet
 from solver.contract import Context
 from solver.decay import SOLVER, DecayParams
 from solver.decay.body.body import Body
@@ -22,7 +23,8 @@ from solver.decay.settings import choose
 from solver.decay.surfaces.surface import extent
 
 
-def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: int = 6) -> None:
+def frames(preset: str, day: float, rate: float, count: int) -> dict[str, float]:
+    """Return milliseconds of fields, body and skin of a frame."""
     params = SOLVER.parse({"body": "quasi-static", "te": 0.03, "skin": {}}, preset)
     assert isinstance(params, DecayParams)
     settings = choose(params, "default")
@@ -47,10 +49,22 @@ def main(preset: str = "apple", day: float = 10.0, rate: float = 24.0, count: in
             for name, seconds in zip(spent, (fields, moved, wrinkled), strict=True):
                 spent[name] += 1e3 * seconds / count
         begun = time.process_time()
-    parts = ", ".join(f"{name} {took:.0f} ms" for name, took in spent.items())
-    whole = sum(spent.values())
-    print(f"{preset}, day {day:g}, {rate:g} frames a day: {parts}; sum {whole:.0f} ms, {1e4 / whole:.0f} times in 10 s")
+    return spent
+
+
+def main(preset: str = "apple", days: str = "10,25", rate: float = 24.0, count: int = 6) -> None:
+    head = ("frames about day", "fields", "body", "skin", "sum", "against the paper's 10 s")
+    sheet = Sheet("decay-frames", head, "decay")
+    for day in map(float, days.split(",")):
+        spent = frames(preset, day, rate, count)
+        whole = sum(spent.values())
+        cells = [f"{took:.0f} ms" for took in (*spent.values(), whole)]
+        sheet.add(
+            (f"{preset}, {day:g}", *cells, f"{1e4 / whole:.0f} times"),
+            preset=preset, day=day, frames_a_day=rate, frames=count, ms=spent,
+        )  # fmt: skip
+    sheet.keep()
 
 
 if __name__ == "__main__":
-    main(*(kind(text) for kind, text in zip((str, float, float, int), sys.argv[1:], strict=False)))
+    main(*(kind(text) for kind, text in zip((str, str, float, int), sys.argv[1:], strict=False)))

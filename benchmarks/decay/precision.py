@@ -27,6 +27,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from benchmarks.figures import Sheet
 from solver.decay import SOLVER, DecayParams
 from solver.decay.fields.layer import Layer, State
 from solver.decay.fields.rates import Rates, daily
@@ -223,10 +224,11 @@ def main(path: Path, python: str | None) -> None:
         if python and not round_:
             found += [peer(python, rates, n, exact) for n in (64, 128)]
         rows += [{"where": where, **row} for row in found]
-    print("| on a | code | points | steps | CPU s | error |\n|---|---|---|---|---|---|")
+    sheet = Sheet("decay-precision", ("on a", "code", "points", "steps", "CPU s", "error"), "decay")
     for row in rows:
         cells = (row["where"], row["code"], row["points"], row["steps"], f"{row['seconds']:.3f}", f"{row['error']:.1e}")
-        print("| " + " | ".join(map(str, cells)) + " |")
+        sheet.add(cells, **row)
+    sheet.keep()
     draw(rows, path)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ttest_ind
 
+from benchmarks.figures import Sheet
 from solver.contract import Context
 from solver.decay import DecayParams
 from solver.decay.fields.stepping import march
@@ -45,11 +46,12 @@ def ends(seeds: range, rate: int, days: float) -> NDArray[np.float64]:
 def main(count: int = 24, days: float = 3.0) -> None:
     """Print the table."""
     ends(range(1), 1, 1.0)  # compiled before the clock runs
+    head = ("frames a day", "seeds", "rotten %", "mouldy %", "mean mould %", "t", "CPU s")
     rows = []
     for rate, seeds in ((24, range(count)), (96, range(count)), (96, range(count, 2 * count))):
         begun = time.process_time()
         rows.append((rate, seeds, ends(seeds, rate, days), time.process_time() - begun))
-    print("| frames a day | seeds | rotten % | mouldy % | mean mould % | t | CPU s |\n|---|---|---|---|---|---|---|")
+    sheet = Sheet("decay-seeds", head, "decay")
     first = rows[0][2]
     for rate, seeds, found, seconds in rows:
         cells = [f"{mean:.2f} ± {spread:.2f}" for mean, spread in zip(found.mean(0), found.std(0, ddof=1), strict=True)]
@@ -57,7 +59,12 @@ def main(count: int = 24, days: float = 3.0) -> None:
             noise = "the first's bytes" if seconds != rows[0][3] else ""
         else:
             noise = ", ".join(f"{t:+.1f}" for t in ttest_ind(found, first, equal_var=False).statistic)
-        print(f"| {rate} | {seeds[0]} to {seeds[-1]} | {' | '.join(cells)} | {noise} | {seconds:.1f} |")
+        each = {str(seed): share for seed, share in zip(seeds, found.tolist(), strict=True)}
+        sheet.add(
+            (rate, f"{seeds[0]} to {seeds[-1]}", *cells, noise, f"{seconds:.1f}"),
+            frames_a_day=rate, days=days, cpu=seconds, rotten_mouldy_mean_by_seed=each,
+        )  # fmt: skip
+    sheet.keep()
 
 
 if __name__ == "__main__":

@@ -154,4 +154,4 @@ SLOW = ("1 000 000 vertices",)
 
 
 if __name__ == "__main__":
-    show(CASES, sys.argv[1:])
+    show(CASES, sys.argv[1:], "decay")

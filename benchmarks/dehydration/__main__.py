@@ -1,4 +1,4 @@
-"""Error over CPU time of the dehydration solver: python -m benchmarks.dehydration [--part a|b|c|skips] [--json FILE].
+"""Error over CPU time of the dehydration solver: python -m benchmarks.dehydration [--part a|b|c|skips].
 
 a: the smooth sphere before buckling, ours and other codes (`precision.spheres`; which are missing is said).
 b: descriptors after buckling by quality (`precision.buckled`): minutes per run, so runs that the file has are kept.
@@ -6,8 +6,8 @@ c: cost against the number of elements (`precision.scaling`).
 skips: what each thing that a need leaves out saves, and the error it adds (`precision.skips`).
 
 Everything runs on one thread, one run at a time. a, c and skips run anew each time, since only CPU seconds of one
-session compare. Without --part: a and c. A picture is drawn from whatever the file holds.
-The file says with which version of the solver each part ran.
+session compare. Without --part: a and c. A picture is drawn from whatever the records hold.
+Each part is a record of its own, with the version of the solver that ran.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ from pathlib import Path
 from solver.dehydration import SOLVER
 
 from .precision import buckled, scaling, skips, spheres
-from .precision.record import ROOT, Record
+from .precision.record import Record
 
-RESULTS = ROOT / "benchmarks" / "results" / "dehydration.json"
 #: te, gamma, mirrors, quality, seeds. Thin skins take long: of them an eighth is solved, and only with --thin.
 PLAN = (
     *((0.04, 10.0, "", quality, seeds) for quality, seeds in (("preview", 3), ("default", 2), ("fine", 2))),
@@ -40,18 +39,15 @@ SHORT_EDGES = (12, 20, 32)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", action="append", choices=("a", "b", "c", "skips"), help="may be repeated")
-    parser.add_argument("--json", type=Path, help=f"where the figures are kept (part b: {RESULTS.relative_to(ROOT)})")
     parser.add_argument("--picture", type=Path, help="draw the work-precision diagram here")
     parser.add_argument("--no-peers", action="store_true", help="part a without other codes")
-    parser.add_argument("--short", action="store_true", help="theta 0.95 and few meshes; keeps no file unless told to")
+    parser.add_argument("--short", action="store_true", help="theta 0.95 and few meshes; keeps no record")
     parser.add_argument("--thin", action="store_true", help="part b: te = 0.02 and 0.01 as well")
     parser.add_argument("--limit", type=float, default=120.0, help="seconds per run of part a")
     parser.add_argument("--redraw", action="store_true", help="run nothing, only draw")
     options = parser.parse_args()
     parts = () if options.redraw else tuple(options.part or ("a", "c"))
-    record = Record(options.json or (None if options.short else RESULTS))
-    for part in parts:
-        record.parts.setdefault("solver_version", {})[part] = SOLVER.version
+    record = Record(kept=not options.short)
     if "a" in parts:
         thetas = spheres.THETAS[:1] if options.short else spheres.THETAS
         spheres.measure(record, thetas=thetas, peers=not options.no_peers, short=options.short, limit=options.limit)
@@ -64,7 +60,8 @@ def main() -> None:
     if options.picture:
         from .precision.picture import draw
 
-        draw(record.parts, options.picture)
+        after = buckled.summary(record.rows("buckled"), SOLVER.version)
+        draw({"spheres": record.rows("spheres"), "buckled_summary": after}, options.picture)
 
 
 if __name__ == "__main__":

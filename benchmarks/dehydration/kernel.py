@@ -1,6 +1,6 @@
 """Time of the explicit kernel per element and step, against the C prototype.
 
-python -m benchmarks.dehydration.kernel [--json PATH]
+python -m benchmarks.dehydration.kernel
 
 One thread, no contact. All contestants take turns in one run, so that the ratios hold even where the machine is noisy;
 times are CPU time, the median over the turns. Beside them: arithmetic and memory traffic per element and step,
@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import argparse
 import ctypes
-import json
 import os
-import platform
 import shutil
 import statistics
 import subprocess
@@ -30,11 +28,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
+from benchmarks.figures import keep
 from solver.dehydration.fresh.mesh import cubed_sphere
 from solver.dehydration.kernel import Layout, build_layout, march, new_state, positions
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
 from solver.dehydration.kernel.elements import core_forces, exocarp_forces, one_point_forces
-from solver.dehydration.kernel.metric import inverse_jacobians, quadrature, shape_derivatives
+from solver.dehydration.kernel.metric import inverse_jacobians, quadrature
+from solver.fem import HEX8
 
 from .machine_limits import machine_limits
 
@@ -84,7 +84,7 @@ class Prototype:
             inverse, det = inverse_jacobians(mesh["positions"][mesh["connectivity"][part]], points)
             planes = inverse.reshape(-1, 16, len(points), 9).transpose(0, 2, 3, 1).astype(np.float32, order="C")
             volumes = (det * weights).reshape(-1, 16, len(points)).transpose(0, 2, 1).astype(np.float32, order="C")
-            slopes = shape_derivatives(points).transpose(0, 2, 1).astype(np.float32, order="C")
+            slopes = HEX8.gradients(points).transpose(0, 2, 1).astype(np.float32, order="C")
             self.geometry.append((planes, volumes, slopes))
         self.mu = mesh["mu"][elements].astype(np.float32)
         self.kappa = mesh["kappa"][elements].astype(np.float32)
@@ -217,7 +217,6 @@ def compare(n: int, steps: int, turns: int) -> dict[str, Any]:
         "layout_seconds": setup,
         "rows": rows,
         "limits": limits,
-        "machine": {"processor": platform.processor() or platform.machine(), "python": platform.python_version()},
     }
 
 
@@ -226,7 +225,6 @@ def main() -> None:
     parser.add_argument("--n", type=int, default=24, help="elements per cube edge")
     parser.add_argument("--steps", type=int, default=60, help="steps per turn")
     parser.add_argument("--turns", type=int, default=9)
-    parser.add_argument("--json", type=Path, help="write the result here")
     options = parser.parse_args()
     result = compare(options.n, options.steps, options.turns)
     mesh = result["mesh"]
@@ -238,8 +236,8 @@ def main() -> None:
             text += f"{row['flops']:8.0f}{row['bytes']:8.0f}{row['us_of_arithmetic']:11.4f}{row['us_of_traffic']:12.4f}"
         print(text)
     print("machine:", ", ".join(f"{name} {value:.0f}" for name, value in result["limits"].items()))
-    if options.json:
-        options.json.write_text(json.dumps(result, indent=2))
+    rows = [{"kernel": name, **row} for name, row in result.pop("rows").items()]
+    keep("dehydration-kernel", rows, "dehydration", **result)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The onset of the exact references on both roads: python -m benchmarks.dehydration.onset [--quality Q] [--json PATH].
+"""The onset of the exact references on both roads: python -m benchmarks.dehydration.onset [--quality Q] [--fruits].
 
 Error is that of s_cr, relative to the reference; seconds are those of one call on this machine.
 """
@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 from pathlib import Path
 from typing import Any
 
+from benchmarks.figures import keep
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.dehydration.bifurcation import onset
 
@@ -57,7 +57,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quality", default="default", choices=("preview", "default", "fine"))
     parser.add_argument("--fruits", action="store_true", help="the axisymmetric fruits of Table 1, too")
-    parser.add_argument("--json", type=Path, help="write the figures here")
     asked = parser.parse_args()
     cases = json.loads(REFERENCE.read_text())["bifurcation"]
     rows = [row for case in cases for row in measure(case, asked.quality)]
@@ -65,9 +64,7 @@ def main() -> None:
         worst = max(abs(row["error"]) for row in rows if row["road"] == road)
         print(f"{road}: largest error {worst:.1e}")
     more = fruits(asked.quality) if asked.fruits else []
-    if asked.json:
-        document = {"machine": platform.processor() or platform.machine(), "quality": asked.quality}
-        asked.json.write_text(json.dumps(document | {"spheres": rows, "fruits": more}, indent=2))
+    keep("dehydration-onset", rows, "dehydration", quality=asked.quality, fruits=more)
 
 
 if __name__ == "__main__":

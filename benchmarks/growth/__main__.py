@@ -15,6 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from benchmarks.figures import Sheet
 from solver import shell
 from solver.contract import NotConverged
 from solver.growth.engine import Engine
@@ -109,17 +110,16 @@ def compared(one: Engine, other: Engine) -> str:
     return f"apart: largest {away.max():.1e}, rms {np.sqrt((away**2).mean()):.1e}, {said}"
 
 
-def painted(name: str, vertices: int) -> Iterator[str]:
+def painted(name: str, vertices: int) -> Iterator[tuple[str, str]]:
     """Yield what a painting costs both ways, and how far they end from each other and from a hundredth of the goal."""
-    what = f"{vertices:6d} {name:7s}"
     said, whole = paint(name, vertices)
-    yield f"{what} whole: {said}"
+    yield "whole", said
     said, active = paint(name, vertices, active=True)
-    yield f"{what} active: {said}"
+    yield "active", said
     exact = paint(name, vertices, residual=_EXACT)[1]
-    yield f"{what} active to whole: {compared(active, whole)}"
-    yield f"{what} whole to a residual of {_EXACT:g}: {compared(whole, exact)}"
-    yield f"{what} active to a residual of {_EXACT:g}: {compared(active, exact)}"
+    yield "active to whole", compared(active, whole)
+    yield f"whole to a residual of {_EXACT:g}", compared(whole, exact)
+    yield f"active to a residual of {_EXACT:g}", compared(active, exact)
 
 
 def main() -> None:
@@ -132,17 +132,21 @@ def main() -> None:
         if given.slices:
             for name in _PAINTINGS:  # compile
                 paint(name, 600, 40, active=True)
+            sheet = Sheet("growth-painting", ("vertices", "painting", "what", "found"), "growth")
             for vertices in given.vertices or [5000, 10_000]:
                 for name in _PAINTINGS:
-                    for line in painted(name, vertices):
-                        print(line, flush=True)
+                    for what, found in painted(name, vertices):
+                        sheet.add((vertices, name, what, found))
+            sheet.keep()
             return
         for values, tool in _CASES.values():  # compile
             measure(values, tool, 100, "quasi_newton")
+        sheet = Sheet("growth-ways", ("case", *given.ways), "growth")
         for vertices in given.vertices or [2600, 10_000]:
             for name, (values, tool) in _CASES.items():
-                for way in given.ways:
-                    print(f"{vertices:6d} {name:16s} {way:13s} {measure(values, tool, vertices, way)}", flush=True)
+                found = {way: str(measure(values, tool, vertices, way)) for way in given.ways}
+                sheet.add((f"{name}, {vertices}", *found.values()), case=name, vertices=vertices, **found)
+        sheet.keep()
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from benchmarks.figures import Sheet
 from benchmarks.growth.crossings import crossings
 from solver import registry
 from solver.contract import Need, SolverError
@@ -56,12 +57,12 @@ def panel(run: xr.Dataset, name: str) -> Panel:
     return Panel(x / np.linalg.norm(x, axis=1).max(), triangles=shape.triangles, up=shape.up, note=name, view=view)
 
 
-def line(run: xr.Dataset, name: str) -> str:
-    """Return its line of the table."""
+def line(run: xr.Dataset, name: str) -> tuple[str, ...]:
+    """Return its row of the table."""
     shape = triangles(run)[0]
     through = crossings(np.asarray(shape.position, float), np.asarray(shape.triangles, np.int64))
     count, residual, steps = int(run["vertex_count"][0]), float(run["residual"][0]), int(run["iterations"][0])
-    return f"| {name} | {count} | {residual:.1e} | {steps} | {run.attrs['cpu']:.1f} | {through or 'none'} |"
+    return name, str(count), f"{residual:.1e}", str(steps), f"{run.attrs['cpu']:.1f}", str(through or "none")
 
 
 def main() -> None:
@@ -74,16 +75,18 @@ def main() -> None:
     paths = [_FOLDER / f"{name}.toml" for name in asked.names] or sorted(_FOLDER.glob("*.toml"))
     solver = registry.get("growth")
     solver.solve(solver.parse({}), Need.parse({"stages": [0.1], "quality": "preview"}))  # compile
-    print("| file | vertices | residual | iterations | CPU s | crossings |\n|---|---|---|---|---|---|")
+    table = Sheet("growth-gallery", ("file", "vertices", "residual", "iterations", "CPU s", "crossings"), "growth")
     panels = []
     for path in paths:
         try:
             run = grown(path, asked.quality, asked.keep)
         except SolverError as error:
-            print(f"| {path.stem} | {error} |", flush=True)
+            table.add((path.stem, "", "", "", "", error), file=path.stem, failed=str(error))
             continue
-        print(line(run, path.stem), flush=True)
+        table.add(line(run, path.stem))
         panels.append(panel(run, path.stem))
+    if not asked.names:
+        table.keep(quality=asked.quality)
     if asked.out:
         rows = [panels[i : i + _COLUMNS] for i in range(0, len(panels), _COLUMNS)]
         asked.out.write_bytes(sheet(rows, title="Growth: the gallery of Combaz and Neyret 2004, Fig. 2", pixels=260))

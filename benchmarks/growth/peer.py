@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.figures import Sheet
 from solver import shell
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
@@ -42,9 +43,13 @@ def main(python: str, vertices: int) -> None:
     def tell(name: str, seconds: float, y: np.ndarray) -> None:
         value, gradient = StepEnergy(state, material, 0.0, (), Tangent(state.mesh))(y.astype(float))
         size = float(np.abs(gradient).max()) / state.length
-        print(f"| {name} | {seconds:.2f} | {value:.6f} | {size:.1e} | {np.ptp(y[:, 2]):.3f} |", flush=True)
+        height = float(np.ptp(y[:, 2]))
+        sheet.add(
+            (name, f"{seconds:.2f}", f"{value:.6f}", f"{size:.1e}", f"{height:.3f}"),
+            way=name, cpu=seconds, energy=float(value), residual=size, height=height,
+        )  # fmt: skip
 
-    print(f"{len(x)} vertices\n\n| way | CPU s | energy | residual | height |\n|---|---|---|---|---|")
+    sheet = Sheet("growth-peer", ("way", "CPU s", "energy", "residual", "height"), "growth")
     tell("start", 0.0, x)
     for name, way in (("quasi-Newton", quasi_newton), ("L-BFGS", lbfgs)):
         for _ in range(2):  # the first compiles
@@ -65,6 +70,7 @@ def main(python: str, vertices: int) -> None:
         found = np.load(out)
         for step, seconds, y in zip(_STEPS, found["seconds"], found["positions"], strict=True):
             tell(f"newton {found['version']}, {step} steps", seconds, y)
+    sheet.keep(vertices=len(x))
 
 
 if __name__ == "__main__":

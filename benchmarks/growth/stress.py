@@ -183,4 +183,4 @@ SLOW = ("a leaf of 40 000 vertices",)
 
 
 if __name__ == "__main__":
-    show(CASES, sys.argv[1:])
+    show(CASES, sys.argv[1:], "growth")

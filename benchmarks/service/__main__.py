@@ -1,4 +1,4 @@
-"""The service under load, beside xpublish in the same run: python -m benchmarks.service [--peer PYTHON] [--json PATH].
+"""The service under load, beside xpublish in the same run: python -m benchmarks.service [--peer PYTHON].
 
 Parts: `start` (until the first answer), `load` (requests per second and latencies of 200 kB bodies at 16 clients, one
 worker each, in turns), `batch` (one request against many), `memory` (four workers over one table), `swaps` (a new
@@ -27,6 +27,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks.figures import keep
 from solver.dehydration import DehydrationParams
 from store import seal, starter, tables
 from store.store import Store
@@ -265,7 +266,6 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=4.0, help="of load per server and round")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--swaps", type=int, default=200)
-    parser.add_argument("--json", type=Path, help="also write the figures there")
     options = parser.parse_args()
     parts = options.parts or PARTS
     if not set(parts) <= set(PARTS):
@@ -304,8 +304,8 @@ def main() -> None:
         if "swaps" in parts:
             found["swaps"] = row = swaps(root, options.swaps)
             print("{swaps} swaps under load: {requests} requests, {failed} failed, p99 {p99_ms:.1f} ms".format(**row))
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=1) + "\n")
+    for part, rows in found.items():
+        keep(f"service-{part}", rows if isinstance(rows, list) else [rows])
 
 
 if __name__ == "__main__":

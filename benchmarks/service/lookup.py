@@ -1,4 +1,4 @@
-"""Time of one look-up on one core: python -m benchmarks.service.lookup [--json PATH].
+"""Time of one look-up on one core: python -m benchmarks.service.lookup.
 
 Rows go by resolution, by what is asked for (in the default method), and by method (positions).
 
@@ -9,19 +9,17 @@ here; errors against finite-element runs are measured elsewhere.
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import platform
 import statistics
 import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from benchmarks.figures import keep
 from solver.contract import Need, finish
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes
@@ -82,7 +80,6 @@ def median(call: Callable[[], Any], seconds: float = 1.0) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path, help="also write the figures there")
     parser.add_argument("--seconds", type=float, default=1.0, help="per figure")
     options = parser.parse_args()
     if hasattr(os, "sched_setaffinity"):
@@ -116,10 +113,10 @@ def main() -> None:
     print(f"fft: {transforms.backend()}, one core, medians [ms]")
     for row in rows:
         print(f"{row['resolution']:>5} {row['what']:<17} {row['ms']:9.3f}")
-    if options.json:
-        options.json.write_text(
-            json.dumps({"machine": platform.processor(), "fft": transforms.backend(), "rows": rows})
-        )
+    usual = {row["resolution"]: row["ms"] for row in rows if row["what"] == "position"}
+    head = ["lattice", *(f"{n} x {2 * n}" for n in usual)]
+    cells = ["ms", *(f"{ms:.2f}" for ms in usual.values())]
+    keep("service-lookup", rows, fft=transforms.backend(), table={"head": head, "rows": [cells]})
 
 
 if __name__ == "__main__":

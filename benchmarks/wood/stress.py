@@ -137,4 +137,4 @@ def tried(name: str) -> str:
 
 
 if __name__ == "__main__":
-    show({name: partial(tried, name) for name in CASES}, sys.argv[1:])
+    show({name: partial(tried, name) for name in CASES}, sys.argv[1:], "wood")

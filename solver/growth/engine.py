@@ -1,6 +1,6 @@
 """A growing shell that is advanced from outside, in slices of time, while tools are added.
 
-Growth goes in fixed steps: grow the rest state, find the equilibrium, forget what is plastic, cut what is long. A slice
+Growth goes in fixed steps: forget what is plastic, cut what is long, grow the rest state, find the equilibrium. A slice
 may end anywhere within the search for an equilibrium; what comes out does not depend on the slices. A tool added
 between slices starts with the next step, and `script` gives the parameters whose batch run is the same.
 """
@@ -143,7 +143,8 @@ class Engine:
         before, tools = self.state, len(self._tools)
         # the way on from here is the same after an undo only with the same inverse
         kept, self._tangent = (self._tangent, self._habit), self._tangent.copy()
-        state = started(before, self._tools, self.params.step, self.params.seed)
+        meshed = yield from self._readied(before)
+        state = started(meshed, self._tools, self.params.step, self.params.seed)
         middle = state.time + dt / 2
         acting = dict(enumerate(self._tools[:tools]))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
@@ -154,29 +155,37 @@ class Engine:
         energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         yield
-        settled = yield from begun(energy, before, dt, goal, p, self._habit)
+        settled = yield from begun(energy, meshed, dt, goal, p, self._habit)
         self._habit = settled.habit
         point, spent = yield from balanced(energy, settled.x, settled.spent, goal, self._most, p, before.time)
         forces = point.gradient / state.length
         drift = (point.x - state.x) / dt if dt else None
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
-        if self.params.plasticity:
-            state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
         state = branched(state, acting, self.params.seed)
         yield
-        if self.params.remesh:
-            finer, changes = yield from remesh(state, self._longest, self._largest)
-            tangent = self._tangent
-            for pairs in changes:
-                tangent = tangent.remeshed(finer.mesh, pairs)
-            if finer.mesh is not state.mesh:
-                self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
-                self._habit = self._habit.remeshed(finer.mesh, changes)
-            state = finer
         if self._keeps:
             self._remember(before, tools, *kept)
         self.state = state
         self._steps += 1
+
+    def _readied(self, state: State) -> Generator[None, None, State]:
+        """Find the state from which a step grows: what is plastic forgotten, on a mesh that fits; yields in between.
+
+        Both disturb the equilibrium. So they come before a step's growth, not after it: what is returned is settled on
+        the mesh and against the rest state that are returned with it.
+        """
+        if self.params.plasticity and self._steps:
+            state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
+        if not self.params.remesh:
+            return state
+        finer, changes = yield from remesh(state, self._longest, self._largest)
+        tangent = self._tangent
+        for pairs in changes:
+            tangent = tangent.remeshed(finer.mesh, pairs)
+        if finer.mesh is not state.mesh:
+            self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
+            self._habit = self._habit.remeshed(finer.mesh, changes)
+        return finer
 
     def _remember(self, before: State, tools: int, tangent: Tangent, habit: Habit) -> None:
         """Keep what `undo` goes back to; inverses of the last steps only, for they are large."""

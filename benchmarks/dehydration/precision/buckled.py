@@ -73,8 +73,6 @@ def measure(record: Record, plan: Sequence[tuple[float, float, str, str, int]]) 
                 f"{row['cpu_process']:.0f} CPU s",
                 flush=True,
             )
-    record.parts["buckled_summary"] = summary(record.rows("buckled"), SOLVER.version)
-    record.save()
 
 
 def summary(rows: Sequence[Row], version: str) -> list[Row]:

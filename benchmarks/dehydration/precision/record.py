@@ -1,4 +1,4 @@
-"""The figures of a benchmark in one JSON file, kept after every run; and runs in processes of their own.
+"""The parts of one benchmark, kept after every run; and runs in processes of their own.
 
 A run of its own process has its own peak memory and its own CPU time, and can be stopped after its time limit.
 """
@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import platform
-import re
 import resource
 import subprocess
 import sys
@@ -16,7 +14,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[3]
+from benchmarks import figures
+from benchmarks.figures import ROOT
+
 #: One thread each, so that CPU seconds of different codes compare.
 SINGLE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
@@ -24,18 +24,21 @@ Row = dict[str, Any]
 
 
 class Record:
-    """A JSON document of parts, each a list of rows that are found again by their key."""
+    """The parts of `benchmarks.dehydration`, each a record of its own: rows that are found again by their key.
 
-    def __init__(self, path: Path | None, *, renew: bool = False) -> None:
-        self.path = path
-        known = path is not None and path.exists() and not renew
-        self.parts: dict[str, Any] = json.loads(path.read_text()) if known and path else {}
-        self.parts["machine"] = _machine()
+    Without `kept`, nothing is read and nothing written.
+    """
+
+    def __init__(self, kept: bool = True) -> None:
+        self.kept = kept
+        self.parts: dict[str, list[Row]] = {}
 
     def rows(self, part: str) -> list[Row]:
         """Return the rows of a part."""
-        found: list[Row] = self.parts.setdefault(part, [])
-        return found
+        if part not in self.parts:
+            there = self.kept and f"dehydration-{part}" in figures.names()
+            self.parts[part] = figures.load(f"dehydration-{part}")["runs"] if there else []
+        return self.parts[part]
 
     def row(self, part: str, key: Mapping[str, Any], run: Callable[[], Row], *, again: bool = False) -> Row:
         """Return the row with this key, from the file or by running it; `again` runs it whatever the file says."""
@@ -44,19 +47,15 @@ class Record:
         if old and not again:
             return old[0]
         rows[:] = [row for row in rows if row not in old]
-        row = {**key, **run()}
+        row = {**key, **run(), "commit": figures.made(None)["commit"]}
         rows.append(row)
-        self.save()
+        self.save(part)
         return row
 
-    def save(self) -> None:
-        """Write the file, if there is one."""
-        if self.path is None:
-            return
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self.path.with_suffix(".part")
-        fresh.write_text(json.dumps(_rounded(self.parts), indent=1) + "\n")
-        fresh.replace(self.path)
+    def save(self, part: str, **more: Any) -> None:
+        """Write the record of a part."""
+        if self.kept:
+            figures.keep(f"dehydration-{part}", self.rows(part), "dehydration", threads=1, **more)
 
 
 def child(
@@ -95,20 +94,3 @@ def worker(function: str, **arguments: Any) -> Row:
     limit = float(arguments.pop("limit", 3600.0))
     command = [sys.executable, "-m", "benchmarks.dehydration.precision.worker", function, json.dumps(arguments)]
     return answer(command, limit=limit)
-
-
-def _rounded(value: Any) -> Any:
-    """Six digits are more than any of these figures has."""
-    if isinstance(value, float):
-        return float(f"{value:.6g}")
-    if isinstance(value, Mapping):
-        return {name: _rounded(item) for name, item in value.items()}
-    return [_rounded(item) for item in value] if isinstance(value, list | tuple) else value
-
-
-def _machine() -> Row:
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists() and (found := re.search(r"model name\s*:\s*(.+)", info.read_text())):
-        cpu = found[1]
-    return {"cpu": cpu, "cores": os.cpu_count(), "python": platform.python_version(), "threads": 1}

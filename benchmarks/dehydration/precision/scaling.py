@@ -58,11 +58,11 @@ def together(edges: Sequence[int], span: float) -> Row:
 def measure(record: Record, edges: Sequence[int] = EDGES) -> None:
     """Run it anew and record it."""
     found = worker("scaling:together", edges=list(edges), span=SPAN)
-    record.parts["scaling"] = found
-    record.save()
     if "failed" in found:
         print(f"scaling: {found['failed']}")
         return
+    record.parts["scaling"] = found["meshes"]
+    record.save("scaling", **{name: value for name, value in found.items() if name != "meshes"})
     for row in found["meshes"]:
         print(
             f"n {row['n']:3d} {row['elements']:7d} elements {row['steps']:6d} steps {row['cpu']:7.2f} CPU s "

@@ -15,6 +15,7 @@ import numpy as np
 
 from solver.contract import Quality
 
+from .buckled import summary
 from .record import Record, Row, worker
 
 #: Hand-overs of one stage per figure.
@@ -148,6 +149,8 @@ def handed(quality: Quality, shrinkage: float) -> Row:
 
 def measure(record: Record, quality: Quality = "preview") -> None:
     """Run every row anew; the quality's row comes from the runs after buckling, if they are in the record."""
+    from solver.dehydration import SOLVER
+
     whole_runs = {
         "stop at s = 0.15": ("run to s = 0.3", "skips:early_stop", {"last": 0.3, "wanted": 0.15}),
         "closed form at s = 0.05": ("march from s = 0", "skips:below_onset", {"shrinkage": 0.05}),
@@ -158,9 +161,9 @@ def measure(record: Record, quality: Quality = "preview") -> None:
         rows.append(row | worker(function, quality=quality, **arguments))
     handed_over = worker("skips:handed", quality=quality, shrinkage=0.15)
     rows += handed_over.get("rows", [{"what": "hand-over", **handed_over}])
-    rows += _qualities(record.parts.get("buckled_summary", []))
+    rows += _qualities(summary(record.rows("buckled"), SOLVER.version))
     record.parts["skips"] = rows
-    record.save()
+    record.save("skips")
     for row in rows:
         if "failed" in row:
             print(f"{row['what']}: {row['failed']}")

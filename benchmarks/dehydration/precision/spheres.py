@@ -108,10 +108,7 @@ def measure(
     for theta in thetas:
         for code, mesh, run in _plan(theta, places, short, limit):
             _show(record.row("spheres", {"theta": theta, "code": code, "mesh": mesh}, run, again=True))
-    if peers:
-        record.parts["missing_peers"] = missing
-    record.parts["spheres_ratios"] = ratios(record.rows("spheres"))
-    record.save()
+    record.save("spheres", missing_peers=missing)
 
 
 def _plan(

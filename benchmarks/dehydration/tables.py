@@ -1,0 +1,172 @@
+"""The tables of docs/dehydration.md, made of the records of `benchmarks.dehydration`."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from benchmarks.figures import Row, markdown
+
+from .precision.buckled import STAGES, kind, summary
+from .precision.spheres import SHIPPED, ratios
+
+__all__ = ["table"]
+
+#: Seconds of the paper's own run.
+_PAPER = 7200.0
+_CODES = {
+    "meridional": "ours, meridional",
+    "implicit": "ours, implicit",
+    "explicit": "ours, explicit, whole sphere",
+    "felupe": "FElupe {} Q1/P0",
+    "calculix": "CalculiX {} C3D8",
+    "ngsolve": "NGSolve {} Q2/P1d",
+    "dolfinx": "dolfinx {} Q2/P1d",
+}
+
+
+def table(record: Row, part: str = "") -> str:
+    """Return the table of that record and part."""
+    makers: dict[str, Callable[[Row], str]] = {
+        "dehydration-spheres": lambda r: _spheres(r, 0.95),
+        "dehydration-spheres past": _best,
+        "dehydration-buckled whole": _whole,
+        "dehydration-buckled eighths": _eighths,
+        "dehydration-scaling": _scaling,
+        "dehydration-skips": _skips,
+    }
+    return makers[f"{record['name']} {part}".strip()](record)
+
+
+def _four(values: Sequence[float], form: str = "{:.4f}") -> str:
+    return " ".join(form.format(value).removeprefix("0") for value in values)
+
+
+def _part(seconds: float) -> str:
+    times = _PAPER / seconds
+    return f"1/{round(times, 1 - int(math.log10(times))):.0f}"
+
+
+def _depth(values: Sequence[float]) -> str:
+    return f"{max(values):.1g}" if max(values) > 0 else "0"
+
+
+def _share(values: Sequence[float]) -> str:
+    return " ".join(f"{100 * value:+.0f}" for value in values) + " %"
+
+
+def _whole(record: Row) -> str:
+    rows = _measured(record, "")
+    fine = [row["roughness"] for row in rows if row["quality"] == "fine" and "failed" not in row]
+    lines = []
+    for row in rows:
+        name = f"{row['quality']}, {row['seed']}"
+        if "failed" in row:
+            lines.append([name, row["failed"], *[""] * 6])
+            continue
+        off = [x / statistics.mean(truth) - 1 for x, *truth in zip(row["roughness"], *fine, strict=True)]
+        missed = [f"{s:g}" for s, fine in zip(STAGES, row["converged"], strict=True) if not fine]
+        lines.append(
+            [
+                name, f"{row['elements']:,}", f"{row['steps']:,}", _four(row["cpu"], "{:.0f}"), _four(row["roughness"]),
+                _share(off), _four(row["residual"], "{:.1e}"), ", ".join(missed) or "none",
+                f"{row['least_jacobian'][-1]:.2f}", _depth(row["penetration"]),
+            ]
+        )  # fmt: skip
+    head = ("quality, seed", "elements", "steps", "CPU s to each stage", "roughness [r1]", "against fine's mean")
+    return markdown((*head, "residual", "not converged at s =", "least J", "deepest [te]"), lines)
+
+
+def _eighths(record: Row) -> str:
+    rows = _measured(record, "xyz")
+    lines = []
+    groups = list(dict.fromkeys((*kind(row), row["quality"]) for row in rows))
+    means = summary(record["runs"], record["version"])
+    for te, gamma, mirrors, quality in sorted(groups, key=lambda g: (-g[0], g[1])):
+        same = [row for row in rows if (*kind(row), row["quality"]) == (te, gamma, mirrors, quality)]
+        found = [row for row in means if (*kind(row), row["quality"]) == (te, gamma, mirrors, quality)]
+        missed = sum(len(STAGES) - sum(row["converged"]) for row in same)
+        off = "" if found[0]["reference"] == quality else _share([row["roughness"]["error"] for row in found])
+        lines.append(
+            [
+                f"{te:g}" + (f", gamma {gamma:g}" if gamma != 10 else ""), f"{quality}, {len(same)}",
+                f"{same[0]['elements']:,}", _four([row["cpu"] for row in found], "{:.0f}"),
+                _four([row["roughness"]["mean"] for row in found]), off, f"{missed} of {len(same) * len(STAGES)}",
+                _depth([depth for row in same for depth in row["penetration"]]), _part(found[-1]["cpu"]),
+                f"{max(row['peak_MB'] for row in same):.0f}",
+            ]
+        )  # fmt: skip
+    head = ("te", "quality, seeds", "elements", "CPU s to each stage", "roughness [r1]", "against fine's mean")
+    return markdown((*head, "stages not converged", "deepest [te]", f"of {_PAPER:.0f} s", "peak MB"), lines)
+
+
+def _measured(record: Row, mirrors: str) -> list[Row]:
+    order = {"preview": 0, "default": 1, "fine": 2}
+    rows = [row for row in record["runs"] if row["version"] == record["version"] and row["mirrors"] == mirrors]
+    return sorted(rows, key=lambda row: (-row["te"], row["gamma"], order[row["quality"]], row["seed"]))
+
+
+def _spheres(record: Row, theta: float) -> str:
+    rows = [row for row in record["runs"] if row["theta"] == theta]
+    over = {(row["code"], row["mesh"]): row["over_implicit"] for row in ratios(rows)}
+    lines = []
+    for row in rows:
+        name = _CODES[row["code"]].format(row.get("version", "")) + (
+            " (default)" * (SHIPPED.get(row["code"]) == row["mesh"])
+        )
+        if "failed" in row:
+            lines.append([name, row["mesh"], "", "", row["failed"], "", ""])
+            continue
+        times = over.get((row["code"], row["mesh"]))
+        lines.append(
+            [
+                name, row["mesh"], f"{row['unknowns']:,}", f"{row['cpu']:.2f}", f"{row['error_radial_reference']:.1e}",
+                f"{row['error_closed_form']:.1e}", f"{times:.1f}" if times else "",
+            ]
+        )  # fmt: skip
+    return markdown(("code", "mesh", "unknowns", "CPU s", "error", "against closed form", "over ours"), lines)
+
+
+def _best(record: Row) -> str:
+    rows = [row for row in record["runs"] if row["theta"] == 0.9]
+    lines = []
+    for code, name in _CODES.items():
+        good = [row for row in rows if row["code"] == code and "failed" not in row]
+        failed = [row["mesh"] for row in rows if row["code"] == code and "failed" in row]
+        if good:
+            best = min(good, key=lambda row: float(row["error_radial_reference"]))
+            cells = [name.format(best.get("version", "")), best["mesh"], f"{best['error_radial_reference']:.1e}"]
+            lines.append([*cells, f"{best['cpu']:.2f}", ", ".join(failed) or "none"])
+    return markdown(("code", "its best mesh", "error", "CPU s", "meshes that failed"), lines)
+
+
+def _scaling(record: Row) -> str:
+    lines = [
+        [f"{row['elements']:,}", str(row["steps"]), f"{row['cpu']:.2f}", f"{row['us_per_element_step']:.3f}"]
+        for row in record["runs"]
+    ]
+    made = markdown(("elements", "steps", "CPU s", "CPU-us per element-step"), lines)
+    step, march = record["slope_of_a_step"], record["slope_of_the_march"]
+    return f"{made}\n\nA step costs elements^{step:.2f}, the march elements^{march:.2f}."
+
+
+def _skips(record: Row) -> str:
+    lines = []
+    for row in record["runs"]:
+        if "failed" in row:
+            lines.append([row["what"], row.get("instead_of", ""), row["failed"], ""])
+            continue
+        cost = f"{row['cpu_full']:.3g} to {row['cpu']:.3g}"
+        if "MB" in row:
+            cost += f", {1e3 * row['MB_full']:.3g} to {1e3 * row['MB']:.3g} kB"
+        lines.append([row["what"], row["instead_of"], cost, _added(row)])
+    return markdown(("asked for", "instead of", "CPU s", "error added"), lines)
+
+
+def _added(row: dict[str, Any]) -> str:
+    if row["error"] == 0:
+        return "none"
+    relative = row["error_is"].startswith("relative")
+    return f"{100 * row['error']:+.0f} %, {row['error_is']}" if relative else f"{row['error']:.1e}, {row['error_is']}"

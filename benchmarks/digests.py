@@ -1,0 +1,61 @@
+"""Digests of small runs of every solver: what only moves code must leave every byte where it was.
+
+    python -m benchmarks.digests [--out FILE.json] [--against FILE.json]
+
+Compare on one machine only: another processor rounds otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver import registry
+from solver.contract import Need
+
+#: Solver, parameters, stages, quality: each some seconds.
+RUNS: tuple[tuple[str, dict[str, Any], tuple[float, ...], str], ...] = (
+    ("dehydration", {"te": 0.1, "gamma": 10.0, "mirrors": "xyz"}, (0.05, 0.1), "preview"),
+    ("dehydration", {"te": 0.1, "gamma": 1.0, "mirrors": "xyz"}, (0.02,), "preview"),
+    ("decay", {}, (0.0, 1.0, 2.0), "preview"),
+    ("growth", {"shape": "disc", "vertices": 300}, (0.0, 0.2), "preview"),
+    ("wood", {"rods": 12, "vertices": 10, "tip_load": (0.0, 0.0, -1.0), "clamp": "start"}, (0.0, 0.001), "preview"),
+)
+
+
+def digest(name: str, words: dict[str, Any], stages: tuple[float, ...], quality: str) -> str:
+    """Return the SHA-256 of every variable but the seconds taken, names and shapes included."""
+    solver = registry.get(name)
+    result = solver.solve(solver.parse(words), Need(stages=stages, quality=quality))
+    total = hashlib.sha256()
+    for variable in sorted(map(str, result.variables)):
+        if variable != "seconds":
+            values = np.ascontiguousarray(result[variable].values)
+            total.update(f"{variable} {values.dtype} {values.shape}".encode())
+            total.update(values.tobytes() if values.dtype != object else repr(values.tolist()).encode())
+    return total.hexdigest()[:16]
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("--out", type=Path)
+    asked.add_argument("--against", type=Path)
+    words = asked.parse_args()
+    before = json.loads(words.against.read_text()) if words.against else {}
+    now = {}
+    for run in RUNS:
+        key = f"{run[0]} {json.dumps(run[1])} {run[3]}"
+        now[key] = digest(*run)
+        mark = "" if key not in before else "  same" if before[key] == now[key] else "  OTHER"
+        print(now[key], key, mark, flush=True)
+    if words.out:
+        words.out.write_text(json.dumps(now, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""Figures in documents are those of the records, and say with which version they were measured."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+
+from benchmarks import documents, figures
+from solver import registry
+
+_MARKED = re.compile(r"<!-- (?:figures|measured): .*?<!-- end -->", re.DOTALL)
+#: A table with one of these in its head is a measured one.
+_MEASURED = re.compile(r"CPU s|seconds|\bms\b|\bns\b|error|requests/s")
+
+
+@pytest.mark.parametrize("path", documents.DOCUMENTS, ids=lambda path: path.name)
+def test_figures_are_those_of_the_records(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    if documents.rendered(text) != text:
+        how = dict(documents.stale())[path]
+        pytest.fail(
+            f"{path.name} differs from the records in benchmarks/results, or a solver's version has moved on. Run the "
+            f"benchmarks that changed, then `make docs`, which says of figures left behind that they are:\n{how}",
+            pytrace=False,
+        )
+
+
+@pytest.mark.parametrize("path", documents.DOCUMENTS, ids=lambda path: path.name)
+def test_no_measured_table_is_typed_by_hand(path: Path) -> None:
+    bare = _MARKED.sub("", path.read_text(encoding="utf-8"))
+    heads = re.findall(r"^(\|.*\|)\n\|[-|: ]+\|$", bare, re.MULTILINE)
+    assert not [head for head in heads if _MEASURED.search(head)]
+
+
+@pytest.mark.parametrize("name", figures.names())
+def test_records_say_what_made_them(name: str) -> None:
+    record = figures.load(name)
+    assert record["name"] == name
+    assert record["command"]
+    assert re.fullmatch(r"[0-9a-f]{7,40}\+?", record["commit"])
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", record["date"])
+    assert ("solver" in record) == ("version" in record)
+    if record["source"] == "text":  # taken over: rows, but no runs, and nobody knows on which machine
+        assert record["table"]["rows"]
+        assert not record["runs"]
+    else:
+        assert record["source"] == "run"
+        assert record["runs"]
+        assert record["machine"]["cpu"]
+
+
+def _named(path: Path) -> list[str]:
+    return re.findall(r"<!-- figures: (\S+)", path.read_text(encoding="utf-8"))
+
+
+def test_every_digit_counts() -> None:
+    """Whatever digit is changed between markers, the rendering brings it back."""
+    path = figures.ROOT / "docs" / "dehydration.md"
+    text = path.read_text(encoding="utf-8")
+    blocks = [block for block in _MARKED.finditer(text) if block[0].startswith("<!-- figures")]
+    assert blocks
+    for block in blocks:
+        digits = [block.start() + at.start() for at in re.finditer(r"\d", block[0]) if "\n" in block[0][: at.start()]]
+        for at in digits[:: max(len(digits) // 5, 1)]:
+            wrong = text[:at] + str((int(text[at]) + 1) % 10) + text[at + 1 :]
+            assert documents.rendered(wrong) == documents.rendered(text) != wrong
+
+
+def test_a_version_that_moved_on_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    solver = registry.get("decay")
+    kept = registry.get
+    text = f"<!-- measured: decay {solver.version} -->\nOne takes 2 s.\n<!-- end -->"
+    assert documents.rendered(text) == text
+    later = dataclasses.replace(solver, version="99")
+    monkeypatch.setattr(registry, "get", lambda name: later if name == "decay" else kept(name))
+    said = f"\n*Measured with version {solver.version} of `decay`; it is 99 now.*\n"
+    moved = documents.rendered(text)
+    assert said in moved
+    assert documents.rendered(moved) == moved
+    named = [path for path in documents.DOCUMENTS if any(name.startswith("decay-") for name in _named(path))]
+    assert named
+    assert all(path in dict(documents.stale()) for path in named)
+    monkeypatch.setattr(registry, "get", kept)
+    assert documents.rendered(moved) == text  # and unsaid once it is measured anew
+
+
+def test_all_seeds_of_a_table_are_in_it() -> None:
+    """The run that did not converge stands beside those that did, as it is in their mean."""
+    table = documents.table(figures.load("dehydration-buckled"), "whole")
+    record = figures.load("dehydration-buckled")
+    runs = [run for run in record["runs"] if not run["mirrors"] and run["version"] == record["version"]]
+    shown = re.findall(r"^\| (\w+, \d+) \|", table, re.MULTILINE)
+    assert sorted(shown) == sorted(f"{run['quality']}, {run['seed']}" for run in runs)
+    assert any(0 in run["converged"] for run in runs)
