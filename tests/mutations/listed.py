@@ -40,12 +40,11 @@ class Mutation:
             raise ValueError(f"{self.name}: the old text occurs {text.count(self.old)} times in {self.file}.")
         return text.replace(self.old, self.new)
 
-    @property
-    def digest(self) -> str:
-        """Of all that its outcome hangs on most: the file, the change and the tests, 16 hexadecimal digits."""
+    def digest(self, root: Path) -> str:
+        """Of all that its outcome hangs on most, in a tree: file, change and tests; 16 hexadecimal digits."""
         total = hashlib.sha256("\0".join((self.old, self.new, *self.tests)).encode())
-        for path in (self.path, *test_files(self.tests)):
-            total.update(path.read_bytes())
+        for path in (root / self.file, *(root / path.relative_to(ROOT) for path in test_files(self.tests))):
+            total.update(path.read_bytes() if path.is_file() else path.name.encode())
         return total.hexdigest()[:16]
 
 

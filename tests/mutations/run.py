@@ -3,7 +3,7 @@
     python -m tests.mutations.run [--only WORD] [--again] [--limit SECONDS]
 
 Writes benchmarks/results/mutants.json after each mutation, and the survivors as mutants.md beside it. What is known of
-the same file, change and tests is not run again. Each selection must pass without a mutation first.
+the same file, change and tests is not run again. The test that notices must pass without the mutation.
 
 All that is slow to import is imported once, and each mutation runs in a fork of that process. Compiled functions are
 kept among mutations but for those of modules that import the changed one: numba looks at a function's own file only.
@@ -17,6 +17,7 @@ import importlib
 import json
 import os
 import platform
+import re
 import resource
 import shutil
 import signal
@@ -61,17 +62,26 @@ class Copy:
             if str(path.relative_to(self.root)) not in wanted and "__pycache__" not in path.parts:
                 path.unlink()
 
-    def caches_for(self, changed: str) -> Path:
+    def caches_without(self, changed: str) -> Path:
         """Return a cache without what may have been compiled from a file."""
-        stale = {Path(name).stem for name in self._importers(changed)}
         shutil.rmtree(self._mutant_cache, ignore_errors=True)
-        for path in self.cache.rglob("*.nb?"):
-            # numba calls what it keeps module.function-line...
-            if path.name.partition(".")[0] not in stale:
-                target = self._mutant_cache / path.relative_to(self.cache)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                os.link(path, target)
+        self._linked(self.cache, self._mutant_cache, changed)
         return self._mutant_cache
+
+    def keep_compiled(self, changed: str) -> None:
+        """Keep what the last run compiled, but for what may have been compiled from the changed file."""
+        self._linked(self._mutant_cache, self.cache, changed)
+
+    def _linked(self, source: Path, target: Path, changed: str) -> None:
+        stale = {Path(name).stem for name in self._importers(changed)}
+        target.mkdir(parents=True, exist_ok=True)
+        for path in source.rglob("*.nb?"):
+            # numba calls what it keeps module.function-line...
+            place = target / path.relative_to(source)
+            if path.name.partition(".")[0] not in stale and not (place.exists() and place.samefile(path)):
+                place.parent.mkdir(parents=True, exist_ok=True)
+                place.unlink(missing_ok=True)
+                os.link(path, place)
 
     def _importers(self, changed: str) -> set[str]:
         """Return a file and all that import it, whatever way round."""
@@ -167,14 +177,18 @@ class Ledger:
         page = json.loads(self.path.read_text()) if self.path.exists() else {}
         self.rows: dict[str, dict[str, Any]] = {row["name"]: row for row in page.get("mutations", [])}
 
-    def known(self, mutation: Mutation) -> bool:
+    def known(self, mutation: Mutation, copy: Copy) -> bool:
         row = self.rows.get(mutation.name)
-        return row is not None and row["digest"] == mutation.digest and row["outcome"] in ("caught", "survived")
+        return (
+            row is not None
+            and row["digest"] == mutation.digest(copy.root)
+            and row["outcome"] in ("caught", "caught by its limit", "survived")
+        )
 
     def note(self, mutations: Sequence[Mutation], **row: Any) -> None:
         self.rows[row["name"]] = row
         rows = [self.rows[m.name] for m in mutations if m.name in self.rows]
-        caught = sum(row["outcome"] == "caught" for row in rows)
+        caught = sum(row["outcome"].startswith("caught") for row in rows)
         head = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
         page = {
             "command": "make mutants",
@@ -198,7 +212,7 @@ def _table(page: dict[str, Any]) -> str:
         place = "/".join(parts[:2]) if parts[0] == "solver" and len(parts) > 2 else parts[0]
         counts = floors.setdefault(place, [0, 0])
         counts[0] += 1
-        counts[1] += row["outcome"] == "caught"
+        counts[1] += row["outcome"].startswith("caught")
     lines = [
         "# Mutations",
         "",
@@ -212,7 +226,7 @@ def _table(page: dict[str, Any]) -> str:
         "| not caught | file | what it breaks | outcome |",
         "|---|---|---|---|",
     ]
-    lost = [row for row in page["mutations"] if row["outcome"] != "caught"]
+    lost = [row for row in page["mutations"] if not row["outcome"].startswith("caught")]
     lines += [f"| {row['name']} | `{row['file']}` | {row['why']} | {row['outcome']} |" for row in lost]
     return "\n".join(lines) + "\n"
 
@@ -220,27 +234,24 @@ def _table(page: dict[str, Any]) -> str:
 def main() -> None:
     """Run what is listed and not known."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", help="mutations whose name or file holds this word")
+    parser.add_argument("--only", default="", help="mutations in whose name or file this regular expression is found")
     parser.add_argument("--again", action="store_true", help="run what is known as well")
     parser.add_argument("--limit", type=float, default=_LIMIT, help="CPU seconds of one selection")
     parser.add_argument("--home", type=Path, default=Path(tempfile.gettempdir()) / f"wizen-mutants-{os.getuid()}")
     asked = parser.parse_args()
     mutations, ledger = listed(), Ledger()
-    todo = [m for m in mutations if asked.only in f"{m.name} {m.file}" and (asked.again or not ledger.known(m))]
     copy = Copy(asked.home)
+    wanted = [m for m in mutations if re.search(asked.only, f"{m.name} {m.file}")]
+    todo = [m for m in wanted if asked.again or not ledger.known(m, copy)]
+    # in no order: what is known after an hour says something of the whole
+    todo.sort(key=lambda m: m.digest(copy.root))
     for name in _EARLY:
         importlib.import_module(name)
-    passed: dict[tuple[str, ...], bool] = {}
+    passed: dict[str, bool] = {}
     for number, mutation in enumerate(todo, 1):
-        if mutation.tests not in passed:
-            code, said, seconds = run(mutation.tests, copy, copy.cache, 4 * asked.limit)
-            passed[mutation.tests] = code == 0
-            print(f"    {'passes' if code == 0 else 'FAILS'} as it is: {' '.join(mutation.tests)} ({seconds:.1f} s)")
-            if code:
-                print(said)
-        outcome, by, seconds = "its tests fail as it is", "", 0.0
-        if passed[mutation.tests]:
-            outcome, by, seconds = _tried(mutation, copy, asked.limit)
+        outcome, by, seconds = _tried(mutation, copy, asked.limit)
+        if outcome == "caught" and not _passes(by, passed, copy, 4 * asked.limit):
+            outcome = "its test fails as it is"
         ledger.note(
             mutations,
             name=mutation.name,
@@ -249,13 +260,23 @@ def main() -> None:
             outcome=outcome,
             by=by,
             seconds=round(seconds, 1),
-            digest=mutation.digest,
+            digest=mutation.digest(copy.root),
         )
         print(f"{number}/{len(todo)} {outcome}: {mutation.name} ({seconds:.1f} s) {by}", flush=True)
     rows = [ledger.rows[m.name] for m in mutations if m.name in ledger.rows]
-    caught = sum(row["outcome"] == "caught" for row in rows)
+    caught = sum(row["outcome"].startswith("caught") for row in rows)
     print(f"{caught} of {len(rows)} caught, {len(mutations)} listed")
     sys.exit(caught < 0.95 * len(mutations))
+
+
+def _passes(test: str, known: dict[str, bool], copy: Copy, limit: float) -> bool:
+    """Return whether the test that noticed passes without a mutation."""
+    if test and test not in known:
+        code, said, _ = run([test], copy, copy.cache, limit)
+        known[test] = code == 0
+        if code:
+            print(said)
+    return known.get(test, True)
 
 
 def _tried(mutation: Mutation, copy: Copy, limit: float) -> tuple[str, str, float]:
@@ -265,16 +286,17 @@ def _tried(mutation: Mutation, copy: Copy, limit: float) -> tuple[str, str, floa
     kept = target.stat()
     try:
         target.write_text(mutation.applied(text))
-        code, said, seconds = run(mutation.tests, copy, copy.caches_for(mutation.file), limit)
+        code, said, seconds = run(mutation.tests, copy, copy.caches_without(mutation.file), limit)
     finally:
         target.write_text(text)
         # numba and Python know a source by its time
         os.utime(target, ns=(kept.st_atime_ns, kept.st_mtime_ns))
+    copy.keep_compiled(mutation.file)
     if code in (0, 1):
         failed = [line.removeprefix("FAILED ").partition(" - ")[0] for line in said.splitlines() if "FAILED " in line]
         return ("caught" if code else "survived"), (failed or [""])[-1], seconds
     if code == -9:
-        return "caught", "ran past its limit", seconds
+        return "caught by its limit", "", seconds
     return f"broken (pytest says {code})", said.strip().splitlines()[-1] if said.strip() else "", seconds
 
 
