@@ -61,6 +61,7 @@ STATUS: Mapping[type[Exception], int] = {
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,
+    errors.SlowBody: 408,
     errors.TimedOut: 503,
     errors.Overloaded: 503,
     errors.Unauthorized: 401,
@@ -202,5 +203,5 @@ def _response(
     body = problem.model_dump(exclude_defaults=True)
     extra = {"Cache-Control": "no-store", **(headers or {})}
     if status in _RETRY:
-        extra["Retry-After"] = _RETRY[status]
+        extra.setdefault("Retry-After", _RETRY[status])
     return Response(orjson.dumps(body), status, extra, MEDIA_TYPE)

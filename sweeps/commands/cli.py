@@ -223,7 +223,7 @@ def sweep(
         note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
         reports = []
         for part in read.parts():
-            with progress.stopping() as stop, progress.sweep(part.name, readers(part)) as observe:
+            with progress.stopping(progress.GIVEN_BACK) as stop, progress.sweep(part.name, readers(part)) as observe:
                 reports.append(run_plan(part, opened, pool, observe, stop=stop, again=retry_failed))
             if reports[-1].stopped or (part is read.first and not reports[-1].complete):
                 break

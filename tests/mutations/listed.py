@@ -43,12 +43,12 @@ class Mutation:
     def digest(self, root: Path) -> str:
         """Of all that its outcome hangs on most, in a tree: file, change and tests; 16 hexadecimal digits."""
         total = hashlib.sha256("\0".join((self.old, self.new, *self.tests)).encode())
-        for path in (root / self.file, *(root / path.relative_to(ROOT) for path in test_files(self.tests))):
+        for path in (root / self.file, *(root / path.relative_to(ROOT) for path in files_of(self.tests))):
             total.update(path.read_bytes() if path.is_file() else path.name.encode())
         return total.hexdigest()[:16]
 
 
-def test_files(tests: tuple[str, ...]) -> list[Path]:
+def files_of(tests: tuple[str, ...]) -> list[Path]:
     """Return the test files that a selection names."""
     return [ROOT / word.partition("::")[0] for word in tests if word.startswith("tests/")]
 

@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from .listed import ROOT, Mutation, listed, test_files
+from .listed import ROOT, Mutation, files_of, listed
 
 LISTED = listed()
 
@@ -30,7 +30,7 @@ def test_a_mutation_fits_its_file(mutation: Mutation) -> None:
     """The old text is there exactly once, the new text is Python, and the tests exist and say why."""
     ast.parse(mutation.applied(mutation.path.read_text()))
     assert mutation.why
-    files = test_files(mutation.tests)
+    files = files_of(mutation.tests)
     assert files
     for path in files:
         assert path.is_file(), path.relative_to(ROOT)
