@@ -6,23 +6,20 @@ import difflib
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from pathlib import Path
 
 from .contract import InvalidInput, Solver, Surface
 
 __all__ = ["get", "names", "surface"]
 
-#: Our own solvers: name -> "module:attribute". Others join through the entry-point group `wizen.solvers`.
-_OURS = {
-    "decay": "solver.decay:SOLVER",
-    "dehydration": "solver.dehydration:SOLVER",
-    "growth": "solver.growth:SOLVER",
-    "wood": "solver.wood:SOLVER",
-}
-
 
 @cache
 def _places() -> dict[str, str]:
-    return {**{e.name: e.value for e in entry_points(group="wizen.solvers")}, **_OURS}
+    """Return name -> "module:attribute": of each folder beside this file that has a `run.py`, whose package offers
+    SOLVER, and of what joins through the entry-point group `wizen.solvers`.
+    """
+    ours = {path.parent.name: f"solver.{path.parent.name}:SOLVER" for path in Path(__file__).parent.glob("*/run.py")}
+    return {**{e.name: e.value for e in entry_points(group="wizen.solvers")}, **ours}
 
 
 def names() -> tuple[str, ...]:

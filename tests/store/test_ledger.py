@@ -223,7 +223,7 @@ def test_no_job_is_handed_out_twice(ledger: Ledger) -> None:
     ledger.path.parent.mkdir(exist_ok=True)
     Ledger(ledger.path).want(job(f"{i:03d}") for i in range(240))
     processes = [python(CLAIM, ledger.path, f"w{i}") for i in range(4)]
-    claimed = [line for process in processes for line in process.communicate(timeout=60)[0].split()]
+    claimed = [line for process in processes for line in process.communicate(timeout=120)[0].split()]
     assert sorted(claimed) == [f"{i:03d}" for i in range(240)]
     assert ledger.counts()["done"] == 240
 
@@ -233,7 +233,7 @@ CREATE = "import sys; from store.ledger import Ledger; print(Ledger(sys.argv[1])
 
 def test_processes_race_to_create_the_file(ledger: Ledger) -> None:
     processes = [python(CREATE, ledger.path) for _ in range(4)]
-    assert [process.communicate(timeout=60)[0].strip() for process in processes] == ["0"] * 4
+    assert [process.communicate(timeout=120)[0].strip() for process in processes] == ["0"] * 4
 
 
 def test_threads_share_a_ledger(ledger: Ledger) -> None:
@@ -271,7 +271,7 @@ print(codes, ledger.counts()["done"])
 
 
 def test_a_fork_opens_its_own_connection(ledger: Ledger) -> None:
-    assert python(FORK, ledger.path).communicate(timeout=60)[0].strip() == "[0, 0] 40"
+    assert python(FORK, ledger.path).communicate(timeout=120)[0].strip() == "[0, 0] 40"
 
 
 def test_travels_between_processes(ledger: Ledger) -> None:

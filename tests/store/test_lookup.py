@@ -286,7 +286,7 @@ def test_a_shape_has_converged_only_where_all_that_it_is_made_of_had(store: Stor
         if te == 0.04:
             result["converged"][1] = 0
         store.ledger.want([job])
-        store.ledger.done(job.key, store.put(job.key, result), 1.0)
+        store.ledger.done(store.ledger.claim("tester", 60, [job.key]), store.put(job.key, result), 1.0)
     tables.build(store, SOLVER)
     table = ShapeTable.open(store, surfaces=registry.surface)
     # te, stage, and whether run 0.04 takes part at stage 0.2

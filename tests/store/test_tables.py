@@ -266,5 +266,5 @@ def test_full_disk_while_writing_leaves_nothing(store: Store, tmp_path: Path) ->
     script = f'mount -t tmpfs -o size=48k none {store.tables_dir} && {sys.executable} -c "$0" {store.root}'
     script += f" && ls -A {store.tables_dir}/default"
     command = [unshare, "-rm", "sh", "-c", script, FULL]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert result.stdout.split() == ["storage-full"], result.stderr
