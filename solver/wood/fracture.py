@@ -17,8 +17,8 @@ from numba import njit
 
 from .model.arrays import Bonds, Rods
 from .model.bundle import SAMPLES
+from .model.motion import Motion
 from .model.state import Wood
-from .stepping.explicit import Motion
 
 __all__ = ["Breaks", "break_worst", "overstress"]
 

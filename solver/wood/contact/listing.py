@@ -8,13 +8,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..model.arrays import Rods
-from ..model.state import Wood
+from ..model.arrays import Rods, Rubbing
+from ..model.state import State, Wood
 from ..params import WoodParams
-from ..stepping.explicit import LOST, forces
-from ..stepping.moment import State
 from .pairs import pairs
-from .rubbing import Rubbing, none
 
 __all__ = ["Listing", "Near", "law"]
 
@@ -63,8 +60,8 @@ class Listing:
         self._law = law(wood, params)
         self._thick, self._margin = float(self._law[0]), _MARGIN * float(self._law[0])
         self.on = params.rod_contact and self._thick > 0
-        self._rubbing = none()
         self._near: Near | None = None
+        self._rubbing = Rubbing(np.zeros((0, 2), np.int32), self._law)
 
     def _listed(self, wood: Wood, ahead: float) -> Rubbing:
         """Return pairs that hold until a vertex has moved by `ahead` [m]."""
@@ -83,17 +80,3 @@ class Listing:
         if rubbing is state.scratch.rubbing:
             return state
         return state._replace(scratch=state.scratch._replace(rubbing=rubbing))
-
-    def refreshed(self, state: State, ahead: float, time: float, dt: float) -> State:
-        """Return the state with pairs that hold for `ahead` [s] from `time` [s], its energies booked.
-
-        What rods that touch at the start have is booked as taken from what is lost.
-        """
-        m = state.wood.motion
-        fitted = self.fitted(state, ahead * float(np.sqrt((m.v**2).sum(1).max())) if self.on else 0.0)
-        if fitted is state:
-            return state
-        w, before = state.wood, float(state.books[:4].sum())
-        forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, fitted.scratch, w.turning, time, dt, state.books)
-        state.books[LOST] += before - float(state.books[:4].sum())
-        return fitted

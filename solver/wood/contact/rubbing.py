@@ -9,31 +9,17 @@ and has the force of the points themselves as its slope.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
-from ..model.arrays import Rods
+from ..model.arrays import Rods, Rubbing
 from .bodies import eased
 
-__all__ = ["Rubbing", "closest", "crossed", "none", "rub"]
+__all__ = ["closest", "crossed", "rub"]
 
 _TINY = 1e-30
 #: Weight of places away from the middles of edges, over the thickness squared.
 MIDDLE = 0.1
-
-
-class Rubbing(NamedTuple):
-    """Listed pairs, and what a contact is made of."""
-
-    pair: np.ndarray  # (p, 2) int32 edges
-    law: np.ndarray  # (4,) thickness [m], stiffness [N/m], friction [1], depth over which the stiffness grows [m]
-
-
-def none() -> Rubbing:
-    """Return no pairs."""
-    return Rubbing(np.zeros((0, 2), np.int32), np.zeros(4))
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Bodies", "Bonds", "Rods", "Turns"]
+__all__ = ["Bodies", "Bonds", "Rods", "Rubbing", "Turns"]
 
 
 class Rods(NamedTuple):
@@ -66,3 +66,10 @@ class Bodies(NamedTuple):
     k: np.ndarray  # (r,) contact stiffness per length of rod [N/m2]
     ease: np.ndarray  # (r,) depth over which it grows to this [m]
     first: np.ndarray  # (e + 1,) int32: where the numbers of each edge's points begin
+
+
+class Rubbing(NamedTuple):
+    """Pairs of edges of different rods that are listed as near, and what a contact of theirs is made of."""
+
+    pair: np.ndarray  # (p, 2) int32 edges
+    law: np.ndarray  # (4,) thickness [m], stiffness [N/m], friction [1], depth over which the stiffness grows [m]

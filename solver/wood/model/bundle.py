@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...contract import Context, InvalidGeometry
 from ..params import WoodParams
-from ..stepping.explicit import Motion
 from .arrays import Rods, Turns
+from .axis import along, curved, started
 from .grain import Field
 from .joining import bodied, bonded
+from .motion import Motion
 from .section import areas, balanced, place
 from .state import Wood
 
@@ -23,46 +26,31 @@ _CONTACT = 0.1
 _EASE = 0.1
 
 
-def _along(rods: int, vertices: int, params: WoodParams, generator: np.random.Generator) -> np.ndarray:
-    """Return the vertices' places (rods, vertices) [m] along the rods, edges within their least and greatest length."""
-    u = params.unevenness
-    if u == 0 or vertices == 3:
-        return np.tile(np.linspace(0, params.length, vertices), (rods, 1))
-    # edges of mean 1 whose scaling to the full length keeps them within 1 - u and 1 + u
-    edges = 1 + u * generator.uniform(-1, 1, (rods, vertices - 1))
-    edges = 1 + (edges - edges.mean(1, keepdims=True)) * (1 - 1 / (vertices - 1))
-    edges = np.clip(edges, 1 - u, 1 + u)
-    edges /= edges.sum(1, keepdims=True)
-    places = np.zeros((rods, vertices))
-    places[:, 1:] = np.cumsum(edges, 1) * params.length
-    places[:, -1] = params.length
-    return places
+class _Layout(NamedTuple):
+    """Where all vertices are: k rods of n, ghosts among them, numbered rod after rod."""
 
+    area: np.ndarray  # (k,) [m2]
+    straight: np.ndarray  # (k, n, 3) of the straight bundle [m]
+    rest: np.ndarray  # (k, n, 3) of the unloaded one [m]
+    number: np.ndarray  # (k, n) int32
+    grid: np.ndarray  # (k, vertices) int32 without ghosts
+    ghosts: tuple[bool, bool]  # before the first vertex, behind the last
 
-def _curved(straight: np.ndarray, curvature: float) -> np.ndarray:
-    """Return points (..., 3) of the straight bundle bent to an arc in the x-z plane, towards +z."""
-    if curvature == 0:
-        return straight.copy()
-    s, y, z = np.moveaxis(straight, -1, 0)
-    r = 1 / curvature
-    return np.stack([(r - z) * np.sin(s / r), y, r - (r - z) * np.cos(s / r)], -1)
+    @property
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """First and second vertices (e,) int32 of all edges."""
+        # copies: of a single rod, ravel would give both the same memory, and a split would move both
+        return self.number[:, :-1].flatten(), self.number[:, 1:].flatten()
 
-
-def _started(rest: np.ndarray, params: WoodParams) -> np.ndarray:
-    """Return the points (..., 3) at time 0: the rest shape, deflected by `bend`."""
-    x = rest.copy()
-    if params.bend:
-        xi = rest[..., 0] / params.length
-        inside = np.clip(xi, 0, 1)
-        shape, slope = {
-            "none": (np.sin(np.pi * xi) - 2 / np.pi, np.pi * np.cos(np.pi * xi)),
-            "start": (inside**2 * (3 - inside) / 2, inside * (6 - 3 * inside) / 2),
-            "both": ((1 - np.cos(2 * np.pi * inside)) / 2, np.pi * np.sin(2 * np.pi * inside)),
-        }[params.clamp]
-        x[..., 2] += params.bend * params.length * shape
-        # sections stay plane and square to the axis; without it the bonds would start sheared
-        x[..., 0] -= params.bend * rest[..., 2] * slope
-    return x
+    @property
+    def real(self) -> np.ndarray:
+        """Whether an edge (e,) is no ghost."""
+        out = np.ones((len(self.area), self.number.shape[1] - 1), bool)
+        if self.ghosts[0]:
+            out[:, 0] = False
+        if self.ghosts[1]:
+            out[:, -1] = False
+        return out.ravel()
 
 
 def _strength(points: np.ndarray, field: Field, params: WoodParams) -> np.ndarray:
@@ -73,6 +61,117 @@ def _strength(points: np.ndarray, field: Field, params: WoodParams) -> np.ndarra
         # a ring cut in: the load a section bears goes with its area
         strength = np.where(inside, strength * (1 - notch.depth) ** 2, strength)
     return strength
+
+
+def _layout(points: np.ndarray, area: np.ndarray, s: np.ndarray, params: WoodParams) -> _Layout:
+    """Return where all vertices are; s (k, vertices): places along the rods [m]."""
+    ghosts = (params.clamp != "none", params.clamp == "both")
+    row = s
+    if ghosts[0]:
+        row = np.column_stack([-(row[:, 1] - row[:, 0]), row])
+    if ghosts[1]:
+        row = np.column_stack([row, 2 * row[:, -1] - row[:, -2]])
+    rods, count = row.shape
+    straight = np.concatenate([row[:, :, None], np.repeat(points[:, None, :], count, 1)], -1)
+    number = np.arange(rods * count, dtype=np.int32).reshape(rods, count)
+    grid = number[:, int(ghosts[0]) : count - int(ghosts[1])]
+    return _Layout(area, straight, curved(straight, params.curvature), number, grid, ghosts)
+
+
+def _rods(at: _Layout, grain: Field, params: WoodParams) -> Rods:
+    """Return edges and hinges."""
+    rods, count = at.number.shape
+    (a, b), real, flat = at.edges, at.real, at.rest.reshape(-1, 3)
+    edge = np.arange(len(a), dtype=np.int32).reshape(rods, count - 1)
+    length = np.linalg.norm(flat[b] - flat[a], axis=1)
+    section = np.repeat(at.area, count - 1)
+    middle = (at.straight[:, 1:] + at.straight[:, :-1]) / 2
+    stiff = grain.factor(middle, params.grain.stiffness).ravel()
+    solid = np.where(real, length, 0.0)
+    before, after = edge[:, :-1].ravel(), edge[:, 1:].ravel()
+    return Rods(
+        a,
+        b,
+        length,
+        np.where(real, params.stiffness * section * stiff, 0.0),
+        np.ones(len(a), np.uint8),
+        before,
+        after,
+        solid[before] + solid[after],
+        params.stiffness * _hinges(at) ** 2 / (4 * np.pi) * _stiff(at, grain, params),
+        np.ones(len(before), np.uint8),
+        np.sqrt(section / np.pi),
+    )
+
+
+def _hinges(at: _Layout) -> np.ndarray:
+    """Return the area (h,) [m2] of the rod of each hinge."""
+    return np.repeat(at.area, at.number.shape[1] - 2)
+
+
+def _stiff(at: _Layout, grain: Field, params: WoodParams) -> np.ndarray:
+    """Return the grain's factor (h,) of the stiffness of hinges."""
+    found: np.ndarray = grain.factor(at.straight[:, 1:-1], params.grain.stiffness).ravel()
+    return found
+
+
+def _motion(at: _Layout, rods: Rods, params: WoodParams) -> Motion:
+    """Return the state at time 0, with masses and loads."""
+    k, count = at.number.shape
+    a, b = rods.a, rods.b
+    solid = np.where(rods.k > 0, rods.rest, 0.0)
+    tributary = np.repeat(at.area, count - 1) * solid * params.density / 2
+    mass = np.zeros(k * count)
+    np.add.at(mass, a, tributary)
+    np.add.at(mass, b, tributary)
+    held = np.zeros((k, count), np.uint8)
+    if at.ghosts[0]:
+        held[:, :2] = 1
+    if at.ghosts[1]:
+        held[:, -2:] = 1
+    load = np.zeros((k, count, 3))
+    load[:, -1] = at.area[:, None] / at.area.sum() * np.array(params.tip_load)
+    loads = load.reshape(-1, 3)
+    loads[:, 2] -= mass * params.gravity
+    loads[held.ravel() == 1] = 0.0
+    x = started(at.rest, params).reshape(-1, 3)
+    speed = np.clip(at.straight[..., :1] / params.length, 0, 1) * np.array(params.pull)
+    return Motion(
+        x,
+        speed.reshape(-1, 3).copy(),
+        np.where(mass > 0, params.mass_scaling * mass, 1.0),
+        held.ravel(),
+        loads,
+        np.tile([0.0, 1.0, 0.0], (len(a), 1)),
+        (x[b] - x[a]) / np.linalg.norm(x[b] - x[a], axis=1)[:, None],
+        np.zeros(len(a)),
+        np.zeros(len(a)),
+        np.zeros(len(rods.before)),
+    )
+
+
+def _turns(at: _Layout, rods: Rods, grain: Field, params: WoodParams) -> Turns:
+    """Return what twist and curved rest shapes need besides."""
+    flat, solid = at.rest.reshape(-1, 3), np.where(rods.k > 0, rods.rest, 0.0)
+    tangent = (flat[rods.b] - flat[rods.a]) / rods.rest[:, None]
+    u, w = tangent[rods.before], tangent[rods.after]
+    binormal = 2 * np.cross(u, w) / (1 + (u * w).sum(1))[:, None]
+    kappa = np.column_stack([(np.cross(u + w, [0.0, 1.0, 0.0]) * binormal).sum(1) / 2, -binormal[:, 1]])
+    section = np.repeat(at.area, at.number.shape[1] - 1)
+    return Turns(
+        params.shear * _hinges(at) ** 2 / (2 * np.pi) * _stiff(at, grain, params),
+        kappa,
+        np.zeros(len(rods.before)),
+        params.mass_scaling * params.density * solid * section**2 / (2 * np.pi),
+    )
+
+
+def _strengths(at: _Layout, strong: Field, params: WoodParams) -> np.ndarray:
+    """Return the strain (e, samples) that each place of each edge bears; ghosts bear any."""
+    along_ = SAMPLES[:, None] * (at.straight[:, 1:] - at.straight[:, :-1])[:, :, None]
+    places = at.straight[:, :-1, None] + along_
+    found: np.ndarray = _strength(places, strong, params).reshape(len(at.real), -1)
+    return np.where(at.real[:, None], found, np.inf)
 
 
 def lay(params: WoodParams, vertices: int) -> Wood:
@@ -88,108 +187,26 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
     area = areas(points, params.radius)
     points = balanced(points, area, params.radius)
-    rods = len(points)
-    s = _along(rods, vertices, params, generator)
+    s = along(len(points), vertices, params, generator)
     grain = Field(params.grain.along, params.grain.across, generator)
     strong = Field(params.grain.along, params.grain.across, generator)
-    ghosts = (params.clamp != "none", params.clamp == "both")
-    row = s
-    if ghosts[0]:
-        row = np.column_stack([-(row[:, 1] - row[:, 0]), row])
-    if ghosts[1]:
-        row = np.column_stack([row, 2 * row[:, -1] - row[:, -2]])
-    count = row.shape[1]
-    straight = np.concatenate([row[:, :, None], np.repeat(points[:, None, :], count, 1)], -1)
-    rest = _curved(straight, params.curvature)
-    number = np.arange(rods * count, dtype=np.int32).reshape(rods, count)
-    grid = number[:, int(ghosts[0]) : count - int(ghosts[1])]
-    # copies: of a single rod, ravel would give both the same memory, and a split would move both
-    a, b = number[:, :-1].flatten(), number[:, 1:].flatten()
-    edge = np.arange(len(a), dtype=np.int32).reshape(rods, count - 1)
-    real = np.ones((rods, count - 1), bool)
-    if ghosts[0]:
-        real[:, 0] = False
-    if ghosts[1]:
-        real[:, -1] = False
-    flat = rest.reshape(-1, 3)
-    vector = flat[b] - flat[a]
-    length = np.linalg.norm(vector, axis=1)
-    section = np.repeat(area, count - 1)
-    middle = (straight[:, 1:] + straight[:, :-1]) / 2
-    stiff = grain.factor(middle, params.grain.stiffness).ravel()
-    solid = np.where(real.ravel(), length, 0.0)
-    before, after = edge[:, :-1].ravel(), edge[:, 1:].ravel()
-    hinge_area = np.repeat(area, count - 2)
-    hinge_stiff = grain.factor(straight[:, 1:-1], params.grain.stiffness).ravel()
-    rods_ = Rods(
-        a,
-        b,
-        length,
-        np.where(real.ravel(), params.stiffness * section * stiff, 0.0),
-        np.ones(len(a), np.uint8),
-        before,
-        after,
-        solid[before] + solid[after],
-        params.stiffness * hinge_area**2 / (4 * np.pi) * hinge_stiff,
-        np.ones(len(before), np.uint8),
-        np.sqrt(section / np.pi),
-    )
-    tributary = section * solid * params.density / 2
-    mass = np.zeros(len(flat))
-    np.add.at(mass, a, tributary)
-    np.add.at(mass, b, tributary)
-    held = np.zeros((rods, count), np.uint8)
-    if ghosts[0]:
-        held[:, :2] = 1
-    if ghosts[1]:
-        held[:, -2:] = 1
-    load = np.zeros((rods, count, 3))
-    load[:, -1] = area[:, None] / area.sum() * np.array(params.tip_load)
-    loads = load.reshape(-1, 3)
-    loads[:, 2] -= mass * params.gravity
-    loads[held.ravel() == 1] = 0.0
-    x = _started(rest, params).reshape(-1, 3)
-    speed = np.clip(straight[..., :1] / params.length, 0, 1) * np.array(params.pull)
-    tangent = vector / length[:, None]
-    director = np.tile([0.0, 1.0, 0.0], (len(a), 1))
-    motion = Motion(
-        x,
-        speed.reshape(-1, 3).copy(),
-        np.where(mass > 0, params.mass_scaling * mass, 1.0),
-        held.ravel(),
-        loads,
-        director,
-        (x[b] - x[a]) / np.linalg.norm(x[b] - x[a], axis=1)[:, None],
-        np.zeros(len(a)),
-        np.zeros(len(a)),
-        np.zeros(len(before)),
-    )
-    u, w = tangent[before], tangent[after]
-    binormal = 2 * np.cross(u, w) / (1 + (u * w).sum(1))[:, None]
-    kappa = np.column_stack([(np.cross(u + w, [0.0, 1.0, 0.0]) * binormal).sum(1) / 2, -binormal[:, 1]])
-    turns = Turns(
-        params.shear * hinge_area**2 / (2 * np.pi) * hinge_stiff,
-        kappa,
-        np.zeros(len(before)),
-        params.mass_scaling * params.density * solid * section**2 / (2 * np.pi),
-    )
-    places = straight[:, :-1, None] + SAMPLES[:, None] * (straight[:, 1:] - straight[:, :-1])[:, :, None]
-    strength = np.where(real.ravel()[:, None], _strength(places, strong, params).reshape(len(a), -1), np.inf)
-    k = params.contact_stiffness or _CONTACT * float(np.median(rods_.k[rods_.k > 0] / length[rods_.k > 0]))
-    bonds = bonded(params, points, s, grid, edge[:, int(ghosts[0]) :], flat, grain, strong)
-    rod = np.repeat(np.arange(rods, dtype=np.int32), count - 1)
-    turning = params.twist or params.curvature != 0
+    at = _layout(points, area, s, params)
+    rods = _rods(at, grain, params)
+    real = rods.k > 0
+    k = params.contact_stiffness or _CONTACT * float(np.median(rods.k[real] / rods.rest[real]))
+    edge = np.arange(len(real), dtype=np.int32).reshape(len(points), -1)
+    bonds = bonded(params, points, s, at.grid, edge[:, int(at.ghosts[0]) :], at.rest.reshape(-1, 3), grain, strong)
     return Wood(
-        motion,
-        rods_,
+        _motion(at, rods, params),
+        rods,
         bonds,
-        turns,
-        bodied(params, k, _EASE * float(np.median(rods_.radius)), length),
-        turning,
-        strength,
-        rod,
-        grid,
-        np.full(len(a), -1.0),
-        number.ravel(),
+        _turns(at, rods, grain, params),
+        bodied(params, k, _EASE * float(np.median(rods.radius)), rods.rest),
+        params.twist or params.curvature != 0,
+        _strengths(at, strong, params),
+        np.repeat(np.arange(len(points), dtype=np.int32), at.number.shape[1] - 1),
+        at.grid,
+        np.full(len(real), -1.0),
+        at.number.ravel(),
         params.mass_scaling,
     )

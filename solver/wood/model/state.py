@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..contact.rubbing import none
-from ..stepping.explicit import Motion, Scratch
-from ..stepping.scaling import fragments
-from .arrays import Bodies, Bonds, Rods, Turns
+from .arrays import Bodies, Bonds, Rods, Rubbing, Turns
+from .fragments import fragments
+from .motion import Motion, Scratch
 from .plan import plan_for
 
-__all__ = ["Wood", "scratch_for"]
+__all__ = ["State", "Wood", "copied", "scratch_for"]
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,37 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros(2),
         wood.motion.mass.copy(),
         np.zeros((len(plan.part) - 1, 4)),
-        none(),
+        Rubbing(np.zeros((0, 2), np.int32), np.zeros(4)),
         plan,
         fragments(wood.rods, wood.bonds, wood.motion.held, wood.motion.mass, wood.scaling, wood.least),
+    )
+
+
+class State(NamedTuple):
+    """A moment of a run. books (6,) [J] as `motion` numbers them; impulse (r, 3) [N s]; steps taken."""
+
+    wood: Wood
+    scratch: Scratch
+    books: np.ndarray
+    impulse: np.ndarray
+    rods: int
+    bonds: int
+    steps: int
+
+
+def _again(scratch: Scratch) -> Scratch:
+    """Return a copy; plan and fragments are not written to, but for what a step writes before it reads it."""
+    kept = ("rubbing", "plan", "fragments")
+    fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
+    return scratch._replace(**fresh)
+
+
+def copied(state: State) -> State:
+    """Return a state that can be stepped without touching this one."""
+    wood = state.wood.copied()
+    return state._replace(
+        wood=wood,
+        scratch=_again(state.scratch),
+        books=state.books.copy(),
+        impulse=state.impulse.copy(),
     )

@@ -6,58 +6,20 @@ taken where positions and velocities are of the same time, so that it is exact t
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
 from ..contact.bodies import pose, press
-from ..contact.rubbing import Rubbing, rub
+from ..contact.rubbing import rub
 from ..forces.internal import internal
 from ..forces.twist import carry, turn, twists
 from ..model.arrays import Bodies, Bonds, Rods, Turns
-from ..model.plan import Plan
-from .scaling import Fragments, push, rigid, steady
+from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH, WORK, Motion, Scratch
+from .scaling import push, rigid
+from .touching import steady
 from .verlet import drift, grip, kick, slowed
 
-__all__ = ["BENDING", "BONDS", "CONTACT", "LOST", "STRETCH", "WORK", "Motion", "Scratch", "forces", "march"]
-
-#: Entries of the books [J]: energies of the present, then sums over time.
-STRETCH, BENDING, BONDS, CONTACT, WORK, LOST = range(6)
-
-
-class Motion(NamedTuple):
-    """The state of all vertices and edges."""
-
-    x: np.ndarray  # (v, 3) [m]
-    v: np.ndarray  # (v, 3) [m/s]
-    mass: np.ndarray  # (v,) [kg]
-    held: np.ndarray  # (v,) uint8: keeps its velocity whatever the force
-    load: np.ndarray  # (v, 3) dead load and weight [N]
-    d: np.ndarray  # (e, 3) reference director
-    old: np.ndarray  # (e, 3) tangent that d belongs to
-    theta: np.ndarray  # (e,) angle of the material frame [radian]
-    spin: np.ndarray  # (e,) [radian/s]
-    reference: np.ndarray  # (h,) reference twist [radian]
-
-
-class Scratch(NamedTuple):
-    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3); pairs of edges."""
-
-    f: np.ndarray
-    t: np.ndarray
-    inverse: np.ndarray
-    torque: np.ndarray
-    each: np.ndarray
-    centre: np.ndarray
-    speed: np.ndarray
-    push: np.ndarray
-    power: np.ndarray
-    light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]
-    found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
-    rubbing: Rubbing
-    plan: Plan
-    fragments: Fragments
+__all__ = ["forces", "march"]
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,10 +9,11 @@ import numpy as np
 from ...contract import Context, Unstable
 from ..contact.listing import Listing
 from ..fracture import break_worst, overstress
-from ..model.state import Wood, scratch_for
+from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH
+from ..model.state import State, Wood, copied, scratch_for
 from ..params import WoodParams
-from .explicit import BENDING, BONDS, CONTACT, LOST, STRETCH, forces, march
-from .moment import Reached, State, balanced, begin, copied, floor, largest, real
+from .explicit import forces, march
+from .moment import Reached, balanced, begin, floor, largest, real
 
 __all__ = ["broken", "explicit"]
 
@@ -91,6 +92,21 @@ def _advance(state: State, params: WoodParams, time: float, dt: float, steps: in
     return state._replace(steps=state.steps + steps)
 
 
+def _refreshed(listing: Listing, state: State, ahead: float, time: float, dt: float) -> State:
+    """Return the state with pairs that hold for `ahead` [s] from `time` [s], its energies booked.
+
+    What rods that touch at the start have is booked as taken from what is lost.
+    """
+    m = state.wood.motion
+    fitted = listing.fitted(state, ahead * float(np.sqrt((m.v**2).sum(1).max())) if listing.on else 0.0)
+    if fitted is state:
+        return state
+    w, before = state.wood, float(state.books[: CONTACT + 1].sum())
+    forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, fitted.scratch, w.turning, time, dt, state.books)
+    state.books[LOST] += before - float(state.books[: CONTACT + 1].sum())
+    return fitted
+
+
 def explicit(
     wood: Wood, params: WoodParams, times: Sequence[float], dt: float, tolerance: float, context: Context
 ) -> Iterator[Reached]:
@@ -114,7 +130,7 @@ def explicit(
         while state.steps + look <= ahead:
             steps = min(chunk, (ahead - state.steps) // look * look)
             time = state.steps * dt
-            state = listing.refreshed(state, steps * dt, time, dt)
+            state = _refreshed(listing, state, steps * dt, time, dt)
             state = _advance(state, params, time, dt, steps)
             if breaking:
                 state = broken(state, params, time + steps * dt, dt)
@@ -126,7 +142,7 @@ def explicit(
                 scale = largest(found.energy, scale)
                 context.report(state.steps * dt / times[-1], f"t = {state.steps * dt:.4g} s")
         rest = ahead - state.steps
-        state = listing.refreshed(state, look * dt, state.steps * dt, dt)
+        state = _refreshed(listing, state, look * dt, state.steps * dt, dt)
         shown = copied(state)
         if rest:
             shown = _advance(shown, params, state.steps * dt, dt, rest)

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ...contract import Unstable
-from ..model.state import Wood, scratch_for
+from ..model.motion import CONTACT, LOST, WORK
+from ..model.state import State, Wood, scratch_for
 from ..params import WoodParams
-from .explicit import CONTACT, LOST, WORK, Scratch, forces
+from .explicit import forces
 from .scaling import saved
 
 __all__ = [
     "Energy",
     "Reached",
-    "State",
     "balanced",
     "begin",
-    "copied",
     "floor",
     "kinetic",
     "largest",
@@ -29,18 +28,6 @@ __all__ = [
 
 #: Kinetic, elastic, lost, work and at the start [J].
 Energy = tuple[float, float, float, float, float]
-
-
-class State(NamedTuple):
-    """A moment of a run. books (6,) [J] as `explicit` numbers them; impulse (r, 3) [N s]; steps taken."""
-
-    wood: Wood
-    scratch: Scratch
-    books: np.ndarray
-    impulse: np.ndarray
-    rods: int
-    bonds: int
-    steps: int
 
 
 class Reached(NamedTuple):
@@ -92,24 +79,6 @@ def begin(wood: Wood) -> State:
     books = np.zeros(6)
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, books)
     return State(wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), 0, 0, 0)
-
-
-def _again(scratch: Scratch) -> Scratch:
-    """Return a copy; plan and fragments are not written to, but for what a step writes before it reads it."""
-    kept = ("rubbing", "plan", "fragments")
-    fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
-    return scratch._replace(**fresh)
-
-
-def copied(state: State) -> State:
-    """Return a state that can be stepped without touching this one."""
-    wood = state.wood.copied()
-    return state._replace(
-        wood=wood,
-        scratch=_again(state.scratch),
-        books=state.books.copy(),
-        impulse=state.impulse.copy(),
-    )
 
 
 def largest(energy: Energy, scale: float) -> float:

@@ -15,153 +15,17 @@ longer step is too long for it. Then it falls and slides as if it were heavier.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
-from ..contact.bodies import apart
-from ..model.arrays import Bodies, Bonds, Rods
+from ..model.fragments import Fragments
 
-__all__ = ["Fragments", "fragments", "push", "rigid", "saved", "steady"]
+__all__ = ["push", "rigid", "saved"]
 
 #: Columns of what `rigid` finds of a fragment: middle, velocity, turning, and accelerations of both.
 _MIDDLE, _SPEED, _SPIN, _PULL, _TWIST = 0, 3, 6, 9, 12
 #: Of the trace of J, added to its diagonal: one straight rod does not turn about itself.
 _ROUND = 1e-6
-#: How near a body an edge touches it, over the edge's length.
-_NEAR = 0.05
-#: A fragment that is pushed off its middle turns, too: it is up to so many times as light there.
-_LIGHTER = 8.0
-
-
-class Fragments(NamedTuple):
-    """Which vertices hang together. Without scaling there are none."""
-
-    of: np.ndarray  # (v,) int32 fragment of a vertex
-    gain: np.ndarray  # (n,) g of each; 1 where something is held
-    run: np.ndarray  # (m + 1,) int64 where vertices of another fragment begin
-    heavy: np.ndarray  # (n,) scaled masses [kg]; 0 where something is held
-    law: np.ndarray  # (2,) s; real mass that an edge in contact needs to be stable [kg]
-    field: np.ndarray  # (n, 15) what `rigid` finds
-
-
-@njit(cache=True)
-def _root(up: np.ndarray, i: int) -> int:
-    while up[i] != i:
-        up[i] = up[up[i]]
-        i = up[i]
-    return i
-
-
-@njit(cache=True)
-def _join(up: np.ndarray, i: int, j: int) -> None:
-    p = _root(up, i)
-    q = _root(up, j)
-    # the lower number is the root: the same whatever the order
-    if p < q:
-        up[q] = p
-    elif q < p:
-        up[p] = q
-
-
-@njit(cache=True, error_model="numpy")
-def fragments(rods: Rods, bonds: Bonds, held: np.ndarray, mass: np.ndarray, scaling: float, least: float) -> Fragments:
-    """Return the fragments of what is whole; none if `scaling` is 1.
-
-    held (v,) uint8; mass (v,) scaled [kg]; least [kg]: real mass that an edge in contact needs to be stable.
-    """
-    count = len(mass) if scaling > 1.0 else 0
-    up = np.arange(count)
-    of = np.zeros(count, np.int32)
-    law = np.array([scaling, least])
-    if count == 0:
-        return Fragments(of, np.zeros(0), np.zeros(1, np.int64), np.zeros(0), law, np.zeros((0, 15)))
-    for e in range(len(rods.a)):
-        if rods.alive[e] == 1 and rods.k[e] > 0.0:
-            _join(up, rods.a[e], rods.b[e])
-    for b in range(len(bonds.i)):
-        if bonds.on[b] == 1:
-            _join(up, bonds.i[b], rods.a[bonds.j[b]])
-    number = 0
-    name = np.full(count, -1, np.int32)
-    for i in range(count):
-        r = _root(up, i)
-        if name[r] < 0:
-            name[r] = number
-            number += 1
-        of[i] = name[r]
-    heavy = np.zeros(number)
-    for i in range(count):
-        heavy[of[i]] += mass[i]
-    for i in range(count):
-        if held[i] == 1:
-            heavy[of[i]] = 0.0
-    gain = np.where(heavy > 0.0, scaling, 1.0)
-    change = np.flatnonzero(of[1:] != of[:-1]) + 1
-    run = np.zeros(len(change) + 2, np.int64)
-    run[1:-1] = change
-    run[-1] = count
-    return Fragments(of, gain, run, heavy, law, np.zeros((number, 15)))
-
-
-@njit(cache=True, error_model="numpy")
-def steady(
-    x: np.ndarray,
-    v: np.ndarray,
-    rods: Rods,
-    bodies: Bodies,
-    centre: np.ndarray,
-    speed: np.ndarray,
-    mass: np.ndarray,
-    pair: np.ndarray,
-    parts: Fragments,
-    span: float,
-    light: np.ndarray,
-) -> None:
-    """Set every g by the edges that may touch within `span` [s]: bodies or, if listed in pair (p, 2), other fragments'.
-
-    centre (r, 3) [m] and speed (r, 3) [m/s]: of the bodies.
-
-    light (v,) gets the mass [kg] that friction may stop at once: each touching edge has its share of a fragment's.
-    """
-    if len(parts.gain) == 0:
-        return
-    fast = 0.0
-    for i in range(len(v)):
-        fast = max(fast, v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
-    way = np.sqrt(fast)
-    for r in range(len(speed)):
-        way = max(way, np.sqrt(fast) + np.sqrt(speed[r, 0] ** 2 + speed[r, 1] ** 2 + speed[r, 2] ** 2))
-    touching = np.zeros(len(parts.gain))
-    for e in range(len(rods.a)):
-        if rods.k[e] == 0.0:
-            continue
-        a = rods.a[e]
-        b = rods.b[e]
-        near = _NEAR * rods.rest[e] + way * span
-        for r in range(len(bodies.kind)):
-            found = True
-            for c in range(3):
-                p = x[a, c] - centre[r, c]
-                d = x[b, c] - x[a, c]
-                found = found and not apart(p, d, bodies.box[r, c] + near)
-            if found:
-                touching[parts.of[a]] += 1.0
-    for q in range(len(pair)):
-        n = parts.of[rods.a[pair[q, 0]]]
-        m = parts.of[rods.a[pair[q, 1]]]
-        if n != m:
-            touching[n] += 1.0
-            touching[m] += 1.0
-    for n in range(len(parts.gain)):
-        if parts.heavy[n] > 0.0:
-            most = parts.heavy[n] / max(parts.law[1] * touching[n], 1e-300)
-            parts.gain[n] = min(max(most, 1.0), parts.law[0])
-    for i in range(len(x)):
-        n = parts.of[i]
-        whole = parts.heavy[n] / (parts.gain[n] * _LIGHTER * max(touching[n], 1.0))
-        light[i] = min(mass[i], whole) if parts.heavy[n] > 0.0 else mass[i]
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,11 +9,12 @@ import numpy as np
 from ...contract import Context, NotConverged
 from ...multifrontal import factorise
 from ..forces.hessian import Stiffness
-from ..model.state import Wood
+from ..model.motion import CONTACT, WORK
+from ..model.state import State, Wood, copied
 from ..params import WoodParams
 from .dissection import dissected
-from .explicit import CONTACT, WORK, forces
-from .moment import Reached, State, begin, copied, reached, strength
+from .explicit import forces
+from .moment import Reached, begin, reached, strength
 
 __all__ = ["equilibrium", "static"]
 

@@ -9,9 +9,9 @@ from solver.wood import SOLVER
 from solver.wood.fracture import break_worst, overstress
 from solver.wood.model.bundle import lay
 from solver.wood.model.plan import plan_for
-from solver.wood.model.state import Wood
+from solver.wood.model.state import State, Wood, copied
 from solver.wood.stepping.explicit import march
-from solver.wood.stepping.moment import State, begin, copied
+from solver.wood.stepping.moment import begin
 
 
 def broken(rods: int = 12, vertices: int = 30, **values) -> Wood:

@@ -10,7 +10,8 @@ from solver.contract import Context, InvalidInput, Need
 from solver.wood import SOLVER
 from solver.wood.contact.listing import law
 from solver.wood.contact.pairs import pairs
-from solver.wood.contact.rubbing import MIDDLE, Rubbing, rub
+from solver.wood.contact.rubbing import MIDDLE, rub
+from solver.wood.model.arrays import Rubbing
 from solver.wood.model.bundle import lay
 from solver.wood.stepping.marching import explicit
 from solver.wood.stepping.moment import kinetic

@@ -6,9 +6,11 @@ import pytest
 from solver.contract import InvalidInput, Need
 from solver.wood import SOLVER
 from solver.wood.model.bundle import lay
-from solver.wood.stepping.explicit import BONDS, STRETCH, march
+from solver.wood.model.fragments import fragments
+from solver.wood.model.motion import BONDS, STRETCH
+from solver.wood.stepping.explicit import march
 from solver.wood.stepping.moment import begin, real
-from solver.wood.stepping.scaling import fragments, rigid
+from solver.wood.stepping.scaling import rigid
 from solver.wood.stepping.stability import longest_step
 
 FREE = {"rods": 7, "vertices": 8, "clamp": "none", "fracture": "none"}

@@ -1,0 +1,76 @@
+"""How much of its real mass a fragment keeps while something touches it: the longer step must bear the contact."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..contact.bodies import apart
+from ..model.arrays import Bodies, Rods
+from ..model.fragments import Fragments
+
+__all__ = ["steady"]
+
+#: How near a body an edge touches it, over the edge's length.
+_NEAR = 0.05
+#: A fragment that is pushed off its middle turns, too: it is up to so many times as light there.
+_LIGHTER = 8.0
+
+
+@njit(cache=True, error_model="numpy")
+def steady(
+    x: np.ndarray,
+    v: np.ndarray,
+    rods: Rods,
+    bodies: Bodies,
+    centre: np.ndarray,
+    speed: np.ndarray,
+    mass: np.ndarray,
+    pair: np.ndarray,
+    parts: Fragments,
+    span: float,
+    light: np.ndarray,
+) -> None:
+    """Set every g by the edges that may touch within `span` [s]: bodies or, if listed in pair (p, 2), other fragments'.
+
+    centre (r, 3) [m] and speed (r, 3) [m/s]: of the bodies.
+
+    light (v,) gets the mass [kg] that friction may stop at once: each touching edge has its share of a fragment's.
+    """
+    if len(parts.gain) == 0:
+        return
+    fast = 0.0
+    for i in range(len(v)):
+        fast = max(fast, v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
+    way = np.sqrt(fast)
+    for r in range(len(speed)):
+        way = max(way, np.sqrt(fast) + np.sqrt(speed[r, 0] ** 2 + speed[r, 1] ** 2 + speed[r, 2] ** 2))
+    touching = np.zeros(len(parts.gain))
+    for e in range(len(rods.a)):
+        if rods.k[e] == 0.0:
+            continue
+        a = rods.a[e]
+        b = rods.b[e]
+        near = _NEAR * rods.rest[e] + way * span
+        for r in range(len(bodies.kind)):
+            found = True
+            for c in range(3):
+                p = x[a, c] - centre[r, c]
+                d = x[b, c] - x[a, c]
+                found = found and not apart(p, d, bodies.box[r, c] + near)
+            if found:
+                touching[parts.of[a]] += 1.0
+    for q in range(len(pair)):
+        n = parts.of[rods.a[pair[q, 0]]]
+        m = parts.of[rods.a[pair[q, 1]]]
+        if n != m:
+            touching[n] += 1.0
+            touching[m] += 1.0
+    for n in range(len(parts.gain)):
+        if parts.heavy[n] > 0.0:
+            most = parts.heavy[n] / max(parts.law[1] * touching[n], 1e-300)
+            parts.gain[n] = min(max(most, 1.0), parts.law[0])
+    for i in range(len(x)):
+        n = parts.of[i]
+        whole = parts.heavy[n] / (parts.gain[n] * _LIGHTER * max(touching[n], 1.0))
+        light[i] = min(mass[i], whole) if parts.heavy[n] > 0.0 else mass[i]
