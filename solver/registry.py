@@ -8,9 +8,9 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from .contract import InvalidInput, Solver
+from .contract import InvalidInput, Solver, Surface
 
-__all__ = ["get", "names"]
+__all__ = ["get", "names", "surface"]
 
 
 @cache
@@ -42,3 +42,11 @@ def get(name: str) -> Solver:
         raise InvalidInput(f"there is no solver {name!r}.", advice=f"{hint}Known: {', '.join(sorted(places))}.")
     module, _, attribute = places[name].partition(":")
     return getattr(import_module(module), attribute)
+
+
+def surface(name: str) -> Surface | None:
+    """Return the fresh surface of the solver called `name`, as tables ask for it; None where it has none.
+
+    A table outlives its solver: one that is no longer here has none either.
+    """
+    return get(name).surface if name in _places() else None
