@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import anyio.to_thread
 from fastapi import Depends, FastAPI
+from starlette.routing import Route
 
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, memory, page, problems
+from . import catalogue, memory, page, problems, results
 from .admission import Admission
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
 from .jobs import routes as jobs
 from .jobs.runner import JobRunner
 from .limits import Limits
-from .openapi import Documented
+from .openapi import Documented, operation_id
 from .security import requires
 from .settings import Settings
 from .shapes import batch
@@ -70,6 +71,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=_lifespan,
         docs_url=None,  # both of FastAPI's load scripts from elsewhere; `page` serves our own copy
         redoc_url=None,
+        generate_unique_id_function=operation_id,
     )
     app.state.settings = settings
     app.state.tables = LiveTables(settings.store, settings.reload_interval)
@@ -82,17 +84,21 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     problems.install(app)
     guards = [] if settings.public_read else [Depends(requires("read"))]
     declared = {} if settings.public_read else problems.responses(401, 403)
-    app.include_router(catalogue.open_router)
-    for router in (
+    guarded = (
         catalogue.router,
         shapes.router,
         batch.router,
         jobs.reading,
         jobs_events.router,
         jobs_results.router,
-    ):
+        results.router,
+    )
+    app.include_router(catalogue.open_router)
+    for router in guarded:
         app.include_router(router, dependencies=guards, responses=declared)
     app.include_router(jobs.writing)
+    routers = (*guarded, catalogue.open_router, jobs.writing)
+    app.state.paths = sorted({route.path for router in routers for route in router.routes if isinstance(route, Route)})
     page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)

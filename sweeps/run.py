@@ -121,7 +121,7 @@ class Run:
         self._ledger.want(self._jobs.values(), self._name, again=again)
         before = self._states()
         if any(job.state == "done" and not self._store.has(job.key) for job in before.values()):
-            self._ledger.rebuild(self._store)  # shards were deleted by hand
+            self._ledger.rebuild(self._store.results())  # shards were deleted by hand
             before = self._states()
         self._free(before.values())
         self._finished = {key for key, job in before.items() if job.state in ("done", "failed")}

@@ -20,8 +20,9 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.figures import keep
+from solver import registry
 from solver.contract import Need, Params, finish
-from solver.dehydration import SOLVER, DehydrationParams
+from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
 from store import tables
 from store.blending import methods
@@ -93,10 +94,10 @@ def main() -> None:
         store = Store.open(directory, create=True)
         fill(store)
         start = time.perf_counter()
-        built = tables.build(store, axes=DehydrationParams.axes)
+        built = tables.build(store, SOLVER)
         print(f"build: {built.samples} samples in {time.perf_counter() - start:.2f} s")
         start = time.perf_counter()
-        table = ShapeTable.open(store)
+        table = ShapeTable.open(store, surfaces=registry.surface)
         print(f"open and verify: {(time.perf_counter() - start) * 1e3:.1f} ms")
         rows = []
         for n in (32, 64, 96, 128, 256, 512):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
+from .looks import LOOKS
 from .params import Body, Grain, Notch, Waypoint, WoodParams
 from .presets import PRESETS
 
@@ -52,4 +53,5 @@ SOLVER = Solver(
     presets=PRESETS,
     run=_run,
     cost=_cost,
+    looks=LOOKS,
 )

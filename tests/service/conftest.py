@@ -33,7 +33,7 @@ QUERY: dict[str, Any] = {"te": 0.03, "gamma": 7.0, "s": 0.25, "resolution": 16}
 
 
 def build(store: Store, name: str = "default", **options: Any) -> tables.TableInfo:
-    return tables.build(store, name, axes=SOLVER.params.axes, units={"te": "r1", "gamma": "1"}, **options)
+    return tables.build(store, SOLVER, name, **options)
 
 
 @contextmanager

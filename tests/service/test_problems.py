@@ -54,6 +54,7 @@ EXPECTED: dict[type[Exception], int] = {
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,
+    errors.SlowBody: 408,
     errors.TimedOut: 503,
     errors.Overloaded: 503,
     errors.Unauthorized: 401,

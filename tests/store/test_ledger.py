@@ -296,7 +296,7 @@ def test_rebuilt_from_shards_alone(store: Store) -> None:
         path.unlink()
     damaged = store.shard_path(keys[0])
     damaged.write_bytes(damaged.read_bytes()[:-9])
-    assert store.ledger.rebuild(store) == 3
+    assert store.ledger.rebuild(store.results()) == 3
     after = {j.key: (j.params, j.need, j.digest, j.solver, j.version) for j in store.ledger.jobs("done")}
     assert after == {name: row for name, row in before.items() if name != keys[0]}
     assert store.ledger.want([spec(te=0.03, gamma=10, resolution=8)]) == 1
@@ -305,7 +305,7 @@ def test_rebuilt_from_shards_alone(store: Store) -> None:
 def test_rebuilding_takes_back_what_is_gone(store: Store) -> None:
     keys = fill(store, te=[0.03, 0.04], resolution=8)
     store.shard_path(keys[1]).unlink()
-    assert store.ledger.rebuild(store) == 1
+    assert store.ledger.rebuild(store.results()) == 1
     assert [store.ledger.get(name).state for name in keys] == ["done", "wanted"]
 
 

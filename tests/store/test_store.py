@@ -127,5 +127,5 @@ def test_kill_nine_loses_nothing_that_was_done(tmp_path: Path) -> None:
     assert reported <= done <= visible
     for name in visible:
         assert store.get(name).attrs["key"] == name
-    assert store.ledger.rebuild(store) == len(visible)
+    assert store.ledger.rebuild(store.results()) == len(visible)
     assert {job.key for job in store.ledger.jobs("done")} == visible

@@ -184,7 +184,7 @@ def test_a_solve_that_fails_has_exit_code_1(shrinking: Solves) -> None:
         ("status --store {tmp}/nowhere", 1, "there is no store"),
         ("table build --store {tmp}/nowhere", 1, "there is no store"),
         ("table info --store {table} --name other", 1, "other"),
-        ("table build --store {table}", 1, "dehydration"),
+        ("table build --store {table} --solver decay", 1, "decay"),
         ("query --store {table} --set te=0.03 --set gamma=10", 2, "--stages"),
         ("query --store {table} --set te=0.03 --set gamma=99 --stages 0.1", 2, "lies outside"),
         ("query --store {table} --set te=0.03 --stages 0.1", 2, "gamma must be given"),
