@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sweeps.commands import watchdog
 from sweeps.commands.cli import app
 from sweeps.commands.console import note
 from sweeps.errors import InvalidOption, SweepError
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from .formats import Format
 
 __all__ = ["app", "main"]
-
-#: Seconds that answers under way get when the service stops; streams of events would go on for ever.
-_PATIENCE = 5
 
 
 class PortInUse(SweepError):
@@ -66,8 +64,10 @@ def serve(
     from pydantic import ValidationError
 
     from .app import create_app
+    from .connections import GuardedProtocol
     from .hints import hints
     from .settings import Settings
+    from .stopping import PATIENCE
 
     given: dict[str, Any] = {"store": store, "host": host, "port": port, "workers": workers, "scheduler": scheduler}
     try:
@@ -82,7 +82,7 @@ def serve(
     note(f"serving {settings.store} at {address}")
     for line in hints(settings.store, address):
         note(line)
-    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": _PATIENCE}
+    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": PATIENCE, "http": GuardedProtocol}
     if settings.workers == 1:
         with listener:
             uvicorn.Server(uvicorn.Config(create_app(settings), **options)).run(sockets=[listener])
@@ -99,7 +99,11 @@ def serve(
 
 def main() -> None:
     """Run the command line."""
-    app()
+    watchdog.guard()
+    try:
+        app()
+    finally:
+        watchdog.leave()
 
 
 def _listen(host: str, port: int) -> socket.socket:

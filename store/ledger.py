@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 from .canonical import canonical
 from .clock import Clock
 from .database import Database
-from .errors import CorruptShard, UnknownJob
+from .errors import UnknownJob
 from .jobs import STATES, Job, JobSpec, State, read_row
 
 if TYPE_CHECKING:
-    from .store import Store
+    import xarray as xr
 
 __all__ = ["Job", "JobSpec", "Ledger", "State"]
 
@@ -243,19 +243,15 @@ class Ledger:
             rows = connection.execute(f"SELECT state, count(*) FROM jobs WHERE {where} GROUP BY state", values)
             return {**dict.fromkeys(STATES, 0), **{row[0]: row[1] for row in rows}}
 
-    def rebuild(self, store: Store) -> int:
-        """Make the ledger say what the shards say; return how many results read well.
+    def rebuild(self, results: Iterable[xr.Dataset]) -> int:
+        """Make the ledger say what the shards say; return how many results there are (`Store.results` yields them).
 
-        Every readable shard becomes a done job; a job noted as done whose shard is gone or damaged waits again.
+        Each result becomes a done job; a job noted as done whose result is not among them waits again.
         """
         good: list[str] = []
-        stored = store.keys()
-        for key in stored:
-            try:
-                dataset = store.get(key)
-            except CorruptShard:
-                continue
+        for dataset in results:
             attrs, now = dataset.attrs, time.time()
+            key = attrs["key"]
             seconds = float(dataset["seconds"].max()) if "seconds" in dataset else None
             with self.database.write() as connection:
                 connection.execute(

@@ -9,7 +9,7 @@ fresh shape itself is not interpolated: it follows from the parameters.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Self
@@ -17,7 +17,8 @@ from typing import Any, Self
 import numpy as np
 
 from solver.arrays import Array
-from solver.fruit import Fruit, azimuths, colatitudes
+from solver.contract import Fresh, Surface
+from solver.lattice import azimuths, colatitudes
 from solver.quantities import QUANTITIES
 
 from . import seal
@@ -50,7 +51,7 @@ _ZERO_AT_FIRST = ("roughness", "buckle_count", "penetration")
 class ShapeTable:
     """One generation of a table, open for queries by any number of threads."""
 
-    def __init__(self, table: TableInfo, path: Path) -> None:
+    def __init__(self, table: TableInfo, path: Path, surface: Surface | None = None) -> None:
         self.info = table
         self._spectra = generation.map_spectra(path)
         opened = generation.read(path)
@@ -71,13 +72,23 @@ class ShapeTable:
         stored = {stage: j for j, stage in enumerate(table.stages)}
         self._knots = np.array(sorted({0.0, *stored}))
         self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
-        named: list[str] = [name for name in ("radii", "stone", "exocarp_thickness") if name in table.template]
-        self._fruit_template = {name: table.template[name] for name in named}
-        self._fruit_places = {name: place for name, place in table.places.items() if place[0] in named}
+        self._surface = surface if surface and set(surface.fields) <= set(table.template) else None
+        named = self._surface.fields if self._surface else ()
+        self._fresh_template = {name: table.template[name] for name in named}
+        self._fresh_places = {name: place for name, place in table.places.items() if place[0] in named}
 
     @classmethod
-    def open(cls, path_or_store: Path | str | Store, name: str = "default", verify: bool = True) -> Self:
+    def open(
+        cls,
+        path_or_store: Path | str | Store,
+        name: str = "default",
+        verify: bool = True,
+        surfaces: Callable[[str], Surface | None] = lambda solver: None,
+    ) -> Self:
         """Open the current generation of a table; `verify` reads all of it once and finds any changed byte.
+
+        `surfaces` knows the fresh surfaces by solver, as `solver.registry.surface` does: without, a table gives
+        displacements and no positions.
 
         Raises:
             MissingStore: there is no store in that directory.
@@ -92,7 +103,7 @@ class ShapeTable:
             try:
                 if verify and not seal.is_whole(path):
                     raise CorruptTable(f"{path} is damaged.", "Rebuild the table from the shards.")
-                return cls(table, path)
+                return cls(table, path, surfaces(table.solver))
             except FileNotFoundError:
                 # swapped and pruned since the manifest was read
                 if last_try:
@@ -159,7 +170,7 @@ class ShapeTable:
         Raises:
             OutsideTable: the table does not reach there, or does not hold that, or has no such method.
             TooUncertain: the expected error is above `max_error`, or the table does not know it.
-            InvalidGeometry: no fruit has these parameters, though each lies within the table's bounds.
+            InvalidGeometry: no shape has these parameters, though each lies within the table's bounds.
 
         """
         values = asking.settle(self.info, query)
@@ -178,13 +189,13 @@ class ShapeTable:
         expected = self._expect(near, stages, how)
         if max_error is not None:
             trust.refuse(expected, max_error, inside, self._trust.method if self._trust else None)
-        fruit = self.fruit(values) if "position" in fields else None
+        fresh = self.fresh(values) if "position" in fields else None
         position = displacement = poles = None
         if fields:
             blend = self._blend(point, near, stages, how, n)
-            position, displacement = _synthesize(blend, patch, fruit, "displacement" in fields)
-            if fruit is not None and patch.is_whole:
-                poles = (surface.fresh_poles(fruit) + blend.poles()).astype(blend.waves.real.dtype)
+            position, displacement = _synthesize(blend, patch, fresh, "displacement" in fields)
+            if fresh is not None and patch.is_whole:
+                poles = (fresh.poles() + blend.poles()).astype(blend.waves.real.dtype)
                 poles = poles[:, list(patch.components)]
         return Shape(
             colatitude=_angles(n)[0][patch.rows],
@@ -235,8 +246,8 @@ class ShapeTable:
         """
         if self._samples is None:
             return {}
-        fruits = [self.fruit(self.sample(i)) for i in range(self.size)]
-        return dict(zip(self.stages, trust.correlations(self._spectra, self._samples, fruits).tolist(), strict=True))
+        shapes = [self.fresh(self.sample(i)) for i in range(self.size)]
+        return dict(zip(self.stages, trust.correlations(self._spectra, self._samples, shapes).tolist(), strict=True))
 
     def _near(self, point: Array | None, method: methods.Method, m: int, eta: float) -> Weighted:
         if self._samples is None or point is None:
@@ -291,24 +302,22 @@ class ShapeTable:
         """Return the solver's parameters of a point on the varying axes."""
         return insert(self.info.template, self.info.places, values)
 
-    def fruit(self, values: Mapping[str, float]) -> Fruit:
-        """Return the fruit at a point on the varying axes.
+    def fresh(self, values: Mapping[str, float]) -> Fresh:
+        """Return the fresh shape at a point on the varying axes.
 
         Raises:
-            OutsideTable: the table is not of fruits.
-            InvalidGeometry: no fruit has these parameters.
+            OutsideTable: nobody said what it is.
+            InvalidGeometry: no shape has these parameters.
 
         """
-        places = self._fruit_places
-        params = insert(self._fruit_template, places, {name: values[name] for name in places if name in values})
-        try:
-            radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
-        except KeyError:
+        if self._surface is None:
             raise OutsideTable(
-                "the table is not of fruits, whose fresh shape is known.", "Ask for 'displacement'."
-            ) from None
-        _check_fruit(radii, stone)
-        return Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te)
+                f"nobody said what is fresh in a table of {self.info.solver}.",
+                "Ask for 'displacement', or open it with surfaces=solver.registry.surface.",
+            )
+        places = self._fresh_places
+        known = {name: values[name] for name in places if name in values}
+        return self._surface.of(insert(self._fresh_template, places, known))
 
 
 @lru_cache(maxsize=16)
@@ -320,19 +329,13 @@ def _angles(n: int) -> tuple[Array, Array]:
     return found
 
 
-@lru_cache(maxsize=256)
-def _check_fruit(radii: tuple[float, ...], stone: tuple[float, ...]) -> None:
-    """Refuse impossible fruits. The exocarp lies outside of all that could collide, and its bounds are a box."""
-    Fruit.parse({"radii": radii, "stone": stone})
-
-
 def _stored(stages: Mapping[int, float]) -> dict[int, float]:
     """Return the stored ones of stages with weights: the fresh shape adds nothing to a displacement."""
     return {j: t for j, t in stages.items() if j != _FRESH}
 
 
-def _synthesize(blend: Blend, patch: Patch, fruit: Fruit | None, displaced: bool) -> tuple[Array | None, Array | None]:
+def _synthesize(blend: Blend, patch: Patch, fresh: Fresh | None, displaced: bool) -> tuple[Array | None, Array | None]:
     """Return positions and displacements (height, width, c) on a patch, each only if wanted."""
     with blend.fields(patch) as planes:
-        position = None if fruit is None else surface.add_fresh(fruit, planes, patch)
+        position = None if fresh is None else surface.add_fresh(fresh, planes, patch)
         return position, np.stack(list(planes), axis=-1) if displaced else None

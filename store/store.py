@@ -135,3 +135,11 @@ class Store:
         for path in sorted(self._shards.glob("??/*.h5")):
             if is_key(path.stem):
                 yield path.stem
+
+    def results(self) -> Iterator[xr.Dataset]:
+        """Yield all stored results that read well, in the order of their keys, one in memory at a time."""
+        for key in self.keys():
+            try:
+                yield self.get(key)
+            except CorruptShard:
+                continue

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from solver.contract import Solver
 from store import seal, shards
 from store.shape import Shape
 from store.surfaces import spectra
 
 from .errors import InvalidOption
 from .formats import Encoder, Made, added
-from .pictures.colours import MESH_LAYERS
 
 if TYPE_CHECKING:
     from .pictures.sheet import Panel
@@ -86,10 +86,10 @@ def triangles(run: xr.Dataset) -> list[Panel]:
     size = float(np.linalg.norm(points - middle, axis=1).max()) or 1.0
     if "view" in run.attrs:
         *middle, size = np.asarray(run.attrs["view"], float)
-    up, params = str(run.attrs.get("up", "y")), json.loads(run.attrs.get("params", "{}"))
+    up = str(run.attrs.get("up", "y"))
     found = []
     for frame in frames:
-        skin = colours.layered(frame.fields, params)
+        skin = colours.painted(run, frame.fields)
         paint = None if skin is None else skin.colour
         place = (frame.vertices - np.asarray(middle)) / size
         away = np.linalg.norm(place, axis=1, keepdims=True)
@@ -140,8 +140,8 @@ def check_suffix(path: Path, run: bool, stages: int) -> None:
         raise InvalidOption(f"--out {path}: there is no directory {path.parent}.", "Create it first.")
 
 
-def fields_for(path: Path | None, run: bool, known: Collection[str] = ("position",)) -> tuple[str, ...]:
-    """Return the fields that writing `path` needs, of a solver that has those `known`; none if nothing is written.
+def fields_for(path: Path | None, run: bool, solver: Solver | None = None) -> tuple[str, ...]:
+    """Return the fields that writing `path` needs, of a table's shapes or of a solver; none if nothing is written.
 
     Raises:
         InvalidOption: the format holds the fruit's lattice only, and the solver has none.
@@ -150,6 +150,7 @@ def fields_for(path: Path | None, run: bool, known: Collection[str] = ("position
     encoder = suffixes(run).get(path.suffix) if path is not None else None
     if encoder is None:
         return ()
+    known = ("position",) if solver is None else solver.fields
     if "position" in known or "position" not in encoder.fields:
         return encoder.fields
     if encoder.single:
@@ -158,7 +159,7 @@ def fields_for(path: Path | None, run: bool, known: Collection[str] = ("position
             "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
         )
     # what gives the mesh its colours comes along
-    coloured = tuple(name for name in MESH_LAYERS if name in known)
+    coloured = tuple(name for name in solver.looks.layers if name in known) if solver else ()
     return (*("mesh_position" if name == "position" else name for name in encoder.fields), *coloured)
 
 

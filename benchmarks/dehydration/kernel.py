@@ -33,7 +33,8 @@ from solver.dehydration.fresh.mesh import cubed_sphere
 from solver.dehydration.kernel import Layout, build_layout, march, new_state, positions
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
 from solver.dehydration.kernel.elements import core_forces, exocarp_forces, one_point_forces
-from solver.dehydration.kernel.metric import inverse_jacobians, quadrature, shape_derivatives
+from solver.dehydration.kernel.metric import inverse_jacobians, quadrature
+from solver.fem import HEX8
 
 from .machine_limits import machine_limits
 
@@ -83,7 +84,7 @@ class Prototype:
             inverse, det = inverse_jacobians(mesh["positions"][mesh["connectivity"][part]], points)
             planes = inverse.reshape(-1, 16, len(points), 9).transpose(0, 2, 3, 1).astype(np.float32, order="C")
             volumes = (det * weights).reshape(-1, 16, len(points)).transpose(0, 2, 1).astype(np.float32, order="C")
-            slopes = shape_derivatives(points).transpose(0, 2, 1).astype(np.float32, order="C")
+            slopes = HEX8.gradients(points).transpose(0, 2, 1).astype(np.float32, order="C")
             self.geometry.append((planes, volumes, slopes))
         self.mu = mesh["mu"][elements].astype(np.float32)
         self.kappa = mesh["kappa"][elements].astype(np.float32)

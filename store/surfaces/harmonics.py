@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver.arrays import Array
-from solver.fruit import colatitudes
+from solver.lattice import colatitudes
 
 __all__ = ["LOWEST", "area", "degrees", "legendre", "low_series", "power", "shares", "without_low"]
 

@@ -1,6 +1,6 @@
 """A surface field and its spectrum on the double Fourier sphere.
 
-A field on the lattice of `solver.fruit` continues over the pole to the opposite meridian, f(-theta, phi) =
+A field on the lattice of `solver.lattice` continues over the pole to the opposite meridian, f(-theta, phi) =
 f(theta, phi + pi), which makes it smooth and doubly periodic. In the Fourier series over both angles
 
     f(theta, phi) = sum_{m = -B..B} exp(i m phi) sum_{k = 0..B} S[m, k] * (cos k theta for even m, sin k theta for odd)

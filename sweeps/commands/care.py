@@ -43,12 +43,11 @@ def rebuild(
 
     wizen table rebuild --store demo --name exact --precision float64
     """
+    from solver import registry
     from store import tables
     from store.errors import CorruptTable
     from store.generations import truncation
     from store.store import Store
-
-    from ..plan import units_of
 
     opened = Store.open(store)
     old = tables.info(opened, name)
@@ -57,7 +56,7 @@ def rebuild(
         was = (path.stat().st_size, truncation.losses(opened, old)) if path.is_file() else None
     except CorruptTable:
         was = None
-    new = tables.rebuild(opened, name, units=units_of(old.solver), resolution=resolution, dtype=precision)
+    new = tables.rebuild(opened, registry.get(old.solver), name, resolution=resolution, dtype=precision)
     size, lost = tables.path_of(opened, new).stat().st_size, truncation.losses(opened, new)
 
     def side(table: Any, size: int | None, losses: Any) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from ..errors import InvalidOption
 from . import onset as cli_onset
 from . import queue as cli_queue
 from . import refine as cli_refine
+from . import results as cli_results
 from . import shapes as cli_shapes
 from . import tables as cli_tables
 from .console import Root, emit, grid, note
@@ -133,10 +134,9 @@ def solve(
     from solver.contract import Context, Need
     from store import shards
 
-    from .. import outputs
-    from ..dried import dried
+    from .. import outputs, tabled
     from ..formats import Made
-    from ..plan import job, units_of
+    from ..plan import job
     from . import progress
     from .words import per_stage, show_run
 
@@ -151,16 +151,14 @@ def solve(
     if seed is not None:
         values["seed"] = seed
     params = chosen.parse(values, preset)
-    need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})))
+    need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})), preset)
     if out is not None:
         outputs.check_suffix(out, True, len(need.stages))
-        need = chosen.settle(
-            need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen.fields))})
-        )
+        need = chosen.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen))}))
     spec = job(chosen, params, need)
     start = time.perf_counter()
     with progress.one_run(solver) as observe, progress.stopping() as stop:
-        result = chosen.solve(params, need, Context(observe, stop.is_set, dried=dried))
+        result = chosen.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
     seconds = time.perf_counter() - start
     document = {
         "key": spec.key,
@@ -178,7 +176,7 @@ def solve(
         axes = {name: params.axis(name) for name in params.axes}
         shapes = [outputs.of_result(result, axes, i) for i in range(len(need.stages))] if "position" in result else []
         title = f"{chosen.title}: {preset or (params_file.stem if params_file else solver)}"
-        symbol, units = chosen.stages.symbol, units_of(solver)
+        symbol, units = chosen.stages.symbol, chosen.axis_units()
         made = Made(
             shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key, cut=cut
         )
@@ -223,7 +221,7 @@ def sweep(
         note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
         reports = []
         for part in read.parts():
-            with progress.stopping() as stop, progress.sweep(part.name, readers(part)) as observe:
+            with progress.stopping(progress.GIVEN_BACK) as stop, progress.sweep(part.name, readers(part)) as observe:
                 reports.append(run_plan(part, opened, pool, observe, stop=stop, again=retry_failed))
             if reports[-1].stopped or (part is read.first and not reports[-1].complete):
                 break
@@ -231,7 +229,7 @@ def sweep(
     document = report_document(report) | {"store": str(store), "skipped": read.skipped, "repeated": read.repeated}
     document["parts"] = [report_document(r) for r in reports]
 
-    emit(document, as_json, lambda console: show_report(console, report, store, read.name if read.controls else ""))
+    emit(document, as_json, lambda console: show_report(console, report, store, read))
     if any(r.stopped for r in reports):
         raise typer.Exit(130)
     if not all(r.complete for r in reports):
@@ -248,6 +246,7 @@ def status(store: StorePath, as_json: As_json = False) -> None:
 
     wizen status --store demo --json | jq '.failed[].error'
     """
+    from store import scalars
     from store.store import Store
 
     opened = Store.open(store)
@@ -259,7 +258,8 @@ def status(store: StorePath, as_json: As_json = False) -> None:
         "results": len(list(opened.keys())),
         "running": [{"key": j.key, "plan": j.plan, "worker": j.worker, "progress": j.progress} for j in running],
         "failed": [{"key": j.key, "plan": j.plan, "params": dict(j.params), "error": j.error} for j in failed],
-        "tables": opened.table_names(),
+        "tables": (shapes := opened.table_names()),
+        "scalars": (tabulated := scalars.names(opened)),
     }
 
     def show(console: Any) -> None:
@@ -270,7 +270,9 @@ def status(store: StorePath, as_json: As_json = False) -> None:
             error = j.error or {}
             console.print(f"failed  {j.key[:12]} {error.get('message')} {error.get('advice')}", markup=False)
         console.print(
-            f"{document['results']} results, tables: {', '.join(opened.table_names()) or 'none'}", markup=False
+            f"{document['results']} results, tables of shapes: {', '.join(shapes) or 'none'}, "
+            f"of numbers: {', '.join(tabulated) or 'none'}",
+            markup=False,
         )
 
     emit(document, as_json, show)
@@ -279,5 +281,6 @@ def status(store: StorePath, as_json: As_json = False) -> None:
 cli_refine.add_to(app)
 cli_onset.add_to(app)
 cli_queue.add_to(app)
+cli_results.add_to(app)
 cli_tables.add_to(app)
 cli_shapes.add_to(app)

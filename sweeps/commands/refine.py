@@ -69,7 +69,10 @@ def refine(
     done: list[Any] = []
     with executors.choose(workers, dask, scheduler) as pool:
         note(f"{read.name}: up to {count} runs more on {pool.title}, where {measure} is worst")
-        with progress.stopping() as stop, progress.sweep(refining.name_of(read), readers(read)) as observe:
+        with (
+            progress.stopping(progress.GIVEN_BACK) as stop,
+            progress.sweep(refining.name_of(read), readers(read)) as observe,
+        ):
             for found in rounds(read, opened, name, pool, count, measure, held_out, observe, stop):
                 done.append(found)
                 held = "" if found.held_out is None else f", held out {found.held_out:.4g} ({found.held_runs} runs)"

@@ -40,13 +40,13 @@ def draw_map(
 
     wizen map --store demo --out stages.png --stages 0.1,0.2,0.3
     """
+    from solver import registry
     from store import seal, starter
     from store.lookup import ShapeTable
     from store.store import Store
 
     from .. import outputs
     from ..pictures.maps import Map
-    from ..plan import units_of
 
     if out.suffix != ".png":
         raise InvalidOption(f"--out {out}: a map is a picture.", "Name it .png.")
@@ -54,8 +54,8 @@ def draw_map(
         raise InvalidOption("--stage and --stages exclude each other.", "Keep one of them.")
     outputs.check_suffix(out, False, 1)
     opened = Store.open(store or starter.ROOT)
-    table = ShapeTable.open(opened, name)
-    drawing = Map(opened, table, units_of(table.info.solver), assignments(set_), pixels)
+    table = ShapeTable.open(opened, name, surfaces=registry.surface)
+    drawing = Map(opened, table, registry.get(table.info.solver).axis_units(), assignments(set_), pixels)
     at = table.stages[-1] if stage is None else stage
     picture = drawing.by_stages(numbers(stages)) if stages is not None else drawing.by_axes(x, y, at)
     seal.publish(out, picture)
@@ -91,16 +91,16 @@ def query(
 
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
+    from solver import registry
     from store import starter
     from store.blending import methods
     from store.lookup import ShapeTable
 
     from .. import outputs
     from ..formats import Made
-    from ..plan import units_of
 
     wanted = numbers(stages)
-    table = ShapeTable.open(store or starter.ROOT, name)
+    table = ShapeTable.open(store or starter.ROOT, name, surfaces=registry.surface)
     if not wanted:
         low, high = table.reach
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
@@ -122,7 +122,7 @@ def query(
     }
     if out is not None:
         title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
-        units = units_of(table.info.solver)
+        units = registry.get(table.info.solver).axis_units()
         outputs.save(out, Made(shapes, document, title, table.info.solver, name, table.fixed, units=units))
 
     def show(console: Any) -> None:

@@ -9,7 +9,7 @@ from scipy.sparse import bsr_array
 from solver.contract import Cancelled, Context, InvalidInput, NotConverged
 from solver.dehydration.implicit import base_state, build_model, build_quadratic_mesh, equilibrium, graded_layers
 from solver.dehydration.implicit.buckling import parities
-from solver.dehydration.implicit.hexahedron import NODES, POINTS, PRESSURE, SHAPE_GRADIENTS, WEIGHTS, shape
+from solver.dehydration.implicit.hexahedron import PRESSURE
 from solver.dehydration.implicit.newton import masked
 from solver.dehydration.params import DehydrationParams
 
@@ -21,13 +21,6 @@ PLUM = DehydrationParams(radii=(1, 0.98, 0.93, 0.9, 0.93, 0.98, 1, 0.63), stone=
 
 def sphere_model(n=2, layers=2, symmetry="octant", kappa=100.0, loading=None):
     return build_model(FRUIT, build_quadratic_mesh(FRUIT, n, graded_layers(layers, 1.0), symmetry), kappa, loading)
-
-
-def test_shape_functions_are_one_at_their_node_and_sum_to_one():
-    assert np.allclose(shape(NODES), np.eye(27), atol=1e-15)
-    assert np.allclose(shape(POINTS).sum(axis=1), 1)
-    assert np.allclose(SHAPE_GRADIENTS.sum(axis=1), 0, atol=1e-14)
-    assert WEIGHTS.sum() == pytest.approx(8)
 
 
 @pytest.mark.parametrize("anisotropic", [False, True])

@@ -244,8 +244,9 @@ def test_full_onset_of_a_thick_skin_agrees_with_the_radial_one(method):
 
 
 def test_scikit_fem_assembles_the_same_energy_and_residual():
-    """MeshHex2 / ElementHex2, its own quadrature and nodes; the P-space projection by its own discontinuous basis."""
-    skfem = pytest.importorskip("skfem")
+    """MeshHex2 / ElementHex2 and its assembler, none of which `solver.fem` uses; the tables: see test_fem."""
+    import skfem
+
     rng = np.random.default_rng(9)
     case = block(rng, 1)
     theta, mu, kappa = 0.93, case.mu[0], case.kappa[0]

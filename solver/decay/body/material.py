@@ -14,6 +14,7 @@ from numba import njit
 from scipy import sparse
 
 from ...arrays import Floats, Ints
+from ...fem import tetrahedron_gradients
 
 __all__ = ["Blocks", "blocks", "energy", "forces", "hessian", "inverse_edges"]
 
@@ -42,7 +43,7 @@ def blocks(tets: Ints, count: int) -> Blocks:
 
 def inverse_edges(points: Floats, tets: Ints) -> Floats:
     """Return the inverses (t, 3, 3) of the edge matrices, whose columns are the edges from the first corner."""
-    edges = np.stack([points[tets[:, k]] - points[tets[:, 0]] for k in (1, 2, 3)], axis=2)
+    edges = np.einsum("tai,ak->tik", points[tets], tetrahedron_gradients())
     return np.asarray(np.linalg.inv(edges), dtype=np.float64)
 
 

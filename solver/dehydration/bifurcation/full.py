@@ -15,11 +15,11 @@ from scipy.special import sph_harm_y
 
 from ...arrays import Floats
 from ...contract import Context, NotConverged
+from ...fem import HEX27
 from ..fresh.closed_form import flat_film_wavelength, onset_estimate
 from ..fresh.mesh import layer_fractions
 from ..implicit import Equilibrium, Model, build_model, build_quadratic_mesh, equilibrium, natural_symmetry
 from ..implicit.buckling import Crossing, first_crossing, parities, stress_stiffness, tangent_at
-from ..implicit.hexahedron import shape
 from ..implicit.location import fold, locate
 from ..params import DehydrationParams
 from .result import FieldMode, Method, Onset, Tie
@@ -178,7 +178,7 @@ def _heights(params: DehydrationParams, model: Model, crossing: Crossing) -> Cal
         points = params.surface(colatitude, azimuth)
         folded, signs = fold(mesh, points)
         element, local = locate(params, mesh, folded)
-        moved = signs * np.einsum("pa,pai->pi", shape(local), nodal[mesh.connectivity[element]])
+        moved = signs * np.einsum("pa,pai->pi", HEX27.shape(local), nodal[mesh.connectivity[element]])
         for axis, parity in zip(mesh.planes, crossing.parity, strict=True):
             if parity < 0:
                 moved *= signs[:, axis : axis + 1]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Bools, Floats, Ints
+from ...fem import QUAD9, gauss
 from ..fresh.closed_form import flat_film_wavelength
 from ..fresh.mesh import layer_fractions
 from ..params import DehydrationParams
@@ -92,23 +93,15 @@ def build(params: DehydrationParams, per_wavelength: float, split: int = 1) -> M
     base = (2 * column * levels + 2 * layer).ravel()
     nodes = base[:, None] + (steps[:, None] * levels + steps).ravel()
     is_core = layer.ravel() < (len(core) - 1) * split
-    x, w = np.polynomial.legendre.leggauss(3)
-    value = np.stack([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2], axis=-1)
-    slope = np.stack([x - 0.5, -2 * x, x + 0.5], axis=-1)
-    shape = np.einsum("ai,bj->abij", value, value).reshape(9, 9)
-    local = np.stack(
-        [
-            np.einsum("ai,bj->abij", slope, value).reshape(9, 9),
-            np.einsum("ai,bj->abij", value, slope).reshape(9, 9),
-        ]
-    )
+    points, weights = gauss(3, 2)
+    shape, local = QUAD9.shape(points), QUAD9.gradients(points).transpose(2, 0, 1)
     corners = position[nodes]
     jacobian = np.einsum("kqn,enx->eqkx", local, corners)
     gradient = np.empty((len(nodes), 9, 3, 9))
     gradient[:, :, :2] = np.linalg.solve(jacobian, np.broadcast_to(local.transpose(1, 0, 2), (len(nodes), 9, 2, 9)))
     radius = np.einsum("qn,en->eq", shape, corners[..., 0])
     gradient[:, :, 2] = shape / radius[..., None]
-    weight = np.abs(np.linalg.det(jacobian)) * np.outer(w, w).ravel() * radius
-    pressure = np.stack([np.ones(9), np.repeat(x, 3), np.tile(x, 3)], axis=-1)
+    weight = np.abs(np.linalg.det(jacobian)) * weights * radius
+    pressure = np.concatenate([np.ones((9, 1)), points], axis=1)
     shear = np.where(is_core, 1.0, params.modulus_ratio)
     return MeridionalMesh(colatitude, depth, position, nodes, gradient, weight, pressure, is_core, shear)

@@ -19,6 +19,7 @@ from scipy.linalg import qr
 
 from ...arrays import Bools, Floats, Ints
 from ...contract import NotConverged
+from ...fem import gauss, lobatto, segment
 from ..fresh.closed_form import flat_film_wavelength, sphere_radius
 
 __all__ = ["RadialMesh", "RadialState", "linear_tangents", "radial_mesh", "smooth", "tangent"]
@@ -63,11 +64,9 @@ def radial_mesh(stone: float, thickness: float, gamma: float, order: int = 8) ->
         first *= _GROWTH
     breaks = np.array([stone, *edges[::-1], 1 + thickness / 2, 1 + thickness])
     k, count = order, len(breaks) - 1
-    x, w = legendre.leggauss(k + 2)
-    nodes = np.concatenate([[-1.0], np.sort(legendre.legroots(legendre.legder([0] * k + [1]))), [1.0]])
-    inverse = np.linalg.inv(legendre.legvander(nodes, k))
-    shape = legendre.legvander(x, k) @ inverse
-    slope = legendre.legvander(x, k - 1) @ legendre.legder(np.eye(k + 1)) @ inverse
+    points, w = gauss(k + 2)
+    x = points[:, 0]
+    shape, slope = segment(k, x)
     middle, half = (breaks[1:, None] + breaks[:-1, None]) / 2, (breaks[1:, None] - breaks[:-1, None]) / 2
     radius = middle + half * x
     strain = np.zeros((count, k + 2, 4, 2 * (k + 1)))
@@ -75,7 +74,7 @@ def radial_mesh(stone: float, thickness: float, gamma: float, order: int = 8) ->
     strain[:, :, 1, : k + 1] = strain[:, :, 3, k + 1 :] = shape / radius[..., None]
     at = np.arange(count)[:, None] * k + np.arange(k + 1)
     position = np.empty(count * k + 1)
-    position[at] = middle + half * nodes
+    position[at] = middle + half * lobatto(k)
     core = np.arange(count) < count - 2
     pressure: Floats = np.asarray(legendre.legvander(x, k - 1), dtype=float)
     shear = np.where(core, 1.0, gamma)[:, None]

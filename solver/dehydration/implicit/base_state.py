@@ -10,8 +10,9 @@ import numpy as np
 
 from ...arrays import Floats
 from ...contract import Context, NotConverged
+from ...fem import HEX27
 from ..params import DehydrationParams
-from .hexahedron import POINTS, PRESSURE, pressure_functions, shape
+from .hexahedron import POINTS, PRESSURE, pressure_functions
 from .location import fold, locate
 from .mesh import QuadraticMesh, Symmetry, build_quadratic_mesh, graded_layers, natural_symmetry
 from .newton import Equilibrium, Loading, Model, build_model, equilibrium
@@ -82,7 +83,7 @@ class BaseState:
         folded, signs = fold(self.mesh, at)
         element, local = locate(self.params, self.mesh, folded)
         moved = (self.displaced - self.nodes)[self.mesh.connectivity[element]]
-        return at + signs * np.einsum("pa,pai->pi", shape(local), moved)
+        return at + signs * np.einsum("pa,pai->pi", HEX27.shape(local), moved)
 
     def surface(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return the deformed outer surface, shape (..., 3), at colatitude and azimuth [radian]."""

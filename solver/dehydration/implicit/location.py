@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats, Ints
+from ...fem import HEX27
 from ...fruit import directions
 from ..fresh.mesh import _FACES as FACES
 from ..params import DehydrationParams
-from .hexahedron import shape, shape_gradients
 from .mesh import QuadraticMesh
 
 __all__ = ["fold", "locate"]
@@ -75,7 +75,7 @@ def locate(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tu
     element, local = _first_guess(params, mesh, points)
     corners = mesh.positions[mesh.connectivity[element]]
     for _ in range(4):
-        gap = points - np.einsum("pa,pai->pi", shape(local), corners)
-        jacobian = np.einsum("pai,pak->pik", corners, shape_gradients(local))
+        gap = points - np.einsum("pa,pai->pi", HEX27.shape(local), corners)
+        jacobian = np.einsum("pai,pak->pik", corners, HEX27.gradients(local))
         local = np.clip(local + np.linalg.solve(jacobian, gap[..., None])[..., 0], -1.5, 1.5)
     return element, local

@@ -11,10 +11,11 @@ import numpy as np
 
 from ...arrays import Bools, Floats
 from ...contract import Context, InvalidInput, NotConverged
+from ...fem import HEX27
 from ...multifrontal import Analysis, Factor, analyse, factorise
 from ..params import DehydrationParams
 from .assembly import Assembled, Pattern, assemble, build_pattern
-from .hexahedron import POINTS, PRESSURE, shape
+from .hexahedron import POINTS, PRESSURE
 from .mesh import QuadraticMesh
 
 __all__ = ["Equilibrium", "Loading", "Model", "build_model", "equilibrium", "masked"]
@@ -110,7 +111,7 @@ def build_model(
     free = np.ones((int((~fixed).sum()), 3), dtype=bool)
     for axis in mesh.planes:
         free[:, axis] = mesh.positions[~fixed, axis] != 0
-    gauss = np.matmul(shape(POINTS), mesh.positions[mesh.connectivity])
+    gauss = np.matmul(HEX27.shape(POINTS), mesh.positions[mesh.connectivity])
     return Model(mesh, mu, kappa_ratio * mu, loading or uniform, pattern, analysis, free, gauss)
 
 

@@ -19,7 +19,8 @@ from numba import njit, prange
 from solver.dehydration.kernel.algebra import EXOCARP_WEIGHTS, INVERSE_VOLUME, MU
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.layout import Layout, aligned_copy
-from solver.dehydration.kernel.metric import EXOCARP_POINTS, GAUSS_POINTS, shape_derivatives
+from solver.dehydration.kernel.metric import EXOCARP_POINTS, GAUSS_POINTS
+from solver.fem import HEX8
 
 from ...arrays import Floats, Ints, Ints32
 
@@ -27,9 +28,9 @@ __all__ = ["dilatations", "rested", "rests"]
 
 
 #: dN_a/dxi_k (points, 8, 3) and weights of the exocarp's rule; the core's rule is exact for a trilinear hexahedron.
-_SKIN = shape_derivatives(EXOCARP_POINTS)
+_SKIN = HEX8.gradients(EXOCARP_POINTS)
 _SKIN_WEIGHTS = np.array(EXOCARP_WEIGHTS)
-_CORE = shape_derivatives(GAUSS_POINTS)
+_CORE = HEX8.gradients(GAUSS_POINTS)
 _CORE_WEIGHTS = np.ones(len(GAUSS_POINTS))
 
 

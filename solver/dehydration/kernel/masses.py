@@ -24,8 +24,8 @@ from solver.dehydration.kernel.metric import (
     inverse_jacobians,
     one_point_geometry,
     quadrature,
-    shape_derivatives,
 )
+from solver.fem import HEX8
 
 from ...arrays import Floats
 
@@ -71,7 +71,7 @@ def largest_stiffness(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool,
     Core elements get the larger of the bounds of the 2x2x2 and, if `one_point`, the one-point element.
     """
     points, weights = quadrature(exocarp)
-    derivatives = shape_derivatives(points)
+    derivatives = HEX8.gradients(points)
     result = np.empty(len(corners))
     for first in range(0, len(corners), CHUNK):
         part = slice(first, first + CHUNK)

@@ -19,21 +19,14 @@ from solver.dehydration.kernel.algebra import (
     hexahedron_volume,
     modes_of,
 )
+from solver.fem import HEX8
 
 from ...arrays import Floats
 
-CORNERS = np.array([[1.0 if a & bit else -1.0 for bit in (XI, ETA, ZETA)] for a in range(8)])
-"""Local coordinates of the eight nodes, (8, 3)."""
+CORNERS = HEX8.nodes
+"""Local coordinates of the eight nodes, (8, 3): bits of the node's number."""
 GAUSS_POINTS = GAUSS * np.array(GAUSS_SIGNS, dtype=np.float64)
 EXOCARP_POINTS = np.concatenate([GAUSS_POINTS, [(0.0, 0.0, s * GAUSS) for s in SIGNS]])
-
-
-def shape_derivatives(points: Floats) -> Floats:
-    """dN_a/dxi_k of the trilinear hex at (q, 3) local points: (q, 8, 3)."""
-    factors = 1.0 + points[:, None, :] * CORNERS[None, :, :]
-    return np.stack(
-        [CORNERS[:, k] * factors[:, :, (k + 1) % 3] * factors[:, :, (k + 2) % 3] / 8 for k in range(3)], axis=-1
-    )
 
 
 def quadrature(exocarp: bool) -> tuple[Floats, Floats]:
@@ -45,7 +38,7 @@ def quadrature(exocarp: bool) -> tuple[Floats, Floats]:
 
 def inverse_jacobians(corners: Floats, points: Floats) -> tuple[Floats, Floats]:
     """B = dxi/dX (ne, q, 3, 3), row k = local direction, and det(dX/dxi) (ne, q), for corners (ne, 8, 3)."""
-    jacobians = corners.transpose(0, 2, 1)[:, None] @ shape_derivatives(points)
+    jacobians = corners.transpose(0, 2, 1)[:, None] @ HEX8.gradients(points)
     columns = np.moveaxis(jacobians, -1, 0)
     # Row k of the inverse is the cross product of the other two columns over the determinant.
     rows = [np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)]
@@ -55,7 +48,7 @@ def inverse_jacobians(corners: Floats, points: Floats) -> tuple[Floats, Floats]:
 
 def refuse_inverted(corners: Floats, chunk: int = 4096) -> None:
     """ValueError if an element (corners (ne, 8, 3)) is inverted or flat at an integration point or its centre."""
-    derivatives = shape_derivatives(np.concatenate([EXOCARP_POINTS, np.zeros((1, 3))]))
+    derivatives = HEX8.gradients(np.concatenate([EXOCARP_POINTS, np.zeros((1, 3))]))
     least = np.empty(len(corners))
     for first in range(0, len(corners), chunk):
         jacobians = corners[first : first + chunk].transpose(0, 2, 1)[:, None] @ derivatives
@@ -75,7 +68,7 @@ def _modes(corners: Floats) -> Any:
 def element_planes(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool) -> Floats:
     """Planes of the full core or the exocarp element, (planes, ne) float64."""
     points, weights = quadrature(exocarp)
-    volume = np.linalg.det(corners.transpose(0, 2, 1)[:, None] @ shape_derivatives(points)) @ weights
+    volume = np.linalg.det(corners.transpose(0, 2, 1)[:, None] @ HEX8.gradients(points)) @ weights
     return np.stack([mu, kappa, 1.0 / volume, *(component for mode in _modes(corners)[1:] for component in mode)])
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array
-from solver.fruit import azimuths, colatitudes
+from solver.lattice import azimuths, colatitudes
 
 from ...surfaces import harmonics, window
 from ...surfaces.harmonics import legendre
