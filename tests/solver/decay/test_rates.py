@@ -5,6 +5,7 @@ import pytest
 
 from solver.decay import SOLVER, DecayParams
 from solver.decay.environment import deficit, water_lost
+from solver.decay.fields.colony import PAPER_MOULDS
 from solver.decay.fields.layer import Layer
 from solver.decay.fields.rates import daily
 from solver.decay.fields.system import System
@@ -12,12 +13,14 @@ from solver.decay.surfaces.surface import extent, geodesic, triangulated
 
 #: The paper's width of the map, 1, is the girth of the fruit: lengths there are 2 pi r1.
 R1 = 1 / (2 * np.pi)
+#: Its climate and its kinetics.
+PAPER = {"climate": "paper", "mould": PAPER_MOULDS["penicillium-expansum"].model_dump()}
 
 
 def test_table_3_on_a_fruit_of_the_paper():
     """Eq. 4 and 9 by hand: 25 degC are 77 F; s adds 3 + 77 + 60 + 80 (Eq. 4); a day has 7 steps at growth rate 50."""
     params = SOLVER.parse(
-        {"porosity": 3.0, "temperature": 25.0, "humidity": 60.0, "water_content": 80.0, "growth_rate": 25.0}
+        {**PAPER, "porosity": 3.0, "temperature": 25.0, "humidity": 60.0, "water_content": 80.0, "growth_rate": 25.0}
     )
     colony = params.mould
     rates = daily(colony, params)
@@ -35,20 +38,20 @@ def test_table_3_on_a_fruit_of_the_paper():
 @pytest.mark.parametrize(("name", "per_cent"), [("porosity", 7.0), ("humidity", 4.0), ("water_content", 11.0)])
 def test_each_per_cent_adds_to_the_scale_s(name, per_cent):
     """Warm and moist enough that Eq. 6 damps nothing: 72 F and 50 %, or more."""
-    values = {"porosity": 3.0, "temperature": 30.0, "humidity": 60.0, "water_content": 80.0}
+    values = {**PAPER, "porosity": 3.0, "temperature": 30.0, "humidity": 60.0, "water_content": 80.0}
     few = SOLVER.parse(values)
     many = SOLVER.parse(values | {name: values[name] + per_cent})
     s = 3 + (32 + 1.8 * 30) + 60 + 80
-    ratio = daily(many.mould, many).mobility / daily(few.mould, few).mobility
+    ratio = daily(many.mould, many, 30.0).mobility / daily(few.mould, few, 30.0).mobility
     assert ratio == pytest.approx((s + per_cent) / s, rel=1e-12)
 
 
 def test_nutrient_evens_out_at_its_rate():
     """No organism: n spreads alone. A harmonic of degree 1 falls by exp(-2 D t) on the unit sphere, D in girths^2."""
-    params = SOLVER.parse({"growth_rate": 50.0, "mould": {"nutrient_diffusion": 2e-4}})
+    params = SOLVER.parse({**PAPER, "growth_rate": 50.0, "mould": {"nutrient_diffusion": 2e-4}})
     sphere = triangulated(*geodesic(12))
     y = sphere.points[:, 1]
-    layer = Layer(sphere, daily(params.mould, params), 0.5 + 0.1 * y, np.ones_like(y))
+    layer = Layer(sphere, daily(params.mould, params, 30.0), 0.5 + 0.1 * y, np.ones_like(y))
     state = layer.fresh
     for _ in range(10):
         state = layer.advance(state, 1.0)
