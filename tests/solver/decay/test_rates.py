@@ -85,7 +85,7 @@ def test_air_draws_water_from_what_is_nearly_pure_water(humidity):
 @pytest.mark.parametrize("rate", [0.0, 5.0, 9.0])
 def test_a_colony_spawns_with_the_paper_s_chance(rate):
     """1 / (10 - rate) of its spawnings (D22): 12 a day of two wounds, counted over some thousand landings."""
-    system = System(SOLVER.parse({"propagation_rate": rate, "spawning": 12.0}), 4, True)
+    system = System(SOLVER.parse({"climate": "paper", "propagation_rate": rate, "spawning": 12.0}), 4, True)
     expected = 2000
     until = expected / (2 * 12.0 / (10 - rate))
     for spawner, strays in ((system._rot_spawner, 0.0), (system._mould_spawner, 2.0)):
