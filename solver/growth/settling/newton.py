@@ -56,6 +56,7 @@ def newton(energy: Curved, x: Floats) -> Iterator[Point]:
                 if shift > _LARGEST:
                     yield Point(x, f, size, stuck=True)
                     return
+        assert d is not None  # t is not 0
         stays = value == f
         x, f, g = x + t * d, value, gradient
         if t == 1.0:

@@ -130,7 +130,7 @@ def _bonds(d: np.ndarray, t: np.ndarray, rest: np.ndarray, bonds: Bonds, h: np.n
 def edges(x: np.ndarray, rods: Rods, vertex: np.ndarray) -> Elements:
     """Return edges and then hinges at x (v, 3), of three vertices (n, 3) each; an edge has the last one twice."""
     count = len(rods.a) + len(rods.before)
-    out = Elements(np.zeros((count, 6, 6)), *(np.zeros((count, 2, 3)) for _ in range(2)), np.zeros((count, 3)))
+    out = Elements(np.zeros((count, 6, 6)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3)), np.zeros((count, 3)))
     _rods(x, rods, vertex, out.h, out.weight)
     return out
 
