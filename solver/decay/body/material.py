@@ -1,6 +1,6 @@
 """Neo-Hookean tetrahedra: energy, gradient and a Hessian that is never indefinite, on constant strain.
 
-    W = mu/2 (|F|^2 - 3 - 2 ln J) + lambda/2 (ln J)^2,   F = (edges now) (edges at rest)^-1
+    W = mu/2 (|F|^2 - 3 - 2 ln J) + lambda/2 (ln J)^2,   F = (edges now) (edges at rest)^-1     (solver.material)
 
 W is infinite for an inverted tetrahedron, so no equilibrium holds one. The Hessian's term in dW/dJ is cut where its
 eigenvalues (the singular values of F, Smith et al. 2019) would outweigh mu: Newton's step then always leads down.

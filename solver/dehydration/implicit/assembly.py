@@ -1,7 +1,7 @@
 """Energy, force and tangent of hex27 elements with a trilinear pressure per element, condensed.
 
 F = Fe Fd with Fd = diag(d) given at every Gauss point, Jd = det Fd, I1e = sum_ik F_ik^2 / d_k^2, Je = J / Jd. Energy
-per fresh volume (Liu et al. 2014, Eq. 1-4; Jd W(Fe), nearly incompressible):
+per fresh volume (Liu et al. 2014, Eq. 1-4; Jd W(Fe), nearly incompressible; `solver.material` derives it):
 
     Jd mu/2 (Je^(-2/3) I1e - 3) + Jd kappa/2 (Pi(Je - 1))^2,
 
