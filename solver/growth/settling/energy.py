@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import shell
 from ...arrays import Floats, Ints
-from ...shell.dissection import Fronts
+from ...linalg.dissection import Fronts
 from ...shell.inverse import Inverse, fronts_of, inverse_of
 from ...shell.normals import normals
 from ..params import Bending, Plane, SolidBall
