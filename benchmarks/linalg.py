@@ -71,7 +71,9 @@ def shell_factor() -> Use:
             try:
                 next(work)
             except StopIteration as done:
-                return [done.value.apply(right) for _ in range(10)]
+                factored = done.value
+                break
+        return [factored.apply(right) for _ in range(10)]
 
     return use
 
@@ -143,9 +145,11 @@ def wood_static() -> Use:
     from solver.contract import Context, Need
 
     solver = registry.get("wood")
-    params = solver.parse({"mode": "static", "rods": 60, "vertices": 20, "tip_load": (0.0, 0.0, -1.0), "fracture": "none"})
-    need = Need(fields=("position",), stages=(0.5, 1.0))
-    return lambda: [solver.run(params, need, Context()).position.values]
+    params = solver.parse(
+        {"mode": "static", "rods": 60, "vertices": 20, "tip_load": (0.0, 0.0, -1.0), "fracture": "none"}
+    )
+    need = Need(fields=("tip_position",), stages=(0.5, 1.0))
+    return lambda: [solver.run(params, need, Context()).tip_position.values]
 
 
 def decay_body() -> Use:

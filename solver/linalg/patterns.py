@@ -57,7 +57,13 @@ def places(cliques: Ints, indptr: Ints, indices: Ints) -> Ints:
                 continue
             begin, end = indptr[cliques[m, a]], indptr[cliques[m, a] + 1]
             for b in range(width):
-                at = begin + np.searchsorted(indices[begin:end], cliques[m, b])
-                if at < end and indices[at] == cliques[m, b]:
-                    found[m, a, b] = at
+                low, high = begin, end
+                while low < high:
+                    middle = (low + high) // 2
+                    if indices[middle] < cliques[m, b]:
+                        low = middle + 1
+                    else:
+                        high = middle
+                if low < end and indices[low] == cliques[m, b]:
+                    found[m, a, b] = low
     return found

@@ -15,7 +15,7 @@ __all__ = ["substitute"]
 def substitute(right: Floats, n: Floats, fronts: Fronts, across: Singles, within: Singles, found: Floats) -> None:
     """Solve both systems for `right` (v, 3) into `found`; n (v, 3): normals."""
     nodes, starts, own = fronts.nodes, fronts.starts, fronts.own
-    count, widest = len(right), int(np.diff(starts[:, 0]).max())
+    count, widest = len(right), int((starts[1:, 0] - starts[:-1, 0]).max())
     x = np.empty((count, 4), np.float32)
     # the factors are single: what is solved is scaled, so that no size of gradient leaves their range
     largest = 0.0
