@@ -71,6 +71,7 @@ class ShapeTable:
         self._trust = None
         if found is not None and self._samples is not None:
             self._trust = trust.Trust(*found, self._samples)
+        self._judged = None if self._trust is None else self._trust.method
         stored = {stage: j for j, stage in enumerate(table.stages)}
         self._knots = np.array(sorted({0.0, *stored}))
         self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
@@ -182,7 +183,7 @@ class ShapeTable:
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
         if max_error is not None:
-            trust.refuse(expected, max_error, inside, self._trust and self._trust.method)
+            trust.refuse(expected, max_error, inside, self._judged)
         fresh = self.fresh(values) if "position" in fields else None
         found: _Fields = None, None, None
         if fields:

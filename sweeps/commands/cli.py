@@ -38,8 +38,8 @@ from .options import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from solver.contract import Need, Solver
     from solver.contract import Params as Parameters
-    from solver.contract import Solver
 
 __all__ = ["app"]
 
@@ -139,7 +139,7 @@ def solve(
     from solver.contract import Context, Need
     from store import shards
 
-    from .. import outputs, tabled
+    from .. import tabled
     from ..plan import job
     from . import progress
     from .words import per_stage, show_run
@@ -147,13 +147,10 @@ def solve(
     if cut is not None:
         _check_cut(cut, out)
     chosen = registry.get(solver)
-    values = parameters(params_file) | assignments(set_)
-    values |= {} if seed is None else {"seed": seed}
-    params = chosen.parse(values, preset)
-    need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})), preset)
-    if out is not None:
-        outputs.check_suffix(out, True, len(need.stages))
-        need = chosen.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen))}))
+    own = {} if seed is None else {"seed": seed}
+    params = chosen.parse(parameters(params_file) | assignments(set_) | own, preset)
+    asked = Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {}))
+    need = _for_file(out, chosen, chosen.settle(asked, preset))
     spec = job(chosen, params, need)
     begin = time.perf_counter()
     with progress.one_run(solver) as observe, progress.stopping() as stop:
@@ -168,14 +165,23 @@ def solve(
         "descriptors": per_stage(result),
     }
     if out is not None:
-        title = f"{chosen.title}: {preset or (params_file.stem if params_file else solver)}"
-        _save(out, title, chosen, params, result, document, cut)
+        _save(out, preset or (params_file.stem if params_file else solver), chosen, params, result, document, cut)
     emit(document, as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:
+    """Return the need, settled, with the fields that a file wants; refuse what could not be written."""
+    if out is None:
+        return need
+    from .. import outputs
+
+    outputs.check_suffix(out, True, len(need.stages))
+    return solver.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, solver))}))
 
 
 def _save(
     out: Path,
-    title: str,
+    of: str,
     solver: Solver,
     params: Parameters,
     result: xr.Dataset,
@@ -191,7 +197,7 @@ def _save(
     made = Made(
         [outputs.of_result(result, axes, i) for i in range(count)],
         document,
-        title,
+        f"{solver.title}: {of}",
         solver.name,
         stage_symbol=solver.stages.symbol,
         units=solver.axis_units(),
