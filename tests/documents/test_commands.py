@@ -91,7 +91,7 @@ class Workshop:
         if "$TOKEN" in command and "TOKEN=" not in command:
             command = f"TOKEN=$(wizen token create --store demo --name visitor --scopes run)\n{command}"
         # without it curl calls an answer of 404 a success
-        command = re.sub(r"\bcurl (?=.*http)", "curl --fail-with-body --no-progress-meter --max-time 300 ", command)
+        command = re.sub(r"\bcurl (?=.*http)", "curl --fail-with-body --no-progress-meter --max-time 1500 ", command)
         return subprocess.run(
             ["bash", "-e", "-o", "pipefail", "-c", command],
             cwd=self.at,
@@ -107,7 +107,7 @@ class Workshop:
 def _surroundings() -> dict[str, str]:
     kept = {name: value for name, value in os.environ.items() if not name.startswith("WIZEN_")}
     paths = os.pathsep.join([str(Path(sys.executable).parent), kept.get("PATH", "")])
-    return kept | {"PATH": paths, "WIZEN_JOBS_WORKERS": "1"}
+    return kept | {"PATH": paths, "WIZEN_JOBS_WORKERS": "2"}
 
 
 @pytest.fixture(scope="module")
@@ -177,6 +177,7 @@ def _python() -> list[object]:
 
 
 @pytest.mark.parametrize("block", _python())
+@pytest.mark.timeout(3600)
 def test_a_python_block_works(workshop: Workshop, monkeypatch: pytest.MonkeyPatch, block: Block) -> None:
     """It runs on its own, and an expression has the value that its comment begins with."""
     monkeypatch.chdir(workshop.at)

@@ -1,5 +1,6 @@
 """The look-up against its own formulas written out plainly: a mean in double precision, fields on lattices, no kept
-products, no matrices in place of transforms.
+products, no matrices in place of transforms. Weights, fits and transforms are tested elsewhere; a twin that shares no
+code with the look-up is in test_lookup_paper.py.
 """
 
 from __future__ import annotations
