@@ -67,7 +67,7 @@ def newton(energy: Curved, x: Floats) -> Iterator[Point]:
 
 def _direction(matrix: csc_array, gradient: Floats, shift: float) -> Floats | None:
     """Return -(matrix + shift)^-1 gradient (n, 3), or None where that matrix is not positive definite."""
-    shifted = csc_array(matrix + shift * eye_array(gradient.size, format="csc")) if shift else matrix
+    shifted = csc_array(matrix + shift * eye_array(gradient.size, format="csc", dtype=np.float64)) if shift else matrix
     try:
         # pivots from the diagonal only: then those of U have the signs of the eigenvalues
         factor = splu(

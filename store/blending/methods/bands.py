@@ -97,9 +97,10 @@ class Targets:
         step = known.slopes @ (point - points)
         total = np.exp(totals + step[: len(stages)])
         moved = moved.reshape(len(stages), -1) + step[len(stages) :, None]
-        shares = np.array([self._shares(row) for row in moved])
+        shares: Array = np.array([self._shares(row) for row in moved])
         shares *= mended.reshape(shares.shape)
-        return np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
+        found: Array = np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
+        return found
 
     def _known_of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> _Known:
         at = np.array(samples)[:, None], np.array(stages)
@@ -139,7 +140,8 @@ def _slopes(points: Array, values: Array, fitted: bool) -> Array:
     if not fitted:
         return np.zeros((values.shape[1], points.shape[1]))
     offsets = points - points.mean(axis=0)
-    return np.linalg.lstsq(offsets, values - values.mean(axis=0), rcond=1e-6)[0].T
+    found: Array = np.linalg.lstsq(offsets, values - values.mean(axis=0), rcond=1e-6)[0].T
+    return found
 
 
 def multiplier(gains: Array, bands: Bands, band: int) -> Array:
