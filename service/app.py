@@ -15,7 +15,7 @@ from starlette.routing import Route
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, memory, page, problems
+from . import catalogue, memory, page, problems, results
 from .admission import Admission
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
@@ -91,6 +91,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         jobs.reading,
         jobs_events.router,
         jobs_results.router,
+        results.router,
     )
     app.include_router(catalogue.open_router)
     for router in guarded:

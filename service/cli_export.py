@@ -146,6 +146,7 @@ def _format(name: str | None, out: Path | None, result: str) -> tuple[Export | N
 def _read(result: str, store: Path | None) -> xr.Dataset:
     from store import shards
     from store.store import Store
+    from sweeps.results import resolve
 
     path = Path(result)
     if path.suffix == ".h5":
@@ -155,11 +156,7 @@ def _read(result: str, store: Path | None) -> xr.Dataset:
     if store is None:
         raise InvalidOption(f"{result[:80]!r} is no file.", "Name a result file (.h5), or a key's --store.")
     opened = Store.open(store)
-    found = [key for key in opened.keys() if key.startswith(result)]  # noqa: SIM118 (a method, not a mapping)
-    if len(found) != 1:
-        many = "several results have" if found else "no result has"
-        raise InvalidOption(f"{many} a key that begins with {result[:80]!r}.", "`wizen status --json` lists them.")
-    return opened.get(found[0])
+    return opened.get(resolve(opened, result))
 
 
 def _written(sequence: Sequence, chosen: Export | None, options: Options) -> bytes:

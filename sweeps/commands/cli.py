@@ -17,6 +17,7 @@ from ..errors import InvalidOption
 from . import onset as cli_onset
 from . import queue as cli_queue
 from . import refine as cli_refine
+from . import results as cli_results
 from . import shapes as cli_shapes
 from . import tables as cli_tables
 from .console import Root, emit, grid, note
@@ -228,7 +229,7 @@ def sweep(
     document = report_document(report) | {"store": str(store), "skipped": read.skipped, "repeated": read.repeated}
     document["parts"] = [report_document(r) for r in reports]
 
-    emit(document, as_json, lambda console: show_report(console, report, store, read.name if read.controls else ""))
+    emit(document, as_json, lambda console: show_report(console, report, store, read))
     if any(r.stopped for r in reports):
         raise typer.Exit(130)
     if not all(r.complete for r in reports):
@@ -280,5 +281,6 @@ def status(store: StorePath, as_json: As_json = False) -> None:
 cli_refine.add_to(app)
 cli_onset.add_to(app)
 cli_queue.add_to(app)
+cli_results.add_to(app)
 cli_tables.add_to(app)
 cli_shapes.add_to(app)
