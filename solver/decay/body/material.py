@@ -137,16 +137,14 @@ def _longest(f: Floats) -> float:
     off = a[0, 1] * a[0, 1] + a[0, 2] * a[0, 2] + a[1, 2] * a[1, 2]
     spread = np.sqrt((d0 * d0 + d1 * d1 + d2 * d2 + 2 * off) / 6)
     if spread <= 1e-14 * mean:
-        found: float = np.sqrt(mean)
-        return found
+        return float(np.sqrt(mean))
     det = (
         d0 * (d1 * d2 - a[1, 2] * a[1, 2])
         - a[0, 1] * (a[0, 1] * d2 - a[1, 2] * a[0, 2])
         + a[0, 2] * (a[0, 1] * a[1, 2] - d1 * a[0, 2])
     )
     angle = np.arccos(min(1.0, max(-1.0, det / (2 * spread**3)))) / 3
-    found: float = np.sqrt(mean + 2 * spread * np.cos(angle))
-    return found
+    return float(np.sqrt(mean + 2 * spread * np.cos(angle)))
 
 
 @njit(cache=True)

@@ -97,7 +97,7 @@ class Targets:
         step = known.slopes @ (point - points)
         total = np.exp(totals + step[: len(stages)])
         moved = moved.reshape(len(stages), -1) + step[len(stages) :, None]
-        shares: Array = np.array([self._shares(row) for row in moved])
+        shares = np.array([self._shares(row) for row in moved])
         shares *= mended.reshape(shares.shape)
         found: Array = np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
         return found
@@ -117,7 +117,7 @@ class Targets:
         knots[0], knots[-1] = 2 * quantiles[0] - quantiles[1], 2 * quantiles[-1] - quantiles[-2]
         below = np.interp(self.bands.edges, knots, _KNOTS, left=0, right=1)
         below[0], below[-1] = 0, 1
-        shares = below[1:] - below[:-1] + 1e-4
+        shares: Array = below[1:] - below[:-1] + 1e-4
         shares /= shares.sum()
         return shares
 
