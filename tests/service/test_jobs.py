@@ -206,6 +206,22 @@ def test_two_services_run_no_job_twice(store: Store, log: Path) -> None:
     assert len(log.read_text().splitlines()) == 3
 
 
+def test_streams_of_events_are_counted(store: Store) -> None:
+    """One too many is refused, and may come when another has ended."""
+    with client_of(store.root, jobs_workers=0, max_listeners=2) as client:
+        client.headers.update(bearer(store))
+        url = client.post("/v1/jobs", json=body()).headers["location"] + "/events"
+        with client.stream("GET", url) as one, client.stream("GET", url) as two:
+            assert {next(stream.iter_lines()) for stream in (one, two)} == {"retry: 1000"}
+            checked(client.get(url), 429, "too-many-listeners")
+
+        def free() -> bool:
+            with client.stream("GET", url) as again:
+                return again.status_code == 200
+
+        until(free)
+
+
 def test_jobs_of_stopped_sweeps_are_left_alone(store: Store, queue_only: httpx.Client) -> None:
     asked = queue_only.post("/v1/jobs", json=body()).json()
     (job,) = store.ledger.jobs()
