@@ -14,7 +14,7 @@ PAGE   := $(VIEWER)/dist/index.html
 NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
 
-.PHONY: demo page test test-slow bench docs stress lint format clean constraints
+.PHONY: demo page test test-processor test-slow mutants bench docs stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -42,6 +42,19 @@ demo: $(STAMP)
 ## test: everything quick, on two cores; CI runs this
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+# solvers' tests whose numbers hang on compiled kernels or on BLAS: they hold on any processor
+PROCESSOR_TESTS := $(addprefix tests/solver/,shell growth/test_growth.py growth/test_contact.py decay/test_waves.py \
+  decay/test_body.py decay/test_neighbours.py wood/test_rods.py wood/test_runs.py test_implicit.py test_onset.py \
+  test_contact.py)
+
+## test-processor: some of the solvers' tests once more, as if on a processor of ten years ago; CI runs this too
+test-processor: $(STAMP)
+	NUMBA_CPU_NAME=haswell OPENBLAS_CORETYPE=Haswell $(BIN)/python -m pytest -n 2 --dist loadfile $(PROCESSOR_TESTS)
+
+## mutants: apply the listed mutations one by one in a copy, see whether tests notice; an hour on one core, resumable
+mutants: $(STAMP)
+	$(BIN)/python -m tests.mutations.run
 
 ## test-slow: the long checks as well; those of the page need a Chromium (Debian: apt-get install chromium)
 test-slow: $(STAMP) $(PAGE)

@@ -23,8 +23,8 @@ RUNS: tuple[tuple[str, dict[str, Any], tuple[float, ...], str], ...] = (
     ("dehydration", {"te": 0.1, "gamma": 10.0, "mirrors": "xyz"}, (0.05, 0.1), "preview"),
     ("dehydration", {"te": 0.1, "gamma": 1.0, "mirrors": "xyz"}, (0.02,), "preview"),
     ("decay", {}, (0.0, 1.0, 2.0), "preview"),
-    ("growth", {"shape": "disc", "vertices": 300}, (0.0, 0.2), "preview"),
-    ("wood", {"rods": 12, "vertices": 10, "tip_load": (0.0, 0.0, -1.0), "clamp": "start"}, (0.0, 0.001), "preview"),
+    ("growth", {"shape": "disc", "tools": [{"kind": "spot", "at": (0.2, 0.0, 0.0)}]}, (0.0, 0.2), "preview"),
+    ("wood", {"rods": 12, "tip_load": (0.0, 0.0, -1.0), "clamp": "start"}, (0.0, 0.001), "preview"),
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
@@ -9,17 +10,19 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import anyio.to_thread
 from fastapi import Depends, FastAPI
+from starlette.routing import Route
 
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, memory, page, problems
+from . import catalogue, memory, page, problems, results
+from .admission import Admission
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
 from .jobs import routes as jobs
 from .jobs.runner import JobRunner
 from .limits import Limits
-from .openapi import Documented
+from .openapi import Documented, operation_id
 from .security import requires
 from .settings import Settings
 from .shapes import batch
@@ -28,6 +31,7 @@ from .shapes.answers import Answers, Repeats
 from .shapes.live import LiveTables
 from .shapes.shortcut import Shortcut
 from .shapes.turns import Turns
+from .stopping import at_signals
 from .telemetry import Metrics, Telemetry
 
 __all__ = ["create_app"]
@@ -41,14 +45,15 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     # handlers run in this pool; each shape in flight holds its arrays, so their number bounds the memory
     anyio.to_thread.current_default_thread_limiter().total_tokens = app.state.settings.threads
     runner = JobRunner(app.state.settings)
-    if runner.wanted:
-        runner.start()
-        try:
+    with at_signals(runner.halt):
+        if runner.wanted:
+            runner.start()
+            try:
+                yield
+            finally:
+                await anyio.to_thread.run_sync(runner.stop)
+        else:
             yield
-        finally:
-            await anyio.to_thread.run_sync(runner.stop)
-    else:
-        yield
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -66,6 +71,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=_lifespan,
         docs_url=None,  # both of FastAPI's load scripts from elsewhere; `page` serves our own copy
         redoc_url=None,
+        generate_unique_id_function=operation_id,
     )
     app.state.settings = settings
     app.state.tables = LiveTables(settings.store, settings.reload_interval)
@@ -73,28 +79,33 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.turns = Turns(app.state.settings.max_waiting)
     app.state.tokens = Tokens(settings.store)
     # looking at jobs has threads of its own, so that listeners do not wait for shapes, nor shapes for them
-    app.state.listeners, app.state.listening = 0, anyio.CapacityLimiter(2)
+    app.state.listeners, app.state.listening = Counter[str](), anyio.CapacityLimiter(2)
     metrics = Metrics()
     problems.install(app)
     guards = [] if settings.public_read else [Depends(requires("read"))]
     declared = {} if settings.public_read else problems.responses(401, 403)
-    app.include_router(catalogue.open_router)
-    for router in (
+    guarded = (
         catalogue.router,
         shapes.router,
         batch.router,
         jobs.reading,
         jobs_events.router,
         jobs_results.router,
-    ):
+        results.router,
+    )
+    app.include_router(catalogue.open_router)
+    for router in guarded:
         app.include_router(router, dependencies=guards, responses=declared)
     app.include_router(jobs.writing)
+    routers = (*guarded, catalogue.open_router, jobs.writing)
+    app.state.paths = sorted({route.path for router in routers for route in router.routes if isinstance(route, Route)})
     page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
     # the last one added is the outermost
     if settings.public_read:
         app.add_middleware(Shortcut, state=app.state)
+    app.add_middleware(Admission, settings=settings)
     app.add_middleware(Limits, settings=settings)
     if settings.public_read and settings.cache_bytes:
         app.add_middleware(Repeats, state=app.state)

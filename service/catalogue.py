@@ -97,7 +97,7 @@ def solvers() -> Json:
 
 @router.get("/v1/solvers/{name}", summary="One solver", responses=problems.responses(404))
 def solver(name: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Json:
-    """Describe a solver: parameter schema, query axes and stage axis with units, fields, presets, qualities."""
+    """Describe a solver: parameter schema, query axes and stage axis with units, fields, presets, looks, qualities."""
     return _solver(vocabulary.solver_named(name))
 
 
@@ -112,6 +112,8 @@ def _solver(solver: Solver) -> Json:
         "fields": {name: quantities.attrs(name) for name in solver.fields},
         "default_fields": list(solver.default_fields),
         "presets": solver.presets,
+        "preset_stages": solver.preset_stages,
+        "looks": solver.looks.to_json(),
         "qualities": {
             # an error that was never measured is null, not a guess
             name: {"relative_error": solver.tolerances.get(name), "resolution": resolution}

@@ -5,13 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sweeps.commands import watchdog
 from sweeps.commands.cli import app
 from sweeps.commands.console import note
 from sweeps.errors import InvalidOption, SweepError
@@ -20,14 +21,13 @@ from sweeps.formats import extend
 from . import cli_export
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from sweeps.formats import Encoder, Made
 
     from .formats import Format
 
 __all__ = ["app", "main"]
-
-#: Seconds that answers under way get when the service stops; streams of events would go on for ever.
-_PATIENCE = 5
 
 
 class PortInUse(SweepError):
@@ -66,8 +66,10 @@ def serve(
     from pydantic import ValidationError
 
     from .app import create_app
+    from .connections import GuardedProtocol
     from .hints import hints
     from .settings import Settings
+    from .stopping import PATIENCE
 
     given: dict[str, Any] = {"store": store, "host": host, "port": port, "workers": workers, "scheduler": scheduler}
     try:
@@ -82,7 +84,7 @@ def serve(
     note(f"serving {settings.store} at {address}")
     for line in hints(settings.store, address):
         note(line)
-    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": _PATIENCE}
+    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": PATIENCE, "http": GuardedProtocol}
     if settings.workers == 1:
         with listener:
             uvicorn.Server(uvicorn.Config(create_app(settings), **options)).run(sockets=[listener])
@@ -99,7 +101,11 @@ def serve(
 
 def main() -> None:
     """Run the command line."""
-    app()
+    watchdog.guard()
+    try:
+        app()
+    finally:
+        watchdog.leave()
 
 
 def _listen(host: str, port: int) -> socket.socket:
@@ -119,8 +125,23 @@ def _formats() -> Mapping[str, Encoder]:
     from sweeps.formats import Encoder
 
     from .formats import FORMATS
+    from .sequences import EXPORTS
 
-    return {f.suffix: Encoder(f.fields, partial(_encode, f), single=True) for f in FORMATS.values()}
+    clips = {e.suffix: partial(_clip, e.name) for e in EXPORTS.values() if not e.single and e.suffix.count(".") == 1}
+    known = {f.suffix: Encoder(f.fields, partial(_encode, f), True, clips.get(f.suffix)) for f in FORMATS.values()}
+    runs = {s: Encoder(("position",), partial(_whole, clip), True, clip, runs=True) for s, clip in clips.items()}
+    return {**runs, **known}
+
+
+def _clip(name: str, run: xr.Dataset) -> bytes:
+    from .sequences import EXPORTS, Options, prepared, write
+
+    return write(prepared(run, Options()), EXPORTS[name], Options())
+
+
+def _whole(clip: Callable[[xr.Dataset], bytes], made: Made) -> bytes:
+    assert made.run is not None
+    return clip(made.run)
 
 
 def _encode(chosen: Format, made: Made) -> bytes:

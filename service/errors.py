@@ -19,6 +19,7 @@ __all__ = [
     "Overloaded",
     "QueryTooLong",
     "ServiceError",
+    "SlowBody",
     "TimedOut",
     "TooCostly",
     "TooManyListeners",
@@ -131,6 +132,12 @@ class BodyTooLarge(ServiceError):
     """A request body over the limit."""
 
     code = "body-too-large"
+
+
+class SlowBody(ServiceError):
+    """A request body that takes too long to arrive."""
+
+    code = "slow-body"
 
 
 class TimedOut(ServiceError):

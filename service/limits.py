@@ -1,4 +1,4 @@
-"""Limits on every request: length of the query, size of the body, time until the answer begins.
+"""Limits on every request: length of the query, size and time of the body, time until the answer begins.
 
 Plain ASGI, so that nothing is buffered and nothing is copied on the way through.
 """
@@ -11,7 +11,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import problems
-from .errors import BodyTooLarge, QueryTooLong, TimedOut
+from .errors import BodyTooLarge, QueryTooLong, ServiceError, SlowBody, TimedOut
 from .settings import Settings
 
 __all__ = ["Limits"]
@@ -44,21 +44,30 @@ class Limits:
 
     async def _watch(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on while counting its body and its time; the first to run out gives the answer."""
-        begun, received = False, 0
+        begun, received, whole = False, 0, False
+        failure: ServiceError | None = None
+        deadline = asyncio.get_running_loop().time() + self.settings.body_timeout
 
         async def counted() -> Message:
-            nonlocal received
-            message = await receive()
+            nonlocal received, whole, failure
+            try:
+                # once the body is whole, what is received is that the asker has left: that may take any time
+                async with asyncio.timeout_at(None if whole else deadline):
+                    message = await receive()
+            except TimeoutError:
+                failure = self._too_slow()
+                raise failure from None
+            whole = not message.get("more_body", False)
             received += len(message.get("body", b""))
             if received > self.settings.max_body:
-                # whoever reads the body may take this for a bad one; `watched` then drops what he answers
-                raise self._too_large()
+                failure = self._too_large()
+                raise failure
             return message
 
         async def watched(message: Message) -> None:
             nonlocal begun
-            if received > self.settings.max_body and not begun:
-                return
+            if failure and not begun:
+                return  # whoever read the body took it for a bad one
             begun = True
             timer.reschedule(None)  # a long answer may take its time once it has begun
             await send(message)
@@ -73,8 +82,11 @@ class Limits:
                 f"no answer began within {self.settings.timeout:g} s.", advice="Try again, or ask for less resolution."
             )
             await problems.of(error, scope)(scope, receive, send)
-        if received > self.settings.max_body and not begun:
-            await problems.of(self._too_large(), scope)(scope, receive, send)
+        if failure and not begun:
+            await problems.of(failure, scope)(scope, receive, send)
+
+    def _too_slow(self) -> SlowBody:
+        return SlowBody(f"the body did not arrive within {self.settings.body_timeout:g} s.", advice="Send it at once.")
 
     def _too_large(self) -> BodyTooLarge:
         return BodyTooLarge(f"the body is larger than {self.settings.max_body} bytes.", advice="Send less.")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.routing import APIRoute
 
 from solver import registry
 from solver.contract import Solver
@@ -23,11 +24,13 @@ from .shapes import detail
 from .shapes.live import LiveTables
 from .shapes.query import LIMITS, LOWEST_RESOLUTION
 
-__all__ = ["Documented"]
+__all__ = ["Documented", "operation_id"]
 
 Json = dict[str, Any]
 
 _CORRECTION = "|".join(methods.CORRECTIONS)
+#: Keywords in the solvers' schemas that JSON Schema does not know, and those whose values are no schemas.
+_OWN, _VALUES = ("units", "axes"), ("default", "const", "enum", "example", "examples", "required")
 _METHOD = rf"^({'|'.join(methods.WEIGHTINGS)})([+ ]({_CORRECTION}))*$"
 
 
@@ -47,8 +50,45 @@ class Documented(FastAPI):
             get["parameters"] = [*get["parameters"], *_parameters(self.state.settings, examples)]
             schemas["JobRequest"] = _job_request(schemas)
             _replace_validation(document)
+            _complete(document)
             document["x-examples"] = examples
         return self.openapi_schema  # type: ignore[return-value]
+
+
+def operation_id(route: APIRoute) -> str:
+    """Return the name of an operation in generated clients: its handler's, whatever becomes of its address."""
+    return route.name
+
+
+def _complete(document: Json) -> None:
+    """Add what generators of clients and linters ask for: a server, whether each operation needs a token, and no
+    keyword that JSON Schema does not know.
+    """
+    document["servers"] = [{"url": "/", "description": "The service that sent this page"}]
+    document["info"]["license"] = {"name": "Apache 2.0", "identifier": "Apache-2.0"}
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            # a shape is free, the run that it may ask for is not
+            operation.setdefault("security", [{}, {"token": []}] if operation["operationId"] == "shape" else [])
+    document["paths"] = _plain(document["paths"])
+    document["components"]["schemas"] = {name: _plain(s) for name, s in document["components"]["schemas"].items()}
+
+
+def _plain(schema: Any) -> Any:
+    """Return a schema, or what holds schemas, with our own keywords marked as extensions."""
+    if isinstance(schema, list):
+        return [_plain(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    found = {}
+    for key, value in schema.items():
+        if key in _OWN and ("type" in schema or "anyOf" in schema or "$ref" in schema or "allOf" in schema):
+            found[f"x-{key}"] = value
+        elif key == "properties":
+            found[key] = {name: _plain(each) for name, each in value.items()}
+        else:
+            found[key] = value if key in _VALUES else _plain(value)
+    return found
 
 
 def _job_request(schemas: Json) -> Json:

@@ -61,6 +61,7 @@ STATUS: Mapping[type[Exception], int] = {
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,
+    errors.SlowBody: 408,
     errors.TimedOut: 503,
     errors.Overloaded: 503,
     errors.Unauthorized: 401,
@@ -130,7 +131,7 @@ def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def install(app: FastAPI) -> None:
-    """Make every error of `app` a problem."""
+    """Make every error of `app` a problem; `app.state.paths` are the addresses that there are."""
     for root in (contract.SolverError, stored.StoreError, errors.ServiceError):
         app.add_exception_handler(root, _known)
     app.add_exception_handler(RequestValidationError, _validation)
@@ -162,7 +163,7 @@ async def _http(request: Request, error: Exception) -> Response:
     detail, advice = str(error.detail), ""
     path = request.url.path
     if status == 404:
-        known = [p for p in _paths(request.app) if "{" not in p]
+        known = [path for path in request.app.state.paths if "{" not in path]
         near = difflib.get_close_matches(path, known, n=1)
         detail = f"there is nothing at {path}."
         advice = f"Did you mean {near[0]}? " if near else ""
@@ -173,10 +174,6 @@ async def _http(request: Request, error: Exception) -> Response:
         advice = f"Use {allowed}."
     code = phrase.lower().replace(" ", "-").replace("'", "")
     return _response(request.scope, status, code, detail, advice, headers=error.headers)
-
-
-def _paths(app: FastAPI) -> Iterable[str]:
-    return app.openapi().get("paths", {}).keys()
 
 
 def _response(
@@ -202,5 +199,5 @@ def _response(
     body = problem.model_dump(exclude_defaults=True)
     extra = {"Cache-Control": "no-store", **(headers or {})}
     if status in _RETRY:
-        extra["Retry-After"] = _RETRY[status]
+        extra.setdefault("Retry-After", _RETRY[status])
     return Response(orjson.dumps(body), status, extra, MEDIA_TYPE)

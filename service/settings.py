@@ -12,7 +12,7 @@ from store.starter import own_or_starter
 
 from .page import BUILT
 
-__all__ = ["Settings"]
+__all__ = ["Settings", "page"]
 
 
 class Settings(BaseSettings):
@@ -37,6 +37,17 @@ class Settings(BaseSettings):
     max_query: int = Field(4096, ge=64, description="Longest query string [bytes]")
     max_body: int = Field(1 << 20, ge=0, description="Largest request body [bytes]")
     timeout: float = Field(30.0, gt=0, description="Longest wait for an answer to begin [s]")
+    body_timeout: float = Field(10.0, gt=0, description="Longest time that a request's body may take to arrive [s]")
+    head_timeout: float = Field(10.0, gt=0, description="Longest time that a request's head may take to arrive [s]")
+    max_head: int = Field(32768, ge=1024, description="Longest head of a request: its line and headers [bytes]")
+    max_headers: int = Field(100, ge=8, description="Most headers of a request")
+    max_connections: int = Field(2048, ge=1, description="Most open connections, in each process")
+    max_connections_per_client: int = Field(
+        256, ge=1, description="Most open connections from one address, in each process; a proxy counts as one client"
+    )
+    max_delay: float = Field(
+        1.0, gt=0, description="Longest expected wait for a shape or a result; what would wait longer gets a 503 [s]"
+    )
     max_waiting: int = Field(256, ge=1, description="Most small shapes that wait to be computed, in each process")
     threads: int = Field(8, ge=1, le=256, description="Shapes computed at the same time; each holds its arrays")
     reload_interval: float = Field(0.5, ge=0, description="How often a table's manifest is looked at, at most [s]")
@@ -54,5 +65,30 @@ class Settings(BaseSettings):
     max_job_seconds: float = Field(3600.0, gt=0, description="Longest expected time of one job [s]")
     max_job_bytes: float = Field(8e9, gt=0, description="Largest expected memory or result of one job [bytes]")
     max_listeners: int = Field(64, ge=1, description="Most open streams of job events")
+    max_listeners_per_client: int = Field(8, ge=1, description="Most open streams of job events of one client")
     page: Path = Field(BUILT, description="Directory of the built web page; `make page` makes it")
     metrics: bool = Field(True, description="Serve /metrics in Prometheus' text format")
+
+
+def page() -> str:
+    """Return docs/settings.md: every setting with its default and its meaning."""
+    rows = []
+    for name, field in Settings.model_fields.items():
+        default = "" if field.default_factory or field.default == BUILT else f"`{field.default}`"
+        rows.append(f"| `WIZEN_{name.upper()}` | {default} | {field.description} |")
+    return "\n".join(
+        [
+            "# Settings of the service",
+            "",
+            "`wizen serve` reads them from the environment. `python -m service.settings` printed this page.",
+            "",
+            "| variable | default | |",
+            "|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
+
+
+if __name__ == "__main__":
+    print(page(), end="")

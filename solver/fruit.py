@@ -8,14 +8,14 @@ azimuth about y, from x towards z. Lengths are in units of the reference radius 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from .arrays import Floats
-from .contract import Params, Region
+from .contract import Params
+from .lattice import azimuths, colatitudes, directions, lattice, window
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -122,11 +122,6 @@ class Fruit(Params):
         """Whether the equator is a circle."""
         return self.radii[3] == self.radii[7]
 
-    @property
-    def keeps_shape(self) -> bool:
-        """Whether a run leaves the surface where it is fresh, so that a result without a position has that one."""
-        return False
-
     def generatrix(self, colatitude: Floats) -> tuple[Floats, Floats]:
         """Return (x, y) of the sarcocarp's generatrix (Eq. 8) at colatitudes [radian], shapes as given.
 
@@ -150,7 +145,8 @@ class Fruit(Params):
         """Return points of the fruit's fresh outer surface X, shape (..., 3): r_e = r_f + te along each ray."""
         inner = self.sarcocarp(colatitude, azimuth)
         distance = np.linalg.norm(inner, axis=-1, keepdims=True)
-        return inner * (1 + self.exocarp_thickness / distance)
+        found: Floats = inner * (1 + self.exocarp_thickness / distance)
+        return found
 
     def stone_distance(self, rays: Floats) -> Floats:
         """Return the distance (...) from the centre to the stone's surface along unit rays (..., 3), 0 without one."""
@@ -158,7 +154,8 @@ class Fruit(Params):
             return np.zeros(rays.shape[:-1])
         along, across = self.stone
         axes = np.array([across, along, across * self.radii[7] / self.radii[3]])
-        return 1 / np.linalg.norm(rays / axes, axis=-1)
+        found: Floats = 1 / np.linalg.norm(rays / axes, axis=-1)
+        return found
 
     def _outline(self) -> Floats:
         x, y = self.generatrix(np.linspace(np.pi, 0, 361))
@@ -183,48 +180,6 @@ def _dent(outline: Floats) -> float:
     closed = np.concatenate([outline, outline * [-1, 1]])
     facets = ConvexHull(closed).equations
     return float(-(closed @ facets[:, :2].T + facets[:, 2]).max(axis=1).min())
-
-
-# --- the lattice that all surface fields live on ----------------------------------------------------------------
-
-
-def colatitudes(resolution: int) -> Floats:
-    """Return `resolution` colatitudes [radian] at cell centres, so that no sample sits on a pole."""
-    return (np.arange(resolution) + 0.5) * np.pi / resolution
-
-
-def azimuths(resolution: int) -> Floats:
-    """Return the 2 * `resolution` azimuths [radian] that go with `colatitudes(resolution)`."""
-    return np.arange(2 * resolution) * np.pi / resolution
-
-
-@lru_cache(maxsize=8)
-def lattice(resolution: int) -> tuple[Floats, Floats]:
-    """Return the broadcast (colatitude, azimuth) grids [radian], each of shape (resolution, 2 * resolution)."""
-    theta, phi = np.meshgrid(colatitudes(resolution), azimuths(resolution), indexing="ij")
-    for grid in (theta, phi):
-        grid.flags.writeable = False
-    return theta, phi
-
-
-def window(resolution: int, region: Region | None) -> tuple[slice, slice]:
-    """Return the rows and columns of the lattice that lie inside a region; all of them if there is none."""
-    if region is None:
-        return slice(None), slice(None)
-    slices = []
-    for samples, (low, high) in (
-        (colatitudes(resolution), region.colatitude),
-        (azimuths(resolution), region.azimuth),
-    ):
-        first, last = np.searchsorted(np.degrees(samples), [low, high])
-        slices.append(slice(int(first), int(last)))
-    return slices[0], slices[1]
-
-
-def directions(colatitude: Floats, azimuth: Floats) -> Floats:
-    """Return points of the parametric unit sphere, shape (..., 3): y is the pole, azimuth runs from x to z."""
-    s = np.sin(colatitude)
-    return np.stack(np.broadcast_arrays(s * np.cos(azimuth), np.cos(colatitude), s * np.sin(azimuth)), axis=-1)
 
 
 # --- Table 1 ----------------------------------------------------------------------------------------------------

@@ -12,12 +12,16 @@ __all__ = ["QUANTITIES", "Quantity", "attrs", "register"]
 
 
 class Quantity(NamedTuple):
-    """Units, long name and symbol of one variable; `volatile` ones differ between identical runs (wall time)."""
+    """Units, long name and symbol of one variable; `volatile` ones differ between identical runs (wall time).
+
+    `share`: it runs from 0 to 1 by its meaning, so pictures of it need no other range.
+    """
 
     units: str
     long_name: str
     symbol: str
     volatile: bool = False
+    share: bool = False
 
 
 QUANTITIES: dict[str, Quantity] = {}
@@ -82,11 +86,11 @@ register(
 
 # decay: maps on the surface, and what they come to
 register(
-    rot=Quantity("1", "soft rot, over what a nutrient of 1 can feed", "r"),
-    substrate=Quantity("1", "nutrient left in the flesh, what the rot lives on", "n_r"),
-    mould=Quantity("1", "mould, active and inactive, over what a nutrient of 1 can feed", "m"),
-    mould_active=Quantity("1", "active mould, over what a nutrient of 1 can feed", "u"),
-    nutrient=Quantity("1", "nutrient left in the skin, what the mould lives on", "n"),
+    rot=Quantity("1", "soft rot, over what a nutrient of 1 can feed", "r", share=True),
+    substrate=Quantity("1", "nutrient left in the flesh, what the rot lives on", "n_r", share=True),
+    mould=Quantity("1", "mould, active and inactive, over what a nutrient of 1 can feed", "m", share=True),
+    mould_active=Quantity("1", "active mould, over what a nutrient of 1 can feed", "u", share=True),
+    nutrient=Quantity("1", "nutrient left in the skin, what the mould lives on", "n", share=True),
     rotten_share=Quantity("1", "share of the surface with rot of at least 0.1", "A_r"),
     mouldy_share=Quantity("1", "share of the surface with mould of at least 0.1", "A_m"),
     mean_rot=Quantity("1", "area-weighted mean of the soft rot", "r_mean"),

@@ -6,23 +6,20 @@ import difflib
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from pathlib import Path
 
-from .contract import InvalidInput, Solver
+from .contract import InvalidInput, Solver, Surface
 
-__all__ = ["get", "names"]
-
-#: Our own solvers: name -> "module:attribute". Others join through the entry-point group `wizen.solvers`.
-_OURS = {
-    "decay": "solver.decay:SOLVER",
-    "dehydration": "solver.dehydration:SOLVER",
-    "growth": "solver.growth:SOLVER",
-    "wood": "solver.wood:SOLVER",
-}
+__all__ = ["get", "names", "surface"]
 
 
 @cache
 def _places() -> dict[str, str]:
-    return {**{e.name: e.value for e in entry_points(group="wizen.solvers")}, **_OURS}
+    """Return name -> "module:attribute": of each folder beside this file that has a `run.py`, whose package offers
+    SOLVER, and of what joins through the entry-point group `wizen.solvers`.
+    """
+    ours = {path.parent.name: f"solver.{path.parent.name}:SOLVER" for path in Path(__file__).parent.glob("*/run.py")}
+    return {**{e.name: e.value for e in entry_points(group="wizen.solvers")}, **ours}
 
 
 def names() -> tuple[str, ...]:
@@ -44,4 +41,13 @@ def get(name: str) -> Solver:
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise InvalidInput(f"there is no solver {name!r}.", advice=f"{hint}Known: {', '.join(sorted(places))}.")
     module, _, attribute = places[name].partition(":")
-    return getattr(import_module(module), attribute)
+    found: Solver = getattr(import_module(module), attribute)
+    return found
+
+
+def surface(name: str) -> Surface | None:
+    """Return the fresh surface of the solver called `name`, as tables ask for it; None where it has none.
+
+    A table outlives its solver: one that is no longer here has none either.
+    """
+    return get(name).surface if name in _places() else None

@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 from .canonical import canonical
 from .clock import Clock
 from .database import Database
-from .errors import CorruptShard, UnknownJob
+from .errors import UnknownJob
 from .jobs import STATES, Job, JobSpec, State, read_row
 
 if TYPE_CHECKING:
-    from .store import Store
+    import xarray as xr
 
 __all__ = ["Job", "JobSpec", "Ledger", "State"]
 
@@ -38,7 +38,7 @@ CREATE TABLE IF NOT EXISTS jobs (
     plan TEXT NOT NULL DEFAULT '', state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, worker TEXT,
     lease_until REAL, digest TEXT, error TEXT, seconds REAL, created REAL NOT NULL, updated REAL NOT NULL,
     progress REAL NOT NULL DEFAULT 0,
-    claims INTEGER NOT NULL DEFAULT 0, clock TEXT, lease REAL
+    claims INTEGER NOT NULL DEFAULT 0, clock TEXT, lease REAL, failures INTEGER NOT NULL DEFAULT 0
 );
 CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
 -- a job may belong to several plans, of which jobs.plan is the one that asked first
@@ -50,7 +50,8 @@ CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) W
 #: What older files lack: by the version that they have, how they become the next.
 _UPGRADES = {
     1: "ALTER TABLE jobs ADD COLUMN claims INTEGER NOT NULL DEFAULT 0; "
-    "ALTER TABLE jobs ADD COLUMN clock TEXT; ALTER TABLE jobs ADD COLUMN lease REAL"
+    "ALTER TABLE jobs ADD COLUMN clock TEXT; ALTER TABLE jobs ADD COLUMN lease REAL",
+    2: "ALTER TABLE jobs ADD COLUMN failures INTEGER NOT NULL DEFAULT 0",
 }
 
 #: The claim that a job's worker holds, or gave back without anybody having taken the job since.
@@ -176,17 +177,18 @@ class Ledger:
     def failed(self, job: Job, error: Mapping[str, Any], max_attempts: int = 2) -> State | None:
         """Note a failure (`code`, `message`, `advice`) of a claimed job and return the job's new state.
 
-        It waits again until it was tried `max_attempts` times, then it is failed for good. What its claimant noted as
+        It waits again until it has failed `max_attempts` times, then it is failed for good. What its claimant noted as
         done before stays done. None means that the job is no longer its claimant's, and is left alone.
         """
         with self.database.write() as connection:
             found = get(connection, job.key)
             if found.state == "done" and found.claims == job.claims:
                 return "done"
-            state: State = "failed" if found.attempts >= max_attempts else "wanted"
+            # a claimant that was lost has not failed: only MAX_LOST of those give a job up
+            state: State = "failed" if found.failures + 1 >= max_attempts else "wanted"
             changed = connection.execute(
-                "UPDATE jobs SET state = ?, error = ?, worker = NULL, lease_until = NULL, updated = ? "
-                f"WHERE {_HELD} AND state = 'running'",
+                "UPDATE jobs SET state = ?, error = ?, failures = failures + 1, worker = NULL, lease_until = NULL, "
+                f"updated = ? WHERE {_HELD} AND state = 'running'",
                 (state, json.dumps(error), time.time(), *_held(job)),
             ).rowcount
         return state if changed else None
@@ -243,19 +245,15 @@ class Ledger:
             rows = connection.execute(f"SELECT state, count(*) FROM jobs WHERE {where} GROUP BY state", values)
             return {**dict.fromkeys(STATES, 0), **{row[0]: row[1] for row in rows}}
 
-    def rebuild(self, store: Store) -> int:
-        """Make the ledger say what the shards say; return how many results read well.
+    def rebuild(self, results: Iterable[xr.Dataset]) -> int:
+        """Make the ledger say what the shards say; return how many results there are (`Store.results` yields them).
 
-        Every readable shard becomes a done job; a job noted as done whose shard is gone or damaged waits again.
+        Each result becomes a done job; a job noted as done whose result is not among them waits again.
         """
         good: list[str] = []
-        stored = store.keys()
-        for key in stored:
-            try:
-                dataset = store.get(key)
-            except CorruptShard:
-                continue
+        for dataset in results:
             attrs, now = dataset.attrs, time.time()
+            key = attrs["key"]
             seconds = float(dataset["seconds"].max()) if "seconds" in dataset else None
             with self.database.write() as connection:
                 connection.execute(
@@ -278,8 +276,8 @@ class Ledger:
             good.append(key)
         with self.database.write() as connection:
             connection.execute(
-                "UPDATE jobs SET state = 'wanted', attempts = 0, digest = NULL, progress = 0, updated = ? "
-                "WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
+                "UPDATE jobs SET state = 'wanted', attempts = 0, failures = 0, digest = NULL, progress = 0, "
+                "updated = ? WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
                 (time.time(), json.dumps(good)),
             )
         return len(good)
@@ -309,7 +307,7 @@ def enter(connection: Connection, job: JobSpec, plan: str, revived: Sequence[Sta
     count = connection.execute(
         "INSERT INTO jobs (key, solver, version, params, need, plan, state, created, updated) "
         "VALUES (?, ?, ?, ?, ?, ?, 'wanted', ?, ?) ON CONFLICT (key) DO UPDATE SET "
-        "state = 'wanted', attempts = 0, error = NULL, worker = NULL, progress = 0, "
+        "state = 'wanted', attempts = 0, failures = 0, error = NULL, worker = NULL, progress = 0, "
         f"updated = excluded.updated WHERE state IN ({','.join('?' * len(revived))})",
         (job.key, job.solver, job.version, *texts, plan, now, now, *revived),
     ).rowcount

@@ -9,7 +9,7 @@ fresh shape itself is not interpolated: it follows from the parameters.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Self
@@ -17,7 +17,8 @@ from typing import Any, Self
 import numpy as np
 
 from solver.arrays import Array
-from solver.fruit import Fruit, azimuths, colatitudes
+from solver.contract import Fresh, Surface
+from solver.lattice import azimuths, colatitudes
 from solver.quantities import QUANTITIES
 
 from . import seal
@@ -41,6 +42,8 @@ __all__ = ["ShapeTable"]
 
 #: Fields that a query may ask for.
 FIELDS = ("position", "displacement")
+#: Positions, displacements and poles.
+_Fields = tuple[Array | None, Array | None, Array | None]
 #: Stands for the fresh shape among the stored stages.
 _FRESH = -1
 #: Descriptors that are zero on the fresh shape; the others have no known value next to it.
@@ -50,7 +53,7 @@ _ZERO_AT_FIRST = ("roughness", "buckle_count", "penetration")
 class ShapeTable:
     """One generation of a table, open for queries by any number of threads."""
 
-    def __init__(self, table: TableInfo, path: Path) -> None:
+    def __init__(self, table: TableInfo, path: Path, surface: Surface | None = None) -> None:
         self.info = table
         self._spectra = generation.map_spectra(path)
         opened = generation.read(path)
@@ -68,16 +71,27 @@ class ShapeTable:
         self._trust = None
         if found is not None and self._samples is not None:
             self._trust = trust.Trust(*found, self._samples)
+        self._judged = None if self._trust is None else self._trust.method
         stored = {stage: j for j, stage in enumerate(table.stages)}
         self._knots = np.array(sorted({0.0, *stored}))
         self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
-        named: list[str] = [name for name in ("radii", "stone", "exocarp_thickness") if name in table.template]
-        self._fruit_template = {name: table.template[name] for name in named}
-        self._fruit_places = {name: place for name, place in table.places.items() if place[0] in named}
+        self._surface = surface if surface and set(surface.fields) <= set(table.template) else None
+        named = self._surface.fields if self._surface else ()
+        self._fresh_template = {name: table.template[name] for name in named}
+        self._fresh_places = {name: place for name, place in table.places.items() if place[0] in named}
 
     @classmethod
-    def open(cls, path_or_store: Path | str | Store, name: str = "default", verify: bool = True) -> Self:
+    def open(
+        cls,
+        path_or_store: Path | str | Store,
+        name: str = "default",
+        verify: bool = True,
+        surfaces: Callable[[str], Surface | None] = lambda solver: None,
+    ) -> Self:
         """Open the current generation of a table; `verify` reads all of it once and finds any changed byte.
+
+        `surfaces` knows the fresh surfaces by solver, as `solver.registry.surface` does: without, a table gives
+        displacements and no positions.
 
         Raises:
             MissingStore: there is no store in that directory.
@@ -92,7 +106,7 @@ class ShapeTable:
             try:
                 if verify and not seal.is_whole(path):
                     raise CorruptTable(f"{path} is damaged.", "Rebuild the table from the shards.")
-                return cls(table, path)
+                return cls(table, path, surfaces(table.solver))
             except FileNotFoundError:
                 # swapped and pruned since the manifest was read
                 if last_try:
@@ -149,49 +163,38 @@ class ShapeTable:
     ) -> Shape:
         """Return the shape at parameters and a stage, on the lattice of `resolution` (None: the table's own).
 
-        `window` limits it to a part of the lattice and to some components; the rest is not computed where that pays.
-
-        `fields` are position and/or displacement; nothing else is computed. `method` is named as in
-        `store.blending.methods`; in `idw`, and where the samples form no grid, the `m` nearest take part,
-        with weights distance^-eta.
-        `max_error` limits the expected error, of the roughness or by measure.
+        `fields` are position and/or displacement; nothing else is computed. `window` limits them to a part of the
+        lattice and to some components; the rest is not computed where that pays. `method` is named as in
+        `store.blending.methods`; in `idw`, and where the samples form no grid, the `m` nearest take part, with weights
+        distance^-eta. `max_error` limits the expected error, of the roughness or by measure.
 
         Raises:
             OutsideTable: the table does not reach there, or does not hold that, or has no such method.
             TooUncertain: the expected error is above `max_error`, or the table does not know it.
-            InvalidGeometry: no fruit has these parameters, though each lies within the table's bounds.
+            InvalidGeometry: no shape has these parameters, though each lies within the table's bounds.
 
         """
-        values = asking.settle(self.info, query)
-        s = asking.settle_stage(self.info, stage)
-        asking.check_names("field", fields, list(FIELDS))
+        values, s = asking.settle(self.info, query), asking.settle_stage(self.info, stage)
         n = self.resolution if resolution is None else resolution
-        if not 4 <= n <= 1024:
-            raise OutsideTable(f"a resolution of {n} is out of reach.", "Ask for 4 to 1024 colatitudes.")
-        if m < 1 or not eta > 0:
-            raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
+        _check(fields, n, m, eta)
         how, patch = methods.parse(method), window.on(n)
         point = np.array(list(values.values())) if self._samples is not None else None
-        near = self._near(point, how, m, eta)
-        stages = self._bracket(s)
+        near, stages = self._near(point, how, m, eta), self._bracket(s)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
         if max_error is not None:
-            trust.refuse(expected, max_error, inside, self._trust.method if self._trust else None)
-        fruit = self.fruit(values) if "position" in fields else None
-        position = displacement = poles = None
+            trust.refuse(expected, max_error, inside, self._judged)
+        fresh = self.fresh(values) if "position" in fields else None
+        found: _Fields = None, None, None
         if fields:
-            blend = self._blend(point, near, stages, how, n)
-            position, displacement = _synthesize(blend, patch, fruit, "displacement" in fields)
-            if fruit is not None and patch.is_whole:
-                poles = (surface.fresh_poles(fruit) + blend.poles()).astype(blend.waves.real.dtype)
-                poles = poles[:, list(patch.components)]
+            found = _synthesize(self._blend(point, near, stages, how, n), patch, fresh, "displacement" in fields)
+        colatitude, azimuth = _angles(n)
         return Shape(
-            colatitude=_angles(n)[0][patch.rows],
-            azimuth=_angles(n)[1][patch.columns],
-            position=position,
-            displacement=displacement,
-            poles=poles,
+            colatitude=colatitude[patch.rows],
+            azimuth=azimuth[patch.columns],
+            position=found[0],
+            displacement=found[1],
+            poles=found[2],
             stage=s,
             parameters=values,
             descriptors=self._describe(near, stages),
@@ -235,8 +238,8 @@ class ShapeTable:
         """
         if self._samples is None:
             return {}
-        fruits = [self.fruit(self.sample(i)) for i in range(self.size)]
-        return dict(zip(self.stages, trust.correlations(self._spectra, self._samples, fruits).tolist(), strict=True))
+        shapes = [self.fresh(self.sample(i)) for i in range(self.size)]
+        return dict(zip(self.stages, trust.correlations(self._spectra, self._samples, shapes).tolist(), strict=True))
 
     def _near(self, point: Array | None, method: methods.Method, m: int, eta: float) -> Weighted:
         if self._samples is None or point is None:
@@ -291,24 +294,22 @@ class ShapeTable:
         """Return the solver's parameters of a point on the varying axes."""
         return insert(self.info.template, self.info.places, values)
 
-    def fruit(self, values: Mapping[str, float]) -> Fruit:
-        """Return the fruit at a point on the varying axes.
+    def fresh(self, values: Mapping[str, float]) -> Fresh:
+        """Return the fresh shape at a point on the varying axes.
 
         Raises:
-            OutsideTable: the table is not of fruits.
-            InvalidGeometry: no fruit has these parameters.
+            OutsideTable: nobody said what it is.
+            InvalidGeometry: no shape has these parameters.
 
         """
-        places = self._fruit_places
-        params = insert(self._fruit_template, places, {name: values[name] for name in places if name in values})
-        try:
-            radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
-        except KeyError:
+        if self._surface is None:
             raise OutsideTable(
-                "the table is not of fruits, whose fresh shape is known.", "Ask for 'displacement'."
-            ) from None
-        _check_fruit(radii, stone)
-        return Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te)
+                f"nobody said what is fresh in a table of {self.info.solver}.",
+                "Ask for 'displacement', or open it with surfaces=solver.registry.surface.",
+            )
+        places = self._fresh_places
+        known = {name: values[name] for name in places if name in values}
+        return self._surface.of(insert(self._fresh_template, places, known))
 
 
 @lru_cache(maxsize=16)
@@ -320,10 +321,13 @@ def _angles(n: int) -> tuple[Array, Array]:
     return found
 
 
-@lru_cache(maxsize=256)
-def _check_fruit(radii: tuple[float, ...], stone: tuple[float, ...]) -> None:
-    """Refuse impossible fruits. The exocarp lies outside of all that could collide, and its bounds are a box."""
-    Fruit.parse({"radii": radii, "stone": stone})
+def _check(fields: Sequence[str], n: int, m: int, eta: float) -> None:
+    """Refuse what no table holds."""
+    asking.check_names("field", fields, list(FIELDS))
+    if not 4 <= n <= 1024:
+        raise OutsideTable(f"a resolution of {n} is out of reach.", "Ask for 4 to 1024 colatitudes.")
+    if m < 1 or not eta > 0:
+        raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
 
 
 def _stored(stages: Mapping[int, float]) -> dict[int, float]:
@@ -331,8 +335,14 @@ def _stored(stages: Mapping[int, float]) -> dict[int, float]:
     return {j: t for j, t in stages.items() if j != _FRESH}
 
 
-def _synthesize(blend: Blend, patch: Patch, fruit: Fruit | None, displaced: bool) -> tuple[Array | None, Array | None]:
-    """Return positions and displacements (height, width, c) on a patch, each only if wanted."""
+def _synthesize(blend: Blend, patch: Patch, fresh: Fresh | None, displaced: bool) -> _Fields:
+    """Return positions and displacements (height, width, c) on a patch, and the two poles of a whole surface: each
+    only if wanted.
+    """
     with blend.fields(patch) as planes:
-        position = None if fruit is None else surface.add_fresh(fruit, planes, patch)
-        return position, np.stack(list(planes), axis=-1) if displaced else None
+        position = None if fresh is None else surface.add_fresh(fresh, planes, patch)
+        displacement = np.stack(list(planes), axis=-1) if displaced else None
+    if fresh is None or not patch.is_whole:
+        return position, displacement, None
+    poles = (fresh.poles() + blend.poles()).astype(blend.waves.real.dtype)
+    return position, displacement, poles[:, list(patch.components)]

@@ -108,7 +108,8 @@ class Store:
         """
         if self.has(key):
             try:
-                return self.get(key).attrs["digest"]
+                found: str = self.get(key).attrs["digest"]
+                return found
             except CorruptShard:
                 pass  # replaced below by the good one
         return shards.write(self.shard_path(key), dataset, key)
@@ -135,3 +136,11 @@ class Store:
         for path in sorted(self._shards.glob("??/*.h5")):
             if is_key(path.stem):
                 yield path.stem
+
+    def results(self) -> Iterator[xr.Dataset]:
+        """Yield all stored results that read well, in the order of their keys, one in memory at a time."""
+        for key in self.keys():
+            try:
+                yield self.get(key)
+            except CorruptShard:
+                continue

@@ -2,6 +2,7 @@
 
     root/tables/<name>/<digest>.h5    a generation, netCDF-4/HDF5, sealed
     root/tables/<name>/current.json   which one is current, and what is in it
+    root/tables/<name>/scalars.nc     numbers of the runs over their axes, see `scalars`
 
 A new generation becomes current by renaming the manifest; whoever has the old one open keeps it until it reopens,
 even when it is pruned.
@@ -9,16 +10,18 @@ even when it is pruned.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from solver.contract import Solver
+
 from . import seal
-from .errors import EmptyTable
+from .errors import EmptyTable, MixedSamples
 from .generations import generate, generation
 from .generations.manifest import TableInfo, directory, read_manifest, write_manifest
-from .generations.samples import Axes, collect
+from .generations.samples import Choice, Samples, collect
 from .store import Store
 
 if TYPE_CHECKING:
@@ -32,11 +35,9 @@ Precision = Literal["float32", "float64"]
 
 def build(
     store: Store,
+    solver: Solver,
     name: str = "default",
-    solver: str = "dehydration",
     *,
-    axes: Axes | None = None,
-    units: Mapping[str, str] | None = None,
     plan: str | None = None,
     quality: str | None = None,
     version: str | None = None,
@@ -46,9 +47,8 @@ def build(
 ) -> TableInfo:
     """Build a table from the finished runs of `solver` and make it current.
 
-    `axes` is the solver's `Params.axes`, `units` the units of those axes (the fruit's have none); `keys` names the
-    results, if not all that fit are wanted; `resolution` cuts the spectra to that band, and so the lattice that holds
-    them. The same results make the same digest, in whatever order they were stored.
+    `keys` names the results, if not all that fit are wanted; `resolution` cuts the spectra to that band, and so the
+    lattice that holds them. The same results make the same digest, in whatever order they were stored.
 
     Raises:
         EmptyTable: no finished run fits.
@@ -58,13 +58,19 @@ def build(
         StorageFull: the disk is full; the old generation stays current.
 
     """
+    samples = collect(store, solver.name, solver.params.axes, Choice(plan, quality, version, keys))
+    return _write(store, solver, name, samples, resolution, dtype)
+
+
+def _write(
+    store: Store, solver: Solver, name: str, samples: Samples, resolution: int | None, dtype: Precision
+) -> TableInfo:
     home = directory(store.tables_dir, name)
-    samples = collect(store, solver, axes, plan, quality, version, keys)
     band = min(resolution or samples.need["resolution"], samples.need["resolution"])
     if band < 4:
         raise EmptyTable(f"a band of {band} waves holds no shape.", "Ask for a resolution of at least 4.")
     with seal.scratch(home / "next.h5") as temporary:
-        written = generate.write(temporary, store, samples, solver, band, dtype, units or {})
+        written = generate.write(temporary, store, samples, solver, band, dtype)
         seal.seal(temporary)
         file = f"{written.digest[:16]}.h5"
         seal.adopt(temporary, home / file)
@@ -72,7 +78,7 @@ def build(
         name=name,
         file=file,
         digest=written.digest,
-        solver=solver,
+        solver=solver.name,
         version=samples.version,
         axes={axis: _bounds(values[axis] for values in samples.values) for axis in samples.varying},
         fixed=samples.fixed,
@@ -93,14 +99,14 @@ def build(
 
 def rebuild(
     store: Store,
+    solver: Solver,
     name: str = "default",
     *,
-    units: Mapping[str, str] | None = None,
     more: Collection[str] = (),
     resolution: int | None = None,
     dtype: Precision | None = None,
 ) -> TableInfo:
-    """Write a table anew from the results that it was built of, and make it current; no run is repeated.
+    """Write a table of `solver` anew from the results that it was built of, and make it current; no run is repeated.
 
     What is not said stays: `resolution` and `dtype` of the current generation, even where its file is damaged. `more`
     names results to add. A `resolution` above that of the runs means theirs.
@@ -108,23 +114,18 @@ def rebuild(
     Raises:
         UnknownTable: there is none of that name.
         CorruptTable: its manifest is damaged, so that nobody knows what it was built of.
-        MixedSamples: the results to add differ from the others in more than their axes.
+        MixedSamples: it is another solver's, or the results to add differ from the others in more than their axes.
         UnknownJob: a result is gone.
         CorruptShard: a result is damaged.
         StorageFull: the disk is full; the old generation stays current.
 
     """
     now = info(store, name)
-    return build(
-        store,
-        name,
-        now.solver,
-        axes=now.places,
-        units=units,
-        keys={*now.keys, *more},
-        resolution=resolution or now.resolution,
-        dtype=dtype or ("float64" if now.dtype == "float64" else "float32"),
-    )
+    if now.solver != solver.name:
+        raise MixedSamples(f"table {name!r} is of {now.solver}, not of {solver.name}.", "Build one under another name.")
+    precision: Precision = dtype or ("float64" if now.dtype == "float64" else "float32")
+    samples = collect(store, solver.name, now.places, Choice(keys={*now.keys, *more}))
+    return _write(store, solver, name, samples, resolution or now.resolution, precision)
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from solver.contract import Solver
 from store import seal, shards
 from store.shape import Shape
 from store.surfaces import spectra
 
 from .errors import InvalidOption
 from .formats import Encoder, Made, added
-from .pictures.colours import MESH_LAYERS
 
 if TYPE_CHECKING:
     from .pictures.sheet import Panel
@@ -86,10 +86,10 @@ def triangles(run: xr.Dataset) -> list[Panel]:
     size = float(np.linalg.norm(points - middle, axis=1).max()) or 1.0
     if "view" in run.attrs:
         *middle, size = np.asarray(run.attrs["view"], float)
-    up, params = str(run.attrs.get("up", "y")), json.loads(run.attrs.get("params", "{}"))
+    up = str(run.attrs.get("up", "y"))
     found = []
     for frame in frames:
-        skin = colours.layered(frame.fields, params)
+        skin = colours.painted(run, frame.fields)
         paint = None if skin is None else skin.colour
         place = (frame.vertices - np.asarray(middle)) / size
         away = np.linalg.norm(place, axis=1, keepdims=True)
@@ -113,7 +113,8 @@ _OURS = {
 def suffixes(run: bool) -> dict[str, Encoder | None]:
     """Return what can be written, by suffix; `.h5` (no encoder) holds whole runs only."""
     known: dict[str, Encoder | None] = {".h5": None} if run else {}
-    return {**known, **_OURS, **{suffix: encoder for suffix, encoder in added().items() if suffix not in _OURS}}
+    more = {s: encoder for s, encoder in added().items() if s not in _OURS and (run or not encoder.runs)}
+    return {**known, **_OURS, **more}
 
 
 def check_suffix(path: Path, run: bool, stages: int) -> None:
@@ -129,7 +130,7 @@ def check_suffix(path: Path, run: bool, stages: int) -> None:
             f"--out {path}: cannot write {path.suffix or 'no suffix'!r}.", f"Known: {', '.join(known)}."
         )
     encoder = known[path.suffix]
-    if encoder is not None and encoder.single and stages > 1:
+    if encoder is not None and encoder.single and stages > 1 and not (run and encoder.whole):
         raise InvalidOption(
             f"--out {path}: {path.suffix} holds one stage, not {stages}.",
             "Give one stage with --stages, or write .npz or .png.",
@@ -140,8 +141,8 @@ def check_suffix(path: Path, run: bool, stages: int) -> None:
         raise InvalidOption(f"--out {path}: there is no directory {path.parent}.", "Create it first.")
 
 
-def fields_for(path: Path | None, run: bool, known: Collection[str] = ("position",)) -> tuple[str, ...]:
-    """Return the fields that writing `path` needs, of a solver that has those `known`; none if nothing is written.
+def fields_for(path: Path | None, run: bool, solver: Solver | None = None) -> tuple[str, ...]:
+    """Return the fields that writing `path` needs, of a table's shapes or of a solver; none if nothing is written.
 
     Raises:
         InvalidOption: the format holds the fruit's lattice only, and the solver has none.
@@ -150,15 +151,16 @@ def fields_for(path: Path | None, run: bool, known: Collection[str] = ("position
     encoder = suffixes(run).get(path.suffix) if path is not None else None
     if encoder is None:
         return ()
+    known = ("position",) if solver is None else solver.fields
     if "position" in known or "position" not in encoder.fields:
         return encoder.fields
-    if encoder.single:
+    if encoder.single and encoder.whole is None:
         raise InvalidOption(
             f"--out {path}: a solver with meshes of its own is not written as {path.suffix if path else ''} at once.",
             "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
         )
     # what gives the mesh its colours comes along
-    coloured = tuple(name for name in MESH_LAYERS if name in known)
+    coloured = tuple(name for name in solver.looks.layers if name in known) if solver else ()
     return (*("mesh_position" if name == "position" else name for name in encoder.fields), *coloured)
 
 
@@ -171,7 +173,8 @@ def save(path: Path, made: Made) -> None:
 
     """
     encoder = suffixes(made.run is not None)[path.suffix]
-    if encoder is not None and encoder.single and "position" in encoder.fields and not made.shapes:
+    whole = encoder.whole if encoder is not None and made.run is not None else None
+    if encoder is not None and encoder.single and "position" in encoder.fields and not made.shapes and whole is None:
         raise InvalidOption(
             f"--out {path}: a run on a mesh of its own is not written as {path.suffix} at once.",
             "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
@@ -179,6 +182,8 @@ def save(path: Path, made: Made) -> None:
     if encoder is None:
         assert made.run is not None
         shards.write(path, made.run, made.key)
+    elif whole is not None and made.run is not None and len(made.shapes) != 1:
+        seal.publish(path, whole(made.run))
     else:
         seal.publish(path, encoder.encode(made))
 

@@ -26,7 +26,7 @@ from .errors import PlanError
 from .planfile import PlanFile
 from .points import points
 
-__all__ = ["Plan", "job", "units_of"]
+__all__ = ["Plan", "job"]
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Plan:
         written = planfile.parse(tables)
         try:
             solver = registry.get(written.solver)
-            need = solver.settle(Need.parse(written.need))
+            need = solver.settle(Need.parse(written.need), written.preset)
         except InvalidInput as error:
             raise PlanError(error.message, error.advice) from None
         _check_names(written, solver)
@@ -129,22 +129,6 @@ class Plan:
 def job(solver: Solver, params: Params, need: Need) -> JobSpec:
     """Return the job that computes `need` (settled) of `params`; its key is the same whoever asks."""
     return JobSpec.of(solver, params, need)
-
-
-def units_of(solver: str) -> dict[str, str]:
-    """Return the units of a solver's scalar axes, from its parameters' schema.
-
-    Raises:
-        InvalidInput: there is no such solver.
-
-    """
-    params = registry.get(solver).params
-    extras = {field: info.json_schema_extra for field, info in params.model_fields.items()}
-    return {
-        axis: str(extra.get("units", "1"))
-        for axis, (field, _) in params.axes.items()
-        if isinstance(extra := extras[field], dict)
-    }
 
 
 def _from_pattern(

@@ -14,7 +14,7 @@ from store.generations.audit import Finding
 from store.store import Store
 from store.tables import TableInfo
 
-from .dried import dried
+from . import tabled
 
 __all__ = ["Spot", "recompute"]
 
@@ -64,7 +64,7 @@ def _spot(store: Store, key: str, tolerance: float, cancelled: Callable[[], bool
     job = store.ledger.get(key)
     solver, stored = registry.get(job.solver), store.get(key)
     try:
-        context = Context(cancelled=cancelled, library=store.find, dried=dried)
+        context = Context(cancelled=cancelled, library=store.find, shapes=tabled.shape)
         again = solver.solve(solver.parse(job.params), Need.parse(job.need), context)
     except SolverError as error:
         if error.code == "cancelled":

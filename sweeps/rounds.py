@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from store import tables
+from solver import registry
+from store import scalars, tables
 from store.blending import methods
 from store.blending.methods.weights import Samples
 from store.generations import trust
@@ -27,7 +28,7 @@ from store.surfaces.measures import Surface, compare
 from store.tables import TableInfo
 
 from . import refine, score
-from .plan import Plan, units_of
+from .plan import Plan
 from .refine import Proposal, State
 from .report import Event
 from .runner import run_jobs
@@ -133,7 +134,10 @@ def _add(store: Store, name: str, asked: Mapping[str, Job]) -> None:
     table = tables.info(store, name)
     more = [job for job in asked.values() if job.state == "done" and job.key not in table.keys]
     if more and not _would_end_grid(store, table, more):
-        tables.rebuild(store, name, units=units_of(table.solver), more=[job.key for job in more])
+        solver = registry.get(table.solver)
+        grown = tables.rebuild(store, solver, name, more=[job.key for job in more])
+        if scalars.path_of(store, name).is_file():
+            scalars.build(store, solver, name, keys=grown.keys)
 
 
 def _would_end_grid(store: Store, table: TableInfo, more: Collection[Job]) -> bool:
@@ -150,7 +154,7 @@ def held_out_error(store: Store, name: str, held: Path, measure: str) -> tuple[f
         InvalidOption: no run of `held` lies between the table's samples.
 
     """
-    table = ShapeTable.open(store, name, verify=False)
+    table = ShapeTable.open(store, name, verify=False, surfaces=registry.surface)
     found, _ = score.cases(store, table, held)
     errors = [
         trust.errors(compare(Surface(case.fresh, case.found(methods.DEFAULT, s)), Surface(case.fresh, case.truth(s))))[

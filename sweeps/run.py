@@ -25,6 +25,8 @@ __all__ = ["ATTEMPTS", "Run"]
 
 #: How often a job is tried; what cannot succeed (invalid input) is tried once.
 ATTEMPTS = 2
+#: Seconds that workers get to stop when their runner does: what they would finish is finished by the next run.
+_LANDING = 0.5
 
 _LOST = {
     "code": "worker-lost",
@@ -95,7 +97,7 @@ class Run:
             future.cancel()
             self._ledger.release(job)
             self._call_off(future, job)
-        until = self._now() + GRACE
+        until = self._now() + _LANDING
         while (patience := until - self._now()) > 0 and not all(future.done() for future in self.flying):
             yield min(patience, beat(self._lease))
         for future, job in self.flying.items():
@@ -119,7 +121,7 @@ class Run:
         self._ledger.want(self._jobs.values(), self._name, again=again)
         before = self._states()
         if any(job.state == "done" and not self._store.has(job.key) for job in before.values()):
-            self._ledger.rebuild(self._store)  # shards were deleted by hand
+            self._ledger.rebuild(self._store.results())  # shards were deleted by hand
             before = self._states()
         self._free(before.values())
         self._finished = {key for key, job in before.items() if job.state in ("done", "failed")}

@@ -12,7 +12,8 @@ import numpy as np
 import xarray as xr
 
 from solver.arrays import Array
-from solver.fruit import Fruit, lattice
+from solver.contract import Fresh
+from solver.lattice import lattice
 from store import keys
 from store.blending import methods
 from store.generations.samples import read_axes
@@ -38,14 +39,14 @@ class Case:
     """A shape that is known and one that is looked up: both displacements (n, 2n, 3) on the lattice of `LATTICE`."""
 
     label: str
-    fruit: Fruit
+    start: Fresh
     truth: Callable[[float], Array]
     found: Callable[[str, float], Array]
 
     @property
     def fresh(self) -> Array:
         """Fresh positions (n, 2n, 3)."""
-        return self.fruit.surface(*lattice(LATTICE))
+        return self.start.points(*lattice(LATTICE))
 
 
 class Row(NamedTuple):
@@ -163,7 +164,7 @@ def _left_out(table: ShapeTable, i: int) -> Case:
         assert shape.displacement is not None
         return shape.displacement
 
-    return Case(_label(values), table.fruit(values), truth, lambda method, s: table.left_out(i, s, method, LATTICE))
+    return Case(_label(values), table.fresh(values), truth, lambda method, s: table.left_out(i, s, method, LATTICE))
 
 
 def _held_out(table: ShapeTable, result: xr.Dataset, job: Job) -> Case:
@@ -182,7 +183,7 @@ def _held_out(table: ShapeTable, result: xr.Dataset, job: Job) -> Case:
         assert shape.displacement is not None
         return shape.displacement
 
-    return Case(_label(values), table.fruit(values), truth, found)
+    return Case(_label(values), table.fresh(values), truth, found)
 
 
 def _runs(store: Store, table: ShapeTable, held: Path) -> Iterator[tuple[xr.Dataset, Job]]:

@@ -24,7 +24,7 @@ from store.errors import CorruptShard, StoreError
 from store.ledger import Job, JobSpec
 from store.store import Store
 
-from .dried import dried
+from . import tabled
 from .errors import SweepError, describe
 
 __all__ = ["GRACE", "Hold", "Outcome", "Task", "beat", "quarantine_path", "stop_mark", "work"]
@@ -145,7 +145,7 @@ def _solver(job: JobSpec) -> Solver:
 
 def _solve(task: Task, heart: _Heart, store: Store) -> xr.Dataset:
     solver = _solver(task.job)
-    context = Context(observe=heart.note, cancelled=heart.lost.is_set, library=store.find, dried=dried)
+    context = Context(observe=heart.note, cancelled=heart.lost.is_set, library=store.find, shapes=tabled.shape)
     return solver.solve(solver.parse(task.job.params), Need.parse(task.job.need), context)
 
 

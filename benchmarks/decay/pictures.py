@@ -21,7 +21,6 @@ from scipy import ndimage
 
 from solver.contract import Need
 from solver.decay import SOLVER, DecayParams
-from sweeps.pictures.colours import layered
 from sweeps.pictures.render import View, render
 from sweeps.pictures.sheet import Panel, sheet
 
@@ -42,7 +41,8 @@ def solved(plan: dict[str, Any]) -> list[tuple[DecayParams, xr.Dataset]]:
 def painted(params: DecayParams, stage: xr.Dataset) -> NDArray[Any]:
     """Return the colours (n, 2 n, 3) of a stage."""
     fields = {name: stage[name].values for name in ("rot", "mould", "mould_active")}
-    skin = layered(fields, params.model_dump())
+    assert SOLVER.looks.paint is not None
+    skin = SOLVER.looks.paint(fields, params.model_dump())
     assert skin is not None
     return skin.colour
 

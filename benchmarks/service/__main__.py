@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.figures import keep
-from solver.dehydration import DehydrationParams
+from solver.dehydration import SOLVER
 from store import seal, starter, tables
 from store.store import Store
 
@@ -239,7 +239,7 @@ def swaps(root: Path, times: int, resolution: int = 48) -> dict[str, Any]:
     store = Store.open(root)
     manifest = root / "tables" / "default" / "current.json"
     first = manifest.read_bytes()
-    tables.build(store, axes=DehydrationParams.axes, resolution=resolution)
+    tables.build(store, SOLVER, resolution=resolution)
     kinds = [first, manifest.read_bytes()]
     digests = [json.loads(text)["digest"] for text in kinds]
     done = 0
@@ -276,7 +276,7 @@ def main() -> None:
         if not (root / "tables" / "default").is_dir():
             store = Store.open(root, create=True)
             fill(store)
-            tables.build(store, axes=DehydrationParams.axes)
+            tables.build(store, SOLVER)
         if "start" in parts:
             found["start"] = row = start(root)
             print(f"first answer after {row['first_answer_s']:.2f} s, {row['of_it_processor_s']:.2f} s of processor")

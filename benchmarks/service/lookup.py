@@ -20,12 +20,12 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.figures import keep
-from solver.contract import Need, finish
-from solver.dehydration import SOLVER, DehydrationParams
+from solver import registry
+from solver.contract import Need, Params, finish
+from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
 from store import tables
 from store.blending import methods
-from store.keys import key
 from store.ledger import JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
@@ -37,33 +37,39 @@ QUERY = {"te": 0.0317, "gamma": 23.0}
 STAGE = 0.17
 
 
-def smooth(rng: np.random.Generator) -> np.ndarray:
+def smooth(rng: np.random.Generator, stages: int, band: int) -> np.ndarray:
     """Return (stage, n, 2n, 3) random fields whose spectra fall like wrinkles' do, steeply beyond wave 40."""
-    k = np.arange(BAND + 1)
+    k = np.arange(band + 1)
     decay = np.exp(-((np.hypot(k[:, None], k) / 40) ** 2))[..., None] * 1e-3
-    shape = (len(STAGES), BAND + 1, BAND + 1, 3)
+    shape = (stages, band + 1, band + 1, 3)
     waves = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * decay
-    return spectra.synthesize(waves, BAND).astype(np.float32)
+    return spectra.synthesize(waves, band).astype(np.float32)
+
+
+def put(store: Store, params: Params, need: Need, rng: np.random.Generator) -> None:
+    """Put a made-up result of the displacement into the store."""
+    band = need.resolution or BAND
+    coords = {
+        "stage": np.array(need.stages),
+        "colatitude": colatitudes(band),
+        "azimuth": azimuths(band),
+        "component": ["x", "y", "z"],
+    }
+    moved = smooth(rng, len(need.stages), band)
+    data = {"displacement": (("stage", "colatitude", "azimuth", "component"), moved)}
+    result = finish(xr.Dataset(data, coords), SOLVER, params, need)
+    job = JobSpec.of(SOLVER, params, need)
+    store.ledger.want([job])
+    store.ledger.done(store.ledger.claim("benchmark", 60.0, [job.key]), store.put(job.key, result), 0.0)
 
 
 def fill(store: Store) -> None:
+    """Put 30 made-up results into the store."""
     rng = np.random.default_rng(0)
     need = SOLVER.settle(Need(fields=("displacement",), stages=STAGES, resolution=BAND))
-    coords = {
-        "stage": np.array(STAGES),
-        "colatitude": colatitudes(BAND),
-        "azimuth": azimuths(BAND),
-        "component": ["x", "y", "z"],
-    }
     for te in np.linspace(0.02, 0.06, 5):
         for gamma in np.linspace(10, 60, 6):
-            params = SOLVER.parse({"te": te, "gamma": gamma})
-            data = {"displacement": (("stage", "colatitude", "azimuth", "component"), smooth(rng))}
-            result = finish(xr.Dataset(data, coords), SOLVER, params, need)
-            name = key(SOLVER.name, SOLVER.version, params, need)
-            asked = params.model_dump(mode="json"), need.model_dump(mode="json")
-            store.ledger.want([JobSpec(name, SOLVER.name, SOLVER.version, *asked)])
-            store.ledger.done(store.ledger.claim("benchmark", 60.0, [name]), store.put(name, result), 0.0)
+            put(store, SOLVER.parse({"te": te, "gamma": gamma}), need, rng)
 
 
 def median(call: Callable[[], Any], seconds: float = 1.0) -> float:
@@ -88,10 +94,10 @@ def main() -> None:
         store = Store.open(directory, create=True)
         fill(store)
         start = time.perf_counter()
-        built = tables.build(store, axes=DehydrationParams.axes)
+        built = tables.build(store, SOLVER)
         print(f"build: {built.samples} samples in {time.perf_counter() - start:.2f} s")
         start = time.perf_counter()
-        table = ShapeTable.open(store)
+        table = ShapeTable.open(store, surfaces=registry.surface)
         print(f"open and verify: {(time.perf_counter() - start) * 1e3:.1f} ms")
         rows = []
         for n in (32, 64, 96, 128, 256, 512):

@@ -18,7 +18,9 @@ from starlette.responses import Response, StreamingResponse
 from store.jobs import Job
 
 from .. import problems
+from ..clients import client_of
 from ..errors import TooManyListeners
+from ..settings import Settings
 from .routes import JobId, stored_job
 from .views import ENDED, view
 
@@ -68,20 +70,27 @@ async def events(
     job: Job = await look()
     if job.state in ENDED and last_event_id == _id(job):
         return Response(status_code=204)  # tells a browser not to come back
-    state = request.app.state
-    if state.listeners >= state.settings.max_listeners:
-        raise TooManyListeners(
-            f"{state.listeners} streams of events are open already.", advice="Ask GET /v1/jobs/{id} now and then."
-        )
+    client, listeners = client_of(request.scope), request.app.state.listeners
+    settings: Settings = request.app.state.settings
+    for count, most, whose in (
+        (listeners.total(), settings.max_listeners, ""),
+        (listeners[client], settings.max_listeners_per_client, " of yours"),
+    ):
+        if count >= most:
+            raise TooManyListeners(
+                f"{count} streams of events{whose} are open already.", advice="Ask GET /v1/jobs/{id} now and then."
+            )
 
     async def stream() -> AsyncIterator[bytes]:
-        state.listeners += 1
+        listeners[client] += 1
         try:
             yield f"retry: {_RETRY}\n\n".encode()
             async for text in _follow(job, look, last_event_id):
                 yield text.encode()
         finally:
-            state.listeners -= 1
+            listeners[client] -= 1
+            if not listeners[client]:
+                del listeners[client]
 
     headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
     return StreamingResponse(stream(), headers=headers, media_type="text/event-stream")

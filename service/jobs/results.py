@@ -12,10 +12,12 @@ from starlette.responses import FileResponse, Response
 
 from solver import registry
 from solver.contract import Params, Solver, SolverError
+from solver.lattice import lattice
 from store import seal
 from store.errors import CorruptShard, UnknownJob
 from store.jobs import Job
 from store.store import Store
+from sweeps.pictures import colours
 
 from .. import problems, vocabulary
 from ..errors import InvalidQuery, JobFailed, NotAcceptable, NotDone, Wrong
@@ -131,7 +133,7 @@ def result(
 
 def _is_scene(run: xr.Dataset, asked: dict[str, Any]) -> bool:
     """Return whether a stage as glb or obj is more than the bare lattice: a mesh, colours, another scale."""
-    return bool(asked) or "mesh_position" in run or bool({"rot", "mould"} & set(run.data_vars))
+    return bool(asked) or "mesh_position" in run or bool(set(colours.looks(run).layers) & set(run.data_vars))
 
 
 def _is_surface(run: xr.Dataset, job: Job) -> bool:
@@ -242,11 +244,9 @@ def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
     if abs(stages[near] - wanted) > 1e-9 * max(1.0, abs(wanted)):
         advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
         raise InvalidQuery.of([Wrong("stage", f"the result has no stage {wanted:g}", advice)])
-    if _is_surface(run, job) and "position" not in run and hasattr(params, "surface"):
-        from solver.fruit import lattice
-
-        fresh = params.surface(*lattice(run.sizes["colatitude"]))
-        run["position"] = run["displacement"] + fresh.astype(run["displacement"].dtype)
+    if _is_surface(run, job) and "position" not in run and (fresh := solver.fresh(job.params)) is not None:
+        start = fresh.points(*lattice(run.sizes["colatitude"]))
+        run["position"] = run["displacement"] + start.astype(run["displacement"].dtype)
     if not _is_surface(run, job) or "position" not in run:
         advice = f"Ask for {NETCDF}; a job whose need has the field 'position' and no region is a shape."
         raise NotAcceptable("this result is not a whole surface.", advice=advice)

@@ -53,9 +53,13 @@ class JobRunner:
         """Begin to work."""
         self._thread.start()
 
-    def stop(self) -> None:
-        """Stop working and wait for it; running jobs go back into the queue."""
+    def halt(self) -> None:
+        """Stop working; running jobs go back into the queue."""
         self._stop.set()
+
+    def stop(self) -> None:
+        """Stop working and wait for it."""
+        self.halt()
         self._thread.join()
 
     def _run(self) -> None:

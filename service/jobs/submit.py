@@ -63,7 +63,7 @@ def submit(
     """
     settings: Settings = state.settings
     check_own(settings.store)
-    values, settled = solver.parse(params, preset), solver.settle(need)
+    values, settled = solver.parse(params, preset), solver.settle(need, preset)
     if not unlimited:
         _weigh(solver, values, settled, settings)
     store: Store = state.tables.store

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.quantities import QUANTITIES
 from sweeps.errors import installing
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from .view import Sequence
 
 __all__ = ["exr", "png"]
-
-#: Fields that run from 0 to 1 by their meaning.
-_SHARES = frozenset({"rot", "mould", "mould_active", "nutrient", "substrate"})
 
 
 def _fields(sequence: Sequence, format: str) -> dict[str, np.ndarray]:
@@ -65,7 +63,8 @@ def png(sequence: Sequence, options: Options) -> bytes:
     if name not in fields:
         raise InvalidQuery.of([Wrong("map", f"there is no field {name[:40]!r}", f"Fields: {', '.join(fields)}.")])
     values = baked(fields[name], options.size)
-    low, high = (0.0, 1.0) if name in _SHARES else (float(fields[name].min()), float(fields[name].max()))
+    known = QUANTITIES.get(name)
+    low, high = (0.0, 1.0) if known and known.share else (float(fields[name].min()), float(fields[name].max()))
     low, high = (low if options.low is None else options.low), (high if options.high is None else options.high)
     if high == low and options.low is None and options.high is None:
         high = low + 1  # a field that is the same everywhere is all black

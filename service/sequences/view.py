@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Singles, Words32
-from solver.fruit import lattice as angles
+from solver.lattice import lattice as angles
 from store.surfaces import spectra
 from sweeps.pictures import colours
 
@@ -72,7 +72,7 @@ class Seam(NamedTuple):
 class Sequence:
     """Stages of a result, made one at a time. `kept`: all have the same triangles.
 
-    colour: `auto` (layers of skin, rot and mould where the result has them), `none`, or a field's name.
+    colour: `auto` (the solver's own looks where the result has fields for them), `none`, or a field's name.
     unit: metres per unit of length, 0 where nobody knows. observe: told the share that is done.
     """
 
@@ -115,7 +115,8 @@ class Sequence:
     @cached_property
     def params(self) -> Mapping[str, Any]:
         """The solver's parameters."""
-        return json.loads(self.run.attrs.get("params", "{}"))
+        found: Mapping[str, Any] = json.loads(self.run.attrs.get("params", "{}"))
+        return found
 
     @property
     def about(self) -> dict[str, Any]:
@@ -166,7 +167,7 @@ class Sequence:
         if self.colour == "none":
             return bare
         if self.colour == "auto":
-            skin = colours.layered(bare.fields, self.params)
+            skin = colours.painted(self.run, bare.fields)
             if skin is None:
                 return bare
             return bare._replace(colour=skin.colour.astype("f4"), roughness=skin.roughness.astype("f4"))
@@ -224,17 +225,19 @@ def lattice_fields(run: xr.Dataset, index: int) -> dict[str, Array]:
 
 def _positions(run: xr.Dataset, index: int) -> Array:
     if "position" in run:
-        return run["position"].values[index]
+        found: Array = run["position"].values[index]
+        return found
     from solver import registry
 
-    params: Any = registry.get(str(run.attrs["solver"])).parse(json.loads(run.attrs["params"]))
-    if "displacement" not in run and not params.keeps_shape:
+    solver, values = registry.get(str(run.attrs["solver"])), json.loads(run.attrs["params"])
+    fresh = solver.fresh(values)
+    if fresh is None or ("displacement" not in run and not solver.parse(values).keeps_shape):
         raise UnfitFormat(
             "this result holds fields of a surface that moves, and not where it is.",
             advice="Solve again with the field 'position': `wizen solve` keeps it, a plan names it under [need].",
         )
-    fresh = params.surface(*angles(run.sizes["colatitude"])).astype("f4")
-    return fresh + run["displacement"].values[index] if "displacement" in run else fresh
+    start = fresh.points(*angles(run.sizes["colatitude"])).astype("f4")
+    return start + run["displacement"].values[index] if "displacement" in run else start
 
 
 def _flat(values: Array) -> Singles:

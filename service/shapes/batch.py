@@ -73,7 +73,7 @@ def batch(request: Request, body: BatchRequest) -> Response:
     queries = _queries(entries, words)
     # of an archive, positions: the other half of it only for those who name it
     fields = ("position",) if chosen.name == "npz" and detail.fields is None else detail.of(chosen)
-    _check_fruits(table, queries, "position" in fields)
+    _check_shapes(table, queries, "position" in fields)
     options: dict[str, Any] = {} if body.method is None else {"method": body.method}
     if body.max_error is not None:
         _check_trust(table, queries, {**options, "max_error": body.max_error})
@@ -176,8 +176,8 @@ def _queries(entries: list[Mapping[str, float]], words: Words) -> list[ShapeQuer
     return queries
 
 
-def _check_fruits(table: ShapeTable, queries: list[ShapeQuery], wanted: bool) -> None:
-    """Refuse points where no fruit exists though every number is on its axis.
+def _check_shapes(table: ShapeTable, queries: list[ShapeQuery], wanted: bool) -> None:
+    """Refuse points where no shape exists though every number is on its axis.
 
     Raises:
         InvalidQuery: listing them.
@@ -186,7 +186,7 @@ def _check_fruits(table: ShapeTable, queries: list[ShapeQuery], wanted: bool) ->
     wrong: list[Wrong] = []
     for i, query in enumerate(queries if wanted else []):
         try:
-            table.fruit(query.point)
+            table.fresh(query.point)
         except SolverError as error:
             wrong += _entry(i, [Wrong("", error.message, error.advice)])
     if wrong:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from solver import registry
 from store.errors import CorruptTable, StoreError, UnknownTable
 from store.generations.generation import Judged, judged
 from store.lookup import ShapeTable
@@ -186,7 +187,7 @@ class LiveTables:
         self._known(name)
         # the stamp comes first: a swap in between is then noticed at the next look
         stamp = self._stamp(name)
-        return _Open(ShapeTable.open(self.store, name), stamp, time.monotonic())
+        return _Open(ShapeTable.open(self.store, name, surfaces=registry.surface), stamp, time.monotonic())
 
     def _look(self, name: str, entry: _Open) -> None:
         """See whether there is another generation, and open it on the side: a large one takes seconds to verify."""
@@ -202,7 +203,7 @@ class LiveTables:
 
     def _renew(self, name: str, entry: _Open, stamp: Stamp) -> None:
         try:
-            table = ShapeTable.open(self.store, name)
+            table = ShapeTable.open(self.store, name, surfaces=registry.surface)
         except (StoreError, OSError) as error:
             if entry.stamp == stamp:
                 entry.complaint = str(error)

@@ -14,13 +14,13 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from solver import __version__
-from solver.contract import Solver
+from solver.contract import Solver, SolverError
 from store.canonical import canonical
-from store.errors import TooUncertain
+from store.errors import StoreError, TooUncertain
 from store.lookup import ShapeTable
 
 from .. import problems, vocabulary
-from ..errors import OutsideRanges
+from ..errors import OutsideRanges, ServiceError
 from ..formats import FORMATS, About, Format, negotiate
 from ..settings import Settings
 from . import detail as level
@@ -37,6 +37,9 @@ router = APIRouter(tags=["shapes"])
 #: for the interpreter there.
 _QUICK = ("points", "npz", "json")
 _SMALL = 128
+
+#: Where a request keeps its question, or what is wrong with it.
+_QUESTION = "wizen.question"
 
 #: The words of the tables in use, which one application serves with one limit.
 _kept_words: WeakKeyDictionary[ShapeTable, Words] = WeakKeyDictionary()
@@ -78,7 +81,7 @@ async def at_once(request: Request, solver: str) -> Response | None:
     """
     if not request.app.state.tables.is_ready(solver, request.query_params.get("table")):
         return None  # opening a large table takes seconds
-    asked = _ask(request, solver)
+    asked = _asked(request, solver)
     if not asked.is_quick:
         return None
     async with request.app.state.turns:
@@ -104,7 +107,26 @@ class _Asked(NamedTuple):
 
 
 def _shape(request: Request, solver: str) -> Response:
-    return _settle(request, _ask(request, solver))
+    return _settle(request, _asked(request, solver))
+
+
+def _asked(request: Request, solver: str) -> _Asked:
+    """Return the question of a request, read and checked once: the way in and the handler share what came of it.
+
+    Raises:
+        ServiceError, StoreError, SolverError: it cannot be understood, or there is no table for it.
+
+    """
+    found = request.scope.get(_QUESTION)
+    if found is None:
+        try:
+            found = _ask(request, solver)
+        except (ServiceError, StoreError, SolverError) as error:
+            found = error
+        request.scope[_QUESTION] = found
+    if isinstance(found, Exception):
+        raise found
+    return found
 
 
 def _ask(request: Request, solver: str) -> _Asked:

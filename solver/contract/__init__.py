@@ -6,24 +6,33 @@ progress, cancellation and randomness, and every failure is a `SolverError` that
 
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, SolverError, Unstable
+from .looks import Label, Looks, Place, Shade, Skin
 from .need import Need, Quality, Region
 from .params import Params
 from .solver import Cost, Solver, StageAxis, finish
+from .surface import Fresh, Surface
 
 __all__ = [
     "Cancelled",
     "Context",
     "Cost",
+    "Fresh",
     "InvalidGeometry",
     "InvalidInput",
+    "Label",
+    "Looks",
     "Need",
     "NotConverged",
     "Params",
+    "Place",
     "Quality",
     "Region",
+    "Shade",
+    "Skin",
     "Solver",
     "SolverError",
     "StageAxis",
+    "Surface",
     "Unstable",
     "finish",
 ]

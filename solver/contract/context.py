@@ -24,12 +24,12 @@ class Context:
         observe: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
         library: Callable[[str], xr.Dataset | None] | None = None,
-        dried: Callable[[Mapping[str, float], float, int], np.ndarray] | None = None,
+        shapes: Callable[[str, Mapping[str, float], float, int], np.ndarray] | None = None,
     ) -> None:
         self._observe = observe
         self._cancelled = cancelled
         self._library = library
-        self._dried = dried
+        self._shapes = shapes
         self._fraction = 0.0
 
     def report(self, fraction: float, message: str = "") -> None:
@@ -48,21 +48,21 @@ class Context:
         if self._cancelled is not None and self._cancelled():
             raise Cancelled("the run was cancelled.")
 
-    def dried(self, fruit: Mapping[str, float], shrinkage: float, resolution: int) -> np.ndarray:
-        """Return the displacement (n, 2 n, 3) [r1] of a dried fruit, for runs that want its shape and no more.
+    def shape(self, solver: str, point: Mapping[str, float], stage: float, resolution: int) -> np.ndarray:
+        """Return the displacement (n, 2 n, 3) of another solver's shape, for runs that want that and no more.
 
-        fruit: by the names of the dehydration solver's axes. shrinkage: its s, the share of each length that is lost.
+        point: by the names of that solver's axes. stage: on its stage axis. Lengths are in its unit.
 
         Raises:
-            InvalidInput: nobody here knows dried shapes, or none of this fruit.
+            InvalidInput: nobody here knows shapes of that solver, or none at this point.
 
         """
-        if self._dried is None:
+        if self._shapes is None:
             raise InvalidInput(
-                "the shape comes from a table of dried fruits, and there is none here.",
-                advice="Run it by `wizen solve`, by a sweep or as a job, or give Context(dried=sweeps.dried.dried).",
+                f"the shape comes from a table of {solver}, and there is none here.",
+                advice="Run it by `wizen solve`, by a sweep or as a job, or give Context(shapes=sweeps.tabled.shape).",
             )
-        return self._dried(fruit, shrinkage, resolution)
+        return self._shapes(solver, point, stage, resolution)
 
     def result(self, key: str) -> xr.Dataset:
         """Return an earlier result by its key, for runs that start from one.

@@ -65,6 +65,11 @@ class Params(BaseModel):
             kind = InvalidGeometry if whole_only else InvalidInput
             raise kind(f"{say(error, known)}.") from None
 
+    @property
+    def keeps_shape(self) -> bool:
+        """Whether a run leaves the surface where it is fresh, so that a result without a position has that one."""
+        return False
+
     def axis(self, name: str) -> float:
         """Return the scalar behind an axis name, e.g. `axis("te")`."""
         field, index = self.axes[name]

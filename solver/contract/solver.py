@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,8 +12,10 @@ import numpy as np
 from .. import quantities
 from .context import Context
 from .errors import InvalidInput, Unstable
+from .looks import Looks
 from .need import Need, Quality
 from .params import Params
+from .surface import Fresh, Surface
 from .words import named
 
 if TYPE_CHECKING:
@@ -46,6 +48,11 @@ class Solver:
 
     `version` changes whenever the numbers change, so that stored results of the old numbers are not reused.
     `run` is called with a settled need only.
+
+    The rest is what the floors above want to know of it: `surface`, where the fresh shape is parametric, so that
+    tables of shapes can be built; `looks`, its colours and labels; `preset_stages`, the stages worth a look of those
+    presets that the default ones do not suit; `onset(params, method=, kappa_ratio=, quality=, context=)`, where it
+    can say at which stage its shape begins to lose its symmetry.
     """
 
     name: str
@@ -60,6 +67,10 @@ class Solver:
     presets: Mapping[str, Mapping[str, Any]]
     run: Callable[[Any, Need, Context], xr.Dataset]
     cost: Callable[[Any, Need], Cost]
+    surface: Surface | None = None
+    looks: Looks = field(default_factory=Looks)
+    preset_stages: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    onset: Callable[..., Any] | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.
@@ -81,8 +92,28 @@ class Solver:
         # a whole field given by hand replaces the preset's; a scalar axis replaces one entry of it
         return self.params.parse({**base, **named(values)})
 
-    def settle(self, need: Need) -> Need:
-        """Fill in the defaults of `need` and refuse what this solver cannot give, before any work.
+    def axis_units(self) -> dict[str, str]:
+        """Return the units of the scalar axes, from the parameters' schema."""
+        extras = {field: info.json_schema_extra for field, info in self.params.model_fields.items()}
+        return {
+            axis: str(extra.get("units", "1"))
+            for axis, (field, _) in self.params.axes.items()
+            if isinstance(extra := extras[field], dict)
+        }
+
+    def fresh(self, params: Mapping[str, Any]) -> Fresh | None:
+        """Return the fresh shape that parameters, plain values by name, belong to; None where nobody knows it.
+
+        Raises:
+            InvalidGeometry: no shape has these parameters.
+
+        """
+        if self.surface is None or any(name not in params for name in self.surface.fields):
+            return None
+        return self.surface.of(params)
+
+    def settle(self, need: Need, preset: str | None = None) -> Need:
+        """Fill in the defaults of `need`, those of a preset if one is named; refuse what this solver cannot give.
 
         Raises:
             InvalidInput: unknown field, stage off the axis, a tolerance finer than the measured table.
@@ -96,7 +127,7 @@ class Solver:
                 f"{self.name} has no field {unknown[0]!r}.", advice=f"{hint}Known: {', '.join(self.fields)}."
             )
         axis = self.stages
-        stages = need.stages or axis.default
+        stages = need.stages or self.preset_stages.get(preset or "", axis.default)
         for stage in stages:
             if not axis.lowest <= stage <= axis.highest:
                 raise InvalidInput(

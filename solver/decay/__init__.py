@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
+from ..fresh import SURFACE
+from .looks import LOOKS
 from .names import ALL, DEFAULT
 from .params import DecayParams, Weather
 from .presets import PRESETS
@@ -43,4 +45,6 @@ SOLVER = Solver(
     presets=PRESETS,
     run=_run,
     cost=_cost,
+    surface=SURFACE,
+    looks=LOOKS,
 )

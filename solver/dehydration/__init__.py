@@ -6,7 +6,9 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
+from ..fresh import SURFACE
 from ..fruit import PRESETS
+from .looks import LOOKS
 from .params import DehydrationParams
 
 if TYPE_CHECKING:
@@ -74,4 +76,7 @@ SOLVER = Solver(
     presets=PRESETS,
     run=_run,
     cost=_cost,
+    surface=SURFACE,
+    looks=LOOKS,
+    onset=onset,
 )

@@ -22,6 +22,7 @@ from .remeshing.remesh import remesh
 from .settling.active import Habit
 from .settling.energy import StepEnergy, Tangent
 from .settling.equilibrium import balanced, begun
+from .settling.stage import settled
 from .shapes import start
 from .state import State
 from .tooling.placing import branched, started
@@ -116,12 +117,20 @@ class Engine:
         return True
 
     def reach(self, time: float, context: Context) -> State:
-        """Return the state at a growth time; the run itself stays at the last whole step before it.
+        """Return the state at a growth time, settled by `stage.settled`; the run stays at the last whole step before.
 
         Raises:
             NotConverged, Unstable: as `advance`. Cancelled: the observer asked to stop.
 
         """
+        found = self._reached(time, context)
+        for nearer in settled(found, self.params, self.tolerance):
+            found = nearer
+            context.check_cancelled()
+        return found
+
+    def _reached(self, time: float, context: Context) -> State:
+        """Return the state at a growth time as the way on leaves it."""
         while (self._steps + 1) * self.params.step <= time + 1e-9:
             for _ in self._step(self.params.step):
                 context.check_cancelled()
@@ -155,9 +164,9 @@ class Engine:
         energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         yield
-        settled = yield from begun(energy, meshed, dt, goal, p, self._habit)
-        self._habit = settled.habit
-        point, spent = yield from balanced(energy, settled.x, settled.spent, goal, self._most, p, before.time)
+        first = yield from begun(energy, meshed, dt, goal, p, self._habit)
+        self._habit = first.habit
+        point, spent = yield from balanced(energy, first.x, first.spent, goal, self._most, p, before.time)
         forces = point.gradient / state.length
         drift = (point.x - state.x) / dt if dt else None
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)

@@ -17,6 +17,7 @@ from .engine import Engine
 from .params import GrowthParams
 from .settings import choose
 from .settling.energy import elastic
+from .settling.stage import force_unit
 from .state import State
 
 __all__ = ["run"]
@@ -65,10 +66,11 @@ def _row(
     state: State, params: GrowthParams, need: Need, tolerance: float, stage: float, seconds: float
 ) -> dict[str, Any]:
     material = shell.Material(params.thickness, params.poisson)
+    residual = state.forces * state.length / force_unit(state, material)
     row: dict[str, Any] = {
         "stage": stage,
-        "converged": state.forces <= tolerance,
-        "residual": state.forces,
+        "converged": residual <= tolerance,
+        "residual": residual,
         "iterations": state.iterations,
         "seconds": seconds,
     }

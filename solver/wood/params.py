@@ -96,7 +96,8 @@ class WoodParams(Params):
         30,
         ge=3,
         le=2000,
-        description="Vertices of a rod at quality default; preview has half the edges, fine twice as many",
+        description="Vertices of a rod at quality default; preview has half the edges, fine twice as many; slender "
+        "bundles of many uneven rods get no fewer than they need to bend as a beam does",
         json_schema_extra={"units": "1"},
     )
     unevenness: float = Field(

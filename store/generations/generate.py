@@ -16,7 +16,7 @@ import numpy as np
 
 from solver import quantities
 from solver.arrays import Array
-from solver.fruit import Fruit
+from solver.contract import Solver
 
 from ..blending import methods
 from ..blending.blend import Blender, powers
@@ -33,7 +33,7 @@ from .samples import Samples
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Written", "spectra_of", "write"]
+__all__ = ["Written", "axis", "spectra_of", "write"]
 
 _PAGE = 4096
 #: What a result says per stage: name -> values and attributes.
@@ -51,10 +51,9 @@ def write(
     path: Path,
     store: Store,
     samples: Samples,
-    solver: str,
+    solver: Solver,
     band: int,
     dtype: Literal["float32", "float64"],
-    units: Mapping[str, str],
 ) -> Written:
     """Write the generation of `samples` to `path`, one sample in memory at a time.
 
@@ -81,8 +80,8 @@ def write(
             total.update(block.data)
             target[i] = block
             rows.append(_rows(result))
-    small = _small(samples, rows, solver, band, units)
-    small = small.assign(_judge(map_spectra(path), samples))
+    small = _small(samples, rows, solver, band)
+    small = small.assign(_judge(map_spectra(path), samples, solver))
     content = combined(small, total.hexdigest())
     small.attrs["digest"] = content
     encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
@@ -119,12 +118,13 @@ def _rows(result: xr.Dataset) -> Rows:
     return {str(n): v.variable for n, v in result.data_vars.items() if v.dims == ("stage",) and n not in volatile}
 
 
-def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Mapping[str, str]) -> xr.Dataset:
+def _small(samples: Samples, rows: list[Rows], solver: Solver, band: int) -> xr.Dataset:
     """Return all but the spectra as a dataset."""
     import xarray as xr
 
     waves = np.arange(band + 1)
-    axes = {name: _axis(samples, name, units) for name in samples.axes}
+    units = solver.axis_units()
+    axes = {name: axis(samples, name, units) for name in samples.axes}
     common = [name for name in rows[0] if all(name in row for row in rows)]
     data = {
         name: (("sample", "stage"), np.array([row[name].values for row in rows]), dict(rows[0][name].attrs))
@@ -140,8 +140,8 @@ def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Ma
         **axes,
     }
     attrs = {
-        "title": f"look-up table of {solver}",
-        "solver": solver,
+        "title": f"look-up table of {solver.name}",
+        "solver": solver.name,
         "solver_version": samples.version,
         "params": canonical(samples.template).decode(),
         "fixed": canonical(samples.fixed).decode(),
@@ -151,7 +151,7 @@ def _small(samples: Samples, rows: list[Rows], solver: str, band: int, units: Ma
     return xr.Dataset(data, coords, attrs)
 
 
-def _judge(stored: Array, samples: Samples) -> dict[str, xr.Variable]:
+def _judge(stored: Array, samples: Samples, solver: Solver) -> dict[str, xr.Variable]:
     """Return what look-ups want to know of the spectra: power by degree, errors, likeness of neighbours."""
     import xarray as xr
 
@@ -163,12 +163,12 @@ def _judge(stored: Array, samples: Samples) -> dict[str, xr.Variable]:
             {"units": "1", "long_name": "mean square displacement by spherical-harmonic degree, in units of r1^2"},
         )
     }
-    points, fruits = samples.points(), samples.fruits()
-    if points is None or fruits is None:
+    points, shapes = samples.points(), samples.fresh(solver.surface)
+    if points is None or shapes is None:
         return found
     scattered, method = Points(points), methods.parse(methods.DEFAULT)
     blender = Blender(stored, scattered, power)
-    errors = trust.leave_one_out(blender, stored, scattered, fruits, method)
+    errors = trust.leave_one_out(blender, stored, scattered, shapes, method)
     found |= {
         f"left_out_{name}": xr.Variable(
             ("sample", "stage"),
@@ -181,7 +181,7 @@ def _judge(stored: Array, samples: Samples) -> dict[str, xr.Variable]:
         )
         for i, name in enumerate(Measures._fields)
     }
-    likeness = trust.correlations(stored, scattered, fruits)
+    likeness = trust.correlations(stored, scattered, shapes)
     about = {"units": "1", "long_name": "mean correlation of the radial wrinkles of neighbouring samples"}
     return found | {"neighbour_correlation": xr.Variable("stage", _rounded(likeness), about)}
 
@@ -192,12 +192,11 @@ def _rounded(values: Array) -> Array:
     return (np.round(values * scale) / scale).astype(np.float32)
 
 
-def _axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, Array, dict[str, str]]:
+def axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, Array, dict[str, str]]:
+    """Return an axis of samples as a variable over them."""
     field, index = samples.axes[name]
     where = field if index is None else f"{field}[{index}]"
     attrs = {"long_name": f"parameter {where}"}
-    # lengths of the fruit are in units of r1, and so without units
-    unit = units.get(name, "1" if name in Fruit.axes else "")
-    if unit:
-        attrs["units"] = unit
+    if name in units:
+        attrs["units"] = units[name]
     return "sample", np.array([values[name] for values in samples.values]), attrs

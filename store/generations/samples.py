@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.arrays import Array
-from solver.fruit import Fruit
+from solver.contract import Fresh, Surface
 
 from ..canonical import canonical
 from ..errors import EmptyTable, MixedSamples, UnknownJob
 from ..jobs import Job
 from ..store import Store
 
-__all__ = ["Axes", "Samples", "collect", "default_axes", "insert", "read_axes"]
+__all__ = [
+    "Axes",
+    "Choice",
+    "Samples",
+    "agree",
+    "collect",
+    "finished",
+    "fullest",
+    "insert",
+    "is_surface",
+    "read_axes",
+    "rest_of",
+]
 
 #: Scalar axis name -> (field of the parameters, index in it or None), as in `Params.axes`.
 Axes = Mapping[str, tuple[str, int | None]]
@@ -45,83 +57,107 @@ class Samples(NamedTuple):
         names = self.varying
         return np.array([[values[name] for name in names] for values in self.values]) if names else None
 
-    def fruits(self) -> list[Fruit] | None:
-        """Return the fruit of each sample, whose fresh shape is known; None where they are no fruits."""
-        found = []
-        for values in self.values:
-            params = insert(self.template, self.axes, values)
-            try:
-                radii, stone, te = tuple(params["radii"]), tuple(params["stone"]), params["exocarp_thickness"]
-            except KeyError:
-                return None
-            found.append(Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te))
-        return found
+    def fresh(self, surface: Surface | None) -> list[Fresh] | None:
+        """Return the fresh shape of each sample; None where it does not follow from the parameters."""
+        if surface is None or any(name not in self.template for name in surface.fields):
+            return None
+        return [surface.of(insert(self.template, self.axes, values)) for values in self.values]
 
 
-def collect(
-    store: Store,
-    solver: str,
-    axes: Axes | None,
-    plan: str | None = None,
-    quality: str | None = None,
-    version: str | None = None,
-    keys: Collection[str] | None = None,
-) -> Samples:
+class Choice(NamedTuple):
+    """Which finished runs are wanted: None takes any plan, quality, version; `keys` names them, and then all must be
+    there.
+    """
+
+    plan: str | None = None
+    quality: str | None = None
+    version: str | None = None
+    keys: Collection[str] | None = None
+
+
+def collect(store: Store, solver: str, axes: Axes, choice: Choice) -> Samples:
     """Find the results to tabulate: done, whole surfaces with a displacement.
-
-    None takes any plan, quality, version; `keys` names the results instead, and then all of them must be there.
 
     Raises:
         EmptyTable: there is none.
         MixedSamples: they differ in more than the axes.
-        UnknownJob: one of `keys` is not there.
+        UnknownJob: one of the keys is not there.
 
     """
-    jobs = _named(store, solver, keys) if keys is not None else _done(store, solver, plan)
-    if not jobs and plan is None:
-        store.ledger.rebuild(store)
-        jobs = _done(store, solver, plan)
-    jobs = [job for job in jobs if _fits(job, quality, version)]
-    if plan is None:
-        # a run that others start from is no sample of theirs
-        origins = {pattern["key"] for job in jobs if (pattern := job.params.get("pattern"))}
-        jobs = [job for job in jobs if job.key not in origins]
+    jobs = finished(store, solver, choice, is_surface)
     if not jobs:
         raise EmptyTable(
             f"there are no results of {solver} to build a table from.",
             "A table needs finished runs over the whole surface with the field 'displacement'"
-            + ("." if plan is quality is version is None else ", in the plan, quality and version asked for."),
+            + ("." if choice[:3] == (None,) * 3 else ", in the plan, quality and version asked for."),
         )
-    _refuse_mixed("version", {job.version for job in jobs}, "Build with version=, or run the sweep again.")
-    needs = [{name: value for name, value in job.need.items() if name not in _HARMLESS} for job in jobs]
-    for name in needs[0]:
-        hint = "Build with quality=" if name == "quality" else "Build from one plan with plan="
-        _refuse_mixed(name, {canonical(need.get(name)) for need in needs}, f"{hint}, or run the odd ones again.")
-    axes = dict(axes or default_axes(jobs[0].params))
+    agree(jobs)
     flat = [read_axes(job.params, axes) for job in jobs]
-    rests = [_rest(job.params, axes) for job in jobs]
+    rests = [rest_of(job.params, axes) for job in jobs]
     for name in {name for rest in rests for name in rest}:
         found = {canonical(rest.get(name)) for rest in rests}
         _refuse_mixed(name, found, f"{name} is not an axis: build one table per value, from plans of their own.")
-    # the same run may be stored for several sets of fields: the fullest will do
-    jobs_of: dict[bytes, tuple[Job, dict[str, float]]] = {}
-    for job, values in sorted(
-        zip(jobs, flat, strict=True), key=lambda pair: (-len(pair[0].need["fields"]), pair[0].key)
-    ):
-        jobs_of.setdefault(canonical(values), (job, values))
-    chosen = sorted(jobs_of.values(), key=lambda pair: pair[0].key)
+    chosen = fullest(jobs, flat)
     first = chosen[0][0]
     common = set.intersection(*(set(job.need["fields"]) for job, _ in chosen))
     constant = {name: v for name, v in chosen[0][1].items() if all(values[name] == v for _, values in chosen)}
     return Samples(
         keys=tuple(job.key for job, _ in chosen),
         values=tuple(values for _, values in chosen),
-        axes=axes,
+        axes=dict(axes),
         fixed={**constant, **rests[0]},
         template=insert(first.params, axes, {name: min(v[name] for _, v in chosen) for name in axes}),
         need={**first.need, "fields": sorted(common)},
         version=first.version,
     )
+
+
+def is_surface(job: Job) -> bool:
+    """Return whether a job's result is a whole surface with a displacement."""
+    return "displacement" in job.need["fields"] and job.need.get("region") is None
+
+
+def finished(store: Store, solver: str, choice: Choice, fits: Callable[[Job], bool] = lambda job: True) -> list[Job]:
+    """Return the finished jobs of a solver that are wanted and fit; runs that others of them start from are not.
+
+    Raises:
+        UnknownJob: one of the keys is not there.
+
+    """
+    plan, quality, version, keys = choice
+    jobs = _named(store, solver, keys) if keys is not None else _done(store, solver, plan)
+    if not jobs and plan is None:
+        store.ledger.rebuild(store.results())
+        jobs = _done(store, solver, plan)
+    jobs = [j for j in jobs if fits(j) and quality in (None, j.need["quality"]) and version in (None, j.version)]
+    if plan is None:
+        # a run that others start from is no sample of theirs
+        origins = {pattern["key"] for job in jobs if (pattern := job.params.get("pattern"))}
+        jobs = [job for job in jobs if job.key not in origins]
+    return jobs
+
+
+def agree(jobs: Sequence[Job]) -> None:
+    """Refuse jobs that differ in their version, or in what they need beside fields.
+
+    Raises:
+        MixedSamples: they do.
+
+    """
+    _refuse_mixed("version", {job.version for job in jobs}, "Build with version=, or run the sweep again.")
+    needs = [{name: value for name, value in job.need.items() if name not in _HARMLESS} for job in jobs]
+    for name in needs[0]:
+        hint = "Build with quality=" if name == "quality" else "Build from one plan with plan="
+        _refuse_mixed(name, {canonical(need.get(name)) for need in needs}, f"{hint}, or run the odd ones again.")
+
+
+def fullest(jobs: Sequence[Job], places: Sequence[dict[str, Any]]) -> list[tuple[Job, dict[str, Any]]]:
+    """Return one job per place, by key: the same run may be stored for several sets of fields, the fullest will do."""
+    found: dict[bytes, tuple[Job, dict[str, Any]]] = {}
+    pairs = zip(jobs, places, strict=True)
+    for job, place in sorted(pairs, key=lambda pair: (-len(pair[0].need["fields"]), pair[0].key)):
+        found.setdefault(canonical(place), (job, place))
+    return sorted(found.values(), key=lambda pair: pair[0].key)
 
 
 def _done(store: Store, solver: str, plan: str | None) -> list[Job]:
@@ -131,7 +167,7 @@ def _done(store: Store, solver: str, plan: str | None) -> list[Job]:
 def _named(store: Store, solver: str, keys: Collection[str]) -> list[Job]:
     missing = set(keys) - {job.key for job in _done(store, solver, None)}
     if missing:
-        store.ledger.rebuild(store)
+        store.ledger.rebuild(store.results())
         missing = set(keys) - {job.key for job in _done(store, solver, None)}
     if missing:
         raise UnknownJob(
@@ -141,31 +177,10 @@ def _named(store: Store, solver: str, keys: Collection[str]) -> list[Job]:
     return [job for job in _done(store, solver, None) if job.key in keys]
 
 
-def _fits(job: Job, quality: str | None, version: str | None) -> bool:
-    need = job.need
-    return (
-        "displacement" in need["fields"]
-        and need.get("region") is None
-        and quality in (None, need["quality"])
-        and version in (None, job.version)
-    )
-
-
 def _refuse_mixed(name: str, found: set[Any], advice: str) -> None:
     if len(found) > 1:
         shown = ", ".join(sorted(v.decode() if isinstance(v, bytes) else str(v) for v in found)[:4])
         raise MixedSamples(f"the results differ in {name}: {shown}.", advice)
-
-
-def default_axes(params: Mapping[str, Any]) -> dict[str, tuple[str, int | None]]:
-    """Return axes for parameters whose own are not known: the fruit's, and every other real number by its name."""
-    fruit = {name: place for name, place in Fruit.axes.items() if place[0] in params}
-    taken = {field for field, _ in fruit.values()} | {"seed"}
-    return fruit | {
-        name: (name, None)
-        for name, value in params.items()
-        if name not in taken and isinstance(value, int | float) and not isinstance(value, bool)
-    }
 
 
 def read_axes(params: Mapping[str, Any], axes: Axes) -> dict[str, float]:
@@ -188,7 +203,7 @@ def insert(params: Mapping[str, Any], axes: Axes, values: Mapping[str, float]) -
     return filled
 
 
-def _rest(params: Mapping[str, Any], axes: Axes) -> dict[str, Any]:
+def rest_of(params: Mapping[str, Any], axes: Axes) -> dict[str, Any]:
     """Return what no axis reaches: whole fields by name, entries of half-swept ones as field[index]."""
     swept = set(axes.values())
     rest: dict[str, Any] = {}

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from solver.arrays import Array
-from solver.fruit import Fruit, lattice
+from solver.contract import Fresh
+from solver.lattice import lattice
 
 from ..blending.blend import Blend, Blender, complex_view
 from ..blending.methods import Method
@@ -36,14 +37,14 @@ def surface_of(blend: Blend, start: Array) -> Surface:
         return Surface(start, np.moveaxis(planes, 0, -1))
 
 
-def leave_one_out(blender: Blender, stored: Array, samples: Samples, fruits: list[Fruit], method: Method) -> Array:
+def leave_one_out(blender: Blender, stored: Array, samples: Samples, shapes: list[Fresh], method: Method) -> Array:
     """Return measures (sample, stage, measure) of every sample predicted by the others.
 
     The log-linear fit behind LL is that of the whole table.
     """
     rows = []
-    for i, fruit in enumerate(fruits):
-        others, start = samples.without(i, method.weighting), fresh(fruit)
+    for i, shape in enumerate(shapes):
+        others, start = samples.without(i, method.weighting), fresh(shape)
         rows.append(
             [
                 compare(
@@ -56,20 +57,21 @@ def leave_one_out(blender: Blender, stored: Array, samples: Samples, fruits: lis
     return np.array(rows)
 
 
-def fresh(fruit: Fruit, n: int = LATTICE) -> Array:
-    """Return the fresh surface (n, 2n, 3) of a fruit."""
-    return fruit.surface(*lattice(n))
+def fresh(shape: Fresh, n: int = LATTICE) -> Array:
+    """Return a fresh surface (n, 2n, 3)."""
+    return shape.points(*lattice(n))
 
 
-def correlations(stored: Array, samples: Samples, fruits: list[Fruit]) -> Array:
+def correlations(stored: Array, samples: Samples, shapes: list[Fresh]) -> Array:
     """Return the mean correlation (stage,) of the radial wrinkles of neighbouring samples."""
     pairs = samples.adjacent()
     found = np.empty((len(pairs), stored.shape[1]))
     for j in range(stored.shape[1]):
-        seen = [surface_of(Blend(complex_view(stored[i, j])), fresh(fruit)).wrinkles for i, fruit in enumerate(fruits)]
+        seen = [surface_of(Blend(complex_view(stored[i, j])), fresh(shape)).wrinkles for i, shape in enumerate(shapes)]
         norms = [float(np.sqrt(_dot(w, w))) + 1e-12 for w in seen]
         found[:, j] = [_dot(seen[a], seen[b]) / (norms[a] * norms[b]) for a, b in pairs]
-    return found.mean(axis=0)
+    value: Array = found.mean(axis=0)
+    return value
 
 
 def _dot(a: Array, b: Array) -> float:

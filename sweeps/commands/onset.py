@@ -1,17 +1,20 @@
-"""The command that says where a fruit starts to buckle."""
+"""The command that says where a shape starts to buckle."""
 
 from __future__ import annotations
 
 import io
 import json
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InvalidOption
 from .console import emit, grid
 from .options import As_json, Preset, Quality, Set, assignments
+
+if TYPE_CHECKING:
+    from solver.contract import Fresh, Solver
 
 __all__ = ["add_to"]
 
@@ -36,6 +39,7 @@ def onset(
         float | None, typer.Option("--kappa-ratio", help="Bulk over shear modulus; incompressible if left out.")
     ] = None,
     quality: Quality = None,
+    solver: Annotated[str | None, typer.Option("--solver", help="Which solver, if several know onsets.")] = None,
     mode_out: Annotated[
         Path | None, typer.Option("--mode-out", metavar="FILE", help="The first mode, as .npz or as a picture, .png.")
     ] = None,
@@ -59,18 +63,19 @@ def onset(
     if mode_out is not None:
         _check(mode_out)
     from solver.contract import Context
-    from solver.dehydration import SOLVER, DehydrationParams, bifurcation
 
     from . import progress
 
-    params = cast(DehydrationParams, SOLVER.parse(assignments(set_), preset))
+    chosen = _solver(solver)
+    assert chosen.onset is not None
+    params = chosen.parse(assignments(set_), preset)
     asked = ("exact", "linear") if method == "both" else (method,)
     found = {}
     with progress.one_run("onset") as observe, progress.stopping() as stop:
         for each in asked:
-            found[each] = bifurcation.onset(
+            found[each] = chosen.onset(
                 params,
-                method=each,  # type: ignore[arg-type]
+                method=each,
                 kappa_ratio=kappa_ratio,
                 quality=quality or "default",
                 context=Context(observe, stop.is_set),
@@ -80,7 +85,9 @@ def onset(
     if method == "both":
         document["linear"] = found["linear"].summary()
     if mode_out is not None and first.mode is not None:
-        _write(mode_out, params, first, document, preset)
+        fresh = chosen.fresh(params.model_dump(mode="json"))
+        assert fresh is not None
+        _write(mode_out, fresh, first, document, preset)
     emit(document, as_json, lambda console: _show(console, list(found.values()), document))
 
 
@@ -93,15 +100,33 @@ def _check(path: Path) -> None:
         raise InvalidOption(f"--mode-out {path}: there is no directory {path.parent}.", "Create it first.")
 
 
-def _write(path: Path, params: Any, found: Any, document: dict[str, Any], preset: str | None) -> None:
-    """Write the mode on the fruit's lattice: as numbers, or the fresh fruit with the mode on it as a picture."""
+def _solver(name: str | None) -> Solver:
+    """Return the solver that is asked: the one named, or the only one that knows onsets.
+
+    Raises:
+        InvalidOption: it knows none, or several do and none is named.
+
+    """
+    from solver import registry
+
+    able = {each: registry.get(each) for each in registry.names() if registry.get(each).onset is not None}
+    if name is None and len(able) == 1:
+        return next(iter(able.values()))
+    if name not in able:
+        what = "several solvers know onsets" if name is None else f"--solver {name}: it knows no onset"
+        raise InvalidOption(f"{what}.", f"Say --solver and one of {', '.join(able)}.")
+    return able[name]
+
+
+def _write(path: Path, start: Fresh, found: Any, document: dict[str, Any], preset: str | None) -> None:
+    """Write the mode on the lattice: as numbers, or the fresh shape with the mode on it as a picture."""
     import numpy as np
 
-    from solver.fruit import azimuths, colatitudes, lattice
+    from solver.lattice import azimuths, colatitudes, lattice
     from store import seal
 
     resolution = min(max(96, 4 * found.degree), _FINEST)
-    fresh = params.surface(*lattice(resolution))
+    fresh = start.points(*lattice(resolution))
     heights = found.mode.on(*lattice(resolution))
     if path.suffix == ".npz":
         out = io.BytesIO()

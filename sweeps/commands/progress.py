@@ -16,15 +16,18 @@ from .console import note
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-__all__ = ["one_run", "stopping", "sweep"]
+__all__ = ["GIVEN_BACK", "one_run", "stopping", "sweep"]
+
+#: What a command says that is stopped while it runs jobs of a store.
+GIVEN_BACK = "stopping: running jobs are given back; the same command goes on from here"
 
 #: Nobody wants a bar for what takes less [s].
 _PATIENCE = 2.0
 
 
 @contextmanager
-def stopping() -> Iterator[threading.Event]:
-    """Yield an event that Ctrl-C or SIGTERM sets; a second one ends the program at once."""
+def stopping(said: str = "stopping") -> Iterator[threading.Event]:
+    """Yield an event that Ctrl-C or SIGTERM sets, saying `said`; a second one ends the program at once."""
     stop = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield stop
@@ -35,7 +38,7 @@ def stopping() -> Iterator[threading.Event]:
         stop.set()
         for each, handler in before.items():
             signal.signal(each, handler)
-        note("stopping: running jobs are given back; the same command goes on from here")
+        note(said)
 
     for number in before:
         signal.signal(number, on)

@@ -57,7 +57,7 @@ def work(
     from . import progress
 
     check_own(store)
-    with executors.choose(workers, scheduler=scheduler) as pool, progress.stopping() as stop:
+    with executors.choose(workers, scheduler=scheduler) as pool, progress.stopping(progress.GIVEN_BACK) as stop:
         note(f"working for {store} on {pool.title}")
         solved = run_queue(Store.open(store, create=True), pool, stop, 0.0 if until_empty else math.inf)
     emit({"solved": solved}, as_json, lambda console: console.print(f"{solved} solved"))

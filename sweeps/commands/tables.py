@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,13 @@ from ..errors import InvalidOption
 from . import care as cli_tools
 from .console import emit, grid
 from .options import As_json, Quality, StorePath, StoreToRead, TableName
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from store.store import Store
+
+    from ..score import Report
 
 __all__ = ["add_to"]
 
@@ -27,13 +34,16 @@ def add_to(app: typer.Typer) -> None:
 def build(
     store: StorePath,
     name: TableName = "default",
-    solver: Annotated[str, typer.Option("--solver", help="Whose results.")] = "dehydration",
+    solver: Annotated[str | None, typer.Option("--solver", help="Whose results, if not of one solver.")] = None,
     plan: Annotated[str | None, typer.Option("--plan", help="Only the results of this plan.")] = None,
     quality: Quality = None,
     resolution: Annotated[int | None, typer.Option("--resolution", help="Cut the spectra to this band.")] = None,
     as_json: As_json = False,
 ) -> None:
     """Build a table from the finished runs in a store, and make it the current one.
+
+    Runs of a solver whose fresh surface is known make a table of shapes, to be looked up. Runs of any solver make a
+    table of numbers, scalars.nc, that opens in xarray: descriptors by stage over all that varies between the runs.
 
     [bold]Examples[/bold]
 
@@ -42,23 +52,23 @@ def build(
     wizen table build --store demo --name coarse --plan fig7-right --resolution 32
     """
     from solver import registry
-    from store import tables
+    from store import scalars, tables
+    from store.generations.samples import Choice, finished, is_surface
     from store.store import Store
 
-    from ..plan import units_of
-
-    opened, chosen = Store.open(store), registry.get(solver)
-    made = tables.build(
-        opened,
-        name,
-        solver,
-        axes=chosen.params.axes,
-        units=units_of(solver),
-        plan=plan,
-        quality=quality,
-        resolution=resolution,
-    )
-    _show_table(made, tables.path_of(opened, made), as_json)
+    opened = Store.open(store)
+    chosen = registry.get(solver or _only_solver(opened, plan))
+    made = None
+    if chosen.surface is not None and finished(opened, chosen.name, Choice(plan, quality), is_surface):
+        made = tables.build(opened, chosen, name, plan=plan, quality=quality, resolution=resolution)
+    elif resolution is not None:
+        raise InvalidOption("--resolution cuts shapes, and there are none.", "Leave it out.")
+    path = scalars.build(opened, chosen, name, plan=plan, quality=quality, keys=made.keys if made else None)
+    numbers = _numbers(scalars.read(opened, name), path)
+    if made is not None:
+        _show_table(made, tables.path_of(opened, made), as_json, numbers)
+    else:
+        emit({"name": name, "scalars": numbers}, as_json, lambda console: _show_numbers(console, name, numbers))
 
 
 @table_app.command()
@@ -71,12 +81,17 @@ def info(store: StoreToRead = None, name: TableName = "default", as_json: As_jso
 
     wizen table info --store demo --name coarse --json
     """
-    from store import starter, tables
+    from store import scalars, starter, tables
     from store.store import Store
 
     opened = Store.open(store or starter.ROOT)
+    path = scalars.path_of(opened, name)
+    numbers = _numbers(scalars.read(opened, name), path) if path.is_file() else None
+    if numbers is not None and name not in opened.table_names():
+        emit({"name": name, "scalars": numbers}, as_json, lambda console: _show_numbers(console, name, numbers))
+        return
     found = tables.info(opened, name)
-    _show_table(found, tables.path_of(opened, found), as_json)
+    _show_table(found, tables.path_of(opened, found), as_json, numbers)
 
 
 @table_app.command()
@@ -108,6 +123,7 @@ def score(
 
     wizen table score --store demo --held-out other-store --methods idw,linear+LL+env --json
     """
+    from solver import registry
     from store import seal, starter
     from store.blending import methods
     from store.lookup import ShapeTable
@@ -119,7 +135,7 @@ def score(
         raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
     names = methods.NAMED if methods_ is None else [str(methods.parse(part)) for part in methods_.split(",")]
     opened = Store.open(store or starter.ROOT)
-    table = ShapeTable.open(opened, name)
+    table = ShapeTable.open(opened, name, surfaces=registry.surface)
     cases, pairs = scores.cases(opened, table, held_out)
     report = scores.score(table, cases, pairs, names, held_out is not None)
     if picture is not None:
@@ -128,24 +144,70 @@ def score(
     document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
 
     def show(console: Any) -> None:
-        kind = "held-out runs" if report.held_out else "samples, each predicted from the others"
-        console.print(f"table {name}: {len(cases)} {kind}; {len(pairs)} pairs of seeds; * default", markup=False)
-        rows = [
-            [row.method + " *" * (row.method == methods.DEFAULT), f"{row.stage:g}"]
-            + [f"{value:.3g}" for value in row.measures]
-            for row in report.rows
-        ]
-        grid(console, ["method", "s", *report.rows[0].measures._fields], rows)
-        likeness = [[f"{s:g}", f"{value:.3f}"] for s, value in report.correlation.items()]
-        grid(console, ["s", "correlation of neighbours"], likeness)
+        _show_score(console, name, report, methods.DEFAULT, registry.get(table.info.solver).stages.symbol)
         if picture is not None:
             console.print(f"drawn to {picture}", markup=False)
 
     emit(document, as_json, show)
 
 
-def _show_table(table: Any, path: Path, as_json: bool) -> None:
-    document = table.to_json() | {"path": str(path)}
+def _show_score(console: Any, name: str, report: Report, default: str, symbol: str) -> None:
+    kind = "held-out runs" if report.held_out else "samples, each predicted from the others"
+    console.print(f"table {name}: {len(report.labels)} {kind}; {report.seeds} pairs of seeds; * default", markup=False)
+    rows = [
+        [row.method + " *" * (row.method == default), f"{row.stage:g}"] + [f"{value:.3g}" for value in row.measures]
+        for row in report.rows
+    ]
+    grid(console, ["method", symbol, *report.rows[0].measures._fields], rows)
+    likeness = [[f"{s:g}", f"{value:.3f}"] for s, value in report.correlation.items()]
+    grid(console, [symbol, "correlation of neighbours"], likeness)
+
+
+def _only_solver(store: Store, plan: str | None) -> str:
+    """Return the one solver whose results a store holds.
+
+    Raises:
+        EmptyTable: there are none.
+        InvalidOption: there are several solvers'.
+
+    """
+    from store.errors import EmptyTable
+
+    found = {job.solver for job in store.ledger.jobs("done", plan)}
+    if not found and plan is None:
+        store.ledger.rebuild(store.results())
+        found = {job.solver for job in store.ledger.jobs("done", plan)}
+    if not found:
+        where = f"plan {plan!r} has" if plan else "the store holds"
+        raise EmptyTable(f"{where} no finished run to build a table from.", "Run a sweep first: wizen sweep PLAN.")
+    if len(found) > 1:
+        raise InvalidOption(f"there are results of {', '.join(sorted(found))}.", "Say whose: --solver NAME.")
+    return found.pop()
+
+
+def _numbers(table: xr.Dataset, path: Path) -> dict[str, Any]:
+    """Return what a table of numbers holds, as plain values."""
+    dims = {str(dim): size for dim, size in table.sizes.items()}
+    own = {str(axis): table[axis].values.tolist() for axis in dims if axis in table.coords and axis != "component"}
+    return {
+        "path": str(path),
+        "digest": table.attrs["digest"],
+        "solver": table.attrs["solver"],
+        "sizes": dims,
+        "axes": own,
+        "variables": sorted(map(str, table.data_vars)),
+    }
+
+
+def _show_numbers(console: Any, name: str, numbers: dict[str, Any]) -> None:
+    over = " x ".join(f"{dim} ({size})" for dim, size in numbers["sizes"].items())
+    console.print(f"table {name}: {len(numbers['variables'])} numbers of {numbers['solver']} over {over}", markup=False)
+    console.print(", ".join(numbers["variables"]), markup=False)
+    console.print(numbers["path"], markup=False)
+
+
+def _show_table(table: Any, path: Path, as_json: bool, numbers: dict[str, Any] | None) -> None:
+    document = table.to_json() | {"path": str(path)} | ({"scalars": numbers} if numbers else {})
 
     def show(console: Any) -> None:
         console.print(f"table {table.name}: {table.samples} samples of {table.solver}, digest {table.digest[:16]}")
@@ -154,5 +216,7 @@ def _show_table(table: Any, path: Path, as_json: bool) -> None:
         rows.append(("resolution", str(table.resolution)))
         grid(console, ("axis", "values"), rows)
         console.print(str(path), markup=False)
+        if numbers is not None:
+            _show_numbers(console, table.name, numbers)
 
     emit(document, as_json, show)

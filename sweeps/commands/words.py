@@ -69,8 +69,8 @@ def report_document(report: Report) -> dict[str, Any]:
     return asdict(report) | {"complete": report.complete}
 
 
-def show_report(console: Any, report: Report, store: Path, plan: str = "") -> None:
-    """Print what a sweep achieved, and what to do next, with `plan` where the store holds others beside it."""
+def show_report(console: Any, report: Report, store: Path, plan: Plan) -> None:
+    """Print what a sweep achieved, and what to do next: a table of its shapes, where they are ones to interpolate."""
     for failure in report.failed:
         error = failure.error
         console.print(f"failed {failure.key[:12]}: {error.get('message')} {error.get('advice', '')}", markup=False)
@@ -85,6 +85,8 @@ def show_report(console: Any, report: Report, store: Path, plan: str = "") -> No
         if count
     ]
     console.print(f"{report.plan}: {', '.join(parts)} of {report.total}, in {report.seconds:.1f} s")
-    if report.complete:
-        only = f" --plan {plan}" if plan else ""
+    if report.complete and "displacement" in plan.need.fields:
+        only = f" --plan {plan.name}" if plan.controls else ""
         console.print(f"next: wizen table build --store {store}{only}", markup=False)
+    elif report.solved or report.reused:
+        console.print(f"next: wizen results --store {store} --solver {plan.solver.name}", markup=False)

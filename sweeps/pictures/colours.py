@@ -1,4 +1,4 @@
-"""What a surface looks like besides its shape: fresh skin, rot and mould as layers of colour (Kider et al., 3.5).
+"""What a surface looks like besides its shape: fields as colours, by the looks of the solver that made them.
 
 The one place where fields become colours: pictures, vertex colours and textures all ask here.
 """
@@ -7,69 +7,37 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver import registry
 from solver.arrays import Array, Bytes
+from solver.contract import Looks, Skin
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LAYERS", "MESH_LAYERS", "Skin", "by_field", "encoded", "layered", "of_run"]
+__all__ = ["by_field", "encoded", "looks", "of_run", "painted"]
 
 
-#: Fields that make layers.
-LAYERS = ("rot", "mould", "mould_active")
-#: Fields of meshes that give them colours.
-MESH_LAYERS = ("inside",)
-
-#: Rotten flesh under the skin, and the rim of mould that still grows; linear light.
-_ROT = np.array([0.16, 0.075, 0.03])
-_RIM = np.array([0.86, 0.86, 0.82])
-#: Bark and fresh wood.
-_BARK = np.array([0.105, 0.062, 0.036])
-_WOOD = np.array([0.63, 0.43, 0.235])
-#: Roughness of waxy skin, of wet rot and of felt: chosen by eye, measured by nobody.
-_WAX, _WET, _FELT, _DRY = 0.35, 0.6, 1.0, 0.85
+def looks(run: xr.Dataset) -> Looks:
+    """Return the looks of the solver that made a result; plain ones where it is no longer here."""
+    name = str(run.attrs.get("solver", ""))
+    return registry.get(name).looks if name in registry.names() else Looks()
 
 
-class Skin(NamedTuple):
-    """Colours (..., 3), linear light, and microfacet roughness (...), both 0 to 1."""
-
-    colour: Array
-    roughness: Array
-
-
-def layered(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | None:
-    """Return the look of a surface with fields of rot or mould (...), or of wood `inside`; None if it has neither."""
-    if "inside" in fields:
-        share = np.asarray(fields["inside"], float)
-        return Skin(_over(np.broadcast_to(_BARK, (*share.shape, 3)), _WOOD, share), np.full(share.shape, _DRY))
-    known = [np.asarray(fields[name], float) for name in ("rot", "mould") if name in fields]
-    if not known or not {"skin_colour", "mould_colour"} <= set(params):
-        return None
-
-    def layer(name: str) -> Array:
-        return np.asarray(fields[name], float) if name in fields else np.zeros_like(known[0])
-
-    rot, mould, active = (layer(name) for name in LAYERS)
-    colour = np.broadcast_to(np.array(params["skin_colour"], float), (*known[0].shape, 3))
-    # rot shows long before it is complete, mould hides what is below it
-    rotten, felted = 0.9 * _smooth(rot / 0.2), 0.95 * _smooth(mould / 0.25)
-    colour = _over(colour, _ROT, rotten)
-    # what grows is white while it is thin, and takes its colour with the spores of a dense or a resting mat
-    growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1) * (1 - _smooth((mould - 0.2) / 0.3))
-    centre = np.array(params["mould_colour"], float)
-    colour = _over(colour, centre + (_RIM - centre) * growing[..., None], felted)
-    roughness = _WAX + (_WET - _WAX) * rotten
-    return Skin(colour, roughness + (_FELT - roughness) * felted)
+def painted(run: xr.Dataset, fields: Mapping[str, Array]) -> Skin | None:
+    """Return the look of a surface of `run` with these fields (...); None where they give it none."""
+    paint = looks(run).paint
+    return None if paint is None else paint(fields, json.loads(run.attrs.get("params", "{}")))
 
 
 def of_run(run: xr.Dataset, index: int) -> Array | None:
-    """Return the colours (n, 2n, 3), linear light, of one stage of a run with maps of rot or mould; else None."""
-    maps = {name: run[name][index].values for name in LAYERS if name in run and "colatitude" in run[name].dims}
-    skin = layered(maps, json.loads(run.attrs.get("params", "{}")))
+    """Return the colours (n, 2n, 3), linear light, of one stage of a run with maps that give it some; else None."""
+    layers = looks(run).layers
+    maps = {name: run[name][index].values for name in layers if name in run and "colatitude" in run[name].dims}
+    skin = painted(run, maps)
     return None if skin is None else skin.colour
 
 
@@ -87,12 +55,3 @@ def encoded(linear: Array) -> Bytes:
     x = np.clip(linear, 0, 1)
     display = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
     return (255 * display + 0.5).astype(np.uint8)
-
-
-def _over(below: Array, above: Array, cover: Array) -> Array:
-    return below + (above - below) * cover[..., None]
-
-
-def _smooth(x: Array) -> Array:
-    x = np.clip(x, 0, 1)
-    return x * x * (3 - 2 * x)

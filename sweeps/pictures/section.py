@@ -1,7 +1,7 @@
 """Results cut open: the outline of each stage in a plane, over that of the first, as a picture.
 
-Solvers here know surfaces, not flesh: nothing is known of how deep rot goes. So a cut shows the outline fresh (dashed)
-and now, the colours of the surface as a band along it, whose width means nothing, and the rigid stone of fruits.
+Solvers here know surfaces, not flesh: nothing is known of how deep a colour goes. So a cut shows the outline fresh
+(dashed) and now, the colours of the surface as a band along it, whose width means nothing, and a rigid core.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from solver import meshes
+from solver import meshes, registry
 from solver.arrays import Array
-from solver.fruit import Fruit
 
 from ..errors import InvalidOption
 from . import colours
@@ -25,7 +24,7 @@ from .shading import BACKGROUND
 __all__ = ["Plane", "cut", "picture", "plane"]
 
 
-_INK, _FLESH, _STONE = "#3a2a24", "#efe3c8", "#8a6a4c"
+_INK, _FLESH, _CORE = "#3a2a24", "#efe3c8", "#8a6a4c"
 _PLAIN = np.array([0.36, 0.10, 0.06])
 
 
@@ -92,7 +91,7 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
 
     cuts = [_section(run, i, where) for i in range(run.sizes["stage"])]
     reach = 1.15 * max(float(np.abs(segments).max(initial=1e-9)) for segments, _ in cuts)
-    stone = _stone(run, where)
+    core = _core(run, where)
     paper = tuple(BACKGROUND ** (1 / 2.2))
     width, height = 16 + pixels * len(cuts) + 16, pixels + 118
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=paper)
@@ -101,8 +100,8 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
         if "colatitude" in run.dims:  # seen whole from the centre, so the fan of triangles is the inside
             fan = np.concatenate([np.zeros((len(segments), 1, 2)), segments], axis=1)
             axes.add_collection(PolyCollection(list(fan), facecolors=_FLESH, edgecolors=_FLESH, linewidths=0.6))
-        if stone is not None:
-            axes.add_patch(Polygon(stone, closed=True, facecolor=_STONE, edgecolor="none"))
+        if core is not None:
+            axes.add_patch(Polygon(core, closed=True, facecolor=_CORE, edgecolor="none"))
         shown = colours.encoded(_PLAIN if colour is None else colour) / 255
         axes.add_collection(LineCollection(list(segments), colors=shown, linewidths=4.5, capstyle="round"))
         if i:
@@ -123,7 +122,7 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
 def _section(run: xr.Dataset, index: int, where: Plane) -> tuple[Array, Array | None]:
     if "mesh_position" in run:
         frame = meshes.frame(run, index)
-        skin = colours.layered(frame.fields, json.loads(run.attrs.get("params", "{}")))
+        skin = colours.painted(run, frame.fields)
         return cut(frame.vertices.astype(float), frame.triangles, where, None if skin is None else skin.colour)
     if "position" not in run or "colatitude" not in run.dims:
         raise InvalidOption("there is no surface to cut.", "Ask for the field 'position' and no region.")
@@ -135,15 +134,16 @@ def _section(run: xr.Dataset, index: int, where: Plane) -> tuple[Array, Array | 
     return cut(vertices, triangles, where, np.concatenate([paint.reshape(-1, 3), ends]))
 
 
-def _stone(run: xr.Dataset, where: Plane) -> Array | None:
-    """Return the outline (m, 2) of the stone in a plane; None without one."""
-    values = json.loads(run.attrs.get("params", "{}"))
-    if "colatitude" not in run.dims or not max(values.get("stone", (0, 0))) > 0:
+def _core(run: xr.Dataset, where: Plane) -> Array | None:
+    """Return the outline (m, 2) of the rigid core in a plane; None without one."""
+    name = str(run.attrs.get("solver", ""))
+    if "colatitude" not in run.dims or name not in registry.names():
         return None
-    fruit = Fruit(radii=values["radii"], stone=values["stone"], exocarp_thickness=values["exocarp_thickness"])
+    fresh = registry.get(name).fresh(json.loads(run.attrs.get("params", "{}")))
     angle = np.linspace(0, 2 * np.pi, 181)
     rays = np.cos(angle)[:, None] * where.right + np.sin(angle)[:, None] * where.up
-    return fruit.stone_distance(rays)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    distance = None if fresh is None else fresh.core(rays)
+    return None if distance is None else distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def _dashes(segments: Array) -> list[Array]:

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def checked(answer: httpx.Response, status: int, code: str) -> dict:
-    assert answer.status_code == status
+    assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     problem = answer.json()
     problems.Problem.model_validate(problem)

@@ -33,7 +33,7 @@ QUERY: dict[str, Any] = {"te": 0.03, "gamma": 7.0, "s": 0.25, "resolution": 16}
 
 
 def build(store: Store, name: str = "default", **options: Any) -> tables.TableInfo:
-    return tables.build(store, name, axes=SOLVER.params.axes, units={"te": "r1", "gamma": "1"}, **options)
+    return tables.build(store, SOLVER, name, **options)
 
 
 @contextmanager
@@ -42,11 +42,11 @@ def served(app: FastAPI) -> Iterator[httpx.Client]:
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 60
         while not server.started and time.monotonic() < deadline:
             time.sleep(0.01)
         port = server.servers[0].sockets[0].getsockname()[1]
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=20) as client:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=120) as client:
             yield client
     finally:
         server.should_exit = True

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from service.shapes import batch as module
+from solver import registry
 from store.lookup import ShapeTable
 
 from .conftest import QUERY, SHAPE, client_of
@@ -135,7 +136,7 @@ def test_shapes_that_may_be_too_far_off_are_named(client: httpx.Client) -> None:
 def test_methods(client: httpx.Client, built: Path) -> None:
     found = load(ask(client, method="idw"))
     point = {"te": 0.03, "gamma": 7.0}
-    expected = ShapeTable.open(built).at(point, 0.25, resolution=16, method="idw")
+    expected = ShapeTable.open(built, surfaces=registry.surface).at(point, 0.25, resolution=16, method="idw")
     assert np.array_equal(found["position"][0], expected.position)
     assert json.loads(str(found["about"]))["method"] == "idw"
     wrong = ask(client, method="idv")

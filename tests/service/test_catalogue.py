@@ -15,7 +15,8 @@ from solver.dehydration import SOLVER
 from store import tables
 from store.store import Store
 
-from .conftest import client_of
+from ._asking import checked
+from .conftest import client_of, served
 
 
 def test_index_links_lead_somewhere(client: httpx.Client) -> None:
@@ -110,6 +111,32 @@ def test_openapi_is_valid_and_explains_the_query(built: Path, client: httpx.Clie
 def test_openapi_needs_no_store(tmp_path: Path) -> None:
     document = create_app(Settings(store=tmp_path / "nowhere")).openapi()
     validate(document)
+
+
+def test_openapi_is_one_that_clients_are_made_from() -> None:
+    """Names that stay, a server, who needs a token, and no keyword that JSON Schema does not know."""
+    document = create_app().openapi()
+    operations = {op["operationId"]: op for each in document["paths"].values() for op in each.values()}
+    assert set(operations) == {
+        "index", "health", "tables", "table", "solvers", "solver", "shape", "batch", "jobs", "ask", "job", "cancel",
+        "events", "result", "results",
+    }  # fmt: skip
+    assert document["servers"]
+    needs = {name: operation["security"] for name, operation in operations.items()}
+    assert {name for name, need in needs.items() if need == [{"token": []}]} == {"ask", "cancel"}
+    assert needs["shape"] == [{}, {"token": []}]
+    schemas = document["components"]["schemas"]
+    thickness = schemas["JobRequest_dehydration"]["properties"]["params"]["properties"]["exocarp_thickness"]
+    assert thickness["x-units"] == "r1"
+    assert "units" not in thickness
+
+
+def test_nothing_at_an_address_is_said_without_the_openapi_page(built: Path) -> None:
+    app = create_app(Settings(store=built))
+    with served(app) as client:
+        problem = checked(client.get("/v1/table"), 404, "not-found")
+    assert "/v1/tables" in problem["advice"]
+    assert app.openapi_schema is None
 
 
 def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def test_jobs_run_on_a_dask_cluster(store: Store, log: Path) -> None:
         try:
             assert running.stderr is not None
             address = running.stderr.readline().split()[-1]
-            with httpx.Client(base_url=address, headers=bearer(store), timeout=20) as client:
+            with httpx.Client(base_url=address, headers=bearer(store), timeout=120) as client:
                 until(lambda: answers(client))
                 asked = [client.post("/v1/jobs", json=body(0.02 + 0.01 * i)) for i in range(4)]
                 assert {answer.status_code for answer in asked} == {202}
@@ -49,5 +49,5 @@ def test_jobs_run_on_a_dask_cluster(store: Store, log: Path) -> None:
                 assert "something else" in client.get(bad.headers["location"]).json()["problem"]["advice"]
         finally:
             running.send_signal(signal.SIGTERM)
-            running.communicate(timeout=60)
+            running.communicate(timeout=120)
     assert len(log.read_text().splitlines()) == 5

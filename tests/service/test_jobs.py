@@ -173,7 +173,7 @@ def test_a_killed_service_loses_no_job(store: Store, log: Path) -> None:
     """Kill -9 with ten jobs queued, some of them running; the next service finishes all ten."""
     headers = bearer(store)
     first, address = serve(store)
-    with httpx.Client(base_url=address, headers=headers, timeout=20) as client:
+    with httpx.Client(base_url=address, headers=headers, timeout=120) as client:
         until(lambda: answers(client))
         asked = [client.post("/v1/jobs", json=body(0.02 + 0.002 * i, pause=0.3)) for i in range(10)]
     assert {answer.status_code for answer in asked} == {202}
@@ -184,14 +184,14 @@ def test_a_killed_service_loses_no_job(store: Store, log: Path) -> None:
     assert 2 <= before < 10
     second, address = serve(store)
     try:
-        with httpx.Client(base_url=address, timeout=20) as client:
+        with httpx.Client(base_url=address, timeout=120) as client:
             until(lambda: answers(client))
             until(lambda: len(client.get("/v1/jobs?state=done").json()["jobs"]) == 10)
             for answer in asked:
                 assert client.get(f"{answer.headers['location']}/result").status_code == 200
     finally:
         second.send_signal(signal.SIGTERM)
-        second.communicate(timeout=30)
+        second.communicate(timeout=120)
     # the kill interrupted at most one solve per worker
     assert 10 <= len(log.read_text().splitlines()) <= 12
 
@@ -204,6 +204,22 @@ def test_two_services_run_no_job_twice(store: Store, log: Path) -> None:
         assert len({answer.json()["id"] for answer in asked}) == 3
         until(lambda: len(two.get("/v1/jobs?state=done").json()["jobs"]) == 3)
     assert len(log.read_text().splitlines()) == 3
+
+
+def test_streams_of_events_are_counted(store: Store) -> None:
+    """One too many is refused, and may come when another has ended."""
+    with client_of(store.root, jobs_workers=0, max_listeners=2) as client:
+        client.headers.update(bearer(store))
+        url = client.post("/v1/jobs", json=body()).headers["location"] + "/events"
+        with client.stream("GET", url) as one, client.stream("GET", url) as two:
+            assert {next(stream.iter_lines()) for stream in (one, two)} == {"retry: 1000"}
+            checked(client.get(url), 429, "too-many-listeners")
+
+        def free() -> bool:
+            with client.stream("GET", url) as again:
+                return again.status_code == 200
+
+        until(free)
 
 
 def test_jobs_of_stopped_sweeps_are_left_alone(store: Store, queue_only: httpx.Client) -> None:

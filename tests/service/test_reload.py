@@ -26,7 +26,7 @@ def test_no_request_is_lost_while_tables_change(own: Store) -> None:
     with client_of(own.root, reload_interval=0.02) as client:
 
         def keep_asking() -> None:
-            with httpx.Client(base_url=client.base_url, timeout=20) as mine:
+            with httpx.Client(base_url=client.base_url, timeout=120) as mine:
                 while not stop.is_set():
                     answer = mine.get(SHAPE, params={**QUERY, "format": "json"})
                     answers.append((answer.status_code, answer.json().get("digest", "")))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from solver import registry
 from solver.dehydration import SOLVER
 from solver.fruit import lattice
 from store.lookup import ShapeTable
@@ -47,7 +48,7 @@ def test_npz_is_the_closed_form(client: httpx.Client) -> None:
 
 
 def test_between_samples_it_is_the_lookup(client: httpx.Client, built: Path) -> None:
-    expected = ShapeTable.open(built).at({"te": 0.03, "gamma": 7.0}, 0.25, resolution=16)
+    expected = ShapeTable.open(built, surfaces=registry.surface).at({"te": 0.03, "gamma": 7.0}, 0.25, resolution=16)
     with np.load(io.BytesIO(ask(client, {**QUERY, "format": "npz"}).content)) as archive:
         assert np.array_equal(archive["position"], expected.position)
 

@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 from service.shapes.live import LiveTables
+from solver import registry
 from solver.contract import Need
 from solver.dehydration import SOLVER
 from solver.fruit import lattice
@@ -58,7 +59,7 @@ def queue_only(own: Store) -> Iterator[httpx.Client]:
 
 @pytest.mark.parametrize("method", ["idw", "nearest", "linear+LL"])
 def test_a_method_is_the_lookups(client: httpx.Client, built: Path, method: str) -> None:
-    expected = ShapeTable.open(built).at(POINT, 0.25, resolution=16, method=method)
+    expected = ShapeTable.open(built, surfaces=registry.surface).at(POINT, 0.25, resolution=16, method=method)
     about, found = points(ask(client, format="points", method=method).content)
     assert np.array_equal(found[: 16 * 32].reshape(16, 32, 3), expected.position)
     assert about["method"] == method
@@ -78,7 +79,7 @@ def test_a_method_is_one_however_it_is_spelt(client: httpx.Client) -> None:
 
 
 def test_every_format_says_what_error_to_expect(client: httpx.Client, built: Path) -> None:
-    expected = ShapeTable.open(built).at(POINT, 0.25, resolution=16)
+    expected = ShapeTable.open(built, surfaces=registry.surface).at(POINT, 0.25, resolution=16)
     said = ask(client, format="json").json()
     assert said["expected_error"] == pytest.approx(expected.expected_error)
     assert set(said["expected_error"]) == set(Measures._fields)
@@ -170,7 +171,7 @@ def test_the_catalogue_says_how_to_ask(client: httpx.Client, built: Path, own: S
         "known": list(methods.NAMED),
         "judged": methods.DEFAULT,
     }
-    likeness = ShapeTable.open(built).neighbour_correlation
+    likeness = ShapeTable.open(built, surfaces=registry.surface).neighbour_correlation
     assert said["stage"]["neighbour_correlation"] == pytest.approx(
         [likeness[s] for s in said["stage"]["stored"]], rel=1e-4
     )

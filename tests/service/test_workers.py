@@ -21,11 +21,11 @@ def test_several_processes_answer_alike(built: Path) -> None:
     try:
         assert running.stderr is not None
         address = running.stderr.readline().split()[-1]
-        with httpx.Client(base_url=address, timeout=20) as client:
+        with httpx.Client(base_url=address, timeout=120) as client:
             until(lambda: answers(client))
         bodies = set()
         for _ in range(40):  # each on a connection of its own, which any of them may take
-            answer = httpx.get(f"{address}{SHAPE}", params={**QUERY, "format": "npz"}, timeout=20)
+            answer = httpx.get(f"{address}{SHAPE}", params={**QUERY, "format": "npz"}, timeout=120)
             assert answer.status_code == 200
             bodies.add(answer.content)
         assert len(bodies) == 1
@@ -34,5 +34,5 @@ def test_several_processes_answer_alike(built: Path) -> None:
             assert len(children.read_text().split()) >= 2
     finally:
         running.send_signal(signal.SIGTERM)
-        running.communicate(timeout=30)
+        running.communicate(timeout=120)
     assert running.returncode == 0

@@ -142,10 +142,12 @@ def test_same_bytes_whatever_the_number_of_threads(solver):
 
 def test_an_unknown_field_is_refused_before_any_work(solver):
     params, _, dear = small(solver)
-    begun = time.perf_counter()
+
+    def working(*_: object) -> bool:
+        raise AssertionError("it began")
+
     with pytest.raises(InvalidInput, match="no field 'colour'"):
-        solver.solve(params, dear.model_copy(update={"fields": ("colour",)}))
-    assert time.perf_counter() - begun < 0.1
+        solver.solve(params, dear.model_copy(update={"fields": ("colour",)}), Context(working, working))
 
 
 def test_a_stage_off_the_axis_is_refused(solver):
@@ -169,13 +171,14 @@ def test_cancellation_is_seen_within_two_seconds_and_keeps_what_converged(solver
     def observe(fraction: float, message: str) -> None:
         assert 0 <= fraction <= 1
         if "settled" in message and not asked:
-            asked.append(time.perf_counter())
+            asked.append(time.process_time())
             stop.set()
 
     stages = need.stages[:1] + dear.stages
     with pytest.raises(Cancelled) as caught:
         solver.solve(params, need.model_copy(update={"stages": stages}), Context(observe, stop.is_set))
-    assert time.perf_counter() - asked[0] < 2
+    # its own time: what else the machine does is not the solver's doing
+    assert time.process_time() - asked[0] < 2
     assert caught.value.partial is not None
     assert caught.value.partial.stage.values.tolist() == list(need.stages[:1])
     assert caught.value.last_stage == need.stages[0]

@@ -7,7 +7,7 @@ import xarray as xr
 from scipy.special import sph_harm_y
 
 from solver.contract import finish
-from solver.dehydration import SOLVER, DehydrationParams
+from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes, directions, lattice
 from store.blending.methods.weights import Samples
 from store.store import Store
@@ -15,7 +15,6 @@ from store.surfaces import harmonics
 
 from .conftest import GAMMA, STAGES, TE, _spec, question
 
-AXES = DehydrationParams.axes
 N = 32
 
 

@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 from scipy.special import sph_harm_y
 
+from solver import registry
 from solver.contract import Need, finish
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes, directions, lattice
@@ -143,5 +144,5 @@ def rough(tmp_path_factory: pytest.TempPathFactory) -> ShapeTable:
 
     store = Store.open(tmp_path_factory.mktemp("rough"), create=True)
     wrinkled(store)
-    tables.build(store, axes=DehydrationParams.axes)
-    return ShapeTable.open(store)
+    tables.build(store, SOLVER)
+    return ShapeTable.open(store, surfaces=registry.surface)

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from solver.dehydration import DehydrationParams
+from solver.dehydration import SOLVER
 from store import seal, tables
 from store.errors import CorruptTable, UnknownJob
 from store.generations import audit, compare, truncation
@@ -16,8 +16,6 @@ from store.generations.manifest import write_manifest
 from store.store import Store
 
 from .conftest import fill
-
-AXES = DehydrationParams.axes
 
 
 def flip(path: Path, place: float) -> None:
@@ -29,7 +27,7 @@ def flip(path: Path, place: float) -> None:
 @pytest.mark.parametrize("place", [0.0, 0.3, 0.6, 1.0])
 def test_one_flipped_byte_is_found_in_each_part(store: Store, place: float) -> None:
     keys = fill(store, te=[0.03, 0.04], gamma=[10, 20])
-    table = tables.build(store, axes=AXES)
+    table = tables.build(store, SOLVER)
     assert audit.verify(store) == []
     file = tables.path_of(store, table)
     parts = {"generation": file, "result": store.shard_path(keys[2])}
@@ -87,7 +85,7 @@ def test_what_a_seal_does_not_tell(store: Store, edit: Callable[[h5py.File], Non
     from store.generations import generation
 
     fill(store, te=[0.03, 0.04, 0.05], gamma=[10, 20])
-    table = tables.build(store, axes=AXES)
+    table = tables.build(store, SOLVER)
     file = tables.path_of(store, table)
     edited(file, edit)
     assert any("other values than the manifest" in finding.message for finding in audit.verify(store))
@@ -102,7 +100,7 @@ def test_what_a_seal_does_not_tell(store: Store, edit: Callable[[h5py.File], Non
 
 def test_a_result_that_was_replaced(store: Store) -> None:
     keys = fill(store, te=[0.03, 0.04])
-    tables.build(store, axes=AXES)
+    tables.build(store, SOLVER)
     result = store.get(keys[0])
     store.shard_path(keys[0]).unlink()
     store.put(keys[0], result.assign(displacement=result["displacement"] * 1.01))
@@ -112,28 +110,28 @@ def test_a_result_that_was_replaced(store: Store) -> None:
 
 
 def test_rebuilding_keeps_the_runs_and_the_old_generation(filled: Store) -> None:
-    first = tables.build(filled, axes=AXES, units={"gamma": "1"})
+    first = tables.build(filled, SOLVER)
     fill(filled, te=[0.06], gamma=[10, 20, 30])
     old = tables.path_of(filled, first)
-    exact = tables.rebuild(filled, units={"gamma": "1"}, dtype="float64")
+    exact = tables.rebuild(filled, SOLVER, dtype="float64")
     assert (exact.keys, exact.resolution, exact.dtype) == (first.keys, 16, "float64")
-    coarse = tables.rebuild(filled, units={"gamma": "1"}, resolution=5)
+    coarse = tables.rebuild(filled, SOLVER, resolution=5)
     assert (coarse.resolution, coarse.dtype) == (5, "float64")
     assert old.is_file()
-    again = tables.rebuild(filled, units={"gamma": "1"}, resolution=99, dtype="float32")
+    again = tables.rebuild(filled, SOLVER, resolution=99, dtype="float32")
     assert again.digest == first.digest
     assert audit.verify(filled) == []
     with pytest.raises(UnknownJob, match="1 of the table's 10"):
-        tables.rebuild(filled, more=["0" * 64])
+        tables.rebuild(filled, SOLVER, more=["0" * 64])
     assert tables.info(filled) == again
 
 
 def test_what_truncation_costs(filled: Store) -> None:
-    whole = truncation.losses(filled, tables.build(filled, axes=AXES, dtype="float64"))
+    whole = truncation.losses(filled, tables.build(filled, SOLVER, dtype="float64"))
     assert max(loss.max for loss in whole) < 1e-12
-    single = truncation.losses(filled, tables.rebuild(filled, dtype="float32"))
+    single = truncation.losses(filled, tables.rebuild(filled, SOLVER, dtype="float32"))
     assert 1e-10 < single[-1].rms < 1e-7
-    cut = truncation.losses(filled, tables.rebuild(filled, resolution=5))
+    cut = truncation.losses(filled, tables.rebuild(filled, SOLVER, resolution=5))
     # the harmonic of degree 6 is what is lost, and its amplitude is linear in the stage
     assert [loss.stage for loss in cut] == [0.1, 0.2, 0.3]
     assert cut[2].rms == pytest.approx(3 * cut[0].rms, rel=1e-3)
@@ -141,17 +139,17 @@ def test_what_truncation_costs(filled: Store) -> None:
 
 
 def test_a_damaged_generation_is_rebuilt(filled: Store) -> None:
-    table = tables.build(filled, axes=AXES)
+    table = tables.build(filled, SOLVER)
     flip(tables.path_of(filled, table), 0.5)
-    assert tables.rebuild(filled).digest == table.digest
+    assert tables.rebuild(filled, SOLVER).digest == table.digest
     assert audit.verify(filled) == []
 
 
 def test_comparing(filled: Store) -> None:
-    whole = tables.build(filled, axes=AXES)
+    whole = tables.build(filled, SOLVER)
     left = tables.path_of(filled, whole)
     assert compare.compare(left, left).equal
-    cut = tables.path_of(filled, tables.rebuild(filled, resolution=5))
+    cut = tables.path_of(filled, tables.rebuild(filled, SOLVER, resolution=5))
     found = compare.compare(left, cut)
     assert not found.equal
     assert (found.common, found.only_a, found.only_b, found.fixed) == (9, (), (), {})
@@ -164,10 +162,10 @@ def test_comparing(filled: Store) -> None:
 
 
 def test_comparing_other_samples_and_settings(filled: Store, tmp_path: Path) -> None:
-    a = tables.path_of(filled, tables.build(filled, axes=AXES))
+    a = tables.path_of(filled, tables.build(filled, SOLVER))
     other = Store.open(tmp_path / "other", create=True)
     fill(other, te=[0.03, 0.06], gamma=[10.0, 20.0], seed=3)
-    b = tables.path_of(other, tables.build(other, axes=AXES))
+    b = tables.path_of(other, tables.build(other, SOLVER))
     found = compare.compare(a, b)
     assert (found.common, len(found.only_a), len(found.only_b)) == (2, 7, 2)
     assert found.fixed["seed"] == (0, 3)

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver import registry
 from solver.contract import InvalidGeometry
-from solver.dehydration import DehydrationParams
+from solver.dehydration import SOLVER
 from solver.fruit import Fruit, colatitudes, lattice
 from store import tables
 from store.errors import MissingStore, OutsideTable
@@ -21,19 +22,17 @@ from store.surfaces import spectra
 
 from .conftest import GAMMA, TE, amplitude, answer, displacement, fill, make, question, spec
 
-AXES = DehydrationParams.axes
-
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory: pytest.TempPathFactory, _filled_once: Path) -> Path:
     store = Store.open(shutil.copytree(_filled_once, tmp_path_factory.mktemp("home") / "store"))
-    tables.build(store, axes=AXES)
+    tables.build(store, SOLVER)
     return store.root
 
 
 @pytest.fixture(scope="module")
 def table(home: Path) -> ShapeTable:
-    return ShapeTable.open(home)
+    return ShapeTable.open(home, surfaces=registry.surface)
 
 
 def both(table: ShapeTable, query: dict[str, float], stage: float, **options: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -114,8 +113,8 @@ def test_linear_between_stages_and_from_the_fresh_shape(table: ShapeTable) -> No
 @pytest.mark.parametrize("stages", [(-0.2, -0.1, 0.1, 0.3), (-0.2, 0.0, 0.3), (-0.3, -0.1), (0.1, 0.3), (0.0, 0.3)])
 def test_swelling_and_drying_both_start_at_the_fresh_shape(store: Store, stages: tuple[float, ...]) -> None:
     fill(store, te=[0.03, 0.04], stages=stages)
-    tables.build(store, axes=AXES)
-    table = ShapeTable.open(store)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     low, high = min(0.0, *stages), max(0.0, *stages)
     assert (table.stages, table.reach) == (stages, (low, high))
     for stage in (*stages, low, low / 1.9, low / 2.7, 0.0, high / 3.7, high):
@@ -248,8 +247,8 @@ def test_threads_get_what_one_gets(table: ShapeTable) -> None:
 
 def test_one_sample_is_a_table(store: Store) -> None:
     fill(store, te=[0.04])
-    tables.build(store, axes=AXES)
-    table = ShapeTable.open(store)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     assert table.axes == {}
     assert table.at({}, 0.2).exact
     assert table.at({"te": 0.04}, 0.2).exact
@@ -259,8 +258,8 @@ def test_one_sample_is_a_table(store: Store) -> None:
 
 def test_double_precision(store: Store) -> None:
     fill(store, te=[0.03, 0.04])
-    tables.build(store, axes=AXES, dtype="float64", resolution=8)
-    position, _ = both(ShapeTable.open(store), {"te": 0.034}, 0.2)
+    tables.build(store, SOLVER, dtype="float64", resolution=8)
+    position, _ = both(ShapeTable.open(store, surfaces=registry.surface), {"te": 0.034}, 0.2)
     assert position.dtype == np.float64
     assert position.shape == (8, 16, 3)
 
@@ -270,8 +269,8 @@ def test_a_fruit_that_cannot_be(store: Store) -> None:
     raisin = (1.0, 0.7, 0.5, 0.45, 0.5, 0.7, 1.0, 0.45)
     fill(store, rs2=[0.3, 0.8])
     fill(store, rs2=[0.3], radii=raisin)
-    tables.build(store, axes=AXES)
-    table = ShapeTable.open(store)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     thin = {f"r{i}": raisin[i - 1] for i in range(2, 9) if f"r{i}" in table.axes}
     assert table.at({**thin, "rs2": 0.3}, 0.2).exact
     with pytest.raises(InvalidGeometry, match="stone"):
@@ -287,9 +286,9 @@ def test_a_shape_has_converged_only_where_all_that_it_is_made_of_had(store: Stor
         if te == 0.04:
             result["converged"][1] = 0
         store.ledger.want([job])
-        store.ledger.done(job.key, store.put(job.key, result), 1.0)
-    tables.build(store, axes=AXES)
-    table = ShapeTable.open(store)
+        store.ledger.done(store.ledger.claim("tester", 60, [job.key]), store.put(job.key, result), 1.0)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     # te, stage, and whether run 0.04 takes part at stage 0.2
     for te, stage, leans in [
         (0.04, 0.2, True),
@@ -309,4 +308,4 @@ def test_a_shape_has_converged_only_where_all_that_it_is_made_of_had(store: Stor
 
 def test_no_store(tmp_path: Path) -> None:
     with pytest.raises(MissingStore):
-        ShapeTable.open(tmp_path / "nowhere")
+        ShapeTable.open(tmp_path / "nowhere", surfaces=registry.surface)

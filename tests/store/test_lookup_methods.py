@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver import registry
+from solver.dehydration import SOLVER
 from solver.fruit import directions, lattice
 from store import starter, tables
 from store.blending import methods
@@ -19,7 +21,7 @@ from store.store import Store
 from store.surfaces import harmonics, spectra
 from store.surfaces.measures import Measures
 
-from ._wrinkled import AXES, N, grid, pattern, wrinkled
+from ._wrinkled import N, grid, pattern, wrinkled
 from .conftest import GAMMA, STAGES, TE, fill
 
 CORRECTED = ("linear+LL", "linear+env", "linear+LL+env", "idw+LL+env", "scattered+LL+env")
@@ -94,8 +96,8 @@ def test_smooth_stages_are_left_alone(tmp_path: Path) -> None:
     # no wrinkles before s = 0.2: nothing to correct, and nothing to divide by
     store = Store.open(tmp_path, create=True)
     wrinkled(store, onset=0.2)
-    tables.build(store, axes=AXES)
-    table = ShapeTable.open(store)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     for stage in (1e-9, 0.05, 0.1, 0.2):
         for method in CORRECTED:
             u = found(table, 0.034, 13.0, stage, method)
@@ -189,11 +191,13 @@ def test_a_poor_answer_is_refused(rough: ShapeTable) -> None:
 
 def test_neighbours_with_nothing_in_common(rough: ShapeTable, filled: Store) -> None:
     assert max(map(abs, rough.neighbour_correlation.values())) < 0.25
-    tables.build(filled, axes=AXES)
-    assert min(ShapeTable.open(filled).neighbour_correlation.values()) > 0.99
+    tables.build(filled, SOLVER)
+    assert min(ShapeTable.open(filled, surfaces=registry.surface).neighbour_correlation.values()) > 0.99
     with tables.open(filled) as opened:
         np.testing.assert_allclose(
-            opened["neighbour_correlation"], list(ShapeTable.open(filled).neighbour_correlation.values()), rtol=1e-3
+            opened["neighbour_correlation"],
+            list(ShapeTable.open(filled, surfaces=registry.surface).neighbour_correlation.values()),
+            rtol=1e-3,
         )
         assert opened["left_out_corr"].shape == (9, 3)
         assert opened["degree_power"].shape == (9, 3, 17)
@@ -212,7 +216,7 @@ def test_what_is_left_out_is_not_used(rough: ShapeTable) -> None:
 def test_a_table_without_errors_still_answers(tmp_path: Path) -> None:
     # the table in the package may be older than this; its power by degree is then read from the spectra
     store = Store.open(shutil.copytree(starter.ROOT, tmp_path / "starter"))
-    shape = ShapeTable.open(store).at({"te": 0.034, "gamma": 22.0}, 0.2)
+    shape = ShapeTable.open(store, surfaces=registry.surface).at({"te": 0.034, "gamma": 22.0}, 0.2)
     assert np.isfinite(shape.position).all()  # type: ignore[arg-type]
     with tables.open(store) as opened:
         assert ("degree_power" in opened) == (shape.expected_error is not None)
@@ -220,8 +224,8 @@ def test_a_table_without_errors_still_answers(tmp_path: Path) -> None:
 
 def test_one_axis_and_two_samples(store: Store) -> None:
     fill(store, te=[0.03, 0.04])
-    tables.build(store, axes=AXES)
-    table = ShapeTable.open(store)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     assert np.isfinite(table.at({"te": 0.035}, 0.2, max_error=10).position).all()  # type: ignore[arg-type]
     assert set(table.neighbour_correlation) == set(STAGES)
 

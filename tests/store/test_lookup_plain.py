@@ -1,5 +1,6 @@
 """The look-up against its own formulas written out plainly: a mean in double precision, fields on lattices, no kept
-products, no matrices in place of transforms.
+products, no matrices in place of transforms. Weights, fits and transforms are tested elsewhere; a twin that shares no
+code with the look-up is in test_lookup_paper.py.
 """
 
 from __future__ import annotations
@@ -52,10 +53,10 @@ def plain(table: ShapeTable, n: int) -> tuple[np.ndarray, np.ndarray]:
     envelope.take_low(shape, -low)
 
     u = spectra.synthesize(waves, n) * spectra.synthesize(wave, n) + spectra.synthesize(shape, n)
-    fruit = table.fruit(QUERY)
+    start = table.fresh(QUERY)
     ends = spectra.poles(waves) * spectra.poles(wave) + spectra.poles(shape)
-    fresh = fruit.surface(np.array([0.0, np.pi]), np.zeros(2))
-    return fruit.surface(*lattice(n)) + np.moveaxis(u, 0, -1), fresh + ends.T
+    fresh = start.points(np.array([0.0, np.pi]), np.zeros(2))
+    return start.points(*lattice(n)) + np.moveaxis(u, 0, -1), fresh + ends.T
 
 
 @pytest.mark.parametrize("n", [8, 12, 32, 64, 90])

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from solver.dehydration import DehydrationParams
+from solver.dehydration import SOLVER
 from store import tables
 from store.errors import CorruptShard, CorruptTable, CorruptTokens, MissingStore, UnknownJob, UnknownTable
 from store.lookup import ShapeTable
@@ -131,7 +131,7 @@ def test_a_table_is_the_old_one_or_the_new_one(place: Path) -> None:
     store.ledger.close()
 
     def build() -> str:
-        return tables.build(store, axes=DehydrationParams.axes).digest
+        return tables.build(store, SOLVER).digest
 
     said: list[str] = []
     _, judge = played(place.parent.parent, lambda: said.append(build()), found_table)

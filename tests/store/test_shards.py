@@ -130,7 +130,7 @@ def test_file_size_limit_leaves_nothing(tmp_path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
     process = python(WRITE, tmp_path / "a.h5", preexec_fn=limited)
-    assert process.communicate(timeout=60)[0].split() == ["ready", "storage-full"]
+    assert process.communicate(timeout=120)[0].split() == ["ready", "storage-full"]
     assert not list(tmp_path.iterdir())
 
 
@@ -146,7 +146,7 @@ def test_full_disk_leaves_nothing(tmp_path: Path) -> None:
 
     environment = {"PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin:/usr/sbin:/sbin"}
     command = [unshare, "-rm", "sh", "-c", script, WRITE]
-    result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60)
+    result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120)
     assert result.stdout.split() == ["ready", "storage-full"], result.stderr
     with pytest.raises(StorageFull, match="Free space"):
         raise StorageFull("full.", "Free space.")

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver import registry
 from store import seal, starter, tables
 from store.lookup import ShapeTable
 from store.store import Store
 
 
 def test_it_serves_shapes_at_once() -> None:
-    table = ShapeTable.open(starter.ROOT)
+    table = ShapeTable.open(starter.ROOT, surfaces=registry.surface)
     assert {axis: tuple(ends) for axis, ends in table.info.axes.items()} == {"te": (0.03, 0.04), "gamma": (10.0, 50.0)}
     shape = table.at({"te": 0.035, "gamma": 20.0}, 0.2, resolution=48, fields=("position",))
     radius = np.linalg.norm(shape.position, axis=-1)
@@ -22,7 +23,7 @@ def test_it_serves_shapes_at_once() -> None:
 
 
 def test_every_stage_of_it_is_free_of_penetration_and_inversion() -> None:
-    table = ShapeTable.open(starter.ROOT)
+    table = ShapeTable.open(starter.ROOT, surfaces=registry.surface)
     for te in (0.03, 0.035, 0.04):
         for gamma in (10.0, 17.0, 30.0, 50.0):
             for stage in table.stages:

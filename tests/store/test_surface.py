@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from solver.fresh import FreshFruit
 from solver.fruit import PRESETS, Fruit, directions, lattice
 from store.surfaces import surface
 
@@ -19,12 +20,12 @@ def fruit(name: str) -> Fruit:
 def test_fresh_surface_is_the_fruit_s(name: str, dtype: type, error: float) -> None:
     n = 20
     u = np.random.default_rng(0).standard_normal((3, n, 2 * n)).astype(dtype)
-    position = surface.add_fresh(fruit(name), u)
+    position = surface.add_fresh(FreshFruit(fruit(name)), u)
     assert position.dtype == dtype
     assert position.flags.c_contiguous
     np.testing.assert_allclose(position, fruit(name).surface(*lattice(n)) + np.moveaxis(u, 0, -1), atol=5 * error)
     truth = fruit(name).surface(np.array([0.0, np.pi]), np.zeros(2))
-    np.testing.assert_array_equal(surface.fresh_poles(fruit(name)), truth)
+    np.testing.assert_array_equal(FreshFruit(fruit(name)).poles(), truth)
 
 
 @pytest.mark.parametrize("n", [16, 17])

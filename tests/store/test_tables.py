@@ -10,22 +10,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.dehydration import DehydrationParams
+from solver import registry
+from solver.dehydration import SOLVER
 from store import tables
 from store.errors import CorruptShard, CorruptTable, EmptyTable, MixedSamples, StorageFull, UnknownTable
 from store.generations import audit
-from store.generations.samples import default_axes
 from store.lookup import ShapeTable
 from store.store import Store
 
 from .conftest import ROOT, fill, make, spec
 
-AXES = DehydrationParams.axes
-
 
 def test_a_table_explains_itself(filled: Store) -> None:
     store, keys = filled, sorted(filled.keys())
-    info = tables.build(store, axes=AXES)
+    info = tables.build(store, SOLVER)
     assert info == tables.info(store)
     assert info.axes == {"te": (0.03, 0.05), "gamma": (10.0, 30.0)}
     assert (info.fixed["rs1"], info.fixed["imperfection"], info.fixed["seed"]) == (0.4, 0.001, 0)
@@ -61,36 +59,36 @@ def test_the_digest_is_of_the_content(tmp_path: Path) -> None:
     for i, order in enumerate((1, -1)):
         store = Store.open(tmp_path / str(i), create=True)
         fill(store, te=[0.03, 0.04][::order])
-        digests.add(tables.build(store, axes=AXES).digest)
+        digests.add(tables.build(store, SOLVER).digest)
     assert len(digests) == 1
-    assert tables.build(store, axes=AXES, resolution=8).digest not in digests
-    assert tables.build(store, axes=AXES, dtype="float64").digest not in digests
+    assert tables.build(store, SOLVER, resolution=8).digest not in digests
+    assert tables.build(store, SOLVER, dtype="float64").digest not in digests
     fill(store, te=[0.06])
-    assert tables.build(store, axes=AXES).digest not in digests
+    assert tables.build(store, SOLVER).digest not in digests
 
 
 def test_rebuilt_from_shards_alone(filled: Store) -> None:
     store = filled
-    before = tables.build(store, axes=AXES)
+    before = tables.build(store, SOLVER)
     store.ledger.close()
     for path in store.root.glob("ledger*"):
         path.unlink()
     shutil.rmtree(store.tables_dir)
-    after = tables.build(Store.open(store.root), axes=AXES)
+    after = tables.build(Store.open(store.root), SOLVER)
     assert (after.digest, after.keys, after.axes) == (before.digest, before.keys, before.axes)
 
 
 def test_nothing_to_build_from(store: Store) -> None:
     with pytest.raises(EmptyTable, match="displacement"):
-        tables.build(store)
+        tables.build(store, SOLVER)
     fill(store, te=[0.04], fields=["roughness"])
     fill(store, te=[0.04], region={"colatitude": (0, 90)})
     with pytest.raises(EmptyTable):
-        tables.build(store)
+        tables.build(store, SOLVER)
     fill(store, te=[0.04])
     with pytest.raises(EmptyTable, match="quality"):
-        tables.build(store, quality="fine")
-    assert tables.build(store).samples == 1
+        tables.build(store, SOLVER, quality="fine")
+    assert tables.build(store, SOLVER).samples == 1
 
 
 @pytest.mark.parametrize(
@@ -107,7 +105,7 @@ def test_mixed_samples_are_refused(store: Store, odd: dict[str, object], word: s
     fill(store, te=[0.03])
     fill(store, te=[0.05], **odd)
     with pytest.raises(MixedSamples, match=word) as caught:
-        tables.build(store, axes=AXES)
+        tables.build(store, SOLVER)
     assert caught.value.advice
 
 
@@ -115,35 +113,27 @@ def test_plans_and_qualities_select(store: Store) -> None:
     fill(store, te=[0.03, 0.04])
     fill(store, te=[0.03, 0.05], quality="preview")
     store.ledger.want([spec(te=0.03)], plan="few")
-    assert tables.build(store, axes=AXES, quality="preview").samples == 2
-    assert tables.build(store, axes=AXES, plan="few").samples == 1
+    assert tables.build(store, SOLVER, quality="preview").samples == 2
+    assert tables.build(store, SOLVER, plan="few").samples == 1
 
 
 def test_a_run_that_others_start_from_is_no_sample(store: Store) -> None:
     (origin,) = fill(store, te=[0.035], stages=(0.1,))
     keys = fill(store, te=[0.03, 0.04], pattern={"key": origin, "stage": 0.1})
-    table = tables.build(store, axes=AXES)
+    table = tables.build(store, SOLVER)
     assert set(table.keys) == set(keys)
     assert table.fixed["pattern"] == {"key": origin, "stage": 0.1, "amplitude": 0.2}
-    assert ShapeTable.open(store).at({"te": 0.035}, 0.2).inside
+    assert ShapeTable.open(store, surfaces=registry.surface).at({"te": 0.035}, 0.2).inside
     # the same fruit without the pattern is another question
     fill(store, te=[0.03])
     with pytest.raises(MixedSamples, match="pattern"):
-        tables.build(store, axes=AXES)
+        tables.build(store, SOLVER)
 
 
 def test_the_same_run_for_other_fields_counts_once(store: Store) -> None:
     fill(store, te=[0.03, 0.04])
     fill(store, te=[0.03], fields=["displacement"])
-    assert tables.build(store, axes=AXES).samples == 2
-
-
-def test_default_axes() -> None:
-    params = DehydrationParams().model_dump(mode="json")
-    axes = default_axes(params)
-    assert axes["te"] == ("exocarp_thickness", None)
-    assert axes["modulus_ratio"] == ("modulus_ratio", None)
-    assert "seed" not in axes
+    assert tables.build(store, SOLVER).samples == 2
 
 
 def test_a_damaged_or_cut_result_is_not_left_out_silently(filled: Store) -> None:
@@ -152,30 +142,30 @@ def test_a_damaged_or_cut_result_is_not_left_out_silently(filled: Store) -> None
     path = store.shard_path(name)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(CorruptShard):
-        tables.build(store, axes=AXES)
+        tables.build(store, SOLVER)
     path.unlink()
     store.put(name, dataset.isel(stage=slice(0, 2)))
     with pytest.raises(MixedSamples, match="stages"):
-        tables.build(store, axes=AXES)
+        tables.build(store, SOLVER)
     assert store.table_names() == []
     assert not list((store.tables_dir / "default").iterdir())
 
 
 def test_a_reader_keeps_its_generation(filled: Store) -> None:
     store = filled
-    old_info = tables.build(store, axes=AXES)
-    old = ShapeTable.open(store)
+    old_info = tables.build(store, SOLVER)
+    old = ShapeTable.open(store, surfaces=registry.surface)
     before = old.at({"te": 0.035, "gamma": 20}, 0.15).position
     assert before is not None
     fill(store, te=[0.035], gamma=[20.0])
-    new_info = tables.build(store, axes=AXES)
+    new_info = tables.build(store, SOLVER)
     assert new_info.digest != old_info.digest
     assert tables.prune(store) == [tables.path_of(store, old_info)]
     assert tables.prune(store) == []
     again = old.at({"te": 0.035, "gamma": 20}, 0.15).position
     np.testing.assert_array_equal(again, before)
     assert old.digest == old_info.digest
-    new = ShapeTable.open(store)
+    new = ShapeTable.open(store, surfaces=registry.surface)
     assert (new.digest, new.size) == (new_info.digest, 10)
     assert new.at({"te": 0.035, "gamma": 20}, 0.2).exact
 
@@ -184,24 +174,24 @@ def test_a_swap_between_manifest_and_file_is_survived(store: Store, monkeypatch:
     from store import lookup
 
     fill(store, te=[0.03, 0.04])
-    stale = [tables.build(store, axes=AXES)]
+    stale = [tables.build(store, SOLVER)]
     fill(store, te=[0.05])
-    current = tables.build(store, axes=AXES)
+    current = tables.build(store, SOLVER)
     tables.prune(store)
     monkeypatch.setattr(lookup, "info", lambda store, name: stale.pop() if stale else tables.info(store, name))
-    assert ShapeTable.open(store).digest == current.digest
+    assert ShapeTable.open(store, surfaces=registry.surface).digest == current.digest
 
 
 def test_every_flipped_byte_is_found(store: Store) -> None:
     fill(store, te=[0.03, 0.04], resolution=8)
-    path = tables.path_of(store, tables.build(store, axes=AXES))
+    path = tables.path_of(store, tables.build(store, SOLVER))
     good = path.read_bytes()
     for place in [*range(0, 600, 37), *np.linspace(0, len(good) - 1, 150).astype(int)]:
         data = bytearray(good)
         data[place] ^= 4
         path.write_bytes(data)
         with pytest.raises(CorruptTable, match="Rebuild"):
-            ShapeTable.open(store)
+            ShapeTable.open(store, surfaces=registry.surface)
         assert len(audit.verify(store)) == 1
     manifest = path.with_name("current.json")
     text = manifest.read_bytes()
@@ -220,7 +210,7 @@ def test_every_flipped_byte_is_found(store: Store) -> None:
 
 def test_verify_names_what_is_missing(store: Store) -> None:
     keys = fill(store, te=[0.03, 0.04])
-    info = tables.build(store, axes=AXES)
+    info = tables.build(store, SOLVER)
     store.shard_path(keys[0]).unlink()
     (finding,) = audit.verify(store)
     assert (finding.part, finding.name) == ("result", keys[0])
@@ -228,7 +218,7 @@ def test_verify_names_what_is_missing(store: Store) -> None:
     finding, _ = audit.verify(store)
     assert "missing" in finding.message
     with pytest.raises(CorruptTable, match="missing"):
-        ShapeTable.open(store)
+        ShapeTable.open(store, surfaces=registry.surface)
 
 
 @pytest.mark.parametrize("name", ["", "..", "../shards", ".hidden", "a/b", "x" * 65, "a\n"])
@@ -241,27 +231,28 @@ def test_unknown_table(store: Store) -> None:
     with pytest.raises(UnknownTable, match="Build one"):
         tables.info(store)
     fill(store, te=[0.03])
-    tables.build(store, "plums")
+    tables.build(store, SOLVER, "plums")
     with pytest.raises(UnknownTable, match="plums"):
-        ShapeTable.open(store.root, "plum")
+        ShapeTable.open(store.root, "plum", surfaces=registry.surface)
 
 
 def test_no_space_is_refused_before_work(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     fill(store, te=[0.03])
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10, 10, 0))  # type: ignore[attr-defined]
     with pytest.raises(StorageFull, match="MB"):
-        tables.build(store)
+        tables.build(store, SOLVER)
     assert not list((store.tables_dir / "default").iterdir())
 
 
 FULL = """
 import shutil, sys
-from store import audit, tables
+from solver.dehydration import SOLVER
+from store import tables
 from store.errors import StorageFull
 from store.store import Store
 shutil.disk_usage = lambda path: shutil._ntuple_diskusage(10**9, 0, 10**9)  # others fill the disk while we write
 try:
-    tables.build(Store.open(sys.argv[1]))
+    tables.build(Store.open(sys.argv[1]), SOLVER)
 except StorageFull as error:
     print(error.code)
 """
@@ -275,5 +266,5 @@ def test_full_disk_while_writing_leaves_nothing(store: Store, tmp_path: Path) ->
     script = f'mount -t tmpfs -o size=48k none {store.tables_dir} && {sys.executable} -c "$0" {store.root}'
     script += f" && ls -A {store.tables_dir}/default"
     command = [unshare, "-rm", "sh", "-c", script, FULL]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert result.stdout.split() == ["storage-full"], result.stderr

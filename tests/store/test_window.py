@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from solver import registry
 from store.errors import OutsideTable
 from store.lookup import ShapeTable
 from store.starter import ROOT
@@ -27,7 +28,7 @@ WINDOWS = [
 
 @pytest.fixture(scope="module")
 def table() -> ShapeTable:
-    return ShapeTable.open(ROOT)
+    return ShapeTable.open(ROOT, surfaces=registry.surface)
 
 
 @pytest.mark.parametrize("part", WINDOWS)

@@ -27,7 +27,7 @@ class ShrinkingParams(Fruit):
 
     modulus_ratio: float = Field(10.0, ge=1, le=1000, description="of no consequence here")
     pause: float = Field(0.0, ge=0, description="Seconds that a stage takes")
-    trouble: str = Field("", description="What goes wrong: diverges, refuses, crashes, kills, once")
+    trouble: str = Field("", description="What goes wrong: diverges, refuses, crashes, kills, hangs, once")
 
 
 def _count(word: str) -> int:
@@ -65,6 +65,8 @@ def _trouble(params: ShrinkingParams, need: Need, context: Context, times: int) 
             raise ZeroDivisionError("a defect")
         case "kills":
             os.kill(os.getpid(), 9)
+        case "hangs":
+            time.sleep(600)  # one call, like a factorisation: nobody looks up
         case "once" if times == 1:
             raise NotConverged("not at the first try.")
         case "cancels":

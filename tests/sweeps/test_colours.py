@@ -30,7 +30,7 @@ def layered(rot: float, mould: float, active: float) -> np.ndarray:
     params = registry.get("decay").parse({}, "orange")
     maps = {"rot": rot, "mould": mould, "mould_active": active}
     fields = {name: (("stage", "colatitude", "azimuth"), np.full((1, 4, 8), value)) for name, value in maps.items()}
-    colour = colours.of_run(xr.Dataset(fields, attrs={"params": params.model_dump_json()}), 0)
+    colour = colours.of_run(xr.Dataset(fields, attrs={"solver": "decay", "params": params.model_dump_json()}), 0)
     assert colour is not None
     assert colour.shape == (4, 8, 3)
     return colour[0, 0]

@@ -16,7 +16,7 @@ from store.errors import MixedSamples
 from store.store import Store
 from sweeps import executors, refine
 from sweeps.errors import PlanError
-from sweeps.plan import Plan, units_of
+from sweeps.plan import Plan
 from sweeps.rounds import Round, held_out_error, rounds
 from sweeps.runner import run_plan
 
@@ -31,7 +31,7 @@ def made(root: Path, tables_: Mapping[str, object]) -> tuple[Store, Plan]:
     store, plan = Store.open(root, create=True), Plan.parse(tables_)
     sweep(store, plan)
     solver = plan.solver
-    tables.build(store, solver=solver.name, axes=solver.params.axes, units=units_of(solver.name))
+    tables.build(store, solver)
     return store, plan
 
 
@@ -58,7 +58,7 @@ def at_random(store: Store, plan: Plan, count: int, seed: int) -> None:
     points = [state.samples.unscale(draw.random(2)).tolist() for _ in range(count)]
     more = refine.with_samples(plan, [plan.solver.parse(dict(zip(state.table.axes, p, strict=True))) for p in points])
     sweep(store, more)
-    tables.rebuild(store, more=[job.key for job in more.jobs()])
+    tables.rebuild(store, plan.solver, more=[job.key for job in more.jobs()])
 
 
 @pytest.mark.slow

@@ -126,7 +126,7 @@ def test_a_worker_that_dies_takes_only_its_own_job(shrinking: Solves, store: Sto
 
 
 def test_cancelling_gives_jobs_back(shrinking: Solves, store: Store, write_plan: Write) -> None:
-    plan, stop = Plan.load(write_plan(more="pause = 20")), threading.Event()
+    plan, stop = Plan.load(write_plan(more="pause = 120")), threading.Event()
 
     def observe(event: Event) -> None:
         if event.kind == "progress":
@@ -136,7 +136,7 @@ def test_cancelling_gives_jobs_back(shrinking: Solves, store: Store, write_plan:
         start = time.monotonic()
         with opened as workers:
             report = run_plan(plan, store, workers, observe, stop=stop)
-        assert time.monotonic() - start < 10
+        assert time.monotonic() - start < 100
         assert report.stopped
         assert report.waiting == 6
         assert store.ledger.counts()["wanted"] == 6
@@ -146,7 +146,7 @@ def test_cancelling_gives_jobs_back(shrinking: Solves, store: Store, write_plan:
 
 
 def test_a_job_cancelled_in_the_ledger_stops(shrinking: Solves, store: Store, write_plan: Write) -> None:
-    plan = Plan.load(write_plan("[0.03]", "[10]", "pause = 20"))
+    plan = Plan.load(write_plan("[0.03]", "[10]", "pause = 120"))
 
     def observe(event: Event) -> None:
         if event.kind == "progress":
@@ -155,11 +155,11 @@ def test_a_job_cancelled_in_the_ledger_stops(shrinking: Solves, store: Store, wr
     with executors.serial() as workers:
         report = run_plan(plan, store, workers, observe)
     assert report.cancelled == 1
-    assert report.seconds < 10
+    assert report.seconds < 100
 
 
 def test_workers_that_must_not_open_the_ledger(shrinking: Solves, store: Store, write_plan: Write) -> None:
-    plan, slow, stop = Plan.load(write_plan()), Plan.load(write_plan(more="pause = 20")), threading.Event()
+    plan, slow, stop = Plan.load(write_plan()), Plan.load(write_plan(more="pause = 120")), threading.Event()
     with executors.serial() as workers:
         workers.shares_ledger = False
         assert run_plan(plan, store, workers).solved == 6

@@ -10,6 +10,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from service.cli import app
+from solver import registry
 from solver.contract import Need, finish
 from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
@@ -61,7 +62,7 @@ def held_out(root: Path, table: ShapeTable) -> Store:
 
 
 def test_held_out_runs_and_the_floor_of_another_seed(tmp_path: Path) -> None:
-    table = ShapeTable.open(starter.ROOT)
+    table = ShapeTable.open(starter.ROOT, surfaces=registry.surface)
     runs = held_out(tmp_path / "held", table)
     found, pairs = score.cases(Store.open(starter.ROOT), table, runs.root)
     assert [case.label for case in found] == ["te = 0.034, gamma = 22"]
@@ -85,7 +86,7 @@ def test_the_table_for_people() -> None:
 
 def test_what_cannot_be_scored(tmp_path: Path) -> None:
     store = Store.open(shutil.copytree(starter.ROOT, tmp_path / "store"))
-    table = ShapeTable.open(store)
+    table = ShapeTable.open(store, surfaces=registry.surface)
     empty = Store.open(tmp_path / "empty", create=True)
     with pytest.raises(InvalidOption, match="no finished run"):
         score.cases(store, table, empty.root)

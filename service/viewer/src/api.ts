@@ -1,5 +1,7 @@
 // The service in types: what it offers, what it answers, and how it says no. Knows nothing of three.js or the page.
 
+import type { Look } from "./looks";
+
 export interface Axis {
   lowest: number;
   highest: number;
@@ -26,6 +28,7 @@ export interface Solver {
   name: string;
   title: string;
   presets: Record<string, Record<string, number | number[]>>;
+  looks: Look;
   params: { properties: Record<string, { axes?: string[]; default?: unknown }> };
 }
 

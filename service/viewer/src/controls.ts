@@ -16,7 +16,7 @@ export class Slider {
     look: Look,
     changed: (value: number) => void,
   ) {
-    const word = look.words[scale.name] ?? { symbol: scale.name, name: scale.name };
+    const word = look.labels[scale.name] ?? { symbol: scale.name, name: scale.name };
     const id = `axis-${scale.name}`;
     const about = `${scale.description}${scale.units === "1" ? "" : ` [${scale.units}]`}`;
     this.range = el("input", { type: "range", id, min: "0", max: String(STEPS), step: "1", title: about });

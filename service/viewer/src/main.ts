@@ -8,7 +8,7 @@ import { button, byId, el } from "./dom";
 import { Exact } from "./exact";
 import { Fruit } from "./fruit";
 import { Latest } from "./live";
-import { lookOf } from "./looks";
+import { dressed } from "./looks";
 import { Player } from "./play";
 import { Studio } from "./scene";
 import { at, clamp, fromHash, presetsIn, scales, shareOf, toHash, type Scale } from "./state";
@@ -51,7 +51,7 @@ async function start(): Promise<void> {
 
 async function page(table: Table, all: Table[], wanted: Record<string, string>): Promise<void> {
   const solver = await askSolver(table.solver);
-  const look = lookOf(solver.name);
+  const look = dressed(solver.looks);
   const axes = scales(table);
   const stage = axes[0];
   const point: Point = {};
@@ -59,7 +59,7 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
     const given = wanted[scale.name] === undefined ? NaN : Number(wanted[scale.name]);
     point[scale.name] = Number.isFinite(given) ? clamp(scale, given) : at(scale, scale === stage ? 0.8 : 0.35);
   }
-  let skin = wanted.skin in look.skins ? wanted.skin : Object.keys(look.skins)[0];
+  let skin = wanted.skin in look.shades ? wanted.skin : Object.keys(look.shades)[0];
 
   const fruit = new Fruit();
   const studio = new Studio(canvas, fruit);
@@ -72,7 +72,7 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
 
   const display = (answer: Answer, at: Point, moving: boolean): void => {
     problem.hidden = true;
-    fruit.wear(look.skins[skin], shareOf(stage, at[stage.name]));
+    fruit.wear(look.shades[skin], shareOf(stage, at[stage.name]));
     fruit.show(answer.points, answer.n, moving);
     studio.reshaped();
     const speed = `${answer.milliseconds.toFixed(0)} ms, ${(answer.bytes / 1024).toFixed(0)} kB`;
@@ -144,21 +144,21 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
     changed();
   };
 
-  const play = button("▶ Dry", () => player.toggle(shareOf(stage, point[stage.name])), {
+  const play = button(`▶ ${look.advance}`, () => player.toggle(shareOf(stage, point[stage.name])), {
     class: "play",
-    "aria-label": "Dry",
+    "aria-label": look.advance,
   });
   const player = new Player(
     (share) => set({ [stage.name]: at(stage, share) }),
     (on) => {
-      play.textContent = on ? "❚❚ Stop" : "▶ Dry";
-      play.setAttribute("aria-label", on ? "Stop" : "Dry");
+      play.textContent = on ? "❚❚ Stop" : `▶ ${look.advance}`;
+      play.setAttribute("aria-label", on ? "Stop" : look.advance);
     },
   );
 
   const presets = presetsIn(table, solver);
   const spots: Record<string, Point> = Object.fromEntries(
-    look.places.map((place) => [place.name, { ...shares(axes, place.shares), [stage.name]: place.stage }]),
+    Object.entries(look.places).map(([name, place]) => [name, { ...shares(axes, place.shares), [stage.name]: place.stage }]),
   );
   const places = new Choice("Looks", [...Object.keys(spots), ...Object.keys(presets)], (name) => {
     player.stop();
@@ -167,18 +167,18 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
   });
   const skins = new Choice(
     "Skin",
-    Object.keys(look.skins),
+    Object.keys(look.shades),
     (name) => {
       skin = name;
       skins.mark(name);
-      fruit.wear(look.skins[skin], shareOf(stage, point[stage.name]));
+      fruit.wear(look.shades[skin], shareOf(stage, point[stage.name]));
       studio.invalidate();
       keep();
     },
     (name, made) => {
       const swatch = el("i", { class: "swatch", "aria-hidden": "true" });
-      swatch.style.setProperty("--fresh", look.skins[name].ridge[0]);
-      swatch.style.setProperty("--dry", look.skins[name].ridge[1]);
+      swatch.style.setProperty("--fresh", look.shades[name].ridge[0]);
+      swatch.style.setProperty("--dry", look.shades[name].ridge[1]);
       made.prepend(swatch);
     },
   );

@@ -1,4 +1,4 @@
-// Drying as a film: the stage runs from fresh to dry, waits there, and starts again.
+// The stage axis as a film: the stage runs from the first to the last, waits there, and starts again.
 
 const SECONDS = 7;
 const REST = 0.14; // share of the time in which it stands still at the end

@@ -86,7 +86,7 @@ export class SkinMaterial extends MeshPhysicalMaterial {
     mix(this.own.uRidge, skin.ridge);
     mix(this.own.uFurrow, skin.furrow);
     this.own.uBloom.value.set(skin.bloom);
-    this.own.uBloomAmount.value = skin.bloomAmount;
+    this.own.uBloomAmount.value = skin.bloom_amount;
     this.own.uScale.value = scale;
     this.roughness = skin.roughness[0] + (skin.roughness[1] - skin.roughness[0]) * dryness;
     this.clearcoat = skin.coat * (1 - 0.5 * dryness);

@@ -47,7 +47,7 @@ def displaced(params: DecayParams, water: float, resolution: int, context: Conte
     """
     fruit = {name: params.axis(name) for name in Fruit.axes}
     fruit["gamma"] = (params.skin or Skin()).stiffness
-    return np.asarray(context.dried(fruit, shrinkage(params, water), resolution), float)
+    return np.asarray(context.shape("dehydration", fruit, shrinkage(params, water), resolution), float)
 
 
 def at_rays(values: Floats, rays: Floats) -> Floats:

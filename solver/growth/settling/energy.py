@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import bsr_array, csc_array, diags_array
 
 from ... import shell
 from ...arrays import Floats, Ints
@@ -93,16 +94,23 @@ class StepEnergy:
         self._pressure, self._gravity, self._bending = pressure, gravity, bending
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
-        self.load: Floats | None = pressure * _area_vectors(state.x, state.mesh.triangles) if pressure else None
+        self.load: Floats | None = None
         self.free = ~state.held
         self._last: tuple[Floats, float, Floats] | None = None
         self._distance, self._looked = distance, state.x
         self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
         thirds = np.repeat(shell.areas(state.g) / 3, 3)
         self.areas = np.bincount(state.mesh.triangles.ravel(), thirds, len(state.x)).astype(np.float64)
-        if any(gravity):
-            weight = (self.areas[:, None] * np.array(gravity)).astype(np.float64)
-            self.load = weight if self.load is None else self.load + weight
+        self.follow(state.x)
+
+    def follow(self, x: Floats) -> None:
+        """Lay the pressure along the normals at x (n, 3); it is a dead load until it is laid again."""
+        self._last = None
+        if self._pressure:
+            self.load = self._pressure * _area_vectors(x, self.state.mesh.triangles)
+        if any(self._gravity):
+            weight = self.areas[:, None] * np.array(self._gravity)
+            self.load = weight if self.load is None or not self._pressure else self.load + weight
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient; the gradient of held directions is 0. What was asked last is remembered."""
@@ -166,6 +174,58 @@ class StepEnergy:
         """Whether there is an inverse."""
         return self.tangent.inverse is not None
 
+    @property
+    def curved(self) -> bool:
+        """Whether `hessian` is that of this energy: bending by mean curvature has none here."""
+        return self._mean is None
+
+    def hessian(self, x: Floats) -> csc_array:
+        """Return the second derivative (3n, 3n) of positions (n, 3); unit rows and columns where held.
+
+        Exact but for contact of the sheet with itself, which counts by its stiffness at each vertex.
+        """
+        state, pattern = self.state, self.tangent.pattern
+        mesh, lame = state.mesh, self.material.lame
+        blocks = np.zeros((pattern.blocks, 3, 3))
+        shell.membrane_hessian(x, mesh.triangles, state.g, lame, pattern.of_triangles, blocks)
+        angles = shell.angles(x, mesh.hinges)
+        shell.bending_hessian(x, mesh.hinges, angles, state.rest, self.stiffness, pattern.of_hinges, blocks)
+        self._add_obstacles(x, blocks)
+        matrix = bsr_array((blocks, pattern.indices, pattern.indptr)).tocsc()
+        free = diags_array((~state.held.ravel()).astype(float))
+        return csc_array(free @ matrix @ free + diags_array(state.held.ravel().astype(float)))
+
+    def rigid(self, x: Floats) -> Floats:
+        """Return motions (3n, k), orthonormal, that no force is felt along: turns and shifts that no held vertex stops.
+
+        None where solids or weight tell one place from another.
+        """
+        if self.solids or any(self._gravity):
+            return np.empty((x.size, 0))
+        arms = x - x.mean(axis=0)
+        turns = [np.cross(axis, arms) for axis in np.eye(3)]
+        motions = np.stack([*(np.broadcast_to(axis, x.shape) for axis in np.eye(3)), *turns]).reshape(6, -1)
+        motions = (motions / np.linalg.norm(motions, axis=1)[:, None]).T
+        stopped = motions[self.state.held.ravel()]
+        if len(stopped):
+            _, sizes, ways = np.linalg.svd(stopped, full_matrices=True)
+            size = np.zeros(6)
+            size[: len(sizes)] = sizes
+            motions = motions @ ways[size < 1e-9].T
+        return np.linalg.qr(motions)[0]
+
+    def _add_obstacles(self, x: Floats, blocks: Floats) -> None:
+        """Add the stiffness of solids, and of contact, at each vertex to the diagonal `blocks` (nnz, 3, 3)."""
+        diagonal = self.tangent.pattern.diagonal
+        for solid in self.solids:
+            depth, normal = _depth(solid, x)
+            weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
+            blocks[diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
+        if self._distance:
+            hard = _HARDNESS * self.areas / self._distance
+            t = self.state.mesh.triangles
+            shell.contact_diagonal(x, t, self._pairs, self._distance, hard, diagonal, blocks)
+
     def refactor(self, x: Floats) -> Iterator[None]:
         """Take the inverse of the positive semidefinite tangent at x, shifted; yields after pieces of the work."""
         state, tangent = self.state, self.tangent
@@ -179,14 +239,7 @@ class StepEnergy:
         shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
         shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
         blocks[pattern.diagonal] += _SHIFT * np.eye(3)
-        for solid in self.solids:
-            depth, normal = _depth(solid, x)
-            weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
-            blocks[pattern.diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
-        if self._distance:
-            hard = _HARDNESS * self.areas / self._distance
-            t = state.mesh.triangles
-            shell.contact_diagonal(x, t, self._pairs, self._distance, hard, pattern.diagonal, blocks)
+        self._add_obstacles(x, blocks)
         yield
         n = normals(x, state.mesh.triangles)
         tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, np.asarray(state.held.all(axis=1)))

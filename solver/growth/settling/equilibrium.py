@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
@@ -14,11 +14,14 @@ from ..state import State
 from .active import Habit, Settled, settle
 from .energy import StepEnergy, ahead
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
+from .newton import newton
 
 __all__ = ["balanced", "begun"]
 
 
 _WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
+#: Steps after which quasi-Newton has stalled, and Newton's method takes over: its factorisations are no small pieces.
+_STALLED = 400
 #: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
 _NUDGE, _WAVES = 0.2, (1, 2, 4)
 
@@ -52,7 +55,7 @@ def balanced(
     state, point = energy.state, Point(energy.state.x, 0.0, np.inf)
     nudges = 0 if params.imperfection else 1
     while True:
-        for nearer in _WAYS[params.solver](energy, begin):
+        for nearer in _down(energy, begin, params.solver):
             spent += nearer.x is not point.x
             point = nearer
             if point.gradient <= goal or point.stuck:
@@ -75,6 +78,24 @@ def balanced(
             residual=point.gradient / state.length,
         )
     return point, spent
+
+
+def _down(energy: StepEnergy, begin: Floats, way: str) -> Iterator[Point]:
+    """Go down the asked way; where quasi-Newton stalls, by Newton's method from there, and on if that sticks."""
+    point, steps = Point(begin, 0.0, np.inf), 0
+    for nearer in _WAYS[way](energy, begin):
+        steps += nearer.x is not point.x
+        point = nearer
+        if steps > _STALLED and way == "quasi_newton" and energy.curved:
+            break
+        yield point
+    else:
+        return
+    for nearer in newton(energy, point.x):
+        point = nearer
+        if not point.stuck:
+            yield point
+    yield from _WAYS[way](energy, point.x)
 
 
 def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:

@@ -13,7 +13,7 @@ from numba import njit
 
 from ...arrays import Floats
 
-__all__ = ["Energy", "Point", "conjugate_gradients", "lbfgs", "quasi_newton"]
+__all__ = ["Energy", "Point", "conjugate_gradients", "descend", "lbfgs", "quasi_newton"]
 
 
 _ARMIJO, _SHORTEST = 1e-4, 1e-9
@@ -55,7 +55,7 @@ class Point(NamedTuple):
     stuck: bool = False
 
 
-def _descend(
+def descend(
     energy: Energy, x: Floats, f: float, d: Floats, slope: float, t: float = 1.0
 ) -> tuple[float, float, Floats]:
     """Return (step, energy, gradient) of the first step from t down that lowers the energy; step 0 if none does.
@@ -166,7 +166,7 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
         slope = float(np.vdot(g, d))
         t = 0.0
         if slope < 0:
-            t, value, gradient = _descend(energy, x, f, d, slope)
+            t, value, gradient = descend(energy, x, f, d, slope)
         if t == 0.0:
             if preconditioned and not fresh:
                 anew = True
@@ -223,7 +223,7 @@ def conjugate_gradients(energy: Energy, x: Floats) -> Iterator[Point]:
             return
         _, ahead = energy(x + trial * d)
         bend = float(np.vdot(ahead, d)) - slope
-        t, value, gradient = _descend(
+        t, value, gradient = descend(
             energy, x, f, d, slope, min(-trial * slope / bend, 10 * trial) if bend > 0 else 2 * trial
         )
         if t == 0.0:

@@ -1,14 +1,15 @@
 """Forces of the bonds: a transverse spring and a shear term, both balanced.
 
-With d = x_i - c, c = (1 - share) y_j + share y_(j+1), e = y_(j+1) - y_j and C = e.d / (|e| |d|):
-E = k/2 (|d|/rest - 1)^2 rest + S (C - C0)^2. Sutherland 2012, Eqs. 3.11-3.23, put right: Eq. 3.15 has a wrong sign,
-3.17 squares the energy, and 3.19-3.23 hold c fixed, which loses momentum. Here nothing is 0/0 at the rest angle.
+A bond joins a vertex x to the point c of a curve through another rod's vertices (`model.curves`). With d = x - c and t
+the curve's slope by arc length at rest: E = k/2 (|d|/rest - 1)^2 rest + S (t.d/|d| - C0)^2. Sutherland 2012 has chords
+for curves, and the cosine for t.d/|d|, which is the same but for the edge's stretch (Eqs. 3.11-3.23). Put right: Eq.
+3.15 has a wrong sign, 3.17 squares the energy, and 3.19-3.23 hold c fixed, which loses momentum. Here nothing is 0/0 at
+the rest angle.
 
 The bonds of a part are rows of numbers, one lane a bond: what they read is copied to rows, the forces are computed from
-rows to rows, which is vectorised, and the rows are added up. Measured (ns of CPU per bond, 200 rods; 2000): bond after
-bond, straight to the vertices, 17.3; 18.3. `gather` 2.3; 2.9, `bind` 1.9; 3.2, adding up 1.8; 3.5; a look at energies
-3.0; 3.9 more. What did not help: one loop with gathers in it (13: it is not vectorised), forces kept by bond and added
-up vertex by vertex (1 more; 4 to 9 more), rods numbered along a curve of Hilbert's (within 5 %), fused multiplication.
+rows to rows, which is vectorised, and the rows are added up. What did not help: one loop with gathers in it (it is not
+vectorised), forces kept by bond and added up vertex by vertex, rods numbered along a curve of Hilbert's, fused
+multiplication.
 """
 
 from __future__ import annotations
@@ -18,9 +19,12 @@ from numba import njit
 
 from ..model.plan import COSINE, RATE, SHARE, SHEAR, SPRING
 
-__all__ = ["bind", "bound", "gather"]
+__all__ = ["FORCES", "READS", "bind", "bound", "gather"]
 
 _TINY = 1e-30
+#: Rows that a bond reads: its vertex, its edge's first end, the edge, p and q; and rows of its forces: on the vertex,
+#: the edge, p and q.
+READS, FORCES = 15, 12
 #: Lanes that an edge's numbers are written to at once; rows have as many to spare.
 _WIDE = 8
 
@@ -33,7 +37,7 @@ def _spread(row: np.ndarray, value: float) -> None:
 
 @njit(cache=True, error_model="numpy")
 def gather(x: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray, row: np.ndarray) -> None:
-    """Fill the rows (11, w + 8) of bonds: their vertices' places, first ends, tangents, lengths and their inverses.
+    """Fill the rows (15, w + 8) of bonds: their vertices' places, first ends, edges, p and q.
 
     vertex (w,), lane (m + 1,): as in `Plan`; edge: rows of the part's edges.
     """
@@ -42,69 +46,113 @@ def gather(x: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray
         row[0, n] = x[i, 0]
         row[1, n] = x[i, 1]
         row[2, n] = x[i, 2]
-    ax, ay, az = row[3], row[4], row[5]
-    tx, ty, tz = row[6], row[7], row[8]
-    length, inverse = row[9], row[10]
-    for q in range(len(lane) - 1):
-        # lanes of the next edge are written over: cheaper than loops of some seven
-        for n in range(int(lane[q]), int(lane[q + 1]), _WIDE):
-            _spread(ax[n:], edge[0, q])
-            _spread(ay[n:], edge[1, q])
-            _spread(az[n:], edge[2, q])
-            _spread(tx[n:], edge[6, q])
-            _spread(ty[n:], edge[7, q])
-            _spread(tz[n:], edge[8, q])
-            _spread(length[n:], edge[9, q])
-            _spread(inverse[n:], edge[10, q])
+    _over(lane, edge, 0, row[3], row[4], row[5])
+    _over(lane, edge, 20, row[6], row[7], row[8])
+    _over(lane, edge, 23, row[9], row[10], row[11])
+    _over(lane, edge, 26, row[12], row[13], row[14])
 
 
 @njit(cache=True, error_model="numpy")
-def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces (6, w) [N] of `count` bonds: on their vertices, and on the second ends of their edges.
+def _over(lane: np.ndarray, edge: np.ndarray, first: int, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> None:
+    """Spread three rows of edges from `first` over the lanes of their bonds. More rows at once spill registers."""
+    ex, ey, ez = edge[first], edge[first + 1], edge[first + 2]
+    for q in range(len(lane) - 1):
+        # lanes of the next edge are written over: cheaper than loops of some seven
+        for n in range(int(lane[q]), int(lane[q + 1]), _WIDE):
+            _spread(x[n:], ex[q])
+            _spread(y[n:], ey[q])
+            _spread(z[n:], ez[q])
 
-    law (5, w): as in `Plan`; row: as `gather` leaves it. The first ends bear what is left. No two arguments may be
-    slices with steps: the loop would not be vectorised (12 ns instead of 2).
-    """
+
+@njit(cache=True, error_model="numpy")
+def _reach(count: int, law: np.ndarray, row: np.ndarray) -> None:
+    """Overwrite the rows 0 to 5 of bonds by d and t."""
     for n in range(count):
-        tx = row[6, n]
-        ty = row[7, n]
-        tz = row[8, n]
         u = law[SHARE, n]
-        way = u * row[9, n]
-        dx = row[0, n] - row[3, n] - way * tx
-        dy = row[1, n] - row[4, n] - way * ty
-        dz = row[2, n] - row[5, n] - way * tz
+        v = min(max(u, 0.0), 1.0)
+        w = 1.0 - v
+        # beyond its ends the curve goes straight on
+        a = v * w * w + min(u, 0.0)
+        b = max(u - 1.0, 0.0) - v * v * w
+        a1 = w * (1.0 - 3.0 * v)
+        b1 = v * (3.0 * v - 2.0)
+        ex, ey, ez = row[6, n], row[7, n], row[8, n]
+        px, py, pz = row[9, n], row[10, n], row[11, n]
+        qx, qy, qz = row[12, n], row[13, n], row[14, n]
+        row[0, n] = row[0, n] - row[3, n] - u * ex - a * px - b * qx
+        row[1, n] = row[1, n] - row[4, n] - u * ey - a * py - b * qy
+        row[2, n] = row[2, n] - row[5, n] - u * ez - a * pz - b * qz
+        row[3, n] = ex + a1 * px + b1 * qx
+        row[4, n] = ey + a1 * py + b1 * qy
+        row[5, n] = ez + a1 * pz + b1 * qz
+
+
+@njit(cache=True, error_model="numpy")
+def _pull(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
+    """Write -dE/dd and -dE/dt of bonds to the rows 0 to 5 of force."""
+    for n in range(count):
+        dx, dy, dz = row[0, n], row[1, n], row[2, n]
+        tx, ty, tz = row[3, n], row[4, n], row[5, n]
         d = np.sqrt(max(dx * dx + dy * dy + dz * dz, _TINY))
         away = 1.0 / d
         dx *= away
         dy *= away
         dz *= away
-        cosine = tx * dx + ty * dy + tz * dz
-        w = law[SHEAR, n] * (cosine - law[COSINE, n])
-        q = -law[SPRING, n] * (d * law[RATE, n] - 1.0) - w * cosine * away
-        w1 = w * away
-        px = q * dx + w1 * tx  # -dE/dd
-        py = q * dy + w1 * ty
-        pz = q * dz + w1 * tz
-        w *= row[10, n]
-        force[0, n] = px
-        force[1, n] = py
-        force[2, n] = pz
-        # dE/de: what the turning of the edge adds
-        force[3, n] = w * (dx - cosine * tx) - u * px
-        force[4, n] = w * (dy - cosine * ty) - u * py
-        force[5, n] = w * (dz - cosine * tz) - u * pz
+        slope = tx * dx + ty * dy + tz * dz
+        turn = law[SHEAR, n] * (slope - law[COSINE, n])
+        shear = turn * away
+        pull = -law[SPRING, n] * (d * law[RATE, n] - 1.0) - shear * slope
+        force[0, n] = pull * dx + shear * tx
+        force[1, n] = pull * dy + shear * ty
+        force[2, n] = pull * dz + shear * tz
+        force[3, n] = turn * dx
+        force[4, n] = turn * dy
+        force[5, n] = turn * dz
+
+
+@njit(cache=True, error_model="numpy")
+def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces on p and q to the rows 6 to 11, and on the edge over those by t."""
+    for n in range(count):
+        u = law[SHARE, n]
+        v = min(max(u, 0.0), 1.0)
+        w = 1.0 - v
+        a = v * w * w + min(u, 0.0)
+        b = max(u - 1.0, 0.0) - v * v * w
+        a1 = w * (1.0 - 3.0 * v)
+        b1 = v * (3.0 * v - 2.0)
+        fx, fy, fz = force[0, n], force[1, n], force[2, n]
+        tx, ty, tz = force[3, n], force[4, n], force[5, n]
+        force[3, n] = tx - u * fx
+        force[4, n] = ty - u * fy
+        force[5, n] = tz - u * fz
+        force[6, n] = a1 * tx - a * fx
+        force[7, n] = a1 * ty - a * fy
+        force[8, n] = a1 * tz - a * fz
+        force[9, n] = b1 * tx - b * fx
+        force[10, n] = b1 * ty - b * fy
+        force[11, n] = b1 * tz - b * fz
+
+
+@njit(cache=True, error_model="numpy")
+def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces (12, w) [N] of `count` bonds on their vertices, and on edges, p and q; first ends bear the rest.
+
+    law (5, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In three loops: where
+    more rows are written than six, LLVM gives up asking which overlap, and nothing is vectorised. For the same reason
+    no two arguments may be slices with steps.
+    """
+    _reach(count, law, row)
+    _pull(count, law, row, force)
+    _share(count, law, force)
 
 
 @njit(cache=True, error_model="numpy")
 def bound(count: int, law: np.ndarray, row: np.ndarray, own: np.ndarray) -> None:
-    """Write the energy (w,) [J] of each of `count` bonds; arguments as of `bind`."""
+    """Write the energy (w,) [J] of each of `count` bonds; arguments as of `bind`, which must have been called."""
     for n in range(count):
-        way = law[SHARE, n] * row[9, n]
-        dx = row[0, n] - row[3, n] - way * row[6, n]
-        dy = row[1, n] - row[4, n] - way * row[7, n]
-        dz = row[2, n] - row[5, n] - way * row[8, n]
+        dx, dy, dz = row[0, n], row[1, n], row[2, n]
         d = np.sqrt(max(dx * dx + dy * dy + dz * dz, _TINY))
         strain = d * law[RATE, n] - 1.0
-        off = (row[6, n] * dx + row[7, n] * dy + row[8, n] * dz) / d - law[COSINE, n]
+        off = (row[3, n] * dx + row[4, n] * dy + row[5, n] * dz) / d - law[COSINE, n]
         own[n] = 0.5 * law[SPRING, n] * strain * strain / law[RATE, n] - 0.5 * law[SHEAR, n] * off * off

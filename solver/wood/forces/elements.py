@@ -1,8 +1,9 @@
-"""Second derivatives of edges, hinges and bonds, element by element: of two vectors that three vertices make up.
+"""Second derivatives of edges, hinges and bonds, element by element: of two vectors that a few vertices make up.
 
-Bending and shear are functions of the cosine C between two vectors d and e. With unit vectors u and v, a = v - C u and
+Bending is a function of the cosine C between two edges d and e. With unit vectors u and v, a = v - C u and
 b = u - C v: dC/dd = a / |d|, dC/de = b / |e|, and the second derivatives are -(a u + u a + C (1 - u u)) / |d|^2,
-(1 - v v - u b) / |d||e| and -(b v + v b + C (1 - v v)) / |e|^2.
+(1 - v v - u b) / |d||e| and -(b v + v b + C (1 - v v)) / |e|^2. Shear is one of f = t.u with the bond d and the curve's
+slope t: df/dd = (t - f u) / |d|, df/dt = u.
 """
 
 from __future__ import annotations
@@ -14,17 +15,18 @@ from numba import njit
 
 from ..model.arrays import Bonds, Rods
 
-__all__ = ["Elements", "elements", "spread"]
+__all__ = ["Elements", "edges", "joints", "spread"]
 
 _TINY = 1e-30
 
 
 class Elements(NamedTuple):
-    """Edges, hinges and bonds, one after another."""
+    """Elements (n,) of two vectors that w vertices make up; what a clamp's direction lets through counts besides."""
 
     h: np.ndarray  # (n, 6, 6) second derivatives by the two vectors [N/m]
-    vertex: np.ndarray  # (n, 3) int32
-    weight: np.ndarray  # (n, 2, 3) what each vertex counts in each vector
+    weight: np.ndarray  # (n, 2, w) what each vertex counts in each vector
+    along: np.ndarray  # (n, 2, w) what each vertex counts in each vector along `clamp`
+    clamp: np.ndarray  # (n, 3) a unit vector
 
 
 @njit(cache=True, error_model="numpy")
@@ -37,7 +39,7 @@ def _unit(x: np.ndarray, vertex: np.ndarray, weight: np.ndarray, out: np.ndarray
             value += weight[k] * x[vertex[k], c]
         out[c] = value
         square += value * value
-    length = np.sqrt(max(square, _TINY))
+    length: float = np.sqrt(max(square, _TINY))
     for c in range(3):
         out[c] /= length
     return length
@@ -63,20 +65,10 @@ def _turned(u: np.ndarray, v: np.ndarray, p: float, q: float, once: float, twice
 
 
 @njit(cache=True, error_model="numpy")
-def _fill(
-    x: np.ndarray,
-    rods: Rods,
-    bonds: Bonds,
-    h: np.ndarray,
-    vertex: np.ndarray,
-    weight: np.ndarray,
-) -> None:
+def _rods(x: np.ndarray, rods: Rods, vertex: np.ndarray, h: np.ndarray, weight: np.ndarray) -> None:
     u = np.zeros(3)
     v = np.zeros(3)
     for n in range(len(rods.a)):
-        vertex[n, 0] = rods.a[n]
-        vertex[n, 1] = rods.b[n]
-        vertex[n, 2] = rods.b[n]
         weight[n, 0, 0] = -1.0
         weight[n, 0, 1] = 1.0
         if rods.alive[n] == 0 or rods.k[n] == 0.0:
@@ -89,9 +81,6 @@ def _fill(
     base = len(rods.a)
     for n in range(len(rods.before)):
         m = base + n
-        vertex[m, 0] = rods.a[rods.before[n]]
-        vertex[m, 1] = rods.b[rods.before[n]]
-        vertex[m, 2] = rods.b[rods.after[n]]
         weight[m, 0, 0] = -1.0
         weight[m, 0, 1] = 1.0
         weight[m, 1, 1] = -1.0
@@ -103,52 +92,94 @@ def _fill(
         more = max(1.0 + u[0] * v[0] + u[1] * v[1] + u[2] * v[2], 1e-9)
         stiff = 4.0 * rods.alpha[n] / rods.span[n]
         _turned(u, v, p, q, -2.0 * stiff / (more * more), 4.0 * stiff / (more * more * more), h[m])
-    base += len(rods.before)
-    for n in range(len(bonds.i)):
-        m = base + n
-        s = bonds.share[n]
-        vertex[m, 0] = bonds.i[n]
-        vertex[m, 1] = rods.a[bonds.j[n]]
-        vertex[m, 2] = rods.b[bonds.j[n]]
-        weight[m, 0, 0] = 1.0
-        weight[m, 0, 1] = s - 1.0
-        weight[m, 0, 2] = -s
-        weight[m, 1, 1] = -1.0
-        weight[m, 1, 2] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _bonds(d: np.ndarray, t: np.ndarray, rest: np.ndarray, bonds: Bonds, h: np.ndarray) -> None:
+    """Write second derivatives (b, 6, 6) by bonds d (b, 3) [m] and slopes t (b, 3) times lengths rest (b,) [m]."""
+    u = np.zeros(3)
+    a = np.zeros(3)
+    for n in range(len(d)):
         if bonds.on[n] == 0:
             continue
-        p = _unit(x, vertex[m], weight[m, 0], u)
-        q = _unit(x, vertex[m], weight[m, 1], v)
-        off = u[0] * v[0] + u[1] * v[1] + u[2] * v[2] - bonds.cosine[n]
-        pull = bonds.k[n] * (p / bonds.rest[n] - 1.0) / p
-        _turned(u, v, p, q, 2.0 * bonds.s[n] * off, 2.0 * bonds.s[n], h[m])
+        length = np.sqrt(max(d[n, 0] ** 2 + d[n, 1] ** 2 + d[n, 2] ** 2, _TINY))
+        slope = 0.0
+        for c in range(3):
+            u[c] = d[n, c] / length
+            slope += t[n, c] * u[c]
+        for c in range(3):
+            a[c] = (t[n, c] - slope * u[c]) / length
+        stiff = 2.0 * bonds.s[n] / rest[n] ** 2
+        turn = stiff * (slope - bonds.cosine[n] * rest[n]) / length
+        pull = bonds.k[n] * (length / bonds.rest[n] - 1.0) / length
         for r in range(3):
             for c in range(3):
-                h[m, r, c] += (bonds.k[n] / bonds.rest[n] - pull) * u[r] * u[c] + (pull if r == c else 0.0)
+                one = 1.0 if r == c else 0.0
+                both = t[n, r] * u[c] + u[r] * t[n, c]
+                h[n, r, c] = (
+                    (bonds.k[n] / bonds.rest[n] - pull) * u[r] * u[c]
+                    + pull * one
+                    + stiff * a[r] * a[c]
+                    + turn * (3.0 * slope * u[r] * u[c] - slope * one - both) / length
+                )
+                h[n, 3 + r, 3 + c] = stiff * u[r] * u[c]
+                h[n, r, 3 + c] = stiff * a[r] * u[c] + turn * (one - u[r] * u[c])
+                h[n, 3 + c, r] = h[n, r, 3 + c]
 
 
-def elements(x: np.ndarray, rods: Rods, bonds: Bonds) -> Elements:
-    """Return the elements at x (v, 3)."""
-    count = len(rods.a) + len(rods.before) + len(bonds.i)
-    out = Elements(np.zeros((count, 6, 6)), np.zeros((count, 3), np.int32), np.zeros((count, 2, 3)))
-    _fill(x, rods, bonds, *out)
+def edges(x: np.ndarray, rods: Rods, vertex: np.ndarray) -> Elements:
+    """Return edges and then hinges at x (v, 3), of three vertices (n, 3) each; an edge has the last one twice."""
+    count = len(rods.a) + len(rods.before)
+    out = Elements(np.zeros((count, 6, 6)), *(np.zeros((count, 2, 3)) for _ in range(2)), np.zeros((count, 3)))
+    _rods(x, rods, vertex, out.h, out.weight)
     return out
+
+
+def joints(x: np.ndarray, rods: Rods, bonds: Bonds, vertex: np.ndarray, made: Elements) -> Elements:
+    """Return the bonds at x (v, 3), of vertices (b, 5), in the frame of `made`, whose h is not read."""
+    y = x[vertex]
+    both = np.einsum("bpw,bwc->bpc", made.weight, y)
+    reach = np.einsum("bpw,bwc,bc->bp", made.along, y, made.clamp)
+    both += reach[:, :, None] * made.clamp[:, None, :]
+    h = np.zeros((len(bonds.i), 6, 6))
+    _bonds(both[:, 0], both[:, 1], rods.rest[bonds.j], bonds, h)
+    return made._replace(h=h)
 
 
 @njit(cache=True, error_model="numpy")
 def spread(parts: Elements, place: np.ndarray, out: np.ndarray) -> None:
-    """Add the elements to the blocks out (nnz, 3, 3) at `place` (n, 3, 3); -1 where a vertex is held."""
+    """Add the elements to the blocks out (nnz, 3, 3) at `place` (n, w, w); -1 where a vertex is held."""
+    wide = parts.weight.shape[2]
     for n in range(len(parts.h)):
-        for k in range(3):
-            for m in range(3):
+        g = parts.clamp[n]
+        h = parts.h[n]
+        for k in range(wide):
+            for m in range(wide):
                 at = place[n, k, m]
                 if at < 0:
                     continue
                 for p in range(2):
                     for q in range(2):
-                        w = parts.weight[n, p, k] * parts.weight[n, q, m]
-                        if w == 0.0:
+                        w, z = parts.weight[n, p, k], parts.weight[n, q, m]
+                        a, b = parts.along[n, p, k], parts.along[n, q, m]
+                        if w != 0.0 and z != 0.0:
+                            for r in range(3):
+                                for c in range(3):
+                                    out[at, r, c] += w * z * h[3 * p + r, 3 * q + c]
+                        if a == 0.0 and b == 0.0:
                             continue
+                        # (w + a g g) H (z + b g g) less w z H
+                        whole = 0.0
                         for r in range(3):
                             for c in range(3):
-                                out[at, r, c] += w * parts.h[n, 3 * p + r, 3 * q + c]
+                                whole += g[r] * h[3 * p + r, 3 * q + c] * g[c]
+                        for r in range(3):
+                            for c in range(3):
+                                left = 0.0
+                                right = 0.0
+                                for s in range(3):
+                                    left += g[s] * h[3 * p + s, 3 * q + c]
+                                    right += h[3 * p + r, 3 * q + s] * g[s]
+                                out[at, r, c] += (
+                                    a * z * g[r] * left + w * b * right * g[c] + a * b * whole * g[r] * g[c]
+                                )

@@ -6,42 +6,83 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..model.arrays import Bonds, Rods
-from .elements import elements, spread
+from ..model.curves import slopes, weights
+from .elements import Elements, edges, joints, spread
 
 __all__ = ["Stiffness"]
+
+
+def _frame(x: np.ndarray, rods: Rods, bonds: Bonds) -> tuple[np.ndarray, Elements]:
+    """Return the vertices (b, 5) of each bond, its own and those about its edge, and what they count; h is empty."""
+    count, j = len(rods.a), bonds.j
+    beside = np.full((2, count), -1)
+    whole = rods.whole == 1
+    beside[0, rods.after[whole]] = rods.before[whole]
+    beside[1, rods.before[whole]] = rods.after[whole]
+    before, behind = (np.where(n[j] < 0, j, n[j]) for n in beside)
+    vertex = np.column_stack([bonds.i, rods.a[before], rods.a[j], rods.b[j], rods.b[behind]])
+    made = slopes(rods)[:, j]
+    # p and q by the edges before, of and behind the bond, and by the edge along the clamp's direction
+    zero = np.zeros(len(j))
+    p, q = np.stack([made[0], made[1], zero]), np.stack([zero, made[5], made[4]])
+    p, q = p - made[3] * q, q - made[7] * p
+    along = np.stack([made[2] - made[3] * made[6], made[6] - made[7] * made[2]])
+    place, slope = weights(bonds.share)
+    parts = np.zeros((2, 3, len(j)))
+    parts[0] = -place[0] * p - place[1] * q
+    parts[0, 1] -= bonds.share
+    parts[1] = slope[0] * p + slope[1] * q
+    parts[1, 1] += 1
+    weight, reach = np.zeros((len(j), 2, 5)), np.zeros((len(j), 2, 5))
+    for n in range(3):
+        weight[:, :, 1 + n] -= parts[:, n].T
+        weight[:, :, 2 + n] += parts[:, n].T
+    weight[:, 0, 0] += 1
+    weight[:, 0, 2] -= 1
+    for n, part in enumerate((-(place * along).sum(0), (slope * along).sum(0))):
+        reach[:, n, 2], reach[:, n, 3] = -part, part
+    e = x[rods.b] - x[rods.a]
+    t = e / np.linalg.norm(e, axis=1)[:, None]
+    clamp = t[np.where(made[2] != 0, before, behind)]
+    return vertex, Elements(np.zeros((0, 6, 6)), weight, reach, clamp)
 
 
 class Stiffness:
     """K over the free vertices, in blocks; bonds that were handed over need a new one."""
 
-    def __init__(self, rods: Rods, bonds: Bonds, free: np.ndarray) -> None:
-        """Fix the pattern for free (v,) bool: vertices that are not held."""
+    def __init__(self, x: np.ndarray, rods: Rods, bonds: Bonds, free: np.ndarray) -> None:
+        """Fix the pattern for free (v,) bool: vertices that are not held; clamps stand as at x (v, 3)."""
         p, q = rods.before, rods.after
-        edge = np.column_stack([rods.a, rods.b, np.full(len(rods.a), -1)])
+        edge = np.column_stack([rods.a, rods.b, rods.b])
         hinge = np.column_stack([rods.a[p], rods.b[p], rods.b[q]])
-        bond = np.column_stack([bonds.i, rods.a[bonds.j], rods.b[bonds.j]])
+        self._rods = np.concatenate([edge, hinge])
+        self._bonds, self._frame = _frame(x, rods, bonds)
         self.size = int(free.sum())
-        # the last entry stands for the missing third vertex of an edge
-        number = np.full(len(free) + 1, -1, np.int64)
-        number[:-1][free] = np.arange(self.size)
-        of = number[np.concatenate([edge, hinge, bond])]
-        rows = np.broadcast_to(of[:, :, None], (len(of), 3, 3))
-        columns = np.broadcast_to(of[:, None, :], (len(of), 3, 3))
-        inside = (rows >= 0) & (columns >= 0)
+        number = np.full(len(free), -1, np.int64)
+        number[free] = np.arange(self.size)
         alone = np.arange(self.size, dtype=np.int64) * (self.size + 1)
-        codes = np.concatenate([rows[inside] * self.size + columns[inside], alone])
-        unique, at = np.unique(codes, return_inverse=True)
-        own = int(inside.sum())
-        self.place = np.full(inside.shape, -1, np.int64)
-        self.place[inside] = at[:own]
-        self.diagonal = at[own : own + self.size]
+        codes, inside = [alone], []
+        for vertex in (self._rods, self._bonds):
+            of = number[vertex]
+            rows, columns = np.broadcast_arrays(of[:, :, None], of[:, None, :])
+            inside.append((rows >= 0) & (columns >= 0))
+            codes.append(rows[inside[-1]] * self.size + columns[inside[-1]])
+        unique, at = np.unique(np.concatenate(codes), return_inverse=True)
+        self.diagonal, done = at[: self.size], self.size
+        self._place = []
+        for own in inside:
+            place = np.full(own.shape, -1, np.int64)
+            place[own] = at[done : done + int(own.sum())]
+            done += int(own.sum())
+            self._place.append(place)
         self.indices = unique % max(self.size, 1)
         self.indptr = np.searchsorted(unique, np.arange(self.size + 1, dtype=np.int64) * self.size)
 
     def blocks(self, x: np.ndarray, rods: Rods, bonds: Bonds, diagonal: float = 0.0) -> np.ndarray:
         """Return the blocks (nnz, 3, 3) of K [N/m] at x (v, 3) with `diagonal` added."""
         out = np.zeros((len(self.indices), 3, 3))
-        spread(elements(x, rods, bonds), self.place, out)
+        spread(edges(x, rods, self._rods), self._place[0], out)
+        spread(joints(x, rods, bonds, self._bonds, self._frame), self._place[1], out)
         for c in range(3):
             out[self.diagonal, c, c] += diagonal
         return out

@@ -6,49 +6,66 @@ import numpy as np
 from numba import njit
 
 from ..model.plan import Plan
-from .bonds import bind, bound, gather
+from .bonds import FORCES, READS, bind, bound, gather
+from .curves import ON_CURVE, curve, uncurve
 from .rods import ROWS, bend, bending, place, strain, stretch, stretching
 
 __all__ = ["internal"]
 
 
 @njit(cache=True, error_model="numpy")
-def _add(
-    f: np.ndarray,
-    a: np.ndarray,
-    b: np.ndarray,
-    vertex: np.ndarray,
-    lane: np.ndarray,
-    edge: np.ndarray,
-    force: np.ndarray,
-) -> None:
-    """Add the forces of edges and bonds to f (v, 3) [N]: edges act on both ends, and bear their bonds."""
+def _gathered(f: np.ndarray, vertex: np.ndarray, lane: np.ndarray, force: np.ndarray, edge: np.ndarray) -> None:
+    """Add the forces of bonds to their vertices in f (v, 3) [N], and to the rows of their edges."""
     n = 0
-    for q in range(len(a)):
+    for q in range(len(lane) - 1):
         sx, sy, sz = 0.0, 0.0, 0.0
-        hx, hy, hz = edge[11, q], edge[12, q], edge[13, q]
+        ex, ey, ez = 0.0, 0.0, 0.0
+        px, py, pz = 0.0, 0.0, 0.0
+        qx, qy, qz = 0.0, 0.0, 0.0
         last = int(lane[q + 1])
         while n < last:
             i = vertex[n]
-            px, py, pz = force[0, n], force[1, n], force[2, n]
-            f[i, 0] += px
-            f[i, 1] += py
-            f[i, 2] += pz
-            sx += px
-            sy += py
-            sz += pz
-            hx += force[3, n]
-            hy += force[4, n]
-            hz += force[5, n]
+            gx, gy, gz = force[0, n], force[1, n], force[2, n]
+            f[i, 0] += gx
+            f[i, 1] += gy
+            f[i, 2] += gz
+            sx += gx
+            sy += gy
+            sz += gz
+            ex += force[3, n]
+            ey += force[4, n]
+            ez += force[5, n]
+            px += force[6, n]
+            py += force[7, n]
+            pz += force[8, n]
+            qx += force[9, n]
+            qy += force[10, n]
+            qz += force[11, n]
             n += 1
+        edge[0, q] = sx
+        edge[1, q] = sy
+        edge[2, q] = sz
+        edge[11, q] += ex
+        edge[12, q] += ey
+        edge[13, q] += ez
+        edge[ON_CURVE, q] = px
+        edge[ON_CURVE + 1, q] = py
+        edge[ON_CURVE + 2, q] = pz
+        edge[ON_CURVE + 3, q] = qx
+        edge[ON_CURVE + 4, q] = qy
+        edge[ON_CURVE + 5, q] = qz
+
+
+@njit(cache=True, error_model="numpy")
+def _add(f: np.ndarray, a: np.ndarray, b: np.ndarray, edge: np.ndarray) -> None:
+    """Add the forces of edges to f (v, 3) [N]: they act on both ends; first ends bear the bonds."""
+    for q in range(len(a)):
         i = b[q]
-        f[i, 0] += hx
-        f[i, 1] += hy
-        f[i, 2] += hz
+        for c in range(3):
+            f[i, c] += edge[11 + c, q]
         i = a[q]
-        f[i, 0] -= hx + sx
-        f[i, 1] -= hy + sy
-        f[i, 2] -= hz + sz
+        for c in range(3):
+            f[i, c] -= edge[11 + c, q] + edge[c, q]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc"})
@@ -81,8 +98,8 @@ def internal(
     """
     wide = plan.vertex.shape[1]
     edge = np.empty((ROWS, plan.edge.shape[2]))
-    bond = np.empty((11, wide + 8))
-    force = np.empty((6, wide))
+    bond = np.empty((READS, wide + 8))
+    force = np.empty((FORCES, wide))
     for p in range(first, last):
         e = int(plan.part[p])
         z = int(plan.part[p + 1])
@@ -100,15 +117,24 @@ def internal(
             other[q] = edge[10, q]
         if not turning:
             bend(count, plan.edge[p], edge)
-        lane = plan.lane[e + p : z + p + 1]
-        bonds = int(lane[count])
-        gather(x, plan.vertex[p], lane, edge, bond)
-        bind(bonds, plan.law[p], bond, force)
-        _add(f, a, b, plan.vertex[p], lane, edge, force)
         if look:
             found[p, 0] = stretching(count, plan.edge[p], edge)
             found[p, 1] = 0.0 if turning else bending(count, plan.edge[p], edge)
+            found[p, 2] = 0.0
             found[p, 3] = strain(count, plan.edge[p], edge)
+        lane = plan.lane[e + p : z + p + 1]
+        bonds = int(lane[count])
+        if bonds == 0:
+            edge[0:3] = 0.0
+            _add(f, a, b, edge)
+            continue
+        curve(count, plan.edge[p], edge)
+        gather(x, plan.vertex[p], lane, edge, bond)
+        bind(bonds, plan.law[p], bond, force)
+        _gathered(f, plan.vertex[p], lane, force, edge)
+        uncurve(count, plan.edge[p], edge)
+        _add(f, a, b, edge)
+        if look:
             row = force[0]
             bound(bonds, plan.law[p], bond, row)
             found[p, 2] = _sum(bonds, row)

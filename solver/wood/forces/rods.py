@@ -20,8 +20,9 @@ from ..model.plan import BOW, RADIUS, REST, STIFF, TENSION, WEAK
 __all__ = ["ROWS", "bend", "bending", "place", "strain", "stretch", "stretching"]
 
 #: Rows of a part's edges: 0 first end, 3 second end [m], 6 tangent, 9 length [m], 10 its inverse, 11 -dE/de [N], 14 and
-#: 17 its parts by the hinges behind and before the edge [N].
-ROWS = 20
+#: 17 its parts by the hinges behind and before the edge [N], 20 the edge, 23 and 26 p and q of its curve [m]; from 29
+#: on forces on these, and what `curves.uncurve` hands on [N].
+ROWS = 41
 #: Keeps an edge of no length, and a hinge folded flat, finite.
 _TINY = 1e-30
 _FLAT = 1e-9
@@ -50,6 +51,9 @@ def stretch(count: int, law: np.ndarray, row: np.ndarray) -> None:
         ez = row[5, q] - row[2, q]
         length = np.sqrt(ex * ex + ey * ey + ez * ez)
         il = 1.0 / max(length, _TINY)
+        row[20, q] = ex
+        row[21, q] = ey
+        row[22, q] = ez
         ex *= il
         ey *= il
         ez *= il

@@ -31,7 +31,7 @@ class Rods(NamedTuple):
 
 
 class Bonds(NamedTuple):
-    """Bonds (b,) from a vertex to a point of another rod's edge."""
+    """Bonds (b,) from a vertex to a point of the curve through another rod's vertices (`curves`)."""
 
     i: np.ndarray  # (b,) int32 vertex
     j: np.ndarray  # (b,) int32 edge
@@ -39,7 +39,7 @@ class Bonds(NamedTuple):
     rest: np.ndarray  # (b,) rest distance [m]
     k: np.ndarray  # (b,) transverse stiffness [N]: energy k s^2 rest / 2
     s: np.ndarray  # (b,) shear stiffness S of Eq. 3.12 [J]
-    cosine: np.ndarray  # (b,) cosine of the shear angle at rest
+    cosine: np.ndarray  # (b,) slope along the bond's unit vector, by arc length, at rest
     limit: np.ndarray  # (b,) energy at which it breaks [J]
     on: np.ndarray  # (b,) uint8
 

@@ -7,7 +7,8 @@ from scipy.spatial import cKDTree
 
 from ...contract import InvalidGeometry
 from ..params import Body, WoodParams
-from .arrays import Bodies, Bonds
+from .arrays import Bodies, Bonds, Rods
+from .curves import held
 from .grain import Field
 
 __all__ = ["bodied", "bonded"]
@@ -75,6 +76,7 @@ def bonded(
     grid: np.ndarray,
     edge: np.ndarray,
     rest: np.ndarray,
+    rods: Rods,
     grain: Field,
     strong: Field,
 ) -> Bonds:
@@ -95,15 +97,19 @@ def bonded(
         on.append(edge[q][j])
         share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
     i, e, u = np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
-    width = (np.searchsorted(edge[:, 0], e, side="right") - 1).astype(int)
-    first = grid[width, e - edge[width, 0]]
-    a, b = rest[first], rest[first + 1]
-    d = rest[i] - (1 - u[:, None]) * a - u[:, None] * b
+    on_curve, slope = held(rest, rods, e, u)
+    d = rest[i] - on_curve
     length = np.linalg.norm(d, axis=1)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    cosine = ((b - a) * d).sum(1) / np.maximum(np.linalg.norm(b - a, axis=1) * length, 1e-300)
-    volume = np.pi * params.radius**2 * params.length / max(len(i), 1)
+    cosine = (slope * d).sum(1) / length if len(i) else np.zeros(0)
+    # the wood of a bond: by the length that its vertex stands for
+    gap = np.diff(s, axis=1)
+    own = np.zeros_like(s)
+    own[:, :-1] += gap / 2
+    own[:, 1:] += gap / 2
+    part = own.ravel()[np.searchsorted(grid.ravel(), i)]
+    volume = np.pi * params.radius**2 * params.length * part / max(float(part.sum()), 1e-300)
     middle = rest[i] - d / 2
     stiff = grain.factor(middle, params.grain.stiffness)
     strength = strong.factor(middle, params.grain.strength)

@@ -13,10 +13,12 @@ import numpy as np
 from numba import njit
 
 from .arrays import Bonds, Rods
+from .curves import slopes
 
 __all__ = [
     "BOW",
     "COSINE",
+    "CURVE",
     "RADIUS",
     "RATE",
     "REST",
@@ -31,10 +33,12 @@ __all__ = [
 ]
 
 #: Rows of a part's edges: rest length [m]; k [N], 0 if it is dead; 4 alpha / span [N m] and 4 / span [1/m] of the hinge
-#: behind an edge, 0 where none is whole; radius [m]; 1 / the least strain that it bears.
-REST, TENSION, STIFF, BOW, RADIUS, WEAK = range(6)
+#: behind an edge, 0 where none is whole; radius [m]; 1 / the least strain that it bears; the eight of `curves.slopes`.
+REST, TENSION, STIFF, BOW, RADIUS, WEAK, CURVE = range(7)
+_EDGE = CURVE + 8
 
-#: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S [J]; cosine at rest.
+#: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S over the squared length of the bond's edge [N/m];
+#: slope at rest times this length [m].
 SHARE, RATE, SPRING, SHEAR, COSINE = range(5)
 #: The fewest edges of a part, but for the last: 64 cost a tenth more, 256 as much.
 _PART = 128
@@ -48,7 +52,7 @@ class Plan(NamedTuple):
     part: np.ndarray  # (p + 1,) uint32 first edge
     a: np.ndarray  # (e,) uint32 first vertex
     b: np.ndarray  # (e,) uint32 second vertex
-    edge: np.ndarray  # (p, 6, m) what an edge is made of, in the rows above
+    edge: np.ndarray  # (p, 14, m) what an edge is made of, in the rows above
     lane: np.ndarray  # (e + p,) uint32 first lane of an edge's bonds; a part has one entry more, its end
     vertex: np.ndarray  # (p, w) uint32 vertex of a bond
     law: np.ndarray  # (p, 5, w) what a bond is made of, in the rows above
@@ -91,7 +95,8 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
         wide = max(wide, first[part[p + 1]] - first[part[p]])
     most = (most + _LINE - 1) // _LINE * _LINE
     wide = (wide + _LINE - 1) // _LINE * _LINE
-    edge = np.zeros((parts, 6, most))
+    edge = np.zeros((parts, _EDGE, most))
+    curve = slopes(rods)
     lane = np.zeros(edges + parts, np.uint32)
     own = np.zeros(edges, np.int64)
     for p in range(parts):
@@ -100,6 +105,7 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
             m = e - part[p]
             edge[p, REST, m] = rods.rest[e]
             edge[p, RADIUS, m] = rods.radius[e]
+            edge[p, CURVE:, m] = curve[:, e]
             if rods.alive[e] == 1 and rods.k[e] > 0.0:
                 edge[p, TENSION, m] = rods.k[e]
                 edge[p, WEAK, m] = 1.0 / strength[e].min()
@@ -126,8 +132,8 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
         law[p, SHARE, m] = bonds.share[n]
         law[p, RATE, m] = 1.0 / bonds.rest[n]
         law[p, SPRING, m] = bonds.k[n]
-        law[p, SHEAR, m] = -2.0 * bonds.s[n]
-        law[p, COSINE, m] = bonds.cosine[n]
+        law[p, SHEAR, m] = -2.0 * bonds.s[n] / rods.rest[j] ** 2
+        law[p, COSINE, m] = bonds.cosine[n] * rods.rest[j]
     return Plan(
         part.astype(np.uint32),
         rods.a.astype(np.uint32),

@@ -9,6 +9,7 @@ import numpy as np
 from ...contract import Context, NotConverged
 from ...linalg.multifrontal import analyse, factorise
 from ..forces.hessian import Stiffness
+from ..fracture import overstress
 from ..model.motion import CONTACT, WORK
 from ..model.state import State, Wood, copied
 from ..params import WoodParams
@@ -32,7 +33,7 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
     wood = state.wood
     m = wood.motion
     free = m.held == 0
-    stiffness = Stiffness(wood.rods, wood.bonds, free)
+    stiffness = Stiffness(m.x, wood.rods, wood.bonds, free)
     row = np.repeat(np.arange(stiffness.size), np.diff(stiffness.indptr))
     pairs = np.column_stack([row, stiffness.indices])[row <= stiffness.indices]
     order = analyse(pairs, m.x[free][pairs].mean(axis=1), stiffness.indptr, stiffness.indices, leaf_size=_LEAF)
@@ -72,11 +73,43 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
     return state, norm / max(float(np.linalg.norm(m.load)), least / _TOLERANCE)
 
 
+def _bears(state: State, params: WoodParams, time: float) -> None:
+    """Refuse a state at rest in which something would have broken: an equilibrium breaks nothing.
+
+    Raises:
+        NotConverged: see above; it says how far the loads are beyond what is borne.
+
+    """
+    wood, scratch = state.wood, state.scratch
+    ratio, place, m = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a)), wood.motion
+    rods = overstress(
+        wood.rods,
+        scratch.t,
+        scratch.inverse,
+        wood.strength,
+        m.theta,
+        m.reference,
+        False,
+        params.fracture == "stress",
+        ratio,
+        place,
+    )
+    bonds = float(np.sqrt((scratch.each / wood.bonds.limit).max(initial=0.0)))
+    if max(rods, bonds) <= 1:
+        return
+    what = f"a rod is strained to {rods:.2g} times" if rods >= bonds else f"a bond is loaded to {bonds:.2g} times"
+    raise NotConverged(
+        f"at {time:.3g} times the loads {what} what it bears, and equilibria break nothing.",
+        advice="Apply smaller loads, set fracture none for the unbroken shape, or let it break in mode explicit.",
+        residual=max(rods, bonds) - 1,
+    )
+
+
 def static(wood: Wood, params: WoodParams, times: Sequence[float], context: Context) -> Iterator[Reached]:
     """Yield equilibria; loads grow evenly with time and have their full size at 1 s.
 
     Raises:
-        NotConverged: there is none.
+        NotConverged: there is none, or something would have broken on the way.
         Cancelled: the observer asked to stop.
 
     """
@@ -89,6 +122,8 @@ def static(wood: Wood, params: WoodParams, times: Sequence[float], context: Cont
         context.check_cancelled()
         before, load = state.wood.motion.x.copy(), state.wood.motion.load.copy()
         state, error = equilibrium(state, params, wanted, full)
+        if params.fracture != "none":
+            _bears(state, params, wanted)
         way = state.wood.motion.x - before
         state.books[WORK] += float(((load + state.wood.motion.load) / 2 * way).sum())
         yield reached(wanted, copied(state._replace(steps=state.steps + 1)), start, error, True)

@@ -104,9 +104,12 @@ def test_fruits_in_a_row_that_all_give_way_meet_in_planes():
 
 
 def test_contacts_that_change_to_and_fro_do_not_hold_a_soft_fruit_up():
-    """Without a fall of the model in each direction these take 9 and 22 steps, and rotten ones never end."""
+    """Without a fall of the model in each direction these take 9 and 22 steps, and rotten ones never end.
+
+    With it they took 6 and 14 at most; the limits lie between, as a processor's rounding may cost a step.
+    """
     beside = [{"position": (1.9, 0.0, 0.0)}, {"position": (-0.95, 0.0, 1.6454)}]
-    for neighbours, most in (((), 6), (beside, 14)):
+    for neighbours, most in (((), 8), (beside, 18)):
         _, balance, weight = settled(orange(neighbours=neighbours, firmness=3.0, stone=(0, 0)), water=0.02)
         assert balance.residual <= 1e-3
         assert balance.reaction == pytest.approx(weight, rel=1e-6)

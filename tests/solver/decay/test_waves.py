@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import robust_laplacian
 from scipy import sparse
+from scipy.integrate import solve_ivp
 
 from solver.contract import InvalidGeometry
 from solver.decay import DecayParams
@@ -222,6 +223,45 @@ def test_a_whole_step_keeps_the_budget_to_round_off_and_the_sign(layer):
         assert min(state.u.min(), state.v.min(), state.n.min()) >= 0
     assert layer.share(state).max() > 0.3
     assert layer.budget_error(state) < 1e-14
+
+
+def test_a_step_reacts_as_long_as_it_says():
+    """Everything even: nothing spreads, and Eq. 2, 3, 7-9 are three ordinary equations, solved by another library."""
+
+    def slopes(_: float, y: np.ndarray) -> list[float]:
+        u, _v, n = y
+        eaten = RATES.consume * n * u / (1 + RATES.half * n)
+        tired = RATES.wither * u / ((1 + u / RATES.a1) * (1 + n / RATES.a2))
+        return [RATES.theta * eaten - tired, tired, -eaten]
+
+    sphere = triangulated(*geodesic(2))
+    even = np.ones(len(sphere.points))
+    plain = Layer(sphere, RATES, 0.9 * even, even)
+    state = plain.fresh._replace(u=0.004 * even)
+    for _ in range(100):
+        state = plain.advance(state, 0.005)
+    exact = solve_ivp(slopes, (0, 0.5), [0.004, 0.0, 0.9], rtol=1e-10, atol=1e-14).y[:, -1]
+    assert exact[2] < 0.85  # a good part of 0.9 has been eaten
+    for part, value in zip((state.u, state.v, state.n), exact, strict=True):
+        assert part == pytest.approx(value, rel=2e-3)
+
+
+def test_a_step_spreads_as_far_as_it_says():
+    """Weak form on the unit sphere: cos(angle) is a harmonic of degree 1, so its moment of u falls by 2 of that of Phi.
+
+    Nothing reacts; n = 0.8 and motility are even. Within one step of 0.002 days the moment of Phi falls by 1 %.
+    """
+    still = RATES._replace(consume=0.0, wither=0.0, feed=0.0)
+    sphere = triangulated(*geodesic(16))
+    even = np.ones(len(sphere.points))
+    y = sphere.points[:, 1]
+    plain = Layer(sphere, still, 0.8 * even, even)
+    u = 0.004 * (1 + 0.5 * y)
+    dt = 0.002
+    then = plain.advance(plain.fresh._replace(u=u), dt).u
+    phi = 0.8 * still.mobility * (u**2 / 2 - u**3 / (3 * still.cap))
+    fall = np.sum(sphere.area * y * (u - then))
+    assert fall == pytest.approx(2 * dt * np.sum(sphere.area * y * phi), rel=0.02)
 
 
 def test_splitting_is_of_second_order(layer):

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from solver.contract import InvalidGeometry, InvalidInput, Need, SolverError
+from solver.contract import InvalidGeometry, InvalidInput, Need, NotConverged, SolverError
 from solver.wood import SOLVER
 from solver.wood.fracture import break_worst
 from solver.wood.model.bundle import lay
+from solver.wood.model.curves import held
 from solver.wood.stepping.moment import begin
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
@@ -85,7 +86,7 @@ def test_breaks_keep_mass_and_momentum_and_hand_bonds_over():
     assert now.bonds.s.sum() == pytest.approx(stiffness, rel=1e-14)
     # bonds pull at the places where they pulled
     x, r, b = now.motion.x, now.rods, now.bonds
-    d = x[b.i] - (1 - b.share)[:, None] * x[r.a[b.j]] - b.share[:, None] * x[r.b[b.j]]
+    d = x[b.i] - held(x, r, b.j, b.share)[0]
     assert np.linalg.norm(d, axis=1) == pytest.approx(b.rest, rel=1e-9)
     assert r.alive[b.j].all()
 
@@ -129,6 +130,19 @@ def test_impossible_parameters_are_refused(values, kind):
 def test_the_mode_that_is_gone_says_what_to_use_instead():
     with pytest.raises(InvalidInput, match="mass_scaling of 1e4"):
         SOLVER.parse({"mode": "implicit"})
+
+
+@pytest.mark.parametrize("fracture", ["stress", "vertex"])
+def test_an_equilibrium_says_what_it_cannot_bear(fracture):
+    borne = 10e9 * np.pi * 0.002**2 * 0.01
+    values = {**ROD, "mode": "static", "fracture": fracture, "tip_load": (borne, 0.0, 0.0)}
+    # loads grow evenly and are full at 1 s
+    with pytest.raises(NotConverged, match=r"1\.02 times the loads a rod") as found:
+        run(values, 0.98, 1.02)
+    assert found.value.partial is not None
+    assert found.value.partial.stage.values.tolist() == [0.98]
+    assert "fracture none" in found.value.advice
+    assert run({**values, "fracture": "none"}, 1.02).tip_position.values[0, 0] > 0.15
 
 
 def test_a_bond_of_no_length_stays_finite():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from solver import registry
 from solver.contract import Context, InvalidInput, Need
 from solver.decay import SOLVER
 from solver.decay.surfaces.dried import at_rays
@@ -11,7 +12,7 @@ from solver.fruit import directions, lattice
 from store import starter
 from store.lookup import ShapeTable
 from store.store import Store
-from sweeps.dried import dried
+from sweeps import tabled
 from sweeps.plan import job
 from sweeps.work import Task, work
 
@@ -20,7 +21,7 @@ FRUIT = {"body": "table", "transpiration": 14.1, "weight": 87.0, "water_content"
 
 def solve(values=None, context=None, **need):
     chosen = {"fields": ("position", "water_lost"), "stages": (1.0, 2.0), "resolution": 32, **need}
-    return SOLVER.solve(SOLVER.parse(FRUIT | (values or {})), Need(**chosen), context or Context(dried=dried))
+    return SOLVER.solve(SOLVER.parse(FRUIT | (values or {})), Need(**chosen), context or Context(shapes=tabled.shape))
 
 
 def test_the_shape_is_the_table_s_at_the_water_lost():
@@ -29,7 +30,8 @@ def test_the_shape_is_the_table_s_at_the_water_lost():
     for k in range(2):
         s = 1 - (1 - float(run.water_lost[k])) ** (1 / 3)
         assert 0.05 < s < 0.3
-        theirs = ShapeTable.open(starter.ROOT).at({"te": 0.04, "gamma": 50}, s, resolution=48).position
+        table = ShapeTable.open(starter.ROOT, surfaces=registry.surface)
+        theirs = table.at({"te": 0.04, "gamma": 50}, s, resolution=48).position
         assert np.abs(run.position[k].values - theirs).max() < 1e-5
 
 

@@ -1,0 +1,69 @@
+"""What a solver's results look like besides their shape, and what pages and pictures call them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from ..arrays import Array
+
+__all__ = ["Label", "Looks", "Place", "Shade", "Skin"]
+
+
+class Skin(NamedTuple):
+    """Colours (..., 3), linear light, and microfacet roughness (...), both 0 to 1."""
+
+    colour: Array
+    roughness: Array
+
+
+class Label(NamedTuple):
+    """A short word for a parameter or for the stage, beside its slider."""
+
+    symbol: str
+    name: str
+
+
+class Shade(NamedTuple):
+    """A surface without fields of its own, for pages: colours as #rrggbb (sRGB), each fresh and at the last stage.
+
+    coat: waxy gloss, 0 to 1. bloom: the dust that settles on ridges, and how much of it, 0 to 1.
+    """
+
+    ridge: tuple[str, str]
+    furrow: tuple[str, str]
+    roughness: tuple[float, float]
+    coat: float = 0.0
+    bloom: str = "#ffffff"
+    bloom_amount: float = 0.0
+
+
+class Place(NamedTuple):
+    """A place in a table worth a visit: the share of each axis' range (logarithmic over wide ones), and the stage."""
+
+    shares: Mapping[str, float]
+    stage: float
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Colours by field, and words.
+
+    layers: fields that `paint` makes colours of, given any of them by name (...) and the run's parameters; it returns
+    None where these say no colours. labels: by axis or stage symbol. advance: the word for going along the stage axis.
+    shades and places: by their names on pages.
+    """
+
+    layers: tuple[str, ...] = ()
+    paint: Callable[[Mapping[str, Array], Mapping[str, Any]], Skin | None] | None = None
+    labels: Mapping[str, Label] = field(default_factory=dict)
+    advance: str = "Play"
+    shades: Mapping[str, Shade] = field(default_factory=dict)
+    places: Mapping[str, Place] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what a page wants to know, as JSON values."""
+        named: dict[str, Mapping[str, Any]] = {"labels": self.labels, "shades": self.shades, "places": self.places}
+        said = {key: {name: value._asdict() for name, value in values.items()} for key, values in named.items()}
+        return {"layers": list(self.layers), "advance": self.advance, **said}

@@ -1,0 +1,69 @@
+"""Fresh skin, rot and mould as layers of colour (Kider et al. 2011, section 3.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..contract import Label, Looks, Skin
+
+__all__ = ["LOOKS"]
+
+_LAYERS = ("rot", "mould", "mould_active")
+#: Rotten flesh under the skin, and the rim of mould that still grows; linear light.
+_ROT = np.array([0.16, 0.075, 0.03])
+_RIM = np.array([0.86, 0.86, 0.82])
+#: Roughness of waxy skin, of wet rot and of felt: chosen by eye, measured by nobody.
+_WAX, _WET, _FELT = 0.35, 0.6, 1.0
+
+
+def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | None:
+    known = [np.asarray(fields[name], float) for name in _LAYERS if name in fields]
+    if not known or not {"skin_colour", "mould_colour"} <= set(params):
+        return None
+
+    def layer(name: str) -> Array:
+        return np.asarray(fields[name], float) if name in fields else np.zeros_like(known[0])
+
+    rot, mould, active = (layer(name) for name in _LAYERS)
+    colour = np.broadcast_to(np.array(params["skin_colour"], float), (*known[0].shape, 3))
+    # rot shows long before it is complete, mould hides what is below it
+    rotten, felted = 0.9 * _smooth(rot / 0.2), 0.95 * _smooth(mould / 0.25)
+    colour = _over(colour, _ROT, rotten)
+    # what grows is white while it is thin, and takes its colour with the spores of a dense or a resting mat
+    growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1) * (1 - _smooth((mould - 0.2) / 0.3))
+    centre = np.array(params["mould_colour"], float)
+    colour = _over(colour, centre + (_RIM - centre) * growing[..., None], felted)
+    roughness = _WAX + (_WET - _WAX) * rotten
+    return Skin(colour, roughness + (_FELT - roughness) * felted)
+
+
+def _over(below: Array, above: Array, cover: Array) -> Array:
+    found: Array = below + (above - below) * cover[..., None]
+    return found
+
+
+def _smooth(x: Array) -> Array:
+    x = np.clip(x, 0, 1)
+    found: Array = x * x * (3 - 2 * x)
+    return found
+
+
+LOOKS = Looks(
+    layers=_LAYERS,
+    paint=_paint,
+    advance="Rot",
+    labels={
+        "t": Label("t", "Days"),
+        "temperature": Label("T", "Temperature"),
+        "humidity": Label("H", "Humidity"),
+        "porosity": Label("P", "Porosity of the skin"),
+        "water": Label("W", "Water content"),
+        "growth": Label("G", "Growth rate"),
+        "propagation": Label("p", "Propagation rate"),
+        "firmness": Label("f", "Firmness"),
+    },
+)

@@ -1,0 +1,35 @@
+"""Skins of dried fruits, short words for their parameters, and places of a buckling map worth a visit."""
+
+from __future__ import annotations
+
+from ..contract import Label, Looks, Place, Shade
+
+__all__ = ["LOOKS"]
+
+_SHADES = {
+    "jujube": Shade(("#8e3220", "#6b2115"), ("#6f2416", "#2a0b08"), (0.3, 0.46), 0.35, "#ffb08a", 0.08),
+    "plum": Shade(("#56304f", "#3a2233"), ("#3d1a3c", "#120810"), (0.42, 0.5), 0.2, "#8f9ad0", 0.45),
+    "raisin": Shade(("#93803a", "#50301f"), ("#77682c", "#1b0d09"), (0.36, 0.55), 0.2, "#d8c8b8", 0.22),
+    "wolfberry": Shade(("#c4461c", "#96270f"), ("#c03310", "#4d0a08"), (0.26, 0.42), 0.5, "#ffd0a0", 0.06),
+    "clay": Shade(("#b8aea2", "#b8aea2"), ("#8d8278", "#6f655d"), (0.62, 0.7)),
+}
+
+LOOKS = Looks(
+    labels={
+        "s": Label("s", "Shrinkage"),
+        "te": Label("tₑ", "Skin thickness"),
+        "gamma": Label("γ", "Skin stiffness"),
+        "rs1": Label("rₛ₁", "Stone, along the axis"),
+        "rs2": Label("rₛ₂", "Stone, across"),
+        **{f"r{i}": Label("r" + "₂₃₄₅₆₇₈"[i - 2], f"Radius {i}") for i in range(2, 9)},
+    },
+    advance="Dry",
+    shades=_SHADES,
+    places={
+        "Fresh": Place({"te": 0.5, "gamma": 0.5}, 0.0),
+        "Dimpled": Place({"te": 1.0, "gamma": 0.0}, 0.12),
+        "Pebbled": Place({"te": 0.0, "gamma": 0.0}, 0.2),
+        "Furrowed": Place({"te": 1.0, "gamma": 1.0}, 0.25),
+        "Dried up": Place({"te": 0.0, "gamma": 0.68}, 0.3),
+    },
+)

@@ -1,0 +1,96 @@
+"""The fruit's fresh surface as tables of shapes want it: exact, and on a lattice cheaply."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .arrays import Array
+from .contract import Fresh, Surface
+from .fruit import Fruit
+from .lattice import azimuths, colatitudes
+
+__all__ = ["SURFACE", "FreshFruit"]
+
+
+class FreshFruit(Fresh):
+    """A fruit at rest, in units of r1."""
+
+    def __init__(self, fruit: Fruit) -> None:
+        self.fruit = fruit
+
+    def points(self, colatitude: Array, azimuth: Array) -> Array:
+        """Return points (..., 3) of the outer surface."""
+        return self.fruit.surface(colatitude, azimuth)
+
+    def planes(
+        self, n: int, rows: slice, columns: slice | Array, components: tuple[int, ...], kind: np.dtype[Any]
+    ) -> Iterator[Array]:
+        """Yield the components on a part of the lattice, each broadcasting to (height, width).
+
+        Only the generatrix and the azimuth's sine and cosine are evaluated, each once; the surface is their product.
+        """
+        fruit = self.fruit
+        x, y = (values[rows] for values in _generatrix(fruit.radii, n))
+        cosine, sine = (values[columns] for values in _circle(n))
+        squash = fruit.radii[7] / fruit.radii[3]
+        te = fruit.exocarp_thickness
+        if fruit.is_axisymmetric:
+            stretch: Array = 1 + te / np.hypot(x, y)
+            across: Array = (x * stretch)[:, None].astype(kind)
+            along: Array = (y * stretch)[:, None].astype(kind)
+        else:
+            flat = (x**2).astype(kind)[:, None] * (cosine**2 + (squash * sine) ** 2).astype(kind)
+            stretch = 1 + kind.type(te) / np.sqrt(flat + (y**2).astype(kind)[:, None])
+            across, along = stretch * x.astype(kind)[:, None], stretch * y.astype(kind)[:, None]
+        for component in components:
+            yield along if component == 1 else across * (squash * sine if component else cosine).astype(kind)
+
+    def poles(self) -> Array:
+        """Return the two poles (2, 3)."""
+        inner, distance = _ends(self.fruit.radii)
+        return inner * (1 + self.fruit.exocarp_thickness / distance)
+
+    def core(self, rays: Array) -> Array | None:
+        """Return how far the stone reaches along unit rays; None without one."""
+        return self.fruit.stone_distance(rays) if self.fruit.has_stone else None
+
+
+@lru_cache(maxsize=64)
+def _generatrix(radii: tuple[float, ...], n: int) -> tuple[Array, Array]:
+    # the fruit that these radii come from has been validated
+    fruit: Any = Fruit.model_construct
+    found: tuple[Array, Array] = fruit(radii=radii).generatrix(colatitudes(n))
+    return found
+
+
+@lru_cache(maxsize=64)
+def _ends(radii: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return the sarcocarp's poles (2, 3) and their distances (2, 1) from the centre."""
+    fruit: Any = Fruit.model_construct
+    inner = fruit(radii=radii).sarcocarp(np.array([0.0, np.pi]), np.zeros(2))
+    return inner, np.linalg.norm(inner, axis=-1, keepdims=True)
+
+
+@lru_cache(maxsize=16)
+def _circle(n: int) -> tuple[Array, Array]:
+    phi = azimuths(n)
+    return np.cos(phi), np.sin(phi)
+
+
+@lru_cache(maxsize=256)
+def _check(radii: tuple[float, ...], stone: tuple[float, ...]) -> None:
+    """Refuse impossible fruits. The exocarp lies outside of all that could collide, and its bounds are a box."""
+    Fruit.parse({"radii": radii, "stone": stone})
+
+
+def _of(values: Mapping[str, Any]) -> FreshFruit:
+    radii, stone, te = tuple(values["radii"]), tuple(values["stone"]), values["exocarp_thickness"]
+    _check(radii, stone)
+    return FreshFruit(Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te))
+
+
+SURFACE = Surface(("radii", "stone", "exocarp_thickness"), _of)

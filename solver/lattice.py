@@ -1,0 +1,54 @@
+"""The lattice that all surface fields live on: cell centres in colatitude, twice as many azimuths about the y axis."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .arrays import Floats
+
+if TYPE_CHECKING:
+    from .contract import Region
+
+__all__ = ["azimuths", "colatitudes", "directions", "lattice", "window"]
+
+
+def colatitudes(resolution: int) -> Floats:
+    """Return `resolution` colatitudes [radian] at cell centres, so that no sample sits on a pole."""
+    return (np.arange(resolution) + 0.5) * np.pi / resolution
+
+
+def azimuths(resolution: int) -> Floats:
+    """Return the 2 * `resolution` azimuths [radian] that go with `colatitudes(resolution)`."""
+    return np.arange(2 * resolution) * np.pi / resolution
+
+
+@lru_cache(maxsize=8)
+def lattice(resolution: int) -> tuple[Floats, Floats]:
+    """Return the broadcast (colatitude, azimuth) grids [radian], each of shape (resolution, 2 * resolution)."""
+    theta, phi = np.meshgrid(colatitudes(resolution), azimuths(resolution), indexing="ij")
+    for grid in (theta, phi):
+        grid.flags.writeable = False
+    return theta, phi
+
+
+def window(resolution: int, region: Region | None) -> tuple[slice, slice]:
+    """Return the rows and columns of the lattice that lie inside a region; all of them if there is none."""
+    if region is None:
+        return slice(None), slice(None)
+    slices = []
+    for samples, (low, high) in (
+        (colatitudes(resolution), region.colatitude),
+        (azimuths(resolution), region.azimuth),
+    ):
+        first, last = np.searchsorted(np.degrees(samples), [low, high])
+        slices.append(slice(int(first), int(last)))
+    return slices[0], slices[1]
+
+
+def directions(colatitude: Floats, azimuth: Floats) -> Floats:
+    """Return points of the parametric unit sphere, shape (..., 3): y is the pole, azimuth runs from x to z."""
+    s = np.sin(colatitude)
+    return np.stack(np.broadcast_arrays(s * np.cos(azimuth), np.cos(colatitude), s * np.sin(azimuth)), axis=-1)

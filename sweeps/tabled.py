@@ -1,0 +1,51 @@
+"""Shapes of one solver for runs of another that want only those: from the tables that come with wizen, in milliseconds.
+
+Solvers know no store: they ask through `Context.shape`. It is always these tables, which belong to the version, so that
+the same parameters give the same bytes wherever they are solved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.arrays import Floats
+from solver.contract import InvalidInput
+
+if TYPE_CHECKING:
+    from store.lookup import ShapeTable
+
+__all__ = ["shape"]
+
+
+def shape(solver: str, point: Mapping[str, float], stage: float, resolution: int) -> Floats:
+    """Return the displacement (n, 2 n, 3) on the lattice at a point, named by the axes of `solver`, and a stage.
+
+    Raises:
+        InvalidInput: there is no table of that solver, or the point or the stage lies outside of it.
+
+    """
+    from store.errors import OutsideTable
+
+    try:
+        found = _table(solver).at(point, stage, resolution=resolution, fields=("displacement",))
+    except OutsideTable as error:
+        raise InvalidInput(f"no shape of {solver}: {error.message}", advice=error.advice) from error
+    assert found.displacement is not None
+    return np.asarray(found.displacement, float)
+
+
+@cache
+def _table(solver: str) -> ShapeTable:
+    from store import starter, tables
+    from store.lookup import ShapeTable
+    from store.store import Store
+
+    opened = Store.open(starter.ROOT)
+    for name in opened.table_names():
+        if tables.info(opened, name).solver == solver:
+            return ShapeTable.open(opened, name)
+    raise InvalidInput(f"no table of {solver} comes with wizen.", advice="Solve that shape itself.")

@@ -1,0 +1,249 @@
+"""More requests than time, heads without end, connections without requests: each is told so, and others are served."""
+
+from __future__ import annotations
+
+import heapq
+import random
+import socket
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+
+from service import connections
+from service.admission import Load
+from service.clients import address, client_of
+from service.connections import GuardedProtocol
+from service.settings import Settings, page
+
+from ._asking import ROOT, checked
+from .conftest import client_of as service_over
+
+
+class Station:
+    """One server, first come first served, in time of its own; `cost(client)` [s] is what a request takes."""
+
+    def __init__(self, load: Load, clock: list[float], cost: Callable[[str], float]) -> None:
+        self.load, self.clock, self.cost = load, clock, cost
+        self.free_at = 0.0
+        self.leaving: list[tuple[float, str]] = []
+        self.waited: list[tuple[str, float]] = []
+        self.refused: Counter[str] = Counter()
+
+    def pass_until(self, moment: float) -> None:
+        while self.leaving and self.leaving[0][0] <= moment:
+            self.clock[0], client = heapq.heappop(self.leaving)
+            self.load.leave(client)
+        self.clock[0] = moment
+
+    def ask(self, moment: float, client: str) -> None:
+        self.pass_until(moment)
+        if self.load.refused(client) is not None:
+            self.refused[client] += 1
+            return
+        self.load.enter()
+        self.free_at = max(self.free_at, moment) + self.cost(client)
+        heapq.heappush(self.leaving, (self.free_at, client))
+        self.waited.append((client, self.free_at - moment))
+
+
+def station(cost: Callable[[str], float], longest: float = 1.0) -> Station:
+    clock = [0.0]
+    return Station(Load(8, longest, lambda: clock[0]), clock, cost)
+
+
+def flood(at: Station, rates: dict[str, float], seconds: float) -> None:
+    """Let clients ask at their mean rates [1/s], at random moments."""
+    chance = random.Random(1)
+    moments = []
+    for client, rate in rates.items():
+        moment = 0.0
+        while (moment := moment + chance.expovariate(rate)) < seconds:
+            moments.append((moment, client))
+    for moment, client in sorted(moments):
+        at.ask(moment, client)
+
+
+@pytest.mark.parametrize("mean", [0.002, 0.01, 0.04])
+def test_twice_the_peak_is_served_at_the_peak_s_rate_and_nobody_waits(mean: float) -> None:
+    chance = random.Random(2)
+    at = station(lambda client: chance.expovariate(1 / mean))
+    flood(at, {"all": 2 / mean}, 60.0)
+    waits = sorted(wait for _, wait in at.waited)
+    assert len(waits) >= 0.9 * 60 / mean
+    assert waits[int(0.99 * len(waits))] < 2.0
+
+
+def test_below_the_peak_nobody_is_refused() -> None:
+    at = station(lambda client: 0.01)
+    flood(at, {"all": 70.0}, 60.0)
+    assert not at.refused
+
+
+def test_a_flood_leaves_room_for_the_others() -> None:
+    at = station(lambda client: 0.02)
+    flood(at, {"flood": 500.0, "honest": 5.0, "other": 5.0}, 60.0)
+    assert at.refused["flood"] > 20000
+    honest = [wait for client, wait in at.waited if client == "honest"]
+    assert at.refused["honest"] <= 0.02 * (len(honest) + at.refused["honest"])
+    assert len(honest) > 250
+    # what is left over is the flood's: it may have all that nobody else wants
+    assert sum(client == "flood" for client, _ in at.waited) > 0.8 * 60 / 0.02
+
+
+def test_shares_count_work_not_requests() -> None:
+    """A client of few dear requests has no more of the time than one of many cheap ones."""
+    at = station(lambda client: 0.2 if client == "dear" else 0.01)
+    flood(at, {"dear": 50.0, "cheap": 200.0}, 120.0)
+    work = {name: sum(c == name for c, _ in at.waited) * at.cost(name) for name in ("dear", "cheap")}
+    assert 0.15 < work["cheap"] / sum(work.values()) < 0.85
+
+
+def test_one_slow_request_stops_nobody() -> None:
+    """A table that took ten seconds to open says nothing of the shapes that follow."""
+    first = [10.0]
+    at = station(lambda client: first.pop() if first else 0.01)
+    flood(at, {"all": 20.0}, 60.0)
+    assert sum(at.refused.values()) < 0.2 * len(at.waited)
+
+
+def test_clients_have_names() -> None:
+    def named(host: str, *headers: tuple[bytes, bytes]) -> str:
+        return client_of({"client": (host, 1), "headers": headers})
+
+    assert named("10.0.0.1") == "10.0.0.1" != named("10.0.0.2")
+    assert named("2001:db8::1") == named("2001:db8::ffff") != named("2001:db8:0:1::1")
+    assert address("::ffff:10.0.0.1") == "10.0.0.1"
+    one, two = ((b"authorization", b"Bearer " + word) for word in (b"one", b"two"))
+    assert named("10.0.0.1", one) == named("10.0.0.2", one) != named("10.0.0.1", two)
+    assert "one" not in named("10.0.0.1", one)
+
+
+def test_an_overloaded_service_says_so_at_once(built: Any) -> None:
+    with service_over(built, threads=1, max_delay=1e-6) as client:
+        query = "/v1/shapes/dehydration?te=0.03&gamma=7&resolution=256&format=glb"
+        found: list[httpx.Response] = []
+
+        def ask(i: int) -> None:
+            with httpx.Client(base_url=client.base_url, timeout=60) as own:
+                found.append(own.get(f"{query}&s=0.2{i}"))
+
+        assert client.get(f"{query}&s=0.3").status_code == 200
+        threads = [threading.Thread(target=ask, args=(i,)) for i in range(12)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        refused = [answer for answer in found if answer.status_code == 503]
+        assert refused
+        for answer in refused:
+            checked(answer, 503, "overloaded")
+            assert int(answer.headers["retry-after"]) >= 1
+        # it does not count against those who only look
+        assert client.get("/v1/tables").status_code == 200
+
+
+def test_a_body_that_dribbles_in(built: Any) -> None:
+    with service_over(built, body_timeout=0.3) as client:
+
+        def slowly() -> Iterator[bytes]:
+            yield b"{"
+            time.sleep(1.5)
+            yield b"}"
+
+        answer = client.post("/v1/shapes:batch", content=slowly(), headers={"Content-Type": "application/json"})
+        checked(answer, 408, "slow-body")
+
+
+LIMITS: dict[str, Any] = {
+    "max_connections": 6, "max_connections_per_client": 4, "head_timeout": 0.5, "max_head": 2048, "max_headers": 20,
+}  # fmt: skip
+
+
+async def hello(scope: Any, receive: Any, send: Any) -> None:
+    if scope["type"] == "http":
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+        await send({"type": "http.response.body", "body": b"hi"})
+
+
+@pytest.fixture
+def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    monkeypatch.setattr(connections, "_settings", lambda: Settings(**LIMITS))
+    options: dict[str, Any] = {"http": GuardedProtocol, "ws": "none", "lifespan": "off", "log_config": None}
+    server = uvicorn.Server(uvicorn.Config(hello, port=0, **options))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    yield server.servers[0].sockets[0].getsockname()[1]
+    server.should_exit = True
+    thread.join()
+
+
+def talk(port: int, *pieces: bytes, pause: float = 0.0) -> bytes:
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as line:
+        for piece in pieces:
+            line.sendall(piece)
+            time.sleep(pause)
+        answer = b""
+        while more := line.recv(65536):
+            answer += more
+            if answer.endswith((b"hi", b"}")):
+                break
+        return answer
+
+
+HEAD = b"GET / HTTP/1.1\r\nHost: x\r\n"
+
+
+def test_honest_requests_pass(port: int) -> None:
+    assert talk(port, HEAD + b"\r\n").startswith(b"HTTP/1.1 200")
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}") as client:  # one connection, kept
+        assert [client.get("/").text for _ in range(10)] == ["hi"] * 10
+
+
+@pytest.mark.parametrize(
+    ("pieces", "code"),
+    [
+        ([HEAD + b"X: " + b"a" * 3000 + b"\r\n\r\n"], b"431"),
+        ([HEAD + b"X: ", *[b"a" * 1000] * 3], b"431"),
+        ([b"GET /" + b"a" * 3000], b"431"),
+        ([HEAD + b"".join(b"X%d: 1\r\n" % i for i in range(30)) + b"\r\n"], b"431"),
+        ([HEAD], b"408"),
+    ],
+)
+def test_heads_without_end(port: int, pieces: list[bytes], code: bytes) -> None:
+    answer = talk(port, *pieces, pause=0.02)
+    assert answer.split()[1] == code
+    assert b"application/problem+json" in answer
+    assert talk(port, HEAD + b"\r\n").endswith(b"hi")
+
+
+def test_a_silent_connection_is_closed(port: int) -> None:
+    assert talk(port) == b""
+
+
+def test_connections_of_one_client_are_counted(port: int) -> None:
+    held = [socket.create_connection(("127.0.0.1", port), timeout=10) for _ in range(4)]
+    time.sleep(0.1)
+    answer = talk(port, HEAD + b"\r\n")
+    assert answer.split()[1] == b"503"
+    assert b"retry-after" in answer
+    assert b"of this client" in answer
+    # another address still has room, until all is taken
+    with socket.create_connection(("127.0.0.1", port), timeout=10, source_address=("127.0.0.2", 0)) as other:
+        other.sendall(HEAD + b"\r\n")
+        assert other.recv(4096).startswith(b"HTTP/1.1 200")
+    for line in held:
+        line.close()
+    time.sleep(0.1)
+    assert talk(port, HEAD + b"\r\n").endswith(b"hi")
+
+
+def test_every_setting_is_documented() -> None:
+    assert (ROOT / "docs" / "settings.md").read_text() == page(), "python -m service.settings > docs/settings.md"

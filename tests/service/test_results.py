@@ -1,0 +1,28 @@
+"""`GET /v1/results`: pages of what the store holds."""
+
+from __future__ import annotations
+
+import httpx
+
+from ._asking import checked
+
+
+def test_pages_lead_to_all_results_once(client: httpx.Client) -> None:
+    found, address = [], "/v1/results?limit=3&sort=te"
+    while address:
+        page = client.get(address).json()
+        found += page["results"]
+        address = page["next"]
+    assert len(found) == page["total"]
+    assert len({(row["key"], row["stage"]) for row in found}) == len(found)
+    assert [row["params"]["te"] for row in found] == sorted(row["params"]["te"] for row in found)
+    assert {row["params"]["te"] for row in found} == {0.02, 0.06}
+
+
+def test_conditions(client: httpx.Client) -> None:
+    page = client.get("/v1/results", params={"where": ["te<0.03", "gamma>5"], "last": True}).json()
+    assert [(row["params"]["te"], row["params"]["gamma"]) for row in page["results"]] == [(0.02, 20.0)]
+    for params in ({"where": "te"}, {"where": "tea<3"}, {"sort": "tea"}):
+        problem = checked(client.get("/v1/results", params=params), 422, "invalid-query")
+        assert problem["errors"][0]["name"] in params
+    checked(client.get("/v1/results?limit=0"), 422, "invalid-query")

@@ -1,0 +1,29 @@
+"""The grain's random factor: mean, deviation and correlation over many draws."""
+
+import numpy as np
+import pytest
+
+from solver.wood.model.grain import Field
+
+
+@pytest.mark.parametrize("variation", [0.1, 0.4])
+def test_the_factor_has_mean_1_and_the_deviation_asked_for(variation):
+    """Over 4000 draws at one place; a lognormal of mean 1 has the relative deviation sqrt(exp(v^2) - 1)."""
+    generator = np.random.default_rng(3)
+    found = np.array([Field(0.1, 0.01, generator).factor(np.zeros((1, 3)), variation)[0] for _ in range(4000)])
+    deviation = np.sqrt(np.exp(variation**2) - 1)
+    assert found.mean() == pytest.approx(1, abs=4 * deviation / np.sqrt(4000))
+    assert found.std() == pytest.approx(deviation, rel=0.1)
+    assert np.array_equal(Field(0.1, 0.01, generator).factor(np.zeros((2, 3)), 0.0), np.ones(2))
+
+
+@pytest.mark.parametrize(("axis", "length"), [(0, 0.1), (1, 0.01), (2, 0.01)])
+def test_places_are_alike_within_the_correlation_length(axis, length):
+    """Random cosines with normal wave vectors have the correlation exp(-d^2 / 2 l^2)."""
+    generator = np.random.default_rng(5)
+    points = np.zeros((3, 3))
+    points[1:, axis] = length, 3 * length
+    values = np.array([Field(0.1, 0.01, generator)(points) for _ in range(3000)])
+    alike = np.corrcoef(values.T)[0]
+    assert alike[1] == pytest.approx(np.exp(-0.5), abs=0.06)
+    assert alike[2] == pytest.approx(np.exp(-4.5), abs=0.06)

@@ -1,0 +1,95 @@
+"""Results as a table: rows, conditions, order, and the ways out."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from _command import document, wizen
+from conftest import Solves
+
+from store.store import Store
+from sweeps import results
+from sweeps.errors import InvalidOption
+
+Write = Callable[..., Path]
+
+
+def test_rows_say_what_was_solved_and_what_came_out(table: Path) -> None:
+    rows = results.find(Store.open(table))
+    assert len(rows) == 6 * 2
+    for row in rows:
+        # a fruit that shrinks freely has the radius of its fresh skin, shrunk
+        assert row.numbers["mean_radius"] == pytest.approx((1 - row.stage) * (1 + row.params["te"]))
+        assert row.solver == "shrinking"
+        assert row.params["quality"] == "preview"
+    assert {row.params["te"] for row in rows} == {0.02, 0.03, 0.04}
+    assert {row.params["gamma"] for row in rows} == {10.0, 30.0}
+
+
+def test_conditions_and_order(table: Path) -> None:
+    store = Store.open(table)
+    found = results.find(store, where=["te<0.035, gamma=10"], sort="-volume")
+    assert [(row.params["te"], row.stage) for row in found] == [(0.03, 0.1), (0.02, 0.1), (0.03, 0.2), (0.02, 0.2)]
+    assert len(results.find(store, where=["te<=0.03", "stage>0.15"])) == 4
+    assert results.find(store, where=["te!=0.02"], last=True) == results.find(store, where=["te>0.02", "stage=0.2"])
+    assert results.find(store, solver="growth") == results.find(store, where=["solver=growth"]) == []
+    assert results.find(store, where=["converged=true"]) == results.find(store)
+    for where in ("te", "te<", "<3", "te~3"):
+        with pytest.raises(InvalidOption, match="no condition"):
+            results.find(store, where=[where])
+    for asked in ({"where": ["tea<3"]}, {"sort": "-tea"}):
+        with pytest.raises(InvalidOption, match="no result has 'tea'"):
+            results.find(store, **asked)
+
+
+def test_the_command_writes_what_others_read(table: Path, tmp_path: Path) -> None:
+    words = ("results", "--store", table, "--where", "te<0.03", "--sort", "gamma", "--last")
+    said = document(wizen(*words, "--json"))
+    assert (said["count"], [row["gamma"] for row in said["results"]]) == (2, [10.0, 30.0])
+    lines = list(csv.DictReader(io.StringIO(wizen(*words, "--csv", "--columns", "te,volume").stdout)))
+    assert [float(line["volume"]) for line in lines] == [row["volume"] for row in said["results"]]
+    assert set(lines[0]) == {"te", "volume"}
+    assert wizen(*words, "--nc", tmp_path / "rows.nc").exit_code == 0
+    with xr.open_dataset(tmp_path / "rows.nc", engine="h5netcdf") as opened:
+        assert opened["mean_radius"].attrs["long_name"]
+        assert opened["te"].values.tolist() == [0.02, 0.02]
+    people = wizen(*words).stdout
+    assert said["results"][0]["key"][:12] in people
+    assert "2 rows of 2 results" in people
+    assert wizen("results", "--store", table, "--columns", "tea").exit_code == 2
+
+
+def test_rows_of_several_solvers_are_one_dataset(table: Path) -> None:
+    row = results.find(Store.open(table))[0]
+    other = row._replace(solver="growth", params={"thickness": 0.1}, numbers={"mesh_area": 3.0})
+    both = results.dataset([row, other])
+    assert np.isnan(both["te"].values[1])
+    assert both["mesh_area"].values[1] == 3.0
+    assert both["solver"].values.tolist() == ["shrinking", "growth"]
+
+
+def test_one_result_by_the_beginning_of_its_key(table: Path) -> None:
+    key = next(iter(Store.open(table).keys()))
+    said = document(wizen("show", key[:8], "--store", table, "--json"))
+    assert said["key"] == key
+    assert said["params"]["exocarp_thickness"] in (0.02, 0.03, 0.04)
+    assert said["fields"]["displacement"]["dims"] == ["stage", "colatitude", "azimuth", "component"]
+    assert "mean_radius" in wizen("show", key, "--store", table).stdout
+    for short in (key[:3], "zzzz", ""):
+        assert wizen("show", short, "--store", table).exit_code == 2
+
+
+def test_a_sweep_says_what_can_be_done_next(shrinking: Solves, tmp_path: Path, write_plan: Write) -> None:
+    root = tmp_path / "store"
+    assert f"next: wizen table build --store {root}" in wizen("sweep", write_plan(), "--store", root).stdout
+    plain = write_plan(name="plain")
+    plain.write_text(plain.read_text() + 'fields = ["volume"]\n')
+    said = wizen("sweep", plain, "--store", root).stdout
+    assert f"next: wizen results --store {root} --solver shrinking" in said.replace("\n", " ")
+    assert "table build" not in said

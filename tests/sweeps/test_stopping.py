@@ -1,0 +1,142 @@
+"""Whatever a solver sits in, a signal, a cancellation and a lost claim end it within seconds, and nobody else."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import Solves
+
+from store.store import Store
+from sweeps import executors
+from sweeps.plan import Plan
+from sweeps.report import Event
+from sweeps.runner import run_jobs, run_plan
+
+Write = Callable[..., Path]
+
+ROOT = Path(__file__).parents[2]
+#: Far less than the ten minutes that a hanging solver takes, far more than the two seconds of a machine at rest.
+SOON = 20.0
+
+
+def until(happened: Callable[[], bool], seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.02)
+
+
+def command(*words: object) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "service.cli", *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ['PYTHONPATH']}"},
+        cwd=ROOT,
+        start_new_session=True,
+    )
+
+
+def gone(session: int) -> bool:
+    try:
+        os.killpg(session, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_solve_that_hangs_ends_with_its_command(shrinking: Solves, number: signal.Signals) -> None:
+    running = command("solve", "shrinking", "--set", "trouble=hangs")
+    until(lambda: len(shrinking) == 1)
+    running.send_signal(number)
+    _, said = running.communicate(timeout=SOON)
+    assert running.returncode == 130
+    assert said.strip().splitlines()[-1] == "stopped."
+    assert "given back" not in said
+
+
+def test_a_sweep_of_jobs_that_hang_gives_them_back(shrinking: Solves, tmp_path: Path, write_plan: Write) -> None:
+    root = tmp_path / "store"
+    running = command("sweep", write_plan(more='trouble = "hangs"'), "--store", root, "--workers", 2)
+    until(lambda: len(shrinking) == 2)
+    running.send_signal(signal.SIGTERM)
+    _, said = running.communicate(timeout=SOON)
+    assert running.returncode == 130
+    assert "given back" in said
+    until(lambda: gone(running.pid), SOON)
+    assert Store.open(root).ledger.counts()["wanted"] == 6
+
+
+@pytest.mark.parametrize("lost", ["cancelled", "taken over"])
+def test_a_job_that_hangs_is_killed_alone(shrinking: Solves, store: Store, write_plan: Write, lost: str) -> None:
+    stuck = Plan.load(write_plan("[0.03]", "[20]", 'trouble = "hangs"', name="stuck"))
+    others = Plan.load(write_plan(more="pause = 0.3"))
+    (key,) = (job.key for job in stuck.jobs())
+
+    def take() -> None:
+        until(lambda: len(shrinking) >= 3)
+        if lost == "cancelled":
+            store.ledger.cancel([key])
+            return
+        with store.ledger.database.write() as connection:  # as if its lease had run out
+            connection.execute("UPDATE jobs SET lease_until = -1 WHERE key = ?", (key,))
+        taken = store.ledger.claim("another", 3600, [key])
+        assert taken is not None
+        until(lambda: "lost" in seen)
+        store.ledger.cancel([key])
+
+    seen: list[str] = []
+
+    def observe(event: Event) -> None:
+        if event.kind != "progress":
+            seen.append(event.kind)
+
+    taking = threading.Thread(target=take)
+    with executors.processes(2) as workers:
+        taking.start()
+        report = run_jobs([*stuck.jobs(), *others.jobs()], store, workers, observe=observe)
+        taking.join()
+    assert (report.solved, report.cancelled, report.failed) == (6, 1, ())
+    assert seen.count("lost") == 1
+    assert "retry" not in seen
+    assert report.seconds < 120
+
+
+def test_what_was_suspended_past_its_lease_comes_too_late(
+    shrinking: Solves, tmp_path: Path, store: Store, write_plan: Write
+) -> None:
+    """Two runners, one of them stopped by SIGSTOP until its lease has run out, and woken: one result, no strife."""
+    path = write_plan("[0.03]", "[10]", "pause = 2")
+    script = tmp_path / "run.py"
+    script.write_text(
+        "import sys\nfrom store.store import Store\nfrom sweeps import executors, runner\n"
+        "from sweeps.plan import Plan\nif __name__ == '__main__':\n    with executors.serial() as workers:\n"
+        "        report = runner.run_plan(Plan.load(sys.argv[1]), Store.open(sys.argv[2]), workers, lease=1.0)\n"
+        "    print(report.solved, report.reused)\n"
+    )
+    first = subprocess.Popen(
+        [sys.executable, str(script), str(path), str(store.root)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ['PYTHONPATH']}"},
+    )
+    until(lambda: len(shrinking) == 1)
+    first.send_signal(signal.SIGSTOP)
+    woken = threading.Timer(2.5, first.send_signal, [signal.SIGCONT])
+    woken.start()
+    with executors.serial() as workers:
+        report = run_plan(Plan.load(path), store, workers, lease=1.0)
+    assert first.communicate(timeout=60)[0].split() == ["0", "1"]
+    assert (report.solved, report.reused) == (1, 0)
+    assert len(shrinking) == 2
+    assert store.ledger.get(next(iter(store.keys()))).claims == 2
