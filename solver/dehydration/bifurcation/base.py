@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from ...arrays import Floats
 from ...contract import Context, InvalidInput, NotConverged
+from ...linalg.banded import Pattern, pattern
 from ..params import DehydrationParams
-from .banded import Pattern, pattern
 from .meridional_elements import axisymmetric_tangent, axisymmetric_volume_rate, deformation, forces, moduli
 from .meridional_mesh import PER_WAVELENGTH, MeridionalMesh, build
 
@@ -165,7 +165,8 @@ class BaseState:
         on_axis = radius == 0
         stretch = outwards / np.where(on_axis, 1.0, radius)
         shift = np.stack([points[:, 0] * stretch, along, points[:, 2] * stretch], axis=-1)
-        return points + shift
+        found: Floats = points + shift
+        return found
 
 
 def _parametric(params: DehydrationParams, polar: Floats) -> Floats:

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from ...arrays import Bools, Floats
 from ...contract import NotConverged
-from .banded import Pattern, pattern
+from ...linalg.banded import Pattern, pattern
 from .base import BaseState, Meridian
 from .meridional_elements import deformation, moduli, stress_moduli, tangents, volume_rates
 
@@ -112,7 +112,8 @@ class Perturbations:
         """Return the height of a mode over the surface's columns, largest one 1."""
         p, q, c = vector[self._surface].T
         height = self._normal[:, 0] * (p + q) / np.sqrt(2) + self._normal[:, 1] * c
-        return height / height[np.argmax(np.abs(height))]
+        found: Floats = height / height[np.argmax(np.abs(height))]
+        return found
 
 
 def _saddle(stiff: Floats, rate: Floats, mass: Floats) -> Floats:

@@ -4,9 +4,10 @@ High-order elements along the radius R. Energy per fresh volume, with Jd = theta
 
     Psi = mu Jd / 2 (J^(-2/3) I1(F) - 3) + p (J - Jd) - Jd p^2 / (2 kappa)
 
-(Liu et al. 2014, Eq. 1-4; the last term vanishes for incompressible layers). The smooth state is r(R), with stretches
-lr = dr/dR and lt = r/R. A perturbation u = U(R) Y e_r + V(R) grad Y / k, with k^2 = l (l + 1), decouples by degree;
-averaged over the sphere its second variation is a form in the four numbers e = (U', U/R, V', V/R).
+(Liu et al. 2014, Eq. 1-4; `solver.material`; the last term vanishes for incompressible layers). The smooth state is
+r(R), with stretches lr = dr/dR and lt = r/R. A perturbation u = U(R) Y e_r + V(R) grad Y / k, with k^2 = l (l + 1),
+decouples by degree; averaged over the sphere its second variation is a form in the four numbers
+e = (U', U/R, V', V/R).
 """
 
 from __future__ import annotations
@@ -224,7 +225,7 @@ def _stress_rate(mesh: RadialMesh, fresh: RadialState, kappa_ratio: float | None
 
 
 def _size(mesh: RadialMesh, degree: int) -> int:
-    return mesh.at.shape[1] * (1 if degree == 0 else 2)
+    return int(mesh.at.shape[1] * (1 if degree == 0 else 2))
 
 
 def _bulk(mesh: RadialMesh, coupling: Floats, jd: Floats, kappa_ratio: float) -> Floats:
