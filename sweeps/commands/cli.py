@@ -118,7 +118,8 @@ def solve(
 ) -> None:
     """Run a solver once, here and now, without a store.
 
-    --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, and shapes as .obj or .glb.
+    --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, shapes as .obj or .glb, and all stages as
+    a clip: .glb, .usda, .usdc.
 
     [bold]Examples[/bold]
 

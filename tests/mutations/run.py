@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import fcntl
 import importlib
 import json
 import os
@@ -27,6 +28,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -85,19 +87,20 @@ class Copy:
 
     def _importers(self, changed: str) -> set[str]:
         """Return a file and all that import it, whatever way round."""
-        imports = {name: _imports(self.root / name, name) for name in self._sources()}
-        found, todo = set(), [changed]
+        found, todo = set[str](), [changed]
         while todo:
             name = todo.pop()
             if name in found:
                 continue
             found.add(name)
             module = _module(name)
-            todo += [other for other, needs in imports.items() if module in needs]
+            todo += [other for other, needs in self._imports.items() if module in needs]
         return found
 
-    def _sources(self) -> list[str]:
-        return [str(p.relative_to(self.root)) for floor in FLOORS for p in (self.root / floor).rglob("*.py")]
+    @cached_property
+    def _imports(self) -> dict[str, set[str]]:
+        sources = [path for floor in FLOORS for path in (self.root / floor).rglob("*.py")]
+        return {(name := str(path.relative_to(self.root))): _imports(path, name) for path in sources}
 
 
 def _module(name: str) -> str:
@@ -174,8 +177,12 @@ class Ledger:
 
     def __init__(self) -> None:
         self.path = RESULTS / "mutants.json"
+        self.rows: dict[str, dict[str, Any]] = {}
+        self._read()
+
+    def _read(self) -> None:
         page = json.loads(self.path.read_text()) if self.path.exists() else {}
-        self.rows: dict[str, dict[str, Any]] = {row["name"]: row for row in page.get("mutations", [])}
+        self.rows |= {row["name"]: row for row in page.get("mutations", [])}
 
     def known(self, mutation: Mutation, copy: Copy) -> bool:
         row = self.rows.get(mutation.name)
@@ -186,7 +193,14 @@ class Ledger:
         )
 
     def note(self, mutations: Sequence[Mutation], **row: Any) -> None:
-        self.rows[row["name"]] = row
+        with (RESULTS / "mutants.lock").open("w") as lock:
+            # another one may be at work
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            self._read()
+            self.rows[row["name"]] = row
+            self._write(mutations)
+
+    def _write(self, mutations: Sequence[Mutation]) -> None:
         rows = [self.rows[m.name] for m in mutations if m.name in self.rows]
         caught = sum(row["outcome"].startswith("caught") for row in rows)
         head = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)

@@ -190,7 +190,8 @@ def _heights(params: DehydrationParams, model: Model, crossing: Crossing) -> Cal
         normal = np.cross(around, along)
         normal *= np.sign(np.einsum("pi,pi->p", normal, points) / np.linalg.norm(normal, axis=1))[:, None]
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        return np.einsum("pi,pi->p", moved, normal)
+        found: Floats = np.einsum("pi,pi->p", moved, normal)
+        return found
 
     theta, phi = np.meshgrid(np.linspace(0.01, np.pi - 0.01, 181), np.linspace(0, np.pi, 181), indexing="ij")
     sample = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)

@@ -61,6 +61,15 @@ def test_contacts_seed_stem_floor_and_what_is_touched():
     assert (90, 180) in [(round(w.colatitude), round(w.azimuth)) for w in mirrored]
 
 
+@pytest.mark.parametrize(("apart", "touches"), [(-0.1, True), (0.04, True), (0.06, False), (0.3, False)])
+def test_balls_touch_whose_skins_are_a_twentieth_apart(apart, touches):
+    """Two balls of radius 1.04 and 0.5: what lies between their skins is the distance less both radii."""
+    ball = {"radii": (1.0,) * 8, "exocarp_thickness": 0.04, "seeds": "contacts"}
+    other = {"position": (1.04 + 0.5 + apart, 0.0, 0.0), "radius": 0.5}
+    found = seeds(SOLVER.parse({**ball, "neighbours": [other]}))
+    assert ((90, 0) in [(round(w.colatitude), round(w.azimuth)) for w in found]) is touches
+
+
 def test_pressure_shortens_and_stiffens_where_it_is():
     values = {"body": "quasi-static", "wounds": (), "flesh": {"gravity": 0}}
     plain = SOLVER.parse(values, "orange")
