@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +21,8 @@ from sweeps.formats import extend
 from . import cli_export
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from sweeps.formats import Encoder, Made
 
     from .formats import Format
@@ -123,8 +125,23 @@ def _formats() -> Mapping[str, Encoder]:
     from sweeps.formats import Encoder
 
     from .formats import FORMATS
+    from .sequences import EXPORTS
 
-    return {f.suffix: Encoder(f.fields, partial(_encode, f), single=True) for f in FORMATS.values()}
+    clips = {e.suffix: partial(_clip, e.name) for e in EXPORTS.values() if not e.single and e.suffix.count(".") == 1}
+    known = {f.suffix: Encoder(f.fields, partial(_encode, f), True, clips.get(f.suffix)) for f in FORMATS.values()}
+    runs = {s: Encoder(("position",), partial(_whole, clip), True, clip, runs=True) for s, clip in clips.items()}
+    return {**runs, **known}
+
+
+def _clip(name: str, run: xr.Dataset) -> bytes:
+    from .sequences import EXPORTS, Options, prepared, write
+
+    return write(prepared(run, Options()), EXPORTS[name], Options())
+
+
+def _whole(clip: Callable[[xr.Dataset], bytes], made: Made) -> bytes:
+    assert made.run is not None
+    return clip(made.run)
 
 
 def _encode(chosen: Format, made: Made) -> bytes:

@@ -51,7 +51,7 @@ _PLAIN = """<!doctype html>
 def wanted(accept: str | None) -> bool:
     """Return whether an Accept header prefers a page to JSON, as those of browsers do."""
     try:
-        return mimeparse.best_match(["text/html", "application/json"], (accept or "*/*").lower()) == "text/html"
+        return bool(mimeparse.best_match(["text/html", "application/json"], (accept or "*/*").lower()) == "text/html")
     except mimeparse.MimeTypeParseException:
         return False
 

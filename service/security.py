@@ -62,7 +62,7 @@ def authorize(state: State, secret: str | None, scope: Scope) -> Token:
             advice=f"Send it as 'Authorization: Bearer ...'. {advice}",
             headers={"WWW-Authenticate": _REALM},
         )
-    token = state.tokens.find(secret)
+    token: Token | None = state.tokens.find(secret)
     invalid = {"WWW-Authenticate": f'{_REALM}, error="invalid_token"'}
     if token is None:
         raise Unauthorized("the token is not known here.", advice=f"It may be revoked. {advice}.", headers=invalid)

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from solver import quantities, registry
-from solver.contract import Solver
+from solver.contract import InvalidInput, Solver
 
 from .errors import UnknownSolver
 
@@ -34,7 +34,7 @@ def solver_named(name: str) -> Solver:
     """
     try:
         return registry.get(name)
-    except registry.InvalidInput as error:
+    except InvalidInput as error:
         raise UnknownSolver(error.message, advice=error.advice) from None
 
 

@@ -63,7 +63,8 @@ class FreshFruit(Fresh):
 def _generatrix(radii: tuple[float, ...], n: int) -> tuple[Array, Array]:
     # the fruit that these radii come from has been validated
     fruit: Any = Fruit.model_construct
-    return fruit(radii=radii).generatrix(colatitudes(n))
+    found: tuple[Array, Array] = fruit(radii=radii).generatrix(colatitudes(n))
+    return found
 
 
 @lru_cache(maxsize=64)

@@ -145,7 +145,8 @@ class Fruit(Params):
         """Return points of the fruit's fresh outer surface X, shape (..., 3): r_e = r_f + te along each ray."""
         inner = self.sarcocarp(colatitude, azimuth)
         distance = np.linalg.norm(inner, axis=-1, keepdims=True)
-        return inner * (1 + self.exocarp_thickness / distance)
+        found: Floats = inner * (1 + self.exocarp_thickness / distance)
+        return found
 
     def stone_distance(self, rays: Floats) -> Floats:
         """Return the distance (...) from the centre to the stone's surface along unit rays (..., 3), 0 without one."""
@@ -153,7 +154,8 @@ class Fruit(Params):
             return np.zeros(rays.shape[:-1])
         along, across = self.stone
         axes = np.array([across, along, across * self.radii[7] / self.radii[3]])
-        return 1 / np.linalg.norm(rays / axes, axis=-1)
+        found: Floats = 1 / np.linalg.norm(rays / axes, axis=-1)
+        return found
 
     def _outline(self) -> Floats:
         x, y = self.generatrix(np.linspace(np.pi, 0, 361))

@@ -9,6 +9,7 @@ Duff and Reid 1983 (multifrontal), George 1973 (nested dissection).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -179,8 +180,10 @@ def _eliminate(panel: Floats, rest: Floats) -> tuple[_Block, int]:
     return _Block(factor, signs, below), _negatives(factor, signs)
 
 
-def factorise(analysis: Analysis, data: Floats) -> Factor:
+def factorise(analysis: Analysis, data: Floats, watch: Callable[[], None] | None = None) -> Factor:
     """Return the factor of the symmetric matrix with blocks `data` (nnz, 3, 3) on the analysed pattern.
+
+    watch: called before each front; what it raises ends the factorisation.
 
     Raises numpy.linalg.LinAlgError if a front is exactly singular.
     """
@@ -189,6 +192,8 @@ def factorise(analysis: Analysis, data: Floats) -> Factor:
     open_: dict[int, Floats] = {}
     negative = 0
     for number, front in enumerate(analysis.fronts):
+        if watch is not None:
+            watch()
         size, pivots = 3 * len(front.nodes), 3 * front.own
         place[front.nodes] = np.arange(len(front.nodes))
         panel = np.zeros((size, pivots), order="F")

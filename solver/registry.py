@@ -41,7 +41,8 @@ def get(name: str) -> Solver:
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise InvalidInput(f"there is no solver {name!r}.", advice=f"{hint}Known: {', '.join(sorted(places))}.")
     module, _, attribute = places[name].partition(":")
-    return getattr(import_module(module), attribute)
+    found: Solver = getattr(import_module(module), attribute)
+    return found
 
 
 def surface(name: str) -> Surface | None:

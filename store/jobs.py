@@ -47,7 +47,7 @@ class Job(JobSpec):
 
     `message` is what its run said last, where it says anything. `lease_until` is a reading of `clock`, which counts
     seconds without a date. `claims` numbers the claims of a job and never goes back, as `attempts` does: with
-    `worker`, it tells one claim from every other.
+    `worker`, it tells one claim from every other. `failures` are those attempts that failed, and were not just lost.
     """
 
     plan: str
@@ -64,6 +64,7 @@ class Job(JobSpec):
     claims: int = 0
     clock: str | None = None
     lease: float | None = None
+    failures: int = 0
     message: str = ""
 
 

@@ -38,7 +38,7 @@ CREATE TABLE IF NOT EXISTS jobs (
     plan TEXT NOT NULL DEFAULT '', state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, worker TEXT,
     lease_until REAL, digest TEXT, error TEXT, seconds REAL, created REAL NOT NULL, updated REAL NOT NULL,
     progress REAL NOT NULL DEFAULT 0,
-    claims INTEGER NOT NULL DEFAULT 0, clock TEXT, lease REAL
+    claims INTEGER NOT NULL DEFAULT 0, clock TEXT, lease REAL, failures INTEGER NOT NULL DEFAULT 0
 );
 CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
 -- a job may belong to several plans, of which jobs.plan is the one that asked first
@@ -50,7 +50,8 @@ CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) W
 #: What older files lack: by the version that they have, how they become the next.
 _UPGRADES = {
     1: "ALTER TABLE jobs ADD COLUMN claims INTEGER NOT NULL DEFAULT 0; "
-    "ALTER TABLE jobs ADD COLUMN clock TEXT; ALTER TABLE jobs ADD COLUMN lease REAL"
+    "ALTER TABLE jobs ADD COLUMN clock TEXT; ALTER TABLE jobs ADD COLUMN lease REAL",
+    2: "ALTER TABLE jobs ADD COLUMN failures INTEGER NOT NULL DEFAULT 0",
 }
 
 #: The claim that a job's worker holds, or gave back without anybody having taken the job since.
@@ -176,17 +177,18 @@ class Ledger:
     def failed(self, job: Job, error: Mapping[str, Any], max_attempts: int = 2) -> State | None:
         """Note a failure (`code`, `message`, `advice`) of a claimed job and return the job's new state.
 
-        It waits again until it was tried `max_attempts` times, then it is failed for good. What its claimant noted as
+        It waits again until it has failed `max_attempts` times, then it is failed for good. What its claimant noted as
         done before stays done. None means that the job is no longer its claimant's, and is left alone.
         """
         with self.database.write() as connection:
             found = get(connection, job.key)
             if found.state == "done" and found.claims == job.claims:
                 return "done"
-            state: State = "failed" if found.attempts >= max_attempts else "wanted"
+            # a claimant that was lost has not failed: only MAX_LOST of those give a job up
+            state: State = "failed" if found.failures + 1 >= max_attempts else "wanted"
             changed = connection.execute(
-                "UPDATE jobs SET state = ?, error = ?, worker = NULL, lease_until = NULL, updated = ? "
-                f"WHERE {_HELD} AND state = 'running'",
+                "UPDATE jobs SET state = ?, error = ?, failures = failures + 1, worker = NULL, lease_until = NULL, "
+                f"updated = ? WHERE {_HELD} AND state = 'running'",
                 (state, json.dumps(error), time.time(), *_held(job)),
             ).rowcount
         return state if changed else None
@@ -274,8 +276,8 @@ class Ledger:
             good.append(key)
         with self.database.write() as connection:
             connection.execute(
-                "UPDATE jobs SET state = 'wanted', attempts = 0, digest = NULL, progress = 0, updated = ? "
-                "WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
+                "UPDATE jobs SET state = 'wanted', attempts = 0, failures = 0, digest = NULL, progress = 0, "
+                "updated = ? WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
                 (time.time(), json.dumps(good)),
             )
         return len(good)
@@ -305,7 +307,7 @@ def enter(connection: Connection, job: JobSpec, plan: str, revived: Sequence[Sta
     count = connection.execute(
         "INSERT INTO jobs (key, solver, version, params, need, plan, state, created, updated) "
         "VALUES (?, ?, ?, ?, ?, ?, 'wanted', ?, ?) ON CONFLICT (key) DO UPDATE SET "
-        "state = 'wanted', attempts = 0, error = NULL, worker = NULL, progress = 0, "
+        "state = 'wanted', attempts = 0, failures = 0, error = NULL, worker = NULL, progress = 0, "
         f"updated = excluded.updated WHERE state IN ({','.join('?' * len(revived))})",
         (job.key, job.solver, job.version, *texts, plan, now, now, *revived),
     ).rowcount

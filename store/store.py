@@ -108,7 +108,8 @@ class Store:
         """
         if self.has(key):
             try:
-                return self.get(key).attrs["digest"]
+                found: str = self.get(key).attrs["digest"]
+                return found
             except CorruptShard:
                 pass  # replaced below by the good one
         return shards.write(self.shard_path(key), dataset, key)

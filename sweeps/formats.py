@@ -38,11 +38,16 @@ class Made:
 
 @dataclass(frozen=True)
 class Encoder:
-    """A format: the fields of a shape that it needs, and how to write. `single` formats hold one stage only."""
+    """A format: the fields of a shape that it needs, and how to write. `single` formats hold one stage only.
+
+    whole: how a run is written with all its stages, and on meshes of its own; runs: nothing but runs is written.
+    """
 
     fields: tuple[str, ...]
     encode: Callable[[Made], bytes]
     single: bool = False
+    whole: Callable[[xr.Dataset], bytes] | None = None
+    runs: bool = False
 
 
 _more: list[Callable[[], Mapping[str, Encoder]]] = []

@@ -113,7 +113,8 @@ _OURS = {
 def suffixes(run: bool) -> dict[str, Encoder | None]:
     """Return what can be written, by suffix; `.h5` (no encoder) holds whole runs only."""
     known: dict[str, Encoder | None] = {".h5": None} if run else {}
-    return {**known, **_OURS, **{suffix: encoder for suffix, encoder in added().items() if suffix not in _OURS}}
+    more = {s: encoder for s, encoder in added().items() if s not in _OURS and (run or not encoder.runs)}
+    return {**known, **_OURS, **more}
 
 
 def check_suffix(path: Path, run: bool, stages: int) -> None:
@@ -129,7 +130,7 @@ def check_suffix(path: Path, run: bool, stages: int) -> None:
             f"--out {path}: cannot write {path.suffix or 'no suffix'!r}.", f"Known: {', '.join(known)}."
         )
     encoder = known[path.suffix]
-    if encoder is not None and encoder.single and stages > 1:
+    if encoder is not None and encoder.single and stages > 1 and not (run and encoder.whole):
         raise InvalidOption(
             f"--out {path}: {path.suffix} holds one stage, not {stages}.",
             "Give one stage with --stages, or write .npz or .png.",
@@ -153,7 +154,7 @@ def fields_for(path: Path | None, run: bool, solver: Solver | None = None) -> tu
     known = ("position",) if solver is None else solver.fields
     if "position" in known or "position" not in encoder.fields:
         return encoder.fields
-    if encoder.single:
+    if encoder.single and encoder.whole is None:
         raise InvalidOption(
             f"--out {path}: a solver with meshes of its own is not written as {path.suffix if path else ''} at once.",
             "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
@@ -172,7 +173,8 @@ def save(path: Path, made: Made) -> None:
 
     """
     encoder = suffixes(made.run is not None)[path.suffix]
-    if encoder is not None and encoder.single and "position" in encoder.fields and not made.shapes:
+    whole = encoder.whole if encoder is not None and made.run is not None else None
+    if encoder is not None and encoder.single and "position" in encoder.fields and not made.shapes and whole is None:
         raise InvalidOption(
             f"--out {path}: a run on a mesh of its own is not written as {path.suffix} at once.",
             "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
@@ -180,6 +182,8 @@ def save(path: Path, made: Made) -> None:
     if encoder is None:
         assert made.run is not None
         shards.write(path, made.run, made.key)
+    elif whole is not None and made.run is not None and len(made.shapes) != 1:
+        seal.publish(path, whole(made.run))
     else:
         seal.publish(path, encoder.encode(made))
 

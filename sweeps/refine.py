@@ -159,7 +159,8 @@ def _lines(plan: Plan, state: State, avoid: Sequence[Mapping[str, float]]) -> It
 
 def _ticks(column: Array) -> Array:
     order = np.sort(column)
-    return order[np.append(True, np.diff(order) > 1e-9)]
+    found: Array = order[np.append(True, np.diff(order) > 1e-9)]
+    return found
 
 
 def _candidates(state: State) -> Array:

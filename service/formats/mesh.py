@@ -128,4 +128,5 @@ def _unit(vector: NDArray[np.floating], fallback: NDArray[np.floating]) -> Singl
     if tiny.any():
         vector = np.where(tiny, fallback, vector)
         length = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return (vector / length).astype(np.float32, copy=False)
+    found: Singles = (vector / length).astype(np.float32, copy=False)
+    return found

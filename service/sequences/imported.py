@@ -57,7 +57,8 @@ class Bound:
         """Return the mesh's vertices (v, 3), in its own units, as a stage of the result moves them."""
         displacement = surface.vertices.astype(float) - self.rest
         here = np.einsum("vk,vkc->vc", self.shares, displacement[self.corners])
-        return self.points + self.gain[:, None] * here / self.scale
+        found: Array = self.points + self.gain[:, None] * here / self.scale
+        return found
 
     def report(self) -> dict[str, float]:
         """Return how well the mesh lies on the surface, over the surface's own size."""

@@ -50,7 +50,7 @@ def nearest(points: Array, vertices: Array, triangles: Array) -> Nearest:
             better = _best(here[open_], corners, owner, np.concatenate(lists).astype(np.int64))
             where = start + open_
             face[where], place[where], distance[where] = better
-    shares = np.asarray(points_to_barycentric(corners[face], place, method="cross"), float)
+    shares = np.asarray(points_to_barycentric(corners[face], place, method="cross"), np.float64)
     shares = np.where(np.isfinite(shares), shares, 1 / 3)  # a triangle without area
     shares = np.clip(shares, 0, None)
     return Nearest(face, shares / shares.sum(axis=1, keepdims=True), distance)

@@ -115,7 +115,8 @@ class Sequence:
     @cached_property
     def params(self) -> Mapping[str, Any]:
         """The solver's parameters."""
-        return json.loads(self.run.attrs.get("params", "{}"))
+        found: Mapping[str, Any] = json.loads(self.run.attrs.get("params", "{}"))
+        return found
 
     @property
     def about(self) -> dict[str, Any]:
@@ -224,7 +225,8 @@ def lattice_fields(run: xr.Dataset, index: int) -> dict[str, Array]:
 
 def _positions(run: xr.Dataset, index: int) -> Array:
     if "position" in run:
-        return run["position"].values[index]
+        found: Array = run["position"].values[index]
+        return found
     from solver import registry
 
     solver, values = registry.get(str(run.attrs["solver"])), json.loads(run.attrs["params"])

@@ -42,12 +42,14 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
 
 
 def _over(below: Array, above: Array, cover: Array) -> Array:
-    return below + (above - below) * cover[..., None]
+    found: Array = below + (above - below) * cover[..., None]
+    return found
 
 
 def _smooth(x: Array) -> Array:
     x = np.clip(x, 0, 1)
-    return x * x * (3 - 2 * x)
+    found: Array = x * x * (3 - 2 * x)
+    return found
 
 
 LOOKS = Looks(

@@ -22,7 +22,8 @@ class Anchors:
 
     def at(self, x: Floats, triangles: Ints) -> Floats:
         """Return where they are (m, 3)."""
-        return np.einsum("mk,mkc->mc", self.weights, x[triangles[self.faces]])
+        found: Floats = np.einsum("mk,mkc->mc", self.weights, x[triangles[self.faces]])
+        return found
 
 
 class Corners(NamedTuple):

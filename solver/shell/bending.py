@@ -64,7 +64,7 @@ def _hinge(x: Floats, hinge: Ints, slopes: Floats) -> float:
     length = np.sqrt(square)
     first, second = nx * nx + ny * ny + nz * nz, ox * ox + oy * oy + oz * oz
     cx, cy, cz = ny * oz - nz * oy, nz * ox - nx * oz, nx * oy - ny * ox
-    angle = np.arctan2((cx * ex + cy * ey + cz * ez) / length, nx * ox + ny * oy + nz * oz)
+    angle: float = np.arctan2((cx * ex + cy * ey + cz * ez) / length, nx * ox + ny * oy + nz * oz)
     # a triangle without area has no normal: its hinge exerts no force
     p = -length / first if first > 0 else 0.0
     q = -length / second if second > 0 else 0.0

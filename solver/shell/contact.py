@@ -66,7 +66,8 @@ def _nearest(p: Floats, a: Floats, b: Floats, c: Floats, weights: Floats) -> flo
         v, w = vb / (va + vb + vc), vc / (va + vb + vc)
     weights[0], weights[1], weights[2] = 1 - v - w, v, w
     gap = p - (a + v * ab + w * ac)
-    return np.dot(gap, gap)
+    found: float = np.dot(gap, gap)
+    return found
 
 
 @njit(cache=True, error_model="numpy")

@@ -32,7 +32,8 @@ def to_angles(b: Floats, g: Floats) -> Floats:
 def added_angles(b: Floats, g: Floats, mesh: Topology) -> Floats:
     """Return the angles (h,) of hinges between triangles with second forms b (f, 3)."""
     sides = to_angles(b, g)
-    return sides[mesh.hinge_faces, mesh.hinge_corners].sum(axis=1)
+    found: Floats = sides[mesh.hinge_faces, mesh.hinge_corners].sum(axis=1)
+    return found
 
 
 def from_angles(rest: Floats, g: Floats, mesh: Topology) -> Floats:

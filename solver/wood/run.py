@@ -13,10 +13,12 @@ from threadpoolctl import threadpool_limits
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
 from .contact.listing import law
-from .model.bundle import Wood, lay
+from .model.bundle import lay
+from .model.state import Wood
 from .params import WoodParams
 from .settings import choose
-from .stepping.marching import Reached, explicit
+from .stepping.marching import explicit
+from .stepping.moment import Reached
 from .stepping.stability import longest_step, touchable
 from .surface.skin import Skin
 

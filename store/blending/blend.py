@@ -49,7 +49,8 @@ class Blend(NamedTuple):
         if self.ratio is None or self.low is None:
             return ends
         shape = self.low[:, 0].real @ _AT_POLES
-        return ends * envelope.at_poles(self.ratio)[:, None] + shape.T
+        found: Array = ends * envelope.at_poles(self.ratio)[:, None] + shape.T
+        return found
 
 
 class Blender:
@@ -148,4 +149,5 @@ def powers(stored: Array) -> Array:
 def _form(parts: Array, products: Array) -> Array:
     """Return the quadratic form (...) of terms (T,) and their products (T, T, ...)."""
     count = len(parts)
-    return parts @ (parts @ products.reshape(count, -1)).reshape(count, -1)
+    found: Array = parts @ (parts @ products.reshape(count, -1)).reshape(count, -1)
+    return found

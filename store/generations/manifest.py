@@ -53,7 +53,8 @@ class TableInfo:
 
     def to_json(self) -> dict[str, Any]:
         """Return the manifest as JSON values."""
-        return json.loads(json.dumps(asdict(self)))
+        found: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return found
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> TableInfo:

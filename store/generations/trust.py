@@ -70,7 +70,8 @@ def correlations(stored: Array, samples: Samples, shapes: list[Fresh]) -> Array:
         seen = [surface_of(Blend(complex_view(stored[i, j])), fresh(shape)).wrinkles for i, shape in enumerate(shapes)]
         norms = [float(np.sqrt(_dot(w, w))) + 1e-12 for w in seen]
         found[:, j] = [_dot(seen[a], seen[b]) / (norms[a] * norms[b]) for a, b in pairs]
-    return found.mean(axis=0)
+    value: Array = found.mean(axis=0)
+    return value
 
 
 def _dot(a: Array, b: Array) -> float:

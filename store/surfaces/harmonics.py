@@ -48,7 +48,8 @@ def power(harmonics: Array, other: Array | None = None) -> Array:
     """Return the mean product by degree (..., l) of two fields' harmonics (..., m, l), or the mean square of one."""
     other = harmonics if other is None else other
     products = harmonics.real * other.real + harmonics.imag * other.imag
-    return 2 * products.sum(axis=-2) - products[..., 0, :]
+    found: Array = 2 * products.sum(axis=-2) - products[..., 0, :]
+    return found
 
 
 def without_low(spectrum: Array) -> Array:
@@ -73,7 +74,8 @@ def shares(band: int) -> Array:
     series[0::2, :, 0] /= 2
     both = np.where(np.arange(band + 1) == 0, 1.0, 2.0)
     found = np.einsum("m,mlk->lmk", both, series * _matrices(band))
-    return found / (2 * np.arange(band + 1) + 1)[:, None, None]
+    value: Array = found / (2 * np.arange(band + 1) + 1)[:, None, None]
+    return value
 
 
 @lru_cache(maxsize=64)
@@ -105,7 +107,8 @@ def _fejer(n: int) -> Array:
     """Return Fejer's weights (n,), which sum to 2."""
     k = np.arange(1, n // 2 + 1)
     # at k = n/2 the cosine vanishes on every node
-    return (2 / n) * (1 - 2 * (np.cos(2 * np.outer(colatitudes(n), k)) / (4 * k**2 - 1)).sum(axis=1))
+    found: Array = (2 / n) * (1 - 2 * (np.cos(2 * np.outer(colatitudes(n), k)) / (4 * k**2 - 1)).sum(axis=1))
+    return found
 
 
 @lru_cache(maxsize=4)

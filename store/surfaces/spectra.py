@@ -142,14 +142,14 @@ def band_of(spectrum: Array) -> int:
     """
     shape = spectrum.shape
     if len(shape) >= 2 and shape[-1] == shape[-2]:
-        return shape[-1] - 1
+        return int(shape[-1] - 1)
     if len(shape) >= 3 and shape[-2] == shape[-3]:
-        return shape[-2] - 1
+        return int(shape[-2] - 1)
     raise ValueError(f"{shape} is not the shape of a spectrum (..., B + 1, B + 1[, c])")
 
 
 def _is_vector(spectrum: Array) -> bool:
-    return spectrum.shape[-1] != spectrum.shape[-2]
+    return bool(spectrum.shape[-1] != spectrum.shape[-2])
 
 
 def _planes(field: Array) -> tuple[tuple[int, ...], Array, bool]:

@@ -141,11 +141,13 @@ def _complex(dtype: np.dtype[Any]) -> np.dtype[Any]:
 
 
 def _empty(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Array:
-    return pyfftw.empty_aligned(shape, dtype)
+    found: Array = pyfftw.empty_aligned(shape, dtype)
+    return found
 
 
 def _zeros(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Array:
-    return pyfftw.zeros_aligned(shape, dtype)
+    found: Array = pyfftw.zeros_aligned(shape, dtype)
+    return found
 
 
 _planning = threading.Lock()

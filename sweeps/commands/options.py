@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -105,7 +105,7 @@ def _value(text: str) -> Any:
         from . import meshfile
 
         return meshfile.read(Path(text[1:]))
-    readers = [lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)]
+    readers: list[Callable[[], Any]] = [lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)]
     if "," in text:
         readers.append(lambda: tomllib.loads(f"value = [{text}]")["value"])
     for read in readers:

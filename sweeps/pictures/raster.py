@@ -33,7 +33,8 @@ def normals(vertices: Array, faces: Array) -> Array:
     for axis in range(3):
         for corner in range(3):
             total[:, axis] += np.bincount(faces[:, corner], areas[:, axis], len(vertices))
-    return total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-300)
+    found: Array = total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-300)
+    return found
 
 
 def rasterise(points: Array, depth: Array, faces: Array, side: int, both: bool) -> tuple[Array, Array, Array, Bools]:

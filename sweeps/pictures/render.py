@@ -123,7 +123,8 @@ def _draw(
     skin = None if paint is None else np.einsum("fk,fkc->fc", weights, paint[corners])
     image.reshape(-1, 3)[index] = shade(normal, relief(depth.reshape(side, side)).ravel()[index], skin)
     small = image.reshape(pixels, _SUPERSAMPLES, pixels, _SUPERSAMPLES, 3).mean(axis=(1, 3))
-    return (255 * np.clip(small, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
+    found: Array = (255 * np.clip(small, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
+    return found
 
 
 def _frame(view: View) -> Array:

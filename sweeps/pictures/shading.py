@@ -58,7 +58,8 @@ def shade(normal: Array, behind: Array, paint: Array | None = None) -> Array:
     rim = (1 - np.clip(normal[:, 2:], 0, 1)) ** 3
     light = lit * _KEY_COLOUR + np.clip(normal @ fill, 0, None)[:, None] * _FILL_COLOUR
     light = light + _AMBIENT * (0.6 + 0.4 * normal[:, 1:2])
-    return open_sky * (colour * light + 0.22 * shine * lit * (1 - 0.7 * depth)) + 0.05 * rim * _FILL_COLOUR
+    found: Array = open_sky * (colour * light + 0.22 * shine * lit * (1 - 0.7 * depth)) + 0.05 * rim * _FILL_COLOUR
+    return found
 
 
 def floor_shadow(side: int, elevation: float, seen: Array, scale: float) -> Array:
@@ -74,4 +75,5 @@ def floor_shadow(side: int, elevation: float, seen: Array, scale: float) -> Arra
     shadow = np.exp(
         -1.6 * (((x - side / 2) / reach) ** 2 + ((y - centre) / (reach * max(tilt, 0.15) * 1.15)) ** 2) ** 2
     )
-    return BACKGROUND * (1 - 0.45 * shadow[..., None])
+    found: Array = BACKGROUND * (1 - 0.45 * shadow[..., None])
+    return found

@@ -84,6 +84,16 @@ def test_release_and_cancel(ledger: Ledger) -> None:
     assert ledger.want([job("a")]) == 1
 
 
+def test_a_lost_claimant_is_no_failure(ledger: Ledger) -> None:
+    ledger.want([job("a")])
+    claim(ledger, 0.0)
+    time.sleep(0.01)
+    again = claim(ledger)
+    assert again.attempts == 2
+    assert ledger.failed(again, ERROR) == "wanted"
+    assert ledger.failed(claim(ledger), ERROR) == "failed"
+
+
 def test_what_was_given_back_and_then_finished_counts_unless_it_was_taken(ledger: Ledger) -> None:
     ledger.want([job("a"), job("b")])
     first, second = claim(ledger), claim(ledger)
@@ -343,7 +353,7 @@ def test_a_ledger_of_the_first_version_is_upgraded(tmp_path: Path) -> None:
     counter.seconds = 100.0
     assert claim(upgraded).key == "b"
     with contextlib.closing(sqlite3.connect(path)) as connection:
-        assert connection.execute("PRAGMA user_version").fetchone() == (2,)
-        connection.execute("PRAGMA user_version = 3")
-    with pytest.raises(CorruptLedger, match="version 3"):
+        assert connection.execute("PRAGMA user_version").fetchone() == (3,)
+        connection.execute("PRAGMA user_version = 4")
+    with pytest.raises(CorruptLedger, match="version 4"):
         Ledger(path).counts()

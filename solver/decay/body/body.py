@@ -116,12 +116,14 @@ class Body:
         """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""
         even, rest = self.parted(balance)
         fresh = self._params.surface(*lattice(resolution))
-        return even * fresh + (_outwards(self._layers, resolution) @ rest).reshape(fresh.shape)
+        found: Floats = even * fresh + (_outwards(self._layers, resolution) @ rest).reshape(fresh.shape)
+        return found
 
     def on_surface(self, balance: Balance) -> Floats:
         """Return the displacement of the surface's vertices (v, 3)."""
         even, rest = self.parted(balance)
-        return even * self._surface.points + self.onto(self._cells) @ rest
+        found: Floats = even * self._surface.points + self.onto(self._cells) @ rest
+        return found
 
     def onto(self, cells: int) -> sparse.csr_array:
         """Return the matrix that takes a field (s) of the body's skin to the vertices of a sphere of so many cells."""

@@ -65,7 +65,8 @@ def _cofactor(f: Floats, c: Floats) -> float:
         for j in range(3):
             r, s = (j + 1) % 3, (j + 2) % 3
             c[i, j] = f[p, r] * f[q, s] - f[p, s] * f[q, r]
-    return f[0, 0] * c[0, 0] + f[0, 1] * c[0, 1] + f[0, 2] * c[0, 2]
+    found: float = f[0, 0] * c[0, 0] + f[0, 1] * c[0, 1] + f[0, 2] * c[0, 2]
+    return found
 
 
 @njit(cache=True)
@@ -136,14 +137,14 @@ def _longest(f: Floats) -> float:
     off = a[0, 1] * a[0, 1] + a[0, 2] * a[0, 2] + a[1, 2] * a[1, 2]
     spread = np.sqrt((d0 * d0 + d1 * d1 + d2 * d2 + 2 * off) / 6)
     if spread <= 1e-14 * mean:
-        return np.sqrt(mean)
+        return float(np.sqrt(mean))
     det = (
         d0 * (d1 * d2 - a[1, 2] * a[1, 2])
         - a[0, 1] * (a[0, 1] * d2 - a[1, 2] * a[0, 2])
         + a[0, 2] * (a[0, 1] * a[1, 2] - d1 * a[0, 2])
     )
     angle = np.arccos(min(1.0, max(-1.0, det / (2 * spread**3)))) / 3
-    return np.sqrt(mean + 2 * spread * np.cos(angle))
+    return float(np.sqrt(mean + 2 * spread * np.cos(angle)))
 
 
 @njit(cache=True)

@@ -44,7 +44,8 @@ class Solid:
 def volumes(points: Floats, tets: Ints) -> Floats:
     """Return the signed volumes (t) of tetrahedra."""
     a, b, c = (points[tets[:, k]] - points[tets[:, 0]] for k in (1, 2, 3))
-    return np.einsum("ti,ti->t", np.cross(a, b), c) / 6
+    found: Floats = np.einsum("ti,ti->t", np.cross(a, b), c) / 6
+    return found
 
 
 def fill(fruit: Fruit, layers: int) -> Solid:

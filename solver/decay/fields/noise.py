@@ -25,4 +25,5 @@ def patches(points: Floats, size: float, generator: np.random.Generator) -> Floa
     for wave, phase in zip(waves, phases, strict=True):
         # no matrix product: BLAS sums by threads, and the field must not depend on their number
         total += np.cos(points[:, 0] * wave[0] + points[:, 1] * wave[1] + points[:, 2] * wave[2] + phase)
-    return 2 * ndtr(total * np.sqrt(2 / _WAVES)) - 1
+    found: Floats = 2 * ndtr(total * np.sqrt(2 / _WAVES)) - 1
+    return found

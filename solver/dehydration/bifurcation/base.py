@@ -165,7 +165,8 @@ class BaseState:
         on_axis = radius == 0
         stretch = outwards / np.where(on_axis, 1.0, radius)
         shift = np.stack([points[:, 0] * stretch, along, points[:, 2] * stretch], axis=-1)
-        return points + shift
+        found: Floats = points + shift
+        return found
 
 
 def _parametric(params: DehydrationParams, polar: Floats) -> Floats:

@@ -154,10 +154,11 @@ def _all(
             continue
         context.check_cancelled()
         context.report(number / 2 ** len(parity), f"parity {parity}")
-        factor = model.factor(base, free)
+        factor = model.factor(base, free, context.check_cancelled)
         if factor.negative:
             raise _AlreadyUnstable
-        crossing = first_crossing(model, base, slope, start, parity, free, factor, (wanted or {}).get(parity))
+        guess = (wanted or {}).get(parity)
+        crossing = first_crossing(model, base, slope, start, parity, free, factor, guess, context.check_cancelled)
         if crossing is not None:
             found.append(crossing)
     return found
@@ -190,7 +191,8 @@ def _heights(params: DehydrationParams, model: Model, crossing: Crossing) -> Cal
         normal = np.cross(around, along)
         normal *= np.sign(np.einsum("pi,pi->p", normal, points) / np.linalg.norm(normal, axis=1))[:, None]
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        return np.einsum("pi,pi->p", moved, normal)
+        found: Floats = np.einsum("pi,pi->p", moved, normal)
+        return found
 
     theta, phi = np.meshgrid(np.linspace(0.01, np.pi - 0.01, 181), np.linspace(0, np.pi, 181), indexing="ij")
     sample = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)

@@ -73,7 +73,7 @@ def moduli(mesh: MeridionalMesh, f: Floats, p: Floats, s: float) -> Floats:
     turn = np.einsum("eqkj,eqil->eqijkl", inverse, inverse).reshape(*shape, 9)
     cross = g[..., :, None] * h[..., None, :]
     factor, bulk = factor * mesh.weight, p * volume * mesh.weight
-    out = (factor * i1 * 2 / 9 + bulk)[..., None, None] * twice
+    out: Floats = (factor * i1 * 2 / 9 + bulk)[..., None, None] * twice
     out += (factor * i1 / 3 - bulk)[..., None, None] * turn
     out -= (factor * 2 / 3)[..., None, None] * (cross + cross.swapaxes(-1, -2))
     out[..., np.arange(9), np.arange(9)] += factor[..., None]

@@ -112,7 +112,8 @@ class Perturbations:
         """Return the height of a mode over the surface's columns, largest one 1."""
         p, q, c = vector[self._surface].T
         height = self._normal[:, 0] * (p + q) / np.sqrt(2) + self._normal[:, 1] * c
-        return height / height[np.argmax(np.abs(height))]
+        found: Floats = height / height[np.argmax(np.abs(height))]
+        return found
 
 
 def _saddle(stiff: Floats, rate: Floats, mass: Floats) -> Floats:

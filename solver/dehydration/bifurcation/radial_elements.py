@@ -224,7 +224,7 @@ def _stress_rate(mesh: RadialMesh, fresh: RadialState, kappa_ratio: float | None
 
 
 def _size(mesh: RadialMesh, degree: int) -> int:
-    return mesh.at.shape[1] * (1 if degree == 0 else 2)
+    return int(mesh.at.shape[1] * (1 if degree == 0 else 2))
 
 
 def _bulk(mesh: RadialMesh, coupling: Floats, jd: Floats, kappa_ratio: float) -> Floats:

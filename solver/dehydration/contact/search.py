@@ -224,14 +224,14 @@ def find_pairs(contact: Contact, x: Singles) -> int:
     counts = contact.counts
     reach = contact.margin * np.float32(0.25)
     if _moved(contact, x) < reach * reach and counts[NEEDED] <= contact.pair_nodes.size:
-        return counts[NEEDED]
+        return int(counts[NEEDED])
     for i in range(contact.surface_nodes.size):
         for k in range(3):
             contact.searched[i, k] = x[contact.surface_nodes[i], k]
     gentlest = update_normals(contact, x)
     counts[PAIRS] = counts[NEEDED] = 0
     if gentlest > GENTLE:
-        return counts[NEEDED]
+        return int(counts[NEEDED])
     counts[SEARCHES] += 1
     outward = contact.clearance + contact.margin
     reach = max(outward, contact.depth)
@@ -269,4 +269,4 @@ def find_pairs(contact: Contact, x: Singles) -> int:
                 contact.feet[pair, 0], contact.feet[pair, 1] = u, v
             counts[NEEDED] += 1
     counts[PAIRS] = min(counts[NEEDED], contact.pair_nodes.size)
-    return counts[NEEDED]
+    return int(counts[NEEDED])

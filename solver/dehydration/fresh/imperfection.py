@@ -77,4 +77,5 @@ def bumps(directions: Floats, generator: np.random.Generator, highest: float = H
         heights = np.einsum("ni,wi->nw", part, vectors)
         total[start : start + 4096] = np.cos(heights + phase[keep]).sum(axis=1)
     # a sum of many waves is Gaussian with variance WAVES / 2; its largest value over the sphere is about 4 sigma
-    return total / (4 * np.sqrt(WAVES / 2))
+    found: Floats = total / (4 * np.sqrt(WAVES / 2))
+    return found

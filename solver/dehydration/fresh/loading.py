@@ -47,11 +47,13 @@ class Loading:
     def local(self, points: Floats, shrinkage: float) -> Floats:
         """Return the local shrinkage s (1 - g . X), shape (n,), at fresh points (n, 3) in units of r1."""
         # not `@`: BLAS rounds differently with another number of threads
-        return shrinkage * (1 - np.einsum("ni,i->n", points, self._gradient))
+        found: Floats = shrinkage * (1 - np.einsum("ni,i->n", points, self._gradient))
+        return found
 
     def fd(self, points: Floats, shrinkage: float) -> Floats:
         """Return the diagonal of Fd, shape (n, 3), at fresh points (n, 3) of the flesh."""
-        return 1 - self.local(points, shrinkage)[:, None] * self._factors
+        found: Floats = 1 - self.local(points, shrinkage)[:, None] * self._factors
+        return found
 
     def held(self, points: Floats, shrinkage: float) -> Floats:
         """Return where the inner nodes are, (n, 3), from their fresh places (n, 3): they stay on a stone, or follow."""

@@ -96,7 +96,8 @@ def evened(heights: Floats, sector: Sector) -> Floats:
     total = np.bincount(sector.image, weights=heights)
     count = np.bincount(sector.image)
     mean: Floats = (total / count)[sector.image]
-    return mean * np.sqrt(sector.copies)
+    found: Floats = mean * np.sqrt(sector.copies)
+    return found
 
 
 def _rounded(directions: Floats) -> Ints:

@@ -100,7 +100,7 @@ def _invert(matrix: Floats, inverse: Floats) -> float:
         for m in range(3):
             o, p = (m + 1) % 3, (m + 2) % 3
             inverse[m, i] = matrix[j, o] * matrix[k, p] - matrix[j, p] * matrix[k, o]
-    determinant = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[1, 0] + matrix[0, 2] * inverse[2, 0]
+    determinant: float = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[1, 0] + matrix[0, 2] * inverse[2, 0]
     for i in range(3):
         for m in range(3):
             inverse[i, m] /= determinant

@@ -83,7 +83,8 @@ class BaseState:
         folded, signs = fold(self.mesh, at)
         element, local = locate(self.params, self.mesh, folded)
         moved = (self.displaced - self.nodes)[self.mesh.connectivity[element]]
-        return at + signs * np.einsum("pa,pai->pi", HEX27.shape(local), moved)
+        found: Floats = at + signs * np.einsum("pa,pai->pi", HEX27.shape(local), moved)
+        return found
 
     def surface(self, colatitude: Floats, azimuth: Floats) -> Floats:
         """Return the deformed outer surface, shape (..., 3), at colatitude and azimuth [radian]."""

@@ -84,9 +84,9 @@ class Model:
         """Return nodal values (nn, 3) at the nodes off the stone, (nf, 3), 0 in held components."""
         return np.where(self.free, nodal[self.pattern.free >= 0], 0.0)
 
-    def factor(self, data: Floats, free: Bools | None = None) -> Factor:
-        """Factorise a tangent (nnz, 3, 3) on the free components (default: the model's own)."""
-        return factorise(self.analysis, masked(self.pattern, data, self.free if free is None else free))
+    def factor(self, data: Floats, free: Bools | None = None, watch: Callable[[], None] | None = None) -> Factor:
+        """Factorise a tangent (nnz, 3, 3) on the free components (default: the model's own); `watch` may end it."""
+        return factorise(self.analysis, masked(self.pattern, data, self.free if free is None else free), watch)
 
 
 def masked(pattern: Pattern, data: Floats, free: Bools) -> Floats:
@@ -166,7 +166,7 @@ def _solve(model: Model, start: Equilibrium, shrinkage: float, tolerance: float,
         near = history[-1] < REUSE_BELOW and (len(history) < 2 or history[-1] < 0.1 * history[-2])
         if factor is None or not near:
             try:
-                factor = model.factor(swept.data)
+                factor = model.factor(swept.data, watch=context.check_cancelled)
             except np.linalg.LinAlgError:
                 break
         step = np.zeros_like(deformed)

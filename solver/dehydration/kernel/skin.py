@@ -106,7 +106,8 @@ def read_skin(skin: Skin, state: Ints32, velocity: Singles) -> None:
 def search(skin: Skin, state: Ints32, velocity: Singles) -> bool:
     """Look for pairs that may touch; False if there are more than the contact has room for."""
     read_skin(skin, state, velocity)
-    return find_pairs(skin.contact, skin.position) <= skin.contact.pair_nodes.size
+    found: bool = find_pairs(skin.contact, skin.position) <= skin.contact.pair_nodes.size
+    return found
 
 
 @njit(**OPTIONS)

@@ -19,7 +19,7 @@ def quadrature(resolution: int) -> Floats:
     theta = colatitudes(resolution)
     k = np.arange(1, resolution // 2 + 1)
     series = (np.cos(2 * np.outer(theta, k)) / (4 * k**2 - 1)).sum(axis=1)
-    weights = 2 / resolution * (1 - 2 * series)
+    weights: Floats = 2 / resolution * (1 - 2 * series)
     weights.flags.writeable = False
     return weights
 
@@ -43,14 +43,16 @@ def analyse(field: Floats, degree: int) -> Complexes:
     n = len(field)
     rings = np.fft.rfft(field, axis=1)[:, : degree + 1] * (np.pi / n)
     # without BLAS (no optimize): its rounding depends on the number of threads, and results must not
-    return np.einsum("mlt,tm->ml", _legendre(n, degree), rings * quadrature(n)[:, None])
+    found: Complexes = np.einsum("mlt,tm->ml", _legendre(n, degree), rings * quadrature(n)[:, None])
+    return found
 
 
 def power(coefficients: Complexes) -> Floats:
     """Return the mean square of the field carried by each degree l (Parseval over the sphere's area 4 pi)."""
     twice = np.full(len(coefficients), 2.0)
     twice[0] = 1.0
-    return (twice[:, None] * np.abs(coefficients) ** 2).sum(axis=0) / (4 * np.pi)
+    found: Floats = (twice[:, None] * np.abs(coefficients) ** 2).sum(axis=0) / (4 * np.pi)
+    return found
 
 
 def remove_low(field: Floats, lowest: int) -> Floats:

@@ -29,7 +29,8 @@ LIFT = 0.01
 
 @njit(cache=True, error_model="numpy")
 def _dot(a: Floats, b: Floats) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    found: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return found
 
 
 @njit(cache=True, error_model="numpy")

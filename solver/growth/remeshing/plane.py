@@ -18,7 +18,8 @@ def cross(u: Floats, v: Floats) -> Floats:
 def angle(at: Floats, p: Floats, q: Floats) -> Floats:
     """Return the angles (m,) between p and q as seen from `at`, points (m, 2)."""
     u, v = p - at, q - at
-    return np.abs(np.arctan2(cross(u, v), (u * v).sum(-1)))
+    found: Floats = np.abs(np.arctan2(cross(u, v), (u * v).sum(-1)))
+    return found
 
 
 def metric(p: Floats, q: Floats, r: Floats) -> Floats:

@@ -179,7 +179,8 @@ def _wider(mesh: shell.Topology, some: Bools, rings: int) -> Bools:
 def _touched(mesh: shell.Topology, some: Bools) -> Bools:
     """Return which triangles (f,) have a corner among some vertices (n,)."""
     i, j, k = mesh.triangles.T
-    return some[i] | some[j] | some[k]
+    found: Bools = some[i] | some[j] | some[k]
+    return found
 
 
 def _part(mesh: shell.Topology, moving: Bools) -> Part:

@@ -44,12 +44,12 @@ def newton(energy: Curved, x: Floats) -> Iterator[Point]:
         if size == 0.0:
             return
         matrix, rigid = energy.hessian(x), energy.rigid(x)
-        t = 0.0
+        t, d = 0.0, g
         while t == 0.0:
-            d = _direction(matrix, g, shift)
-            if d is not None:
+            found = _direction(matrix, g, shift)
+            if found is not None:
                 # along these the matrix is rounding, and so is what it divides by
-                d -= (rigid @ (d.ravel() @ rigid)).reshape(-1, 3)
+                d = found - (rigid @ (found.ravel() @ rigid)).reshape(-1, 3)
                 t, value, gradient = descend(energy, x, f, d, float(np.vdot(g, d)))
             if t == 0.0:
                 shift = max(_FIRST, _RISE * shift)
@@ -67,7 +67,7 @@ def newton(energy: Curved, x: Floats) -> Iterator[Point]:
 
 def _direction(matrix: csc_array, gradient: Floats, shift: float) -> Floats | None:
     """Return -(matrix + shift)^-1 gradient (n, 3), or None where that matrix is not positive definite."""
-    shifted = csc_array(matrix + shift * eye_array(gradient.size, format="csc")) if shift else matrix
+    shifted = csc_array(matrix + shift * eye_array(gradient.size, format="csc", dtype=np.float64)) if shift else matrix
     try:
         # pivots from the diagonal only: then those of U have the signs of the eigenvalues
         factor = splu(

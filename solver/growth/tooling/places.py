@@ -139,7 +139,8 @@ Place = Annotated[
 
 def _smooth(values: Floats | float) -> Floats:
     v = np.clip(np.asarray(values, float), 0, 1)
-    return v * v * (3 - 2 * v)
+    found: Floats = v * v * (3 - 2 * v)
+    return found
 
 
 def share(place: Place, mesh: Mesh, border: Ints, seed: int) -> Floats:
@@ -180,5 +181,6 @@ def share(place: Place, mesh: Mesh, border: Ints, seed: int) -> Floats:
             raise InvalidInput(
                 f"{len(place.values)} values are painted on {len(x)} vertices.", advice="Paint each vertex once."
             )
-        return np.clip(np.array(place.values, float), 0, 1)
+        found: Floats = np.clip(np.array(place.values, float), 0, 1)
+        return found
     return np.ones(len(x))

@@ -114,7 +114,8 @@ def _about(apex: Apex, spots: Mapping[int, tuple[Spot, ...]], mesh: Mesh) -> Flo
     centre = anchor.at(*mesh)[0]
     side, other = _plane(_normal(anchor, mesh), np.array(apex.frame))
     if apex.across:
-        return centre + apex.radius * np.linspace(-1, 1, _AROUND)[:, None] * side
+        found: Floats = centre + apex.radius * np.linspace(-1, 1, _AROUND)[:, None] * side
+        return found
     turns = np.radians(apex.arc) * np.linspace(0, 1, _AROUND, endpoint=apex.arc < 360)
     return np.asarray(centre + apex.radius * (np.cos(turns)[:, None] * side + np.sin(turns)[:, None] * other))
 

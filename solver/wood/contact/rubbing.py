@@ -75,7 +75,8 @@ def crossed(
         for k in range(4):
             way[c] += weight[k] * x[vertex[k], c]
         apart += way[c] * way[c]
-    return np.sqrt(apart)
+    found: float = np.sqrt(apart)
+    return found
 
 
 @njit(cache=True, error_model="numpy")

@@ -39,7 +39,7 @@ def _unit(x: np.ndarray, vertex: np.ndarray, weight: np.ndarray, out: np.ndarray
             value += weight[k] * x[vertex[k], c]
         out[c] = value
         square += value * value
-    length = np.sqrt(max(square, _TINY))
+    length: float = np.sqrt(max(square, _TINY))
     for c in range(3):
         out[c] /= length
     return length

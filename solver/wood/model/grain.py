@@ -23,7 +23,8 @@ class Field:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Return the field (...) at points (..., 3) [m] of the straight bundle."""
-        return np.sqrt(2 / _WAVES) * np.cos(points @ self._waves + self._phases).sum(-1)
+        found: np.ndarray = np.sqrt(2 / _WAVES) * np.cos(points @ self._waves + self._phases).sum(-1)
+        return found
 
     def factor(self, points: np.ndarray, variation: float) -> np.ndarray:
         """Return a positive factor (...) of mean 1 and relative deviation about `variation`."""

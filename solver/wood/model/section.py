@@ -86,9 +86,10 @@ def balanced(points: np.ndarray, area: np.ndarray, radius: float) -> np.ndarray:
     Rods that stand on the rim of the sampling would make the section a fifth too stiff at 20 rods; scaled, their
     centres lie about their own radius below the surface.
     """
-    centred = points - area @ points / area.sum()
+    centred: np.ndarray = points - area @ points / area.sum()
     spread = float(area @ (centred**2).sum(1))
     own = float((area**2).sum() / (2 * np.pi))
     if spread == 0:
         return centred
-    return centred * np.sqrt(max(np.pi * radius**4 / 2 - own, 0.0) / spread)
+    found: np.ndarray = centred * np.sqrt(max(np.pi * radius**4 / 2 - own, 0.0) / spread)
+    return found

@@ -195,4 +195,5 @@ def march(
                     books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)
                     motion.spin[e] *= slow
     total = books[STRETCH] + books[BENDING] + books[BONDS]
-    return np.isfinite(total) and np.isfinite(v).all()
+    found: bool = np.isfinite(total) and np.isfinite(v).all()
+    return found

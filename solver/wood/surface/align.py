@@ -101,7 +101,7 @@ def bonded(wood: Wood, span: Spans, pairs: Pairs) -> np.ndarray:
     right = np.minimum(right, len(value) - 1)
     nearer = np.where(np.abs(value[left] - asked) < np.abs(value[right] - asked), left, right)
     close = np.abs(value[nearer] - asked) <= _SPEAKS * float((span.end - span.start).max())
-    holds = close & on[nearer]
+    holds: np.ndarray = close & on[nearer]
     never = np.ones(len(known), bool)
     never[number[mine]] = False
     far, first, second = pairs.through[never[pairs.through[:, 0]]].T
@@ -151,7 +151,8 @@ def turned(rows: Rows, section: Section, pairs: Pairs, holds: np.ndarray) -> np.
         known = own[sure[own]]
         turn[own] = np.interp(rows.place[own], rows.place[known], turn[known]) if len(known) else 1.0
     turn /= np.maximum(np.abs(turn), 1e-12)
-    return turn.real[:, None] * rows.across + turn.imag[:, None] * upward
+    found: np.ndarray = turn.real[:, None] * rows.across + turn.imag[:, None] * upward
+    return found
 
 
 def corners(rows: Rows, section: Section) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

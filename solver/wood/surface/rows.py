@@ -160,4 +160,5 @@ def _material(wood: Wood, joined: np.ndarray, edge: np.ndarray, share: np.ndarra
     other = np.clip(edge + np.where(half > 0, 1, -1), 0, len(t) - 1)
     beside = (other != edge) & joined[np.clip(np.minimum(edge, other), 0, len(joined) - 1)] if len(joined) else False
     weight = np.where(beside, np.abs(half), 0.0)[:, None]
-    return (1 - weight) * own[edge] + weight * own[other]
+    found: np.ndarray = (1 - weight) * own[edge] + weight * own[other]
+    return found

@@ -62,7 +62,7 @@ class Skin:
     def _set_off(self, found: Rows, row: np.ndarray, away: np.ndarray) -> np.ndarray:
         """Return points (n, 3) at `away` (n, 2) [m] in the section from the centre lines; broken ends are rough."""
         upward = np.cross(found.tangent, found.across)[row]
-        points = found.point[row] + away[:, :1] * found.across[row] + away[:, 1:] * upward
+        points: np.ndarray = found.point[row] + away[:, :1] * found.across[row] + away[:, 1:] * upward
         rough = np.flatnonzero(found.rough[row] > 0)
         material = np.column_stack([found.place[row], self.section.points[found.rod[row]] + away])[rough]
         reach = found.rough[row[rough]] * np.tanh(self._grain(material))

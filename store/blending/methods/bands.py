@@ -99,7 +99,8 @@ class Targets:
         moved = moved.reshape(len(stages), -1) + step[len(stages) :, None]
         shares = np.array([self._shares(row) for row in moved])
         shares *= mended.reshape(shares.shape)
-        return np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
+        found: Array = np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
+        return found
 
     def _known_of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> _Known:
         at = np.array(samples)[:, None], np.array(stages)
@@ -116,7 +117,7 @@ class Targets:
         knots[0], knots[-1] = 2 * quantiles[0] - quantiles[1], 2 * quantiles[-1] - quantiles[-2]
         below = np.interp(self.bands.edges, knots, _KNOTS, left=0, right=1)
         below[0], below[-1] = 0, 1
-        shares = below[1:] - below[:-1] + 1e-4
+        shares: Array = below[1:] - below[:-1] + 1e-4
         shares /= shares.sum()
         return shares
 
@@ -139,7 +140,8 @@ def _slopes(points: Array, values: Array, fitted: bool) -> Array:
     if not fitted:
         return np.zeros((values.shape[1], points.shape[1]))
     offsets = points - points.mean(axis=0)
-    return np.linalg.lstsq(offsets, values - values.mean(axis=0), rcond=1e-6)[0].T
+    found: Array = np.linalg.lstsq(offsets, values - values.mean(axis=0), rcond=1e-6)[0].T
+    return found
 
 
 def multiplier(gains: Array, bands: Bands, band: int) -> Array:

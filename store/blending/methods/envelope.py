@@ -124,4 +124,5 @@ def _low_lines(n: int, top: int, height: int, dtype: str) -> Array:
     """Return the matrix from harmonics below `LOWEST` (m, l, part) to lines (colatitude, m, part) of a patch."""
     shapes = legendre(harmonics.LOWEST - 1, n)[..., top : top + height]
     both = np.einsum("mlt,mn,pq->mlptnq", shapes, np.eye(harmonics.LOWEST), np.eye(2))
-    return both.reshape(2 * harmonics.LOWEST**2, -1).astype(dtype)
+    found: Array = both.reshape(2 * harmonics.LOWEST**2, -1).astype(dtype)
+    return found
