@@ -15,7 +15,7 @@ from scipy.sparse import bsr_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ...arrays import Bools, Floats
-from ...multifrontal import Factor
+from ...linalg.multifrontal import Factor
 from .hexahedron import PRESSURE, SHAPE_GRADIENTS, WEIGHTS
 from .newton import Equilibrium, Model, masked
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Bools, Floats
 from ...contract import Context, InvalidInput, NotConverged
 from ...fem import HEX27
-from ...multifrontal import Analysis, Factor, analyse, factorise
+from ...linalg.multifrontal import Analysis, Factor, analyse, factorise
 from ..params import DehydrationParams
 from .assembly import Assembled, Pattern, assemble, build_pattern
 from .hexahedron import POINTS, PRESSURE
@@ -107,7 +107,7 @@ def build_model(
     fixed = np.arange(len(mesh.positions)) % mesh.levels == 0
     pattern = build_pattern(mesh.connectivity, fixed)
     centres = mesh.positions[mesh.stacks[:, 4] * mesh.levels + mesh.levels - 1]
-    analysis = analyse(mesh.stacks, centres, mesh.levels - 1, pattern.indptr, pattern.indices)
+    analysis = analyse(mesh.stacks, centres, pattern.indptr, pattern.indices, mesh.levels - 1)
     free = np.ones((int((~fixed).sum()), 3), dtype=bool)
     for axis in mesh.planes:
         free[:, axis] = mesh.positions[~fixed, axis] != 0
