@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sweeps.commands.console import emit, note
+from sweeps.commands.grouped import grouped
 from sweeps.commands.options import As_json
 from sweeps.errors import InvalidOption
 
@@ -26,39 +27,49 @@ def add_to(app: typer.Typer) -> None:
     app.command()(export)
 
 
-def export(
-    result: Annotated[str, typer.Argument(metavar="KEY|FILE.h5", help="A key (or its beginning), or a result file.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Where it goes; the suffix says how.")
-    ] = None,
-    format: Annotated[str | None, typer.Option("--format", help="Named format, where the suffix does not say.")] = None,
+@dataclass(frozen=True)
+class _Asked:
+    """What `wizen export` is told; left out, options are the formats' own."""
+
+    result: Annotated[str, typer.Argument(metavar="KEY|FILE.h5", help="A key (or its beginning), or a result file.")]
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Where it goes; the suffix says how.")] = (
+        None
+    )
+    format: Annotated[str | None, typer.Option("--format", help="Named format, where the suffix does not say.")] = None
     store: Annotated[
         Path | None, typer.Option("--store", metavar="DIR", envvar="WIZEN_STORE", help="The store that has the key.")
-    ] = None,
-    stage: Annotated[float | None, typer.Option("--stage", help="One stage in place of all.")] = None,
+    ] = None
+    stage: Annotated[float | None, typer.Option("--stage", help="One stage in place of all.")] = None
     colour: Annotated[
         str | None, typer.Option("--colour", help="auto (skin, rot, mould), none, or a field's name.")
-    ] = None,
-    textures: Annotated[int | None, typer.Option("--textures", help="GLB: colours as pictures of N pixels.")] = None,
-    map_: Annotated[str | None, typer.Option("--map", help="PNG, EXR: which field.")] = None,
-    size: Annotated[int | None, typer.Option("--size", help="PNG, EXR: pixels along and down (512).")] = None,
-    low: Annotated[float | None, typer.Option("--low", help="PNG: value shown as 0.")] = None,
-    high: Annotated[float | None, typer.Option("--high", help="PNG: value shown as 65535.")] = None,
+    ] = None
+    textures: Annotated[int | None, typer.Option("--textures", help="GLB: colours as pictures of N pixels.")] = None
+    map_: Annotated[str | None, typer.Option("--map", help="PNG, EXR: which field.")] = None
+    size: Annotated[int | None, typer.Option("--size", help="PNG, EXR: pixels along and down (512).")] = None
+    low: Annotated[float | None, typer.Option("--low", help="PNG: value shown as 0.")] = None
+    high: Annotated[float | None, typer.Option("--high", help="PNG: value shown as 65535.")] = None
     scale: Annotated[
         float | None, typer.Option("--scale", help="Length in the file of the result's unit, e.g. 0.035.")
-    ] = None,
-    fps: Annotated[float | None, typer.Option("--fps", help="Frames per second (24).")] = None,
-    step: Annotated[float | None, typer.Option("--step", help="Frames from stage to stage (12).")] = None,
+    ] = None
+    fps: Annotated[float | None, typer.Option("--fps", help="Frames per second (24).")] = None
+    step: Annotated[float | None, typer.Option("--step", help="Frames from stage to stage (12).")] = None
     mesh: Annotated[
         Path | None,
         typer.Option("--mesh", metavar="MESH", help="PC2, MDD: your own mesh, to be moved (OBJ, PLY, GLB, STL)."),
-    ] = None,
+    ] = None
     binding: Annotated[
         str | None, typer.Option("--binding", help="How MESH is tied: nearest, or direction (fruits).")
-    ] = None,
-    fit: Annotated[str, typer.Option("--fit", help="box lays MESH on the result, none leaves it where it is.")] = "box",
-    as_json: As_json = False,
-) -> None:
+    ] = None
+    fit: Annotated[str, typer.Option("--fit", help="box lays MESH on the result, none leaves it where it is.")] = "box"
+    as_json: As_json = False
+
+
+#: Options that the formats know by the same names.
+_SHARED = ("colour", "textures", "size", "low", "high", "scale", "fps", "step")
+
+
+@grouped(_Asked)
+def export(asked: _Asked) -> None:
     """Write a result for Blender, Houdini, Maya, 3ds Max or a browser. docs/formats.md shows how to open each.
 
     All stages: .glb (animated), .usdc, .usda, .pc2, .mdd, .ply.zip, .obj.zip. One stage, the last unless --stage says
@@ -81,18 +92,17 @@ def export(
 
     from .sequences import Options, prepared
 
-    chosen, out = _format(format, out, result)
-    run = _read(result, store)
-    values: dict[str, Any] = {"colour": colour, "textures": textures, "map": map_, "size": size, "low": low}
-    options = Options.parse(values | {"high": high, "scale": scale, "fps": fps, "step": step})
-    sequence = prepared(run, options, stage, chosen is None or chosen.single)
+    chosen, out = _format(asked.format, asked.out, asked.result)
+    run = _read(asked.result, asked.store)
+    options = Options.parse({"map": asked.map_, **{name: getattr(asked, name) for name in _SHARED}})
+    sequence = prepared(run, options, asked.stage, chosen is None or chosen.single)
     bound = None
     with progress.one_run("export") as observe:
         sequence = replace(sequence, observe=lambda share: observe(share, f"{share * len(sequence):.0f} stages"))
-        if mesh is None:
+        if asked.mesh is None:
             data = _written(sequence, chosen, options)
         else:
-            bound = _bound(mesh, run, options, binding, fit)
+            bound = _bound(asked.mesh, run, options, asked.binding, asked.fit)
             data = _moved(bound, sequence, chosen, options)
     from store import seal
 
@@ -115,7 +125,7 @@ def export(
             console.print(f"{name} {value:.3g}", markup=False)
         console.print(f"written to {out}", markup=False)
 
-    emit(document, as_json, show)
+    emit(document, asked.as_json, show)
 
 
 def _format(name: str | None, out: Path | None, result: str) -> tuple[Export | None, Path]:

@@ -77,7 +77,10 @@ register(
     ridge_anisotropy=Quantity(
         "1", "anisotropy of the wrinkle slope: +1 ridges along meridians, 0 reticular, -1 rings", "a"
     ),
-    penetration=Quantity("1", "deepest self-penetration of the surface, in units of r1", "g"),
+    penetration=Quantity("1", "deepest crossing of two triangles of the finite-element surface, in units of r1", "g"),
+    crossings=Quantity("1", "pairs of triangles of the finite-element surface that cross", "n_x"),
+    lattice_penetration=Quantity("1", "deepest crossing of two triangles of the delivered lattice, in r1", "g_l"),
+    lattice_crossings=Quantity("1", "pairs of triangles of the delivered lattice that cross", "n_l"),
     least_jacobian=Quantity("1", "least elastic volume ratio J/Jd of all integration points; inverted below 0", "J"),
     strain_energy=Quantity("1", "strain energy of the settled fruit, in units of mu r1^3, mu of the sarcocarp", "E"),
     released_energy=Quantity("1", "strain energy that settling released, in units of mu r1^3", "dE"),

@@ -42,6 +42,8 @@ __all__ = ["ShapeTable"]
 
 #: Fields that a query may ask for.
 FIELDS = ("position", "displacement")
+#: Positions, displacements and poles.
+_Fields = tuple[Array | None, Array | None, Array | None]
 #: Stands for the fresh shape among the stored stages.
 _FRESH = -1
 #: Descriptors that are zero on the fresh shape; the others have no known value next to it.
@@ -69,6 +71,7 @@ class ShapeTable:
         self._trust = None
         if found is not None and self._samples is not None:
             self._trust = trust.Trust(*found, self._samples)
+        self._judged = None if self._trust is None else self._trust.method
         stored = {stage: j for j, stage in enumerate(table.stages)}
         self._knots = np.array(sorted({0.0, *stored}))
         self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
@@ -160,12 +163,10 @@ class ShapeTable:
     ) -> Shape:
         """Return the shape at parameters and a stage, on the lattice of `resolution` (None: the table's own).
 
-        `window` limits it to a part of the lattice and to some components; the rest is not computed where that pays.
-
-        `fields` are position and/or displacement; nothing else is computed. `method` is named as in
-        `store.blending.methods`; in `idw`, and where the samples form no grid, the `m` nearest take part,
-        with weights distance^-eta.
-        `max_error` limits the expected error, of the roughness or by measure.
+        `fields` are position and/or displacement; nothing else is computed. `window` limits them to a part of the
+        lattice and to some components; the rest is not computed where that pays. `method` is named as in
+        `store.blending.methods`; in `idw`, and where the samples form no grid, the `m` nearest take part, with weights
+        distance^-eta. `max_error` limits the expected error, of the roughness or by measure.
 
         Raises:
             OutsideTable: the table does not reach there, or does not hold that, or has no such method.
@@ -173,36 +174,27 @@ class ShapeTable:
             InvalidGeometry: no shape has these parameters, though each lies within the table's bounds.
 
         """
-        values = asking.settle(self.info, query)
-        s = asking.settle_stage(self.info, stage)
-        asking.check_names("field", fields, list(FIELDS))
+        values, s = asking.settle(self.info, query), asking.settle_stage(self.info, stage)
         n = self.resolution if resolution is None else resolution
-        if not 4 <= n <= 1024:
-            raise OutsideTable(f"a resolution of {n} is out of reach.", "Ask for 4 to 1024 colatitudes.")
-        if m < 1 or not eta > 0:
-            raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
+        _check(fields, n, m, eta)
         how, patch = methods.parse(method), window.on(n)
         point = np.array(list(values.values())) if self._samples is not None else None
-        near = self._near(point, how, m, eta)
-        stages = self._bracket(s)
+        near, stages = self._near(point, how, m, eta), self._bracket(s)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
         if max_error is not None:
-            trust.refuse(expected, max_error, inside, self._trust.method if self._trust else None)
+            trust.refuse(expected, max_error, inside, self._judged)
         fresh = self.fresh(values) if "position" in fields else None
-        position = displacement = poles = None
+        found: _Fields = None, None, None
         if fields:
-            blend = self._blend(point, near, stages, how, n)
-            position, displacement = _synthesize(blend, patch, fresh, "displacement" in fields)
-            if fresh is not None and patch.is_whole:
-                poles = (fresh.poles() + blend.poles()).astype(blend.waves.real.dtype)
-                poles = poles[:, list(patch.components)]
+            found = _synthesize(self._blend(point, near, stages, how, n), patch, fresh, "displacement" in fields)
+        colatitude, azimuth = _angles(n)
         return Shape(
-            colatitude=_angles(n)[0][patch.rows],
-            azimuth=_angles(n)[1][patch.columns],
-            position=position,
-            displacement=displacement,
-            poles=poles,
+            colatitude=colatitude[patch.rows],
+            azimuth=azimuth[patch.columns],
+            position=found[0],
+            displacement=found[1],
+            poles=found[2],
             stage=s,
             parameters=values,
             descriptors=self._describe(near, stages),
@@ -329,13 +321,28 @@ def _angles(n: int) -> tuple[Array, Array]:
     return found
 
 
+def _check(fields: Sequence[str], n: int, m: int, eta: float) -> None:
+    """Refuse what no table holds."""
+    asking.check_names("field", fields, list(FIELDS))
+    if not 4 <= n <= 1024:
+        raise OutsideTable(f"a resolution of {n} is out of reach.", "Ask for 4 to 1024 colatitudes.")
+    if m < 1 or not eta > 0:
+        raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
+
+
 def _stored(stages: Mapping[int, float]) -> dict[int, float]:
     """Return the stored ones of stages with weights: the fresh shape adds nothing to a displacement."""
     return {j: t for j, t in stages.items() if j != _FRESH}
 
 
-def _synthesize(blend: Blend, patch: Patch, fresh: Fresh | None, displaced: bool) -> tuple[Array | None, Array | None]:
-    """Return positions and displacements (height, width, c) on a patch, each only if wanted."""
+def _synthesize(blend: Blend, patch: Patch, fresh: Fresh | None, displaced: bool) -> _Fields:
+    """Return positions and displacements (height, width, c) on a patch, and the two poles of a whole surface: each
+    only if wanted.
+    """
     with blend.fields(patch) as planes:
         position = None if fresh is None else surface.add_fresh(fresh, planes, patch)
-        return position, np.stack(list(planes), axis=-1) if displaced else None
+        displacement = np.stack(list(planes), axis=-1) if displaced else None
+    if fresh is None or not patch.is_whole:
+        return position, displacement, None
+    poles = (fresh.poles() + blend.poles()).astype(blend.waves.real.dtype)
+    return position, displacement, poles[:, list(patch.components)]

@@ -137,6 +137,9 @@ def _table(rows: Sequence[xr.Dataset], places: Sequence[Mapping[str, Any]], keys
         return table
     if not varying:
         return table.isel(sample=0)
+    if len(varying) == 1:
+        (axis,) = own.values()
+        return table.swap_dims(sample=axis).sortby(axis).transpose(axis, "stage", ...)
     about = {axis: dict(table[axis].attrs) for axis in own.values()}
     grid = table.set_index(sample=list(own.values())).unstack("sample")
     for axis, attrs in about.items():

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import registry
-from store import tables
+from store import scalars, tables
 from store.blending import methods
 from store.blending.methods.weights import Samples
 from store.generations import trust
@@ -134,7 +134,10 @@ def _add(store: Store, name: str, asked: Mapping[str, Job]) -> None:
     table = tables.info(store, name)
     more = [job for job in asked.values() if job.state == "done" and job.key not in table.keys]
     if more and not _would_end_grid(store, table, more):
-        tables.rebuild(store, registry.get(table.solver), name, more=[job.key for job in more])
+        solver = registry.get(table.solver)
+        grown = tables.rebuild(store, solver, name, more=[job.key for job in more])
+        if scalars.path_of(store, name).is_file():
+            scalars.build(store, solver, name, keys=grown.keys)
 
 
 def _would_end_grid(store: Store, table: TableInfo, more: Collection[Job]) -> bool:

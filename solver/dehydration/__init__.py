@@ -27,6 +27,9 @@ _DESCRIPTORS = (
     "buckle_count",
     "ridge_anisotropy",
     "penetration",
+    "crossings",
+    "lattice_penetration",
+    "lattice_crossings",
     "least_jacobian",
 )
 
@@ -56,7 +59,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="5",
+    version="6",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", *_DESCRIPTORS, "strain_energy", "released_energy"),

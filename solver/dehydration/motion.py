@@ -32,6 +32,7 @@ from .kernel import (
     reweigh,
     stiffness_bounds,
 )
+from .kernel.march import SEARCH_EVERY
 from .params import DehydrationParams
 from .settings import Settings
 
@@ -44,6 +45,9 @@ _SAFETY = 2.0
 
 #: Element-steps between two looks at the observer: about a quarter of a second on one core.
 _SLICE = 8_000_000
+
+#: Element-steps between two looks whether the run is cancelled: half a second on one busy core, contact included.
+_WATCHED = 2_000_000
 
 #: How fast rest volumes follow the pressure, as a share of what damping takes from a ringing volume.
 _FOLLOW = 0.125
@@ -103,6 +107,8 @@ class Motion:
             share=sector.share,
         )
         self.steps = 0
+        # whole searches for contact: cut there, a march takes the same steps as in one piece
+        self._watched = SEARCH_EVERY * max(1, _WATCHED // (SEARCH_EVERY * self.elements))
 
     @property
     def elements(self) -> int:
@@ -162,25 +168,28 @@ class Motion:
         layout: Layout | None = None,
     ) -> None:
         """March from shrinkage a to b under rest volumes `rest`; state and velocity change in place."""
-        self._context.check_cancelled()
         layout = layout or self.layout
         forget(self._skin, layout)
         for begin, end, steps in self.drive.pieces(a, b, count):
             middle = (begin + end) / 2
             self.drive.lead(state, middle)
             loaded = self._ready(layout, middle, rest)
-            skin = march(
-                loaded,
-                state,
-                velocity,
-                steps,
-                theta=(1 - begin, 1 - end),
-                damping=damping,
-                one_point=True,
-                skin=self._skin,
-            )
-            assert skin is not None
-            self._skin = skin
+            for first in range(0, steps, self._watched):
+                self._context.check_cancelled()
+                last = min(first + self._watched, steps)
+                per_step = (end - begin) / steps
+                skin = march(
+                    loaded,
+                    state,
+                    velocity,
+                    last - first,
+                    theta=(1 - begin - per_step * first, 1 - begin - per_step * last),
+                    damping=damping,
+                    one_point=True,
+                    skin=self._skin,
+                )
+                assert skin is not None
+                self._skin = skin
         self.steps += count
         if out_of_reach(state):
             raise Unstable(

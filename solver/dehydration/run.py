@@ -9,11 +9,12 @@ import numpy as np
 import xarray as xr
 
 from ..contract import Context, Need, SolverError
-from ..fruit import azimuths, colatitudes, lattice, window
+from ..fruit import azimuths, colatitudes, window
+from ..geometry.crossings import Crossings
 from .fresh.loading import Loading
-from .fresh.mesh import Sampler
+from .measures.crossing import of_quads
+from .measures.delivery import Delivery
 from .measures.descriptors import Descriptors, Surface
-from .measures.penetration import penetration
 from .params import DehydrationParams
 from .path import Path, State
 from .settings import Settings, choose
@@ -22,6 +23,9 @@ __all__ = ["run"]
 
 _FIELDS = ("position", "displacement")
 
+#: What is measured on the lattice that the need's resolution asks for, all of it whatever the region.
+_DELIVERED = ("lattice_crossings", "lattice_penetration")
+
 
 class _Record:
     """Collects what the need asks for, stage by stage, and nothing else."""
@@ -29,15 +33,13 @@ class _Record:
     def __init__(self, params: DehydrationParams, need: Need, path: Path) -> None:
         self._need, self._path = need, path
         self._wants_fields = any(f in need.fields for f in _FIELDS)
+        self._measures_delivered = any(f in need.fields for f in _DELIVERED)
         self._descriptors = [f for f in need.fields if f in Descriptors._fields]
         self._surface = Surface(params, path.mesh) if self._descriptors else None
         assert need.resolution is not None  # settled
         self._inside = window(need.resolution, need.region)
-        if self._wants_fields:
-            self._sampler = Sampler(path.mesh.sphere, need.resolution)
-            theta, phi = lattice(need.resolution)
-            self._fresh = params.surface(theta, phi)
-        self._fresh_nodes = path.mesh.positions[path.mesh.surface_nodes]
+        if self._wants_fields or self._measures_delivered:
+            self._delivered = Delivery(params, path.mesh, need.resolution, need.dtype)
         self._start = time.perf_counter()
         self.rows: list[dict[str, Any]] = []
 
@@ -51,16 +53,18 @@ class _Record:
             "seconds": time.perf_counter() - self._start,
         }
         nodes = state.surface
-        if self._wants_fields:
-            u = self._sampler(nodes - self._fresh_nodes)
-            for name, field in (("displacement", u), ("position", self._fresh + u)):
+        if self._wants_fields or self._measures_delivered:
+            displacement, position, found = self._delivered(nodes)
+            for name, field in (("displacement", displacement), ("position", position)):
                 if name in self._need.fields:
-                    row[name] = field[self._inside].astype(self._need.dtype)
+                    row[name] = field[self._inside]
+            row.update(_told(found, _DELIVERED, self._need))
         if self._surface is not None:
             described = self._surface.describe(nodes)
             row.update({name: getattr(described, name) for name in self._descriptors})
-        if "penetration" in self._need.fields:
-            row["penetration"] = penetration(nodes, self._path.mesh.sphere.quads)
+        if "penetration" in self._need.fields or "crossings" in self._need.fields:
+            found = of_quads(nodes, self._path.mesh.sphere.quads)
+            row.update(_told(found, ("crossings", "penetration"), self._need))
         for name, value in (
             ("least_jacobian", state.least_ratio),
             ("strain_energy", state.energy),
@@ -93,6 +97,12 @@ class _Record:
         return xr.Dataset(data, coords, attrs)
 
 
+def _told(found: Crossings, names: tuple[str, str], need: Need) -> dict[str, float]:
+    """Return number and depth of crossings under their names, those that are asked for."""
+    values = zip(names, (float(found.count), found.depth), strict=True)
+    return {name: value for name, value in values if name in need.fields}
+
+
 def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     """Return displacement, position and descriptors of the wanted stages; see `solver.quantities` for units.
 
@@ -105,7 +115,7 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     loading = Loading(params)
     loading.check(need.stages[0])
     loading.check(need.stages[-1])
-    settings = choose(params, need.quality)
+    settings = choose(params, need.quality, need.stages[-1])
     context.report(0.0, f"meshing {settings.elements} elements")
     path = Path(params, settings, context, with_release="released_energy" in need.fields)
     record = _Record(params, need, path)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
-from ..contract import Cost, Need
+from ..contract import Cost, InvalidInput, Need
 from .fresh.closed_form import flat_film_wavelength, onset_estimate
 from .fresh.loading import Loading
 from .fresh.mesh import flesh_span, layer_fractions
@@ -76,6 +76,11 @@ _QUALITIES = {
     "fine": _Quality(9.0, 36, 160, 30.0, 1e-3, 5e-3, 1000),
 }
 
+#: Elements a wavelength below which a mesh makes up a pattern of its own.
+_FEWEST_PER_WAVELENGTH = 4.0
+#: Elements of the largest run: 3 GB, and an hour or more to s = 0.3 on two cores.
+_MOST_ELEMENTS = 2_500_000
+
 #: Steps from s = 0 to 0.3 at n = 24, kappa / mu = 30: two and a half or four times as many change the roughness of
 #: settled stages by less than 2 %, as another seed does; five eighths of them raise it by 3 % at s = 0.3. More elements
 #: and a stiffer volume shorten the critical step, so their product with the step must be kept.
@@ -95,10 +100,15 @@ _SECONDS_PER_ELEMENT_STEP = 5e-8
 _LOADING = 2.0
 
 
-def choose(params: DehydrationParams, quality: str) -> Settings:
-    """Return the settings of `quality` (preview, default, fine) for `params`.
+def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Settings:
+    """Return the settings of `quality` (preview, default, fine) for `params`, for stages up to `last`.
 
-    The mesh resolves the expected wrinkle wavelength by a fixed number of elements, within the quality's bounds.
+    The mesh resolves the expected wrinkle wavelength by a fixed number of elements, within the quality's bounds, but
+    never by fewer than four where wrinkles are to be expected.
+
+    Raises:
+        InvalidInput: four elements a wavelength are more than a run may have.
+
     """
     q = _QUALITIES[quality]
     wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
@@ -106,16 +116,18 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
     # the bound is on the cost: an eighth may be eight times as fine in area
     most = int(q.most * math.sqrt(2 ** len(params.mirrors)))
     n = min(max(n, q.fewest), most)
+    loading = Loading(params)
+    margin = 0.75 if params.is_sphere and loading.uniform else 0.5
+    start = margin * onset_estimate(params.modulus_ratio, min(params.stone)) / loading.peak
+    least = math.ceil(np.pi / 2 * _FEWEST_PER_WAVELENGTH / wavelength) if last > start else 0
+    forced, n = n < least, max(n, least)
     if params.mirrors:
         n += n % 2  # a mirror plane is a line of nodes
     # where flesh is more than twice as thick as on average, layers are counted on it
     flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), flesh_span(params)[1] / 2)
     core = layer_fractions(max(flesh, 0.05), _FIRST_LAYER * min(wavelength, 0.4), _GROWTH)
     scale = (n / _STEPS_N) * math.sqrt(q.march_kappa_ratio / _STEPS_KAPPA)
-    loading = Loading(params)
-    margin = 0.75 if params.is_sphere and loading.uniform else 0.5
-    onset = onset_estimate(params.modulus_ratio, min(params.stone))
-    return Settings(
+    settings = Settings(
         n=n,
         core=core,
         kappa_ratio=_KAPPA,
@@ -129,16 +141,23 @@ def choose(params: DehydrationParams, quality: str) -> Settings:
         swing_steps=round(_SWING_STEPS * scale),
         calm_steps=_CALM_STEPS,
         settle_steps=round(_SETTLE_STEPS * scale),
-        start=margin * onset / loading.peak,
+        start=start,
         full_levels=q.full_levels,
         copies=2 ** len(params.mirrors),
     )
+    if forced and settings.elements > _MOST_ELEMENTS:
+        raise InvalidInput(
+            f"wrinkles of te = {params.exocarp_thickness:g} and gamma = {params.modulus_ratio:g} are {wavelength:.3g} "
+            f"long and take {settings.elements:,} elements, more than {_MOST_ELEMENTS:,}.",
+            advice="Give the fruit mirrors (each halves the elements), or take a thicker or stiffer exocarp.",
+        )
+    return settings
 
 
 def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     """Return expected wall seconds on this machine's cores and bytes of memory."""
-    settings = choose(params, need.quality)
     last = max(need.stages, default=0.0)
+    settings = choose(params, need.quality, last)
     # most stages settle for two thirds of the steps they may take
     steps = max(last - settings.start, 0.0) / settings.pace + 2 / 3 * settings.settle_steps * len(need.stages)
     seconds = steps * settings.elements * _SECONDS_PER_ELEMENT_STEP / (os.cpu_count() or 1)

@@ -15,15 +15,17 @@ import numpy as np
 from numba import njit
 
 from ..arrays import Bools, Floats, Ints, Singles
-from .dissection import Fronts, dissect
-from .factor import factor
+from ..linalg.cholesky import factor
+from ..linalg.dissection import Fronts, dissect
+from ..linalg.substitution import substitute
 from .pattern import Pattern
-from .substitution import substitute
 from .topology import Topology
 
 __all__ = ["Inverse", "fronts_of", "inverse_of"]
 
 
+#: Hinges in the smallest front.
+_LEAF = 80
 #: Entries beyond are those of triangles without area [mu].
 _MOST = 1e12
 #: What a new vertex gives alone under a force: about the inverse of a membrane's diagonal [1 / mu].
@@ -37,7 +39,7 @@ def fronts_of(mesh: Topology, x: Floats) -> Fronts:
     lone = np.setdiff1d(np.arange(len(t)), mesh.hinge_faces)
     bare = np.setdiff1d(np.arange(mesh.vertices), t)
     parts = np.concatenate([mesh.hinges, t[lone][:, [0, 1, 2, 2]], np.repeat(bare[:, None], 4, axis=1)])
-    return dissect(parts, x[parts].mean(axis=1), mesh.vertices)
+    return dissect(parts, x[parts].mean(axis=1), mesh.vertices, _LEAF)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +63,7 @@ class Inverse:
         for pairs, count in zip(reversed(self.parents), reversed(counts[:-1]), strict=True):
             rights.append(_gathered(rights[-1], pairs, count))
         found = np.empty((counts[0], 3))
-        f = self.fronts
-        substitute(rights[-1], self.normals, f.nodes, f.starts, f.own, f.widest, self.across, self.within, found)
+        substitute(rights[-1], self.normals, self.fronts, self.across, self.within, found)
         for pairs, own in zip(self.parents, reversed(rights[:-1]), strict=True):
             found = 0.5 * (found[pairs[:, 0]] + found[pairs[:, 1]])
             new = pairs[:, 0] != pairs[:, 1]
@@ -85,8 +86,8 @@ def inverse_of(
     across, within = np.empty(pattern.blocks), np.empty(pattern.blocks)
     _reduce(blocks, n, pattern.indptr, pattern.indices, held, across, within)
     yield
-    first = yield from factor(fronts, pattern, across)
-    second = yield from factor(fronts, pattern, within)
+    first = yield from factor(fronts, pattern.indptr, pattern.indices, across)
+    second = yield from factor(fronts, pattern.indptr, pattern.indices, within)
     return Inverse(fronts, n, first, second)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ..arrays import Ints
-from .topology import Topology, distinct
+from ..linalg.patterns import of_pairs, places
+from .topology import Topology
 
 __all__ = ["Pattern", "pattern"]
 
@@ -34,29 +34,11 @@ def pattern(mesh: Topology) -> Pattern:
     n = mesh.vertices
     # corners share a triangle where there is an edge; those of a hinge else are the opposite ones
     both = np.concatenate([mesh.edges, mesh.hinges[:, 2:]])
-    keys = distinct(np.concatenate([both @ [n, 1], both @ [1, n], np.arange(n) * (n + 1)]))
-    indptr, indices = np.searchsorted(keys // n, np.arange(n + 1)), keys % n
-    own = np.arange(n)[:, None]
+    indptr, indices, diagonal = of_pairs(both, n)
     return Pattern(
         indptr=indptr,
         indices=indices,
-        of_triangles=_places(mesh.triangles, indptr, indices),
-        of_hinges=_places(mesh.hinges, indptr, indices),
-        diagonal=_places(own, indptr, indices)[:, 0],
+        of_triangles=places(mesh.triangles, indptr, indices).reshape(-1, 9),
+        of_hinges=places(mesh.hinges, indptr, indices).reshape(-1, 16),
+        diagonal=diagonal,
     )
-
-
-@njit(cache=True)
-def _places(corners: Ints, indptr: Ints, indices: Ints) -> Ints:
-    """Return where the blocks of all pairs of corners (m, c) lie (m, c^2); -1 of pairs that have none."""
-    width = corners.shape[1]
-    found = np.full((len(corners), width * width), -1)
-    for t in range(len(corners)):
-        for a in range(width):
-            i = corners[t, a]
-            for b in range(width):
-                for at in range(indptr[i], indptr[i + 1]):
-                    if indices[at] == corners[t, b]:
-                        found[t, width * a + b] = at
-                        break
-    return found

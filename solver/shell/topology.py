@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Ints
 from ..contract import InvalidGeometry
 
-__all__ = ["Topology", "distinct", "part_of", "topology"]
+__all__ = ["Topology", "part_of", "topology"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +110,3 @@ def _kept(used: Ints, count: int) -> tuple[Ints, Ints]:
     there = np.zeros(count, bool)
     there[used] = True
     return np.flatnonzero(there), np.cumsum(there) - 1
-
-
-def distinct(keys: Ints) -> Ints:
-    """Return the different keys, sorted: by sorting, which is many times faster than the hashing of numpy.unique."""
-    found = np.sort(keys, axis=None)
-    return found[np.concatenate([[True], found[1:] != found[:-1]])] if len(found) else found

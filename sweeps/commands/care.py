@@ -71,24 +71,24 @@ def rebuild(
 
     before, after = side(old, *(was or (None, None))), side(new, size, lost)
     document = {"table": name, "changed": old.digest != new.digest, "before": before, "after": after}
+    symbol = registry.get(old.solver).stages.symbol
+    emit(document, as_json, lambda console: _show_rebuilt(console, document, symbol))
 
-    def show(console: Any) -> None:
-        console.print(f"table {name}: " + ("rebuilt" if old.digest != new.digest else "rebuilt, and the same"))
-        rows = [
-            ["digest", old.digest[:16], new.digest[:16]],
-            ["resolution", str(old.resolution), str(new.resolution)],
-            ["precision", old.dtype, new.dtype],
-            ["samples", str(old.samples), str(new.samples)],
-            ["size", _size(before["bytes"]), _size(size)],
-        ]
-        lost_before = {row.stage: row for row in was[1]} if was else {}
-        for row in lost:
-            gone = lost_before.get(row.stage)
-            then = f"{gone.rms:.2g} (max {gone.max:.2g})" if gone else "damaged"
-            rows.append([f"lost at s = {row.stage:g} [r1]", then, f"{row.rms:.2g} (max {row.max:.2g})"])
-        grid(console, ["", "before", "after"], rows)
 
-    emit(document, as_json, show)
+def _show_rebuilt(console: Any, document: dict[str, Any], symbol: str) -> None:
+    before, after = document["before"], document["after"]
+    console.print(f"table {document['table']}: rebuilt" + ("" if document["changed"] else ", and the same"))
+    rows = [
+        ["digest", before["digest"][:16], after["digest"][:16]],
+        *([word, str(before[word]), str(after[word])] for word in ("resolution", "precision", "samples")),
+        ["size", _size(before["bytes"]), _size(after["bytes"])],
+    ]
+    lost = {row["stage"]: row for row in before["truncation"]}
+    for row in after["truncation"]:
+        gone = lost.get(row["stage"])
+        then = f"{gone['rms']:.2g} (max {gone['max']:.2g})" if gone else "damaged"
+        rows.append([f"lost at {symbol} = {row['stage']:g} [r1]", then, f"{row['rms']:.2g} (max {row['max']:.2g})"])
+    grid(console, ["", "before", "after"], rows)
 
 
 def verify(

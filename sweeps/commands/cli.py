@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,6 +35,12 @@ from .options import (
     numbers,
     parameters,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from solver.contract import Need, Solver
+    from solver.contract import Params as Parameters
 
 __all__ = ["app"]
 
@@ -135,54 +141,82 @@ def solve(
     from solver.contract import Context, Need
     from store import shards
 
-    from .. import outputs, tabled
-    from ..formats import Made
+    from .. import tabled
     from ..plan import job
     from . import progress
     from .words import per_stage, show_run
 
     if cut is not None:
-        from ..pictures import section
-
-        section.plane(cut)
-        if out is None or out.suffix != ".png":
-            raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
+        _check_cut(cut, out)
     chosen = registry.get(solver)
-    values = parameters(params_file) | assignments(set_)
-    if seed is not None:
-        values["seed"] = seed
-    params = chosen.parse(values, preset)
-    need = chosen.settle(Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {})), preset)
-    if out is not None:
-        outputs.check_suffix(out, True, len(need.stages))
-        need = chosen.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, chosen))}))
+    own = {} if seed is None else {"seed": seed}
+    params = chosen.parse(parameters(params_file) | assignments(set_) | own, preset)
+    asked = Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {}))
+    need = _for_file(out, chosen, chosen.settle(asked, preset))
     spec = job(chosen, params, need)
-    start = time.perf_counter()
+    begin = time.perf_counter()
     with progress.one_run(solver) as observe, progress.stopping() as stop:
         result = chosen.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
-    seconds = time.perf_counter() - start
+    seconds = round(time.perf_counter() - begin, 3)
     document = {
-        "key": spec.key,
-        "solver": chosen.name,
-        "version": chosen.version,
-        "params": dict(spec.params),
-        "need": dict(spec.need),
+        **{name: getattr(spec, name) for name in ("key", "solver", "version", "params", "need")},
         "digest": shards.digest(result),
-        "seconds": round(seconds, 3),
-        "path": None if out is None else str(out),
+        "seconds": seconds,
+        "path": out and str(out),
         "stages": [float(stage) for stage in result["stage"]],
         "descriptors": per_stage(result),
     }
     if out is not None:
-        axes = {name: params.axis(name) for name in params.axes}
-        shapes = [outputs.of_result(result, axes, i) for i in range(len(need.stages))] if "position" in result else []
-        title = f"{chosen.title}: {preset or (params_file.stem if params_file else solver)}"
-        symbol, units = chosen.stages.symbol, chosen.axis_units()
-        made = Made(
-            shapes, document, title, solver, stage_symbol=symbol, units=units, run=result, key=spec.key, cut=cut
-        )
-        outputs.save(out, made)
+        _save(out, preset or (params_file.stem if params_file else solver), chosen, params, result, document, cut)
     emit(document, as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:
+    """Return the need, settled, with the fields that a file wants; refuse what could not be written."""
+    if out is None:
+        return need
+    from .. import outputs
+
+    outputs.check_suffix(out, True, len(need.stages))
+    return solver.settle(need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, solver))}))
+
+
+def _save(
+    out: Path,
+    of: str,
+    solver: Solver,
+    params: Parameters,
+    result: xr.Dataset,
+    document: dict[str, Any],
+    cut: str | None,
+) -> None:
+    """Write a run and the shapes in it."""
+    from .. import outputs
+    from ..formats import Made
+
+    axes = {name: params.axis(name) for name in params.axes}
+    count = result.sizes["stage"] if "position" in result else 0
+    made = Made(
+        [outputs.of_result(result, axes, i) for i in range(count)],
+        document,
+        f"{solver.title}: {of}",
+        solver.name,
+        stage_symbol=solver.stages.symbol,
+        units=solver.axis_units(),
+        run=result,
+        key=document["key"],
+        cut=cut,
+    )
+    outputs.save(out, made)
+
+
+def _check_cut(cut: str, out: Path | None) -> None:
+    """Refuse, before any work, a cut that nobody could draw."""
+    from ..pictures import section
+
+    section.plane(cut)
+    if out is None or out.suffix != ".png":
+        raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
 
 
 @app.command()

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import emit, grid, note
+from .grouped import grouped
 from .options import As_json, StorePath, TableName
+
+if TYPE_CHECKING:
+    from ..rounds import Round
 
 __all__ = ["add_to"]
 
@@ -19,25 +24,31 @@ def add_to(app: typer.Typer) -> None:
     app.command()(refine)
 
 
-def refine(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan that the table was built from.")],
-    store: StorePath,
-    name: TableName = "default",
-    count: Annotated[int, typer.Option("--count", min=1, help="Runs to add in all, earlier ones counted.")] = 8,
+@dataclass(frozen=True)
+class _Asked:
+    """What `wizen refine` is told."""
+
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="The plan that the table was built from.")]
+    store: StorePath
+    name: TableName = "default"
+    count: Annotated[int, typer.Option("--count", min=1, help="Runs to add in all, earlier ones counted.")] = 8
     measure: Annotated[
         str, typer.Option("--measure", help="The error to bring down: rgh, dB, W1, patch, L2nr, ang or corr.")
-    ] = "W1",
+    ] = "W1"
     held_out: Annotated[
         Path | None, typer.Option("--held-out", metavar="PLAN|STORE", help="Runs to measure the error by, as well.")
-    ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
-    workers: Annotated[int | None, typer.Option("--workers", help="Local processes; each round fills them.")] = None,
-    dask: Annotated[bool, typer.Option("--dask", help="Let Dask run the local processes.")] = False,
+    ] = None
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False
+    workers: Annotated[int | None, typer.Option("--workers", help="Local processes; each round fills them.")] = None
+    dask: Annotated[bool, typer.Option("--dask", help="Let Dask run the local processes.")] = False
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler.")
-    ] = None,
-    as_json: As_json = False,
-) -> None:
+    ] = None
+    as_json: As_json = False
+
+
+@grouped(_Asked)
+def refine(asked: _Asked) -> None:
     """Add samples to a table where it predicts worst: run them, rebuild it, and say how the error falls.
 
     Each sample is predicted from the others; the next one goes where that error times the distance to the samples is
@@ -60,56 +71,56 @@ def refine(
     from . import progress
     from .words import readers
 
-    read, opened = Plan.load(plan), Store.open(store)
-    if dry_run:
-        refining.check(read, tables.info(opened, name))
-        state = refining.read(opened, name, measure)
-        _show_proposals(list(itertools.islice(refining.propose(read, state), count)), state, measure, count, as_json)
+    read, opened, measure = Plan.load(asked.plan), Store.open(asked.store), asked.measure
+    if asked.dry_run:
+        refining.check(read, tables.info(opened, asked.name))
+        state = refining.read(opened, asked.name, measure)
+        _show_proposals(list(itertools.islice(refining.propose(read, state), asked.count)), state, asked)
         return
-    done: list[Any] = []
-    with executors.choose(workers, dask, scheduler) as pool:
-        note(f"{read.name}: up to {count} runs more on {pool.title}, where {measure} is worst")
+    done: list[Round] = []
+    with executors.choose(asked.workers, asked.dask, asked.scheduler) as pool:
+        note(f"{read.name}: up to {asked.count} runs more on {pool.title}, where {measure} is worst")
         with (
             progress.stopping(progress.GIVEN_BACK) as stop,
             progress.sweep(refining.name_of(read), readers(read)) as observe,
         ):
-            for found in rounds(read, opened, name, pool, count, measure, held_out, observe, stop):
+            for found in rounds(read, opened, asked.name, pool, asked.count, measure, asked.held_out, observe, stop):
                 done.append(found)
                 held = "" if found.held_out is None else f", held out {found.held_out:.4g} ({found.held_runs} runs)"
                 note(f"{found.added} added: {measure} left out {found.left_out:.4g}{held}")
     failed = sum(one.failed for one in done)
     document = {
-        "table": name,
+        "table": asked.name,
         "measure": measure,
         "added": done[-1].added if done else 0,
         "failed": failed,
         "rounds": [one._asdict() for one in done],
     }
-
-    def show(console: Any) -> None:
-        head = ["added", "at", f"{measure} left out"] + ["held out", "runs"] * (held_out is not None)
-        rows = []
-        for one in done:
-            at = "; ".join(_place(point) for point in one.points) or "-"
-            held = [] if one.held_out is None else [f"{one.held_out:.4g}", str(one.held_runs)]
-            rows.append([str(one.added), at, f"{one.left_out:.4g}", *held])
-        grid(console, head, rows)
-        if stop.is_set():
-            console.print("stopped: the same command goes on from here", markup=False)
-        elif failed:
-            console.print(f"{failed} runs failed: `wizen status` says why", markup=False)
-        elif document["added"] < count:
-            console.print("nothing more fits into --count (a grid grows by whole lines)", markup=False)
-
-    emit(document, as_json, show)
+    emit(document, asked.as_json, lambda console: _show_rounds(console, done, asked, failed, stop.is_set()))
     if stop.is_set():
         raise typer.Exit(130)
     if failed:
         raise typer.Exit(1)
 
 
-def _show_proposals(found: list[Any], state: Any, measure: str, count: int, as_json: bool) -> None:
-    left, kept = count, []
+def _show_rounds(console: Any, done: list[Round], asked: _Asked, failed: int, stopped: bool) -> None:
+    head = ["added", "at", f"{asked.measure} left out"] + ["held out", "runs"] * (asked.held_out is not None)
+    rows = []
+    for one in done:
+        at = "; ".join(_place(point) for point in one.points) or "-"
+        held = [] if one.held_out is None else [f"{one.held_out:.4g}", str(one.held_runs)]
+        rows.append([str(one.added), at, f"{one.left_out:.4g}", *held])
+    grid(console, head, rows)
+    if stopped:
+        console.print("stopped: the same command goes on from here", markup=False)
+    elif failed:
+        console.print(f"{failed} runs failed: `wizen status` says why", markup=False)
+    elif (done[-1].added if done else 0) < asked.count:
+        console.print("nothing more fits into --count (a grid grows by whole lines)", markup=False)
+
+
+def _show_proposals(found: list[Any], state: Any, asked: _Asked) -> None:
+    measure, left, kept = asked.measure, asked.count, []
     for proposal in found:
         if len(proposal.points) <= left:
             kept.append(proposal)
@@ -129,7 +140,7 @@ def _show_proposals(found: list[Any], state: Any, measure: str, count: int, as_j
             [[str(len(p.points)), "; ".join(_place(q) for q in p.points), f"{p.expected:.4g}"] for p in kept],
         )
 
-    emit(document, as_json, show)
+    emit(document, asked.as_json, show)
 
 
 def _place(point: dict[str, float]) -> str:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InvalidOption
 from .console import emit, grid
 from .options import As_json, Out, Set, Stages, StoreToRead, TableName, assignments, numbers
+
+if TYPE_CHECKING:
+    from store.shape import Shape
 
 __all__ = ["add_to"]
 
@@ -104,14 +107,12 @@ def query(
     if not wanted:
         low, high = table.reach
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
-    fields: tuple[str, ...] = ()
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
-        fields = outputs.fields_for(out, False)
+    fields = outputs.fields_for(out, False)
     values, how, limits = assignments(set_), method or methods.DEFAULT, _limits(max_error)
-    shapes = [
-        table.at(values, stage, resolution=resolution, fields=fields, method=how, max_error=limits) for stage in wanted
-    ]
+    told: dict[str, Any] = {"resolution": resolution, "fields": fields, "method": how, "max_error": limits}
+    shapes = [table.at(values, stage, **told) for stage in wanted]
     document = {
         "table": name,
         "digest": table.digest,
@@ -120,25 +121,25 @@ def query(
         "path": None if out is None else str(out),
         "stages": [_document(shape) for shape in shapes],
     }
+    solver = registry.get(table.info.solver)
     if out is not None:
         title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
-        units = registry.get(table.info.solver).axis_units()
-        outputs.save(out, Made(shapes, document, title, table.info.solver, name, table.fixed, units=units))
+        outputs.save(out, Made(shapes, document, title, solver.name, name, table.fixed, units=solver.axis_units()))
+    emit(document, as_json, lambda console: _show(console, shapes, solver.stages.symbol, out))
 
-    def show(console: Any) -> None:
-        rows = [
-            [key, *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
-            for key in shapes[-1].descriptors
-        ]
-        errors = [shape.expected_error for shape in shapes if shape.expected_error is not None]
-        if len(errors) == len(shapes):
-            rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
-        rows += [["exact", *(str(shape.exact) for shape in shapes)]]
-        grid(console, ["", *(f"s = {shape.stage:g}" for shape in shapes)], rows)
-        if out is not None:
-            console.print(f"written to {out}", markup=False)
 
-    emit(document, as_json, show)
+def _show(console: Any, shapes: list[Shape], symbol: str, out: Path | None) -> None:
+    rows = [
+        [key, *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
+        for key in shapes[-1].descriptors
+    ]
+    errors = [shape.expected_error for shape in shapes if shape.expected_error is not None]
+    if len(errors) == len(shapes):
+        rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
+    rows += [["exact", *(str(shape.exact) for shape in shapes)]]
+    grid(console, ["", *(f"{symbol} = {shape.stage:g}" for shape in shapes)], rows)
+    if out is not None:
+        console.print(f"written to {out}", markup=False)
 
 
 def _limits(text: str | None) -> dict[str, float] | None:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from store.store import Store
 
+    from ..score import Report
+
 __all__ = ["add_to"]
 
 table_app = typer.Typer(no_args_is_help=True, help="Build, keep, check, compare and describe look-up tables.")
@@ -142,20 +144,23 @@ def score(
     document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
 
     def show(console: Any) -> None:
-        kind = "held-out runs" if report.held_out else "samples, each predicted from the others"
-        console.print(f"table {name}: {len(cases)} {kind}; {len(pairs)} pairs of seeds; * default", markup=False)
-        rows = [
-            [row.method + " *" * (row.method == methods.DEFAULT), f"{row.stage:g}"]
-            + [f"{value:.3g}" for value in row.measures]
-            for row in report.rows
-        ]
-        grid(console, ["method", "s", *report.rows[0].measures._fields], rows)
-        likeness = [[f"{s:g}", f"{value:.3f}"] for s, value in report.correlation.items()]
-        grid(console, ["s", "correlation of neighbours"], likeness)
+        _show_score(console, name, report, methods.DEFAULT, registry.get(table.info.solver).stages.symbol)
         if picture is not None:
             console.print(f"drawn to {picture}", markup=False)
 
     emit(document, as_json, show)
+
+
+def _show_score(console: Any, name: str, report: Report, default: str, symbol: str) -> None:
+    kind = "held-out runs" if report.held_out else "samples, each predicted from the others"
+    console.print(f"table {name}: {len(report.labels)} {kind}; {report.seeds} pairs of seeds; * default", markup=False)
+    rows = [
+        [row.method + " *" * (row.method == default), f"{row.stage:g}"] + [f"{value:.3g}" for value in row.measures]
+        for row in report.rows
+    ]
+    grid(console, ["method", symbol, *report.rows[0].measures._fields], rows)
+    likeness = [[f"{s:g}", f"{value:.3f}"] for s, value in report.correlation.items()]
+    grid(console, [symbol, "correlation of neighbours"], likeness)
 
 
 def _only_solver(store: Store, plan: str | None) -> str:

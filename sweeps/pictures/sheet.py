@@ -65,12 +65,7 @@ def sheet(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    panels = [panel for row in rows for panel in row if panel is not None]
-    if not panels:
-        raise ValueError("there is nothing to draw")
-    reach = max(float(np.linalg.norm(panel.position, axis=-1).max()) for panel in panels)
-    base = view or View()
-    view = View(base.azimuth, base.elevation, 1.13 * reach)
+    view = _common(rows, view or View())
     columns = max(len(row) for row in rows)
     left = 96 if row_labels else 16
     top = (58 if title else 12) + (34 if column_labels else 0) + (26 if column_title else 0)
@@ -86,7 +81,7 @@ def sheet(
         for j, panel in enumerate(row):
             x, y = left + j * pixels, top + i * pixels
             if panel is None:
-                write(x + pixels / 2, y + pixels / 2, "no such fruit", 9, alpha=0.5, **middle)
+                write(x + pixels / 2, y + pixels / 2, "no such shape", 9, alpha=0.5, **middle)
                 continue
             box = (x / width, 1 - (y + pixels) / height, pixels / width, pixels / height)
             axes = figure.add_axes(box)
@@ -109,3 +104,17 @@ def sheet(
     out = io.BytesIO()
     FigureCanvasAgg(figure).print_png(out)
     return out.getvalue()
+
+
+def _common(rows: Sequence[Sequence[Panel | None]], base: View) -> View:
+    """Return a view that holds every panel.
+
+    Raises:
+        ValueError: there is nothing to draw.
+
+    """
+    panels = [panel for row in rows for panel in row if panel is not None]
+    if not panels:
+        raise ValueError("there is nothing to draw")
+    reach = max(float(np.linalg.norm(panel.position, axis=-1).max()) for panel in panels)
+    return View(base.azimuth, base.elevation, 1.13 * reach)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from solver.dehydration.kernel import build_layout, kinetic_energy, march, positions, strain_energy
+from solver.dehydration.kernel.bounds import element_bounds, nodal_sums
+from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.masses import largest_stiffness
 
 from ._kernel_twin import KINDS, algebra_forces, block_mesh, deformed, random_hex
@@ -71,3 +73,35 @@ def test_kinetic_energy_counts_free_nodes():
     layout = build_layout(**block_mesh(np.random.default_rng(13), (2, 2)))
     velocity = np.full((layout.nodes, 4), 0.5, dtype=np.float32)
     assert kinetic_energy(layout, velocity) == pytest.approx(0.5 * 0.75 * layout.mass[layout.free].sum())
+
+
+@pytest.mark.parametrize("exocarp", [False, True])
+def test_compiled_bound_is_the_plain_one(exocarp):
+    rng = np.random.default_rng(16)
+    corners = np.stack([random_hex(rng) @ np.diag([1, 1, flat]) / 4 for flat in (1.0, 0.5, 0.1, 0.03) * 5])
+    state = np.zeros((8 * len(corners), 4), np.int32)
+    place(state, corners.reshape(-1, 3))
+    mu, kappa = rng.uniform(0.5, 10, (2, len(corners))) * [[1], [30]]
+    plain = largest_stiffness(positions(state).reshape(-1, 8, 3), mu, kappa, exocarp, one_point=False)
+    connect, kind = np.arange(8 * len(corners)).reshape(-1, 8), np.full(len(corners), exocarp)
+    compiled = element_bounds(state, connect, kind, mu, kappa, -np.inf)
+    np.testing.assert_allclose(compiled, plain, rtol=1e-12)
+
+
+def test_an_inverted_element_has_no_bound():
+    cube = 0.5 * np.array([[a >> 2 & 1, a >> 1 & 1, a & 1] for a in range(8)])
+    folded = cube.copy()
+    folded[7] = [0.1, 0.1, 0.1]
+    state = np.zeros((16, 4), np.int32)
+    place(state, np.concatenate([cube, folded]))
+    connect = np.arange(16).reshape(2, 8)
+    sound, crushed = element_bounds(state, connect, np.zeros(2, bool), np.ones(2), np.ones(2), 0.05)
+    assert sound > 0
+    assert crushed == 0
+
+
+def test_nodal_sums_are_those_of_numpy():
+    rng = np.random.default_rng(17)
+    connect, values = rng.integers(0, 30, (40, 8)), rng.normal(size=40)
+    plain = np.bincount(connect.ravel(), weights=np.repeat(values, 8), minlength=30)
+    np.testing.assert_allclose(nodal_sums(connect, values, 30), plain, rtol=1e-12, atol=1e-15)

@@ -13,7 +13,6 @@ from scipy.special import eval_legendre, sph_harm_y
 from solver.contract import Cancelled, Context, InvalidInput
 from solver.dehydration import SOLVER, DehydrationParams
 from solver.dehydration.bifurcation import AxisymmetricMode, Onset, base_state, onset
-from solver.dehydration.bifurcation.banded import pattern
 from solver.dehydration.bifurcation.base import Meridian
 from solver.dehydration.bifurcation.meridional_elements import deformation, forces, moduli, tangents, volume_rates
 from solver.dehydration.bifurcation.pencil import Pencil, Perturbations
@@ -22,6 +21,7 @@ from solver.dehydration.bifurcation.result import dominant_degree
 from solver.dehydration.bifurcation.search import Valley
 from solver.dehydration.fresh.closed_form import sphere_radius
 from solver.fruit import directions
+from solver.linalg.banded import pattern
 
 REFERENCE = json.loads((Path(__file__).parent / "core_shell_sphere.json").read_text())
 

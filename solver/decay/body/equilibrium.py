@@ -9,9 +9,9 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...contract import NotConverged
+from ...linalg.krylov import conjugate_gradients, times
 from .loads import Loads, Touch, below, drop, pushes, touches
 from .material import Blocks, energy, forces, hessian, inverse_edges
-from .sparse import solve, times
 
 __all__ = ["Balance", "Rest", "rested", "settle"]
 
@@ -133,9 +133,9 @@ def _direction(x: Floats, rest: Rest, loads: Loads, pattern: Blocks, asked: floa
     near = touches(x, loads, _NEAR)
     g, *_ = _slope(x, rest, loads._replace(contact=np.zeros_like(loads.contact)))
     for cut in (False, True):
-        a = np.zeros((len(pattern.near), 3, 3))
+        a = np.zeros((len(pattern.indices), 3, 3))
         hessian(x, *rest, pattern.slot, a, cut)
-        own = a[pattern.own]
+        own = a[pattern.diagonal]
         own[:, 0, 0] += loads.tether
         own[:, 2, 2] += loads.tether
         d, upwards = _carried(x, g, a, own, loads, near, pattern, asked)
@@ -156,26 +156,26 @@ def _carried(
     first = 0.0
     for _ in range(_CONTACTS):
         stiff = np.where(touching, loads.contact, 0.0)
-        a[pattern.own] = own
-        a[pattern.own, 1, 1] += stiff
+        a[pattern.diagonal] = own
+        a[pattern.diagonal, 1, 1] += stiff
         right = -g
         right[:, 1] += stiff * ((0.0 if loads.floor is None else loads.floor) - x[:, 1])
         point, out = near.point[leaning], near.out[leaning]
         hard = loads.contact[point][:, None] * out
-        np.add.at(a, pattern.own[point], hard[:, :, None] * out[:, None, :])
+        np.add.at(a, pattern.diagonal[point], hard[:, :, None] * out[:, None, :])
         np.add.at(right, point, near.depth[leaning][:, None] * hard)
-        right -= times(pattern.start, pattern.near, a, d)
+        right -= times(pattern.indptr, pattern.indices, a, d)
         size = float(np.linalg.norm(right))
         first = first or size
         if size <= asked * first:
             break
-        more, _, upwards = solve(
-            pattern.start, pattern.near, pattern.own, a, right, min(asked * first / size, 0.3), _ITERATIONS
+        more, _, upwards = conjugate_gradients(
+            pattern.indptr, pattern.indices, pattern.diagonal, a, right, min(asked * first / size, 0.3), _ITERATIONS
         )
         if not upwards:
             return d + more, False
         # contacts that change to and fro would go on for ever: the model itself must fall
-        straight = times(pattern.start, pattern.near, a, more)
+        straight = times(pattern.indptr, pattern.indices, a, more)
         straight[:, 1] -= stiff * more[:, 1]
         np.subtract.at(straight, point, np.einsum("ki,ki->k", out, more[point])[:, None] * hard)
         gain, bend = float(np.sum((g + bent) * more)), float(np.sum(more * straight)) / 2

@@ -1,6 +1,6 @@
 """Neo-Hookean tetrahedra: energy, gradient and a Hessian that is never indefinite, on constant strain.
 
-    W = mu/2 (|F|^2 - 3 - 2 ln J) + lambda/2 (ln J)^2,   F = (edges now) (edges at rest)^-1
+    W = mu/2 (|F|^2 - 3 - 2 ln J) + lambda/2 (ln J)^2,   F = (edges now) (edges at rest)^-1     (solver.material)
 
 W is infinite for an inverted tetrahedron, so no equilibrium holds one. The Hessian's term in dW/dJ is cut where its
 eigenvalues (the singular values of F, Smith et al. 2019) would outweigh mu: Newton's step then always leads down.
@@ -9,36 +9,35 @@ Energies are in units of (stiffness) r1^3, forces in (stiffness) r1^2.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
-from scipy import sparse
 
 from ...arrays import Floats, Ints
 from ...fem import tetrahedron_gradients
+from ...linalg.patterns import of_cliques, places
 
 __all__ = ["Blocks", "blocks", "energy", "forces", "hessian", "inverse_edges"]
 
 
-class Blocks:
+class Blocks(NamedTuple):
     """Sparsity of a matrix of 3 x 3 blocks over the points of tetrahedra.
 
-    start, near: compressed rows of the neighbours of each point, itself among them; slot (t, 4, 4): where the block of
-    two corners of a tetrahedron stands; own (p): where the diagonal blocks stand.
+    indptr, indices: compressed rows of the neighbours of each point, itself among them; diagonal (p): where the
+    diagonal blocks stand; slot (t, 4, 4): where the block of two corners of a tetrahedron stands.
     """
 
-    def __init__(self, tets: Ints, count: int) -> None:
-        rows, columns = np.repeat(tets, 4, axis=1).ravel(), np.tile(tets, 4).ravel()
-        graph = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-        graph.sort_indices()
-        self.start, self.near = graph.indptr.astype(np.int64), graph.indices.astype(np.int64)
-        keys = np.repeat(np.arange(count), np.diff(self.start)) * count + self.near
-        self.slot = np.searchsorted(keys, rows * count + columns).reshape(-1, 4, 4)
-        self.own = np.searchsorted(keys, np.arange(count) * (count + 1))
+    indptr: Ints
+    indices: Ints
+    diagonal: Ints
+    slot: Ints
 
 
 def blocks(tets: Ints, count: int) -> Blocks:
     """Return the sparsity of tetrahedra on `count` points."""
-    return Blocks(tets, count)
+    found = of_cliques(tets, count)
+    return Blocks(*found, places(tets, found.indptr, found.indices))
 
 
 def inverse_edges(points: Floats, tets: Ints) -> Floats:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...contract import NotConverged
+from ...linalg.dissection import Fronts
 from ...shell import (
     Material,
     angles,
@@ -28,7 +29,6 @@ from ...shell import (
     pattern,
     topology,
 )
-from ...shell.dissection import Fronts
 from ...shell.inverse import Inverse, fronts_of, inverse_of
 from ...shell.normals import normals
 from .flesh import Skin

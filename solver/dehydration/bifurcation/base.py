@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from ...arrays import Floats
 from ...contract import Context, InvalidInput, NotConverged
+from ...linalg.banded import Pattern, pattern
 from ..params import DehydrationParams
-from .banded import Pattern, pattern
 from .meridional_elements import axisymmetric_tangent, axisymmetric_volume_rate, deformation, forces, moduli
 from .meridional_mesh import PER_WAVELENGTH, MeridionalMesh, build
 

@@ -154,10 +154,11 @@ def _all(
             continue
         context.check_cancelled()
         context.report(number / 2 ** len(parity), f"parity {parity}")
-        factor = model.factor(base, free)
+        factor = model.factor(base, free, context.check_cancelled)
         if factor.negative:
             raise _AlreadyUnstable
-        crossing = first_crossing(model, base, slope, start, parity, free, factor, (wanted or {}).get(parity))
+        guess = (wanted or {}).get(parity)
+        crossing = first_crossing(model, base, slope, start, parity, free, factor, guess, context.check_cancelled)
         if crossing is not None:
             found.append(crossing)
     return found

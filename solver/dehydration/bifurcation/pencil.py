@@ -11,7 +11,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from ...arrays import Bools, Floats
 from ...contract import NotConverged
-from .banded import Pattern, pattern
+from ...linalg.banded import Pattern, pattern
 from .base import BaseState, Meridian
 from .meridional_elements import deformation, moduli, stress_moduli, tangents, volume_rates
 

@@ -4,9 +4,10 @@ High-order elements along the radius R. Energy per fresh volume, with Jd = theta
 
     Psi = mu Jd / 2 (J^(-2/3) I1(F) - 3) + p (J - Jd) - Jd p^2 / (2 kappa)
 
-(Liu et al. 2014, Eq. 1-4; the last term vanishes for incompressible layers). The smooth state is r(R), with stretches
-lr = dr/dR and lt = r/R. A perturbation u = U(R) Y e_r + V(R) grad Y / k, with k^2 = l (l + 1), decouples by degree;
-averaged over the sphere its second variation is a form in the four numbers e = (U', U/R, V', V/R).
+(Liu et al. 2014, Eq. 1-4; `solver.material`; the last term vanishes for incompressible layers). The smooth state is
+r(R), with stretches lr = dr/dR and lt = r/R. A perturbation u = U(R) Y e_r + V(R) grad Y / k, with k^2 = l (l + 1),
+decouples by degree; averaged over the sphere its second variation is a form in the four numbers
+e = (U', U/R, V', V/R).
 """
 
 from __future__ import annotations

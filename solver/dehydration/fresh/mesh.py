@@ -56,7 +56,7 @@ class CubedSphere:
     """Equiangular cubed sphere with `n` elements along each of the 12 edges.
 
     directions: (nd, 3) nodes on the unit sphere. faces: (6, n+1, n+1) node numbers of each face, by first and second
-    tangent. quads: (6 n^2, 4) corners, counter-clockwise seen from outside.
+    tangent. quads: (6 n^2, 4) corners, counter-clockwise seen from outside, the first where a diagonal begins.
     """
 
     n: int
@@ -78,6 +78,10 @@ def cubed_sphere(n: int) -> CubedSphere:
     )
     faces = inverse.reshape(6, n + 1, n + 1)
     quads = np.stack([faces[:, :-1, :-1], faces[:, 1:, :-1], faces[:, 1:, 1:], faces[:, :-1, 1:]], axis=-1)
+    # each is seen as two triangles, cut from its first corner: mirror images are to be cut in mirror images
+    half = np.arange(n) - (n - 1) / 2
+    turned = (half[:, None] * half < 0)[None, ..., None]
+    quads = np.where(turned, np.roll(quads, -1, axis=-1), quads)
     sphere = CubedSphere(n, points[first], faces, quads.reshape(-1, 4))
     for array in (sphere.directions, sphere.faces, sphere.quads):
         array.flags.writeable = False
@@ -207,6 +211,7 @@ class Sampler:
 
     Cubic splines on each of the six faces: the two faces of an edge share its nodes and hence its spline, so the
     result is continuous; between nodes it is fourth-order where trilinear elements are second.
+    face, alpha, beta: (lattice points,) the face of each and its angles along both tangents.
     """
 
     def __init__(self, sphere: CubedSphere, resolution: int) -> None:
@@ -215,21 +220,21 @@ class Sampler:
         self._shape = theta.shape
         points = directions(theta, phi).reshape(-1, 3)
         heights = points @ _FACES[:, 0].T
-        self._face = np.argmax(heights, axis=1)
-        axes = _FACES[self._face]
-        height = heights[np.arange(len(points)), self._face]
-        self._alpha = np.arctan2(np.einsum("pi,pi->p", points, axes[:, 1]), height)
-        self._beta = np.arctan2(np.einsum("pi,pi->p", points, axes[:, 2]), height)
+        self.face = np.argmax(heights, axis=1)
+        axes = _FACES[self.face]
+        height = heights[np.arange(len(points)), self.face]
+        self.alpha = np.arctan2(np.einsum("pi,pi->p", points, axes[:, 1]), height)
+        self.beta = np.arctan2(np.einsum("pi,pi->p", points, axes[:, 2]), height)
         self._knots = np.linspace(-np.pi / 4, np.pi / 4, sphere.n + 1)
 
     def __call__(self, nodal: Floats) -> Floats:
         """Return the field (nd, c) or (nd,) at the lattice: (resolution, 2 * resolution, c) or without c."""
         values = nodal.reshape(len(nodal), -1)
-        out = np.empty((len(self._face), values.shape[1]))
+        out = np.empty((len(self.face), values.shape[1]))
         for face in range(6):
-            here = np.flatnonzero(self._face == face)
+            here = np.flatnonzero(self.face == face)
             grid = values[self._sphere.faces[face]]
             for c in range(values.shape[1]):
                 spline = RectBivariateSpline(self._knots, self._knots, grid[..., c])
-                out[here, c] = spline.ev(self._alpha[here], self._beta[here])
+                out[here, c] = spline.ev(self.alpha[here], self.beta[here])
         return out.reshape(*self._shape, *nodal.shape[1:])

@@ -1,7 +1,7 @@
 """Energy, force and tangent of hex27 elements with a trilinear pressure per element, condensed.
 
 F = Fe Fd with Fd = diag(d) given at every Gauss point, Jd = det Fd, I1e = sum_ik F_ik^2 / d_k^2, Je = J / Jd. Energy
-per fresh volume (Liu et al. 2014, Eq. 1-4; Jd W(Fe), nearly incompressible):
+per fresh volume (Liu et al. 2014, Eq. 1-4; Jd W(Fe), nearly incompressible; `solver.material` derives it):
 
     Jd mu/2 (Je^(-2/3) I1e - 3) + Jd kappa/2 (Pi(Je - 1))^2,
 
@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 
 from ...arrays import Bools, Floats, Ints
+from ...linalg.patterns import of_cliques, places
 from .hexahedron import PRESSURE, SHAPE_GRADIENTS, WEIGHTS
 
 __all__ = ["Assembled", "Pattern", "assemble", "build_pattern"]
@@ -61,35 +62,9 @@ class Assembled(NamedTuple):
 
 def build_pattern(connectivity: Ints, fixed: Bools) -> Pattern:
     """Return the pattern for elements (ne, 27) and nodes (nn,) that are held in all components."""
-    from scipy.sparse import csr_array
-
     free = np.where(fixed, -1, np.cumsum(~fixed) - 1)
-    local = free[connectivity]
-    rows = np.repeat(np.arange(len(local)), local.shape[1])
-    held = local.ravel() < 0
-    touch = csr_array(
-        (np.ones(int((~held).sum()), np.int32), (rows[~held], local.ravel()[~held])),
-        shape=(len(local), int(free.max()) + 1),
-    )
-    graph = (touch.T @ touch).tocsr()
-    graph.sort_indices()
-    indptr, indices = graph.indptr.astype(np.int64), graph.indices.astype(np.int64)
-    return Pattern(free, indptr, indices, _find_blocks(local, indptr, indices))
-
-
-@njit(cache=True)
-def _find_blocks(local: Ints, indptr: Ints, indices: Ints) -> Ints:
-    blocks = np.full((local.shape[0], local.shape[1], local.shape[1]), -1, np.int64)
-    for e in range(local.shape[0]):
-        for a in range(local.shape[1]):
-            row = local[e, a]
-            if row < 0:
-                continue
-            begin, end = indptr[row], indptr[row + 1]
-            for b in range(local.shape[1]):
-                if local[e, b] >= 0:
-                    blocks[e, a, b] = begin + np.searchsorted(indices[begin:end], local[e, b])
-    return blocks
+    found = of_cliques(free[connectivity], int(free.max()) + 1)
+    return Pattern(free, found.indptr, found.indices, places(free[connectivity], found.indptr, found.indices))
 
 
 @njit(cache=True, inline="always")

@@ -7,7 +7,7 @@ an independent problem on the same part of the mesh with other supports on the p
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.sparse import bsr_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ...arrays import Bools, Floats
-from ...multifrontal import Factor
+from ...linalg.multifrontal import Factor
 from .hexahedron import PRESSURE, SHAPE_GRADIENTS, WEIGHTS
 from .newton import Equilibrium, Model, masked
 
@@ -82,15 +82,16 @@ def stress_stiffness(model: Model, state: Equilibrium) -> Floats:
 
 def first_crossing(
     model: Model, base: Floats, slope: Floats, start: float, parity: tuple[int, ...], free: Bools,
-    factor: Factor | None = None, guess: Floats | None = None,
+    factor: Factor | None = None, guess: Floats | None = None, watch: Callable[[], None] = lambda: None,
 ) -> Crossing | None:  # fmt: skip
     """Return the first singular tangent of base + (s - start) slope beyond `start` in one parity, by Lanczos.
 
     base, slope: (nnz, 3, 3), base positive definite in this parity (its `factor` may be given). None if the slope
-    softens no mode. The largest mu of -slope v = mu base v gives s = start + 1 / mu.
+    softens no mode. The largest mu of -slope v = mu base v gives s = start + 1 / mu. `watch` is called before each
+    product and may end the search.
     """
     pattern = model.pattern
-    factor = factor or model.factor(base, free)
+    factor = factor or model.factor(base, free, watch)
     size = free.size
 
     def sparse(data: Floats) -> bsr_array:
@@ -99,7 +100,13 @@ def first_crossing(
     stiff, softening = sparse(base), -sparse(slope)
     loose = free.ravel().astype(float)
     # the identity that stands on held components must not compete: project it out
-    operator = LinearOperator((size, size), matvec=lambda v: loose * (softening @ (loose * v.ravel())), dtype=float)
+
+    def soften(v: Floats) -> Floats:
+        watch()
+        softened: Floats = loose * (softening @ (loose * v.ravel()))
+        return softened
+
+    operator = LinearOperator((size, size), matvec=soften, dtype=float)
     inverse = LinearOperator((size, size), matvec=lambda v: factor.solve(v.ravel()), dtype=float)
     begin = guess.ravel() if guess is not None else np.random.default_rng(0).normal(size=size)
     values, vectors = eigsh(

@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Bools, Floats
 from ...contract import Context, InvalidInput, NotConverged
 from ...fem import HEX27
-from ...multifrontal import Analysis, Factor, analyse, factorise
+from ...linalg.multifrontal import Analysis, Factor, analyse, factorise
 from ..params import DehydrationParams
 from .assembly import Assembled, Pattern, assemble, build_pattern
 from .hexahedron import POINTS, PRESSURE
@@ -84,9 +84,9 @@ class Model:
         """Return nodal values (nn, 3) at the nodes off the stone, (nf, 3), 0 in held components."""
         return np.where(self.free, nodal[self.pattern.free >= 0], 0.0)
 
-    def factor(self, data: Floats, free: Bools | None = None) -> Factor:
-        """Factorise a tangent (nnz, 3, 3) on the free components (default: the model's own)."""
-        return factorise(self.analysis, masked(self.pattern, data, self.free if free is None else free))
+    def factor(self, data: Floats, free: Bools | None = None, watch: Callable[[], None] | None = None) -> Factor:
+        """Factorise a tangent (nnz, 3, 3) on the free components (default: the model's own); `watch` may end it."""
+        return factorise(self.analysis, masked(self.pattern, data, self.free if free is None else free), watch)
 
 
 def masked(pattern: Pattern, data: Floats, free: Bools) -> Floats:
@@ -107,7 +107,7 @@ def build_model(
     fixed = np.arange(len(mesh.positions)) % mesh.levels == 0
     pattern = build_pattern(mesh.connectivity, fixed)
     centres = mesh.positions[mesh.stacks[:, 4] * mesh.levels + mesh.levels - 1]
-    analysis = analyse(mesh.stacks, centres, mesh.levels - 1, pattern.indptr, pattern.indices)
+    analysis = analyse(mesh.stacks, centres, pattern.indptr, pattern.indices, mesh.levels - 1)
     free = np.ones((int((~fixed).sum()), 3), dtype=bool)
     for axis in mesh.planes:
         free[:, axis] = mesh.positions[~fixed, axis] != 0
@@ -166,7 +166,7 @@ def _solve(model: Model, start: Equilibrium, shrinkage: float, tolerance: float,
         near = history[-1] < REUSE_BELOW and (len(history) < 2 or history[-1] < 0.1 * history[-2])
         if factor is None or not near:
             try:
-                factor = model.factor(swept.data)
+                factor = model.factor(swept.data, watch=context.check_cancelled)
             except np.linalg.LinAlgError:
                 break
         step = np.zeros_like(deformed)

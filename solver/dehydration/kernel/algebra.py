@@ -10,9 +10,9 @@ Physics (Liu et al. 2014, Eq. 1-4; page ``physics/dehydration.md``): F = Fe Fd w
 
     Jd [ mu/2 (J^(-2/3) I1(F) - 3) + kappa/2 (Jbar/Jd - 1)^2 ],        Jbar = deformed / fresh element volume,
 
-(isochoric(Fe) = isochoric(F), so theta enters the shear part through Jd alone) plus a barrier against inversion,
-``4 mu Jd (J/Jd - 0.6)^2`` where J/Jd < 0.6. Below J/Jd = 0.25 the factor J^(-2/3) continues along its tangent, so
-that energy and force stay finite, and the force the exact gradient, even in an inverted element.
+(isochoric(Fe) = isochoric(F), so theta enters the shear part through Jd alone: `solver.material`) plus a barrier
+against inversion, ``4 mu Jd (J/Jd - 0.6)^2`` where J/Jd < 0.6. Below J/Jd = 0.25 the factor J^(-2/3) continues along
+its tangent, so that energy and force stay finite, and the force the exact gradient, even in an inverted element.
 
 Conventions. Local node ``a`` of a hex8 sits at xi = +1 if ``a & 4``, eta = +1 if ``a & 2``, zeta = +1 if ``a & 1``
 (else -1); zeta is radial. "Modes" are the eight unscaled butterfly sums of the nodal positions,

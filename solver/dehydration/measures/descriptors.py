@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ...arrays import Floats
 from ...fruit import Fruit, lattice
@@ -21,6 +22,8 @@ LOWEST_DEGREE = 3
 RESOLUTION, DEGREE = 128, 120
 #: Amplitude below which a surface counts as smooth: no degree, wavelength or buckle is read from noise.
 SMOOTH = 1e-5
+#: Share of the rms below which a place lies in a buckle.
+LOW = -0.5
 
 
 class Descriptors(NamedTuple):
@@ -50,7 +53,6 @@ class Surface:
         around = np.linalg.norm(_around(self._fresh), axis=-1)
         self._metric = along, around
         self._area = along * around
-        self._tree = cKDTree(mesh.rays)
 
     def describe(self, nodes: Floats) -> Descriptors:
         """Return the descriptors of the deformed surface nodes (nc, 3), units of r1."""
@@ -74,7 +76,7 @@ class Surface:
             roughness,
             degree,
             float(wavelength),
-            self._count(nodes, roughness, degree),
+            _valleys(wrinkles, LOW * roughness),
             self._anisotropy(wrinkles),
         )
 
@@ -85,15 +87,6 @@ class Surface:
         flux = sum(np.einsum("qi,qi->q", p, np.cross(q, r)) for p, q, r in ((a, b, c), (a, c, d), (a, b, d), (b, c, d)))
         return float(np.sum(flux) / 12)
 
-    def _count(self, nodes: Floats, roughness: float, degree: float) -> int:
-        """Count inward buckles: nodes lowest within a third of a wavelength and below half the rms."""
-        depth = np.einsum("ni,ni->n", nodes - self._fresh_nodes, self._mesh.rays)
-        depth -= depth.mean()
-        radius = 2 * np.sin(np.pi / degree * 0.35)
-        low = np.flatnonzero(depth < -0.5 * roughness)
-        around = self._tree.query_ball_point(self._mesh.rays[low], radius)
-        return int(sum(depth[i] <= depth[near].min() for i, near in zip(low, around, strict=True)))
-
     def _anisotropy(self, wrinkles: Floats) -> float:
         along, around = self._metric
         slope_along = np.gradient(wrinkles, np.pi / RESOLUTION, axis=0) / along
@@ -103,6 +96,23 @@ class Surface:
         a = float((weight * slope_along**2).sum())
         b = float((weight * slope_around**2).sum())
         return (b - a) / (b + a)
+
+
+def _valleys(wrinkles: Floats, level: float) -> int:
+    """Count the connected regions of a field on the lattice (n, 2n) that lie below `level`.
+
+    Lattice points hang together along meridians and circles, and across a pole with the point opposite.
+    """
+    n = len(wrinkles)
+    place = np.arange(wrinkles.size).reshape(wrinkles.shape)
+    opposite = np.roll(place, n, axis=1)
+    tails = np.concatenate([place.ravel(), place[:-1].ravel(), place[0], place[-1]])
+    heads = np.concatenate([np.roll(place, -1, axis=1).ravel(), place[1:].ravel(), opposite[0], opposite[-1]])
+    low = wrinkles.ravel() < level
+    kept = low[tails] & low[heads]
+    graph = coo_array((np.ones(kept.sum()), (tails[kept], heads[kept])), (wrinkles.size, wrinkles.size))
+    alone = int(np.count_nonzero(~low))
+    return int(connected_components(graph, directed=False)[0]) - alone
 
 
 def _around(field: Floats) -> Floats:

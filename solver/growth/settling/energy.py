@@ -10,7 +10,7 @@ from scipy.sparse import bsr_array, csc_array, diags_array
 
 from ... import shell
 from ...arrays import Floats, Ints
-from ...shell.dissection import Fronts
+from ...linalg.dissection import Fronts
 from ...shell.inverse import Inverse, fronts_of, inverse_of
 from ...shell.normals import normals
 from ..params import Bending, Plane, SolidBall

@@ -7,19 +7,20 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...contract import Context, NotConverged
-from ...multifrontal import factorise
+from ...linalg.multifrontal import analyse, factorise
 from ..forces.hessian import Stiffness
 from ..fracture import overstress
 from ..model.motion import CONTACT, WORK
 from ..model.state import State, Wood, copied
 from ..params import WoodParams
-from .dissection import dissected
 from .explicit import forces
 from .moment import Reached, begin, reached, strength
 
 __all__ = ["equilibrium", "static"]
 
 _TOLERANCE = 1e-6
+#: Coupled pairs of vertices in the smallest front.
+_LEAF = 200
 
 
 def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarray) -> tuple[State, float]:
@@ -33,7 +34,9 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
     m = wood.motion
     free = m.held == 0
     stiffness = Stiffness(m.x, wood.rods, wood.bonds, free)
-    order = dissected(m.x[free], stiffness.indptr, stiffness.indices)
+    row = np.repeat(np.arange(stiffness.size), np.diff(stiffness.indptr))
+    pairs = np.column_stack([row, stiffness.indices])[row <= stiffness.indices]
+    order = analyse(pairs, m.x[free][pairs].mean(axis=1), stiffness.indptr, stiffness.indices, leaf_size=_LEAF)
     done, increment = 0.0, 1.0
     share = np.linalg.norm(full) or 1.0
     begun = float((m.load * full).sum() / share**2)

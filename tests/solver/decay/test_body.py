@@ -94,9 +94,9 @@ def test_gradient_and_hessian_are_differences_of_the_energy(bent):
     g = slope(x, rest)
     assert np.sum(g * d) == pytest.approx((energy(x + e * d, *rest) - energy(x - e * d, *rest)) / (2 * e), rel=1e-6)
     pattern = blocks(rest.tets, len(x))
-    a = np.zeros((len(pattern.near), 3, 3))
+    a = np.zeros((len(pattern.indices), 3, 3))
     hessian(x, *rest, pattern.slot, a, False)
-    matrix = bsr_array((a, pattern.near, pattern.start), shape=(x.size, x.size))
+    matrix = bsr_array((a, pattern.indices, pattern.indptr), shape=(x.size, x.size))
     change = (slope(x + e * d, rest) - slope(x - e * d, rest)) / (2 * e)
     assert np.abs((matrix @ d.ravel()).reshape(-1, 3) - change).max() < 1e-6 * np.abs(change).max()
 
@@ -107,9 +107,9 @@ def test_the_cut_hessian_never_curves_downwards(bent):
     pattern = blocks(rest.tets, len(x))
     lowest = []
     for cut in (False, True):
-        a = np.zeros((len(pattern.near), 3, 3))
+        a = np.zeros((len(pattern.indices), 3, 3))
         hessian(squeezed, *rest, pattern.slot, a, cut)
-        dense = bsr_array((a, pattern.near, pattern.start), shape=(x.size, x.size)).toarray()
+        dense = bsr_array((a, pattern.indices, pattern.indptr), shape=(x.size, x.size)).toarray()
         lowest.append(np.linalg.eigvalsh(dense)[0] / np.abs(dense).max())
     assert lowest[0] < -1e-3  # the exact one does
     assert lowest[1] > -1e-12

@@ -5,25 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..arrays import Floats, Ints, Singles
+from ..arrays import Floats, Singles
+from .dissection import Fronts
 
 __all__ = ["substitute"]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
-def substitute(
-    right: Floats,
-    n: Floats,
-    nodes: Ints,
-    starts: Ints,
-    own: Ints,
-    widest: int,
-    across: Singles,
-    within: Singles,
-    found: Floats,
-) -> None:
-    """Solve both systems for `right` (v, 3) into `found`; n (v, 3): normals. The rest: `Fronts` and both factors."""
-    count = len(right)
+def substitute(right: Floats, n: Floats, fronts: Fronts, across: Singles, within: Singles, found: Floats) -> None:
+    """Solve both systems for `right` (v, 3) into `found`; n (v, 3): normals."""
+    nodes, starts, own = fronts.nodes, fronts.starts, fronts.own
+    count, widest = len(right), int((starts[1:, 0] - starts[:-1, 0]).max())
     x = np.empty((count, 4), np.float32)
     # the factors are single: what is solved is scaled, so that no size of gradient leaves their range
     largest = 0.0

@@ -1,32 +1,28 @@
-"""Order of elimination of a mesh's vertices: nested dissection of its hinges by place (George 1973).
+"""Order of elimination by nested dissection of places (George 1973), for every multifrontal factor here.
 
-Hinges are halved again and again along the longer side of where they are; a vertex is eliminated where all hinges that
-touch it first lie in one half. The halves make a binary tree whose nodes are the fronts of a multifrontal factor.
+What couples unknowns comes in parts: hinges of a mesh, quads over columns of nodes, pairs of a graph. Parts are halved
+again and again along the longer side of where they are; an unknown is eliminated where all parts that touch it first
+lie in one half. The halves make a binary tree whose nodes are the fronts of a multifrontal factor.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ..arrays import Floats, Ints
-from .topology import distinct
+from .patterns import distinct
 
 __all__ = ["Fronts", "dissect"]
 
 
-#: Hinges in the smallest front: fewer make more fronts, more make them fuller.
-_LEAF = 80
+class Fronts(NamedTuple):
+    """Fronts in the order of elimination, children before parents, level by level.
 
-
-@dataclass(frozen=True, eq=False)
-class Fronts:
-    """Fronts in the order of elimination, children before parents.
-
-    nodes: vertices of all fronts, end to end, those eliminated in each first. starts: (f + 1, 3) offsets into nodes,
-    into the columns of the factor and into the complements that go to parents. own: (f,) eliminated in each.
+    nodes: unknowns of all fronts, end to end, those eliminated in each first. starts: (f + 1, 3) offsets into nodes,
+    into the columns of a triangular factor and into the complements that go to parents. own: (f,) eliminated in each.
     children: (f, 2), -1 where there are none.
     """
 
@@ -35,23 +31,14 @@ class Fronts:
     own: Ints
     children: Ints
 
-    @property
-    def count(self) -> int:
-        """Number of fronts."""
-        return len(self.own)
 
-    @property
-    def widest(self) -> int:
-        """Vertices of the largest front."""
-        return int(np.diff(self.starts[:, 0]).max())
-
-
-def dissect(parts: Ints, centres: Floats, vertices: int) -> Fronts:
+def dissect(parts: Ints, centres: Floats, vertices: int, leaf_size: int) -> Fronts:
     """Return the fronts of the graph whose cliques are `parts` (p, c), which lie at `centres` (p, 3).
 
-    Every vertex must be in a part.
+    leaf_size: parts in the smallest front: fewer make more fronts, more make them fuller. Every vertex must be in a
+    part.
     """
-    depth = max(0, int(np.ceil(np.log2(max(len(parts), 1) / _LEAF))))
+    depth = max(0, int(np.ceil(np.log2(max(len(parts), 1) / leaf_size))))
     leaf = np.empty(len(parts), np.int64)
     _halve(centres, depth, leaf)
     leaves = np.repeat(leaf, parts.shape[1])

@@ -9,6 +9,7 @@ Duff and Reid 1983 (multifrontal), George 1973 (nested dissection).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,13 +17,13 @@ import numpy as np
 from numba import njit
 from scipy.linalg import blas, lapack
 
-from .arrays import Floats, Ints
+from ..arrays import Floats, Ints
+from .dissection import dissect
 
-__all__ = ["Analysis", "Factor", "Front", "analyse", "extend", "factorise", "gather"]
-
+__all__ = ["Analysis", "Factor", "analyse", "factorise"]
 
 LEAF = 2
-"""Stacks in the smallest part."""
+"""Parts in the smallest front."""
 
 
 class Front(NamedTuple):
@@ -49,39 +50,31 @@ class Analysis:
         return 3 * (len(self.indptr) - 1)
 
 
-def analyse(stacks: Ints, centres: Floats, per_column: int, indptr: Ints, indices: Ints, leaf: int = LEAF) -> Analysis:
-    """Dissect the quads of a surface until parts hold `leaf` of them.
+def analyse(
+    parts: Ints, centres: Floats, indptr: Ints, indices: Ints, per_column: int = 1, leaf_size: int = LEAF
+) -> Analysis:
+    """Dissect what couples the nodes of a matrix until parts hold `leaf_size`.
 
-    stacks: (ns, c) columns under each quad. centres: (ns, 3) where it is. per_column: nodes of a column; the nodes of
-    column c are c * per_column onwards. indptr, indices: pattern of the matrix by nodes, both triangles.
+    parts: (p, c) columns that each couples. centres: (p, 3) where it is. per_column: nodes of a column, those of
+    column c being c * per_column onwards. indptr, indices: pattern of the matrix by nodes, both triangles.
     """
-    last = np.bincount(stacks.ravel())
+    found = dissect(parts, centres, (len(indptr) - 1) // per_column, leaf_size)
+    nodes = (found.nodes[:, None] * per_column + np.arange(per_column)).ravel()
+    first = found.starts[:, 0] * per_column
     fronts: list[Front] = []
 
-    def dissect(part: Ints) -> tuple[int, Ints]:
-        children: tuple[int, ...] = ()
-        if len(part) > leaf:
-            at = centres[part]
-            along = at[:, np.argmax(np.ptp(at, axis=0))]
-            order = np.argsort(along, kind="stable")
-            halves = [dissect(part[half]) for half in np.array_split(order, 2)]
-            children = tuple(number for number, _ in halves)
-            columns = np.unique(np.concatenate([open_ for _, open_ in halves]))
-        else:
-            columns = np.unique(stacks[part])
-        here = np.bincount(stacks[part].ravel(), minlength=len(last))
-        done = here[columns] == last[columns]
-        ordered = np.concatenate([columns[done], columns[~done]])
-        nodes = (ordered[:, None] * per_column + np.arange(per_column)).ravel()
-        fronts.append(Front(nodes, int(done.sum()) * per_column, children))
-        return len(fronts) - 1, columns[~done]
+    def visit(f: int) -> int:
+        # depth first: few complements wait for their parents at a time
+        inside = tuple(visit(child) for child in found.children[f].tolist() if child >= 0)
+        fronts.append(Front(nodes[first[f] : first[f + 1]], int(found.own[f]) * per_column, inside))
+        return len(fronts) - 1
 
-    dissect(np.arange(len(stacks)))
+    visit(len(found.own) - 1)
     return Analysis(tuple(fronts), indptr, indices)
 
 
 @njit(cache=True)
-def gather(panel: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, data: Floats, place: Ints) -> None:
+def _gather(panel: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, data: Floats, place: Ints) -> None:
     """Add the matrix's blocks (row in front, column eliminated here), lower triangle, to panel (3 nf, 3 own)."""
     for local in range(own):
         node = nodes[local]
@@ -94,7 +87,7 @@ def gather(panel: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, da
 
 
 @njit(cache=True)
-def extend(panel: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, pivots: int) -> None:
+def _extend(panel: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, pivots: int) -> None:
     """Add a child's Schur complement (lower triangle, on `nodes`) to a front."""
     size = len(inner)
     at = np.empty(size, np.int64)
@@ -179,8 +172,10 @@ def _eliminate(panel: Floats, rest: Floats) -> tuple[_Block, int]:
     return _Block(factor, signs, below), _negatives(factor, signs)
 
 
-def factorise(analysis: Analysis, data: Floats) -> Factor:
+def factorise(analysis: Analysis, data: Floats, watch: Callable[[], None] | None = None) -> Factor:
     """Return the factor of the symmetric matrix with blocks `data` (nnz, 3, 3) on the analysed pattern.
+
+    watch: called before each front; what it raises ends the factorisation.
 
     Raises numpy.linalg.LinAlgError if a front is exactly singular.
     """
@@ -189,14 +184,16 @@ def factorise(analysis: Analysis, data: Floats) -> Factor:
     open_: dict[int, Floats] = {}
     negative = 0
     for number, front in enumerate(analysis.fronts):
+        if watch is not None:
+            watch()
         size, pivots = 3 * len(front.nodes), 3 * front.own
         place[front.nodes] = np.arange(len(front.nodes))
         panel = np.zeros((size, pivots), order="F")
         rest = np.zeros((size - pivots, size - pivots), order="F")
-        gather(panel, front.nodes, front.own, analysis.indptr, analysis.indices, data, place)
+        _gather(panel, front.nodes, front.own, analysis.indptr, analysis.indices, data, place)
         for child in front.children:
             below = analysis.fronts[child]
-            extend(panel, rest, open_.pop(child), below.nodes[below.own :], place, pivots)
+            _extend(panel, rest, open_.pop(child), below.nodes[below.own :], place, pivots)
         place[front.nodes] = -1
         block, below_zero = _eliminate(panel, rest) if pivots else (_Block(panel, None, panel), 0)
         blocks.append(block)

@@ -12,10 +12,8 @@ from numba import njit
 
 from ..arrays import Floats, Ints, Singles
 from .dissection import Fronts
-from .pattern import Pattern
 
 __all__ = ["factor"]
-
 
 #: Multiplications of one piece of a factorisation: some milliseconds.
 _PIECE = 5_000_000
@@ -23,8 +21,8 @@ _PIECE = 5_000_000
 _FLOOR = 1e-8
 
 
-def factor(fronts: Fronts, pattern: Pattern, data: Floats) -> Generator[None, None, Singles]:
-    """Factor the matrix with entries `data` (nnz,) on a pattern; the generator's value is the columns, end to end.
+def factor(fronts: Fronts, indptr: Ints, indices: Ints, data: Floats) -> Generator[None, None, Singles]:
+    """Factor the matrix with entries `data` (nnz,) on a pattern (CSR); the generator's value: columns, end to end.
 
     Raises:
         numpy.linalg.LinAlgError: it is not finite.
@@ -33,28 +31,15 @@ def factor(fronts: Fronts, pattern: Pattern, data: Floats) -> Generator[None, No
     total = fronts.starts[-1]
     values = np.empty(total[1], np.float32)
     complements = np.empty(total[2])
-    place = np.full(len(pattern.diagonal), -1)
+    place = np.full(len(indptr) - 1, -1)
     size, own = np.diff(fronts.starts[:, 0]), fronts.own
     # sum over the eliminated columns of what is left, squared
     work = np.cumsum((size**3 - (size - own) ** 3) / 3 + size**2)
     at = 0
-    while at < fronts.count:
+    while at < len(own):
         done = work[at - 1] if at else 0.0
         end = max(at + 1, int(np.searchsorted(work, done + _PIECE)))
-        good = _eliminate(
-            at,
-            end,
-            fronts.nodes,
-            fronts.starts,
-            own,
-            fronts.children,
-            pattern.indptr,
-            pattern.indices,
-            data,
-            place,
-            complements,
-            values,
-        )
+        good = _eliminate(at, end, fronts, indptr, indices, data, place, complements, values)
         if not good:
             raise np.linalg.LinAlgError("the tangent is not finite")
         at = end
@@ -64,23 +49,14 @@ def factor(fronts: Fronts, pattern: Pattern, data: Floats) -> Generator[None, No
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _eliminate(
-    first: int,
-    last: int,
-    nodes: Ints,
-    starts: Ints,
-    own: Ints,
-    children: Ints,
-    indptr: Ints,
-    indices: Ints,
-    data: Floats,
-    place: Ints,
-    complements: Floats,
-    values: Singles,
-) -> bool:
+    first: int, last: int, fronts: Fronts, indptr: Ints, indices: Ints, data: Floats,
+    place: Ints, complements: Floats, values: Singles,
+) -> bool:  # fmt: skip
     """Eliminate fronts first to last - 1; returns whether all pivots were finite. place (n,): -1 on entry and exit.
 
     Fronts are symmetric; row c of w holds column c from the diagonal on.
     """
+    nodes, starts, own, children = fronts
     for f in range(first, last):
         begin, pivots = starts[f, 0], own[f]
         size = starts[f + 1, 0] - begin

@@ -1,4 +1,4 @@
-"""Sparse symmetric matrices of the meridional mesh, stored by a fixed pattern and factored as bands.
+"""Sparse symmetric matrices of elements along a line, stored by a fixed pattern and factored as bands.
 
 Unknowns run column by column, so that the band is three columns wide and LAPACK's banded routines cost O(n b^2).
 """
@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded, solve_banded
 
-from ...arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints
 
 __all__ = ["Factor", "Pattern", "pattern"]
 

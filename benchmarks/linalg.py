@@ -1,0 +1,254 @@
+"""Each user of `solver.linalg` before and after: python -m benchmarks.linalg BEFORE [--rounds 15].
+
+BEFORE is a checkout to compare with. Both trees work in a process of their own with one thread, and take turns: before,
+after, before, after. What is timed is CPU seconds of one whole use, set up outside of the clock; the ratio is of the
+least times (other work on the machine only adds), that of the medians stands beside it. The trees' modules bear
+different names, which `_named` knows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+#: A use: what is done once outside of the clock returns what is timed, which returns arrays to compare.
+Use = Callable[[], list[np.ndarray]]
+
+
+def _named(*names: str) -> Any:
+    """Import the first module of that name that this tree has."""
+    for name in names:
+        try:
+            return importlib.import_module(name)
+        except ModuleNotFoundError:
+            continue
+    raise ModuleNotFoundError(names[0])
+
+
+def _shell() -> tuple[Any, Any, np.ndarray, Any, np.ndarray]:
+    from solver import shell
+    from solver.growth import shapes
+
+    x, triangles = shapes.sphere(3000) if hasattr(shapes, "sphere") else _sheet(55)
+    mesh, g = shell.topology(triangles, len(x)), shell.metric(x, triangles)
+    pattern = shell.pattern(mesh)
+    blocks = np.zeros((pattern.blocks, 3, 3))
+    shell.membrane_tangent(1.05 * x, triangles, g, 1.0, pattern.of_triangles, blocks)
+    shell.bending_tangent(1.05 * x, mesh.hinges, shell.hinge_stiffness(g, mesh, 0.01), pattern.of_hinges, blocks)
+    blocks[pattern.diagonal] += 1e-3 * np.eye(3)
+    return mesh, pattern, x, blocks, triangles
+
+
+def _sheet(n: int) -> tuple[np.ndarray, np.ndarray]:
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    points = np.stack([i + 0.5 * j, np.sqrt(0.75) * j, 0.3 * np.sin(0.4 * i)], -1)
+    at = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (part.ravel() for part in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
+    return points, np.concatenate([np.stack([a, b, d], -1), np.stack([b, c, d], -1)])
+
+
+def shell_factor() -> Use:
+    """Order, factors and ten solves of a growing shell's inverse, 3,025 vertices."""
+    inverse = importlib.import_module("solver.shell.inverse")
+    mesh, pattern, x, blocks, _ = _shell()
+    normals = np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    held, right = np.zeros(len(x), bool), np.random.default_rng(0).normal(size=x.shape)
+
+    def use() -> list[np.ndarray]:
+        work = inverse.inverse_of(inverse.fronts_of(mesh, x), pattern, blocks, normals, held)
+        while True:
+            try:
+                next(work)
+            except StopIteration as done:
+                factored = done.value
+                break
+        return [factored.apply(right) for _ in range(10)]
+
+    return use
+
+
+def shell_pattern() -> Use:
+    """The pattern of the same shell, as after each remeshing."""
+    from solver import shell
+
+    mesh = _shell()[0]
+
+    def use() -> list[np.ndarray]:
+        found = [shell.pattern(mesh) for _ in range(5)]
+        return [found[0].indices, found[0].of_hinges]
+
+    return use
+
+
+def implicit() -> Use:
+    """A factor and five solves of the smooth state's tangent: the implicit road, the full onset."""
+    from solver.dehydration.implicit import build_model, build_quadratic_mesh, graded_layers
+    from solver.dehydration.params import DehydrationParams
+
+    fruit = DehydrationParams()
+    model = build_model(fruit, build_quadratic_mesh(fruit, 10, graded_layers(4, 0.8), "octant"), 1000.0)
+    zero = np.zeros((len(model.mesh.connectivity), 8))
+    data = model.sweep(model.mesh.positions, model.stretch(0.0), zero).data
+    right = model.free_part(np.random.default_rng(0).normal(size=model.mesh.positions.shape)).ravel()
+
+    def use() -> list[np.ndarray]:
+        factor = model.factor(data)
+        return [factor.solve(right) for _ in range(5)]
+
+    return use
+
+
+def implicit_model() -> Use:
+    """Pattern and order of elimination of the same model."""
+    from solver.dehydration.implicit import build_model, build_quadratic_mesh, graded_layers
+    from solver.dehydration.params import DehydrationParams
+
+    fruit = DehydrationParams()
+    mesh = build_quadratic_mesh(fruit, 10, graded_layers(4, 0.8), "octant")
+    return lambda: [build_model(fruit, mesh, 1000.0).pattern.blocks]
+
+
+def meridional() -> Use:
+    """A band of 400 columns of quadrilaterals: twenty factors and solves."""
+    banded = _named("solver.linalg.banded", "solver.dehydration.bifurcation.banded", "solver.dehydration.onset.banded")
+    levels, columns = 13, 401
+    node = np.arange(columns * levels).reshape(columns, levels)
+    cells = np.stack(
+        [node[a : columns - 2 + a : 2, b : levels - 2 + b : 2].ravel() for a in range(3) for b in range(3)], -1
+    )
+    unknowns = (2 * cells[:, :, None] + np.arange(2)).reshape(len(cells), 18)
+    form = np.random.default_rng(0).normal(size=(18, 18))
+    pattern = banded.pattern(unknowns, 2 * node.size)
+    entries = pattern.assemble(np.broadcast_to(form @ form.T + np.eye(18), (len(cells), 18, 18)))
+    right = np.ones(2 * node.size)
+
+    def use() -> list[np.ndarray]:
+        return [pattern.factor(entries).solve(right) for _ in range(20)]
+
+    return use
+
+
+def wood_static() -> Use:
+    """A whole bending test of a bundle at rest, contacts and forces included."""
+    from solver import registry
+    from solver.contract import Context, Need
+
+    solver = registry.get("wood")
+    params = solver.parse(
+        {"mode": "static", "rods": 60, "vertices": 20, "tip_load": (0.0, 0.0, -1.0), "fracture": "none"}
+    )
+    need = Need(fields=("tip_position",), stages=(0.5, 1.0))
+    return lambda: [solver.run(params, need, Context()).tip_position.values]
+
+
+def decay_body() -> Use:
+    """Conjugate gradients on a fruit's flesh of ten shells, to 1e-8."""
+    from solver.dehydration.params import DehydrationParams
+
+    body, solid = importlib.import_module("solver.decay.body.material"), _named("solver.decay.body.solid")
+    krylov = _named("solver.linalg.krylov", "solver.decay.body.sparse")
+    solve = getattr(krylov, "conjugate_gradients", None) or krylov.solve
+    filled = solid.fill(DehydrationParams(), 10)
+    one = np.ones(len(filled.tets))
+    pattern = body.blocks(filled.tets, len(filled.points))
+    rows = [getattr(pattern, a, None) for a in ("indptr", "indices", "diagonal")]
+    if rows[0] is None:
+        rows = [pattern.start, pattern.near, pattern.own]
+    a = np.zeros((len(rows[1]), 3, 3))
+    inverse = body.inverse_edges(filled.points, filled.tets)
+    body.hessian(filled.points, filled.tets, inverse, filled.volume, one, 20 * one, pattern.slot, a, True)
+    a[rows[2]] += 1e-3 * np.eye(3)
+    right = np.random.default_rng(0).normal(size=filled.points.shape)
+    return lambda: [solve(*rows, a, right, 1e-8, 2000)[0]]
+
+
+USES = (shell_factor, shell_pattern, implicit, implicit_model, meridional, wood_static, decay_body)
+
+
+def _work() -> None:
+    """Answer names of uses on stdin with CPU seconds and a digest of what came out."""
+    ready: dict[str, Use] = {}
+    for line in sys.stdin:
+        name = line.strip()
+        if name not in ready:
+            ready[name] = globals()[name]()
+            ready[name]()
+        begin = time.process_time()
+        found = ready[name]()
+        spent = time.process_time() - begin
+        digest = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in found)).hexdigest()[:12]
+        size = float(np.linalg.norm(found[-1].ravel().astype(float)))
+        print(json.dumps({"seconds": spent, "digest": digest, "norm": size}), flush=True)
+
+
+class _Tree:
+    """A worker in a tree."""
+
+    def __init__(self, root: Path) -> None:
+        one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+        command = [sys.executable, str(Path(__file__).resolve()), "--worker"]
+        environment = {**os.environ, **one, "PYTHONPATH": str(root)}
+        self.child = subprocess.Popen(
+            command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def run(self, name: str) -> dict[str, Any]:
+        assert self.child.stdin
+        assert self.child.stdout
+        self.child.stdin.write(name + "\n")
+        self.child.stdin.flush()
+        return dict(json.loads(self.child.stdout.readline()))
+
+
+def main() -> None:
+    """Let both trees take turns, and keep what came of it."""
+    from benchmarks.figures import ROOT, Sheet
+
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("before", type=Path)
+    asked.add_argument("--rounds", type=int, default=15)
+    asked.add_argument("--only", nargs="*", default=[use.__name__ for use in USES])
+    options = asked.parse_args()
+    trees = {"before": _Tree(options.before.resolve()), "after": _Tree(ROOT)}
+    sheet = Sheet("linalg", ["user", "before [ms]", "after [ms]", "after / before", "of medians", "result"])
+    for name in options.only:
+        runs: dict[str, list[dict[str, Any]]] = {"before": [], "after": []}
+        for _ in range(options.rounds):
+            for which, tree in trees.items():
+                runs[which].append(tree.run(name))
+        seconds = {which: [run["seconds"] for run in found] for which, found in runs.items()}
+        least, middle = ({w: float(f(v)) for w, v in seconds.items()} for f in (np.min, np.median))
+        before, after = runs["before"][0], runs["after"][0]
+        same = "same bytes" if before["digest"] == after["digest"] else f"{after['norm'] / before['norm'] - 1:.1e}"
+        sheet.add(
+            [
+                name,
+                f"{1e3 * least['before']:.1f}",
+                f"{1e3 * least['after']:.1f}",
+                f"{least['after'] / least['before']:.3f}",
+                f"{middle['after'] / middle['before']:.3f}",
+                same,
+            ],
+            user=name,
+            seconds=seconds,
+            digests={which: found[0]["digest"] for which, found in runs.items()},
+        )
+    sheet.keep()
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--worker"]:
+        _work()
+    else:
+        main()

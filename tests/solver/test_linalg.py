@@ -1,0 +1,86 @@
+"""Sparse algebra against dense algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import bsr_array
+
+from solver.linalg.krylov import conjugate_gradients, times
+from solver.linalg.multifrontal import analyse, factorise
+from solver.linalg.patterns import of_cliques, of_pairs, places
+
+
+def springs(seed: int = 0, n: int = 150):
+    """A bundle of points coupled with their near ones: places (n, 3), pattern, blocks, the dense matrix."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(size=(n, 3)) * [8.0, 1.0, 1.0]
+    pairs = np.argwhere(np.triu(np.linalg.norm(x[:, None] - x[None], axis=-1) < 0.7, 1))
+    pattern = of_pairs(pairs, n)
+    blocks = np.zeros((len(pattern.indices), 3, 3))
+    blocks[pattern.diagonal] += 0.1 * np.eye(3)
+    at = places(pairs, pattern.indptr, pattern.indices)
+    for (i, j), where in zip(pairs, at, strict=True):
+        way = (x[j] - x[i]) / np.linalg.norm(x[j] - x[i])
+        blocks[where.ravel()] += np.outer(way, way) * np.array([1, -1, -1, 1])[:, None, None]
+    dense = bsr_array((blocks, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n)).toarray()
+    return x, pattern, blocks, dense
+
+
+def order(x, pattern, leaf_size):
+    row = np.repeat(np.arange(len(x)), np.diff(pattern.indptr))
+    pairs = np.column_stack([row, pattern.indices])[row <= pattern.indices]
+    return analyse(pairs, x[pairs].mean(axis=1), pattern.indptr, pattern.indices, leaf_size=leaf_size)
+
+
+@pytest.mark.parametrize("leaf_size", [5, 40, 10_000])
+def test_a_graph_is_factored_wherever_it_is_cut(leaf_size):
+    x, pattern, blocks, dense = springs()
+    assert np.abs(dense - dense.T).max() == 0
+    right = np.random.default_rng(1).normal(size=len(dense))
+    found = order(x, pattern, leaf_size)
+    assert sorted(np.concatenate([f.nodes[: f.own] for f in found.fronts])) == list(range(len(x)))
+    factor = factorise(found, blocks)
+    assert factor.solve(right) == pytest.approx(np.linalg.solve(dense, right), rel=1e-9, abs=1e-9)
+    assert factor.negative == 0
+
+
+def test_inertia_is_counted_where_the_matrix_is_indefinite():
+    x, pattern, blocks, dense = springs(2)
+    blocks[pattern.diagonal] -= 0.9 * np.eye(3)
+    shifted = dense - 0.9 * np.eye(len(dense))
+    factor = factorise(order(x, pattern, 40), blocks)
+    assert factor.negative == int((np.linalg.eigvalsh(shifted) < 0).sum()) > 0
+    right = np.ones(len(dense))
+    assert factor.solve(right) == pytest.approx(np.linalg.solve(shifted, right), rel=1e-7, abs=1e-7)
+
+
+def test_conjugate_gradients_solve_and_notice_a_direction_that_curves_down():
+    _, pattern, blocks, dense = springs(3)
+    right = np.random.default_rng(4).normal(size=(len(dense) // 3, 3))
+    assert times(pattern.indptr, pattern.indices, blocks, right).ravel() == pytest.approx(dense @ right.ravel())
+    x, iterations, upwards = conjugate_gradients(*pattern, blocks, right, 1e-12, 2000)
+    assert upwards
+    assert 3 < iterations < 2000
+    assert x.ravel() == pytest.approx(np.linalg.solve(dense, right.ravel()), rel=1e-7, abs=1e-7)
+    # the diagonal, which preconditions, stays positive
+    blocks[np.setdiff1d(np.arange(len(blocks)), pattern.diagonal)] *= 3
+    assert not conjugate_gradients(*pattern, blocks, right, 1e-12, 2000)[2]
+
+
+def test_patterns_of_pairs_and_of_cliques_are_the_same_and_know_their_places():
+    cliques = np.array([[0, 1, 2], [2, 3, -1], [4, 2, 1]])
+    found = of_cliques(cliques, 5)
+    pairs = np.array([[0, 1], [0, 2], [1, 2], [2, 3], [4, 2], [4, 1]])
+    for a, b in zip(found, of_pairs(pairs, 5), strict=True):
+        assert np.array_equal(a, b)
+    at = places(cliques, found.indptr, found.indices)
+    row = np.repeat(np.arange(5), np.diff(found.indptr))
+    for clique, where in zip(cliques, at, strict=True):
+        for a, i in enumerate(clique):
+            for b, j in enumerate(clique):
+                if i < 0 or j < 0:
+                    assert where[a, b] == -1
+                else:
+                    assert (row[where[a, b]], found.indices[where[a, b]]) == (i, j)
+    assert places(np.array([[0, 4]]), found.indptr, found.indices)[0, 0, 1] == -1

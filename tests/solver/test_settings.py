@@ -1,0 +1,45 @@
+"""What a quality means, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import registry
+from solver.contract import InvalidInput
+from solver.dehydration.settings import choose
+
+SOLVER = registry.get("dehydration")
+
+
+def _chosen(params, quality):
+    try:
+        return choose(params, quality, 0.3)
+    except InvalidInput:
+        return None
+
+
+@pytest.mark.parametrize("quality", ["preview", "default", "fine"])
+@pytest.mark.parametrize("mirrors", ["", "xyz"])
+@pytest.mark.parametrize("te", [0.2, 0.04, 0.01, 0.005, 0.002])
+@pytest.mark.parametrize("gamma", [3.0, 10.0, 100.0])
+def test_no_quality_runs_below_four_elements_a_wave(quality, mirrors, te, gamma):
+    """Flat film: 2 pi te (gamma / 3)^(1/3), on an edge of the cube of a quarter turn."""
+    params = SOLVER.parse({"te": te, "gamma": gamma, "mirrors": mirrors})
+    wave = 2 * np.pi * te * (gamma / 3) ** (1 / 3)
+    settings = _chosen(params, quality)
+    if settings is None:
+        assert te <= 0.005
+        assert not mirrors or (te, gamma) == (0.002, 3.0)
+    else:
+        assert settings.n * wave / (np.pi / 2) >= 4 - 1e-9
+
+
+def test_a_stage_that_is_still_smooth_needs_no_waves():
+    params = SOLVER.parse({"te": 0.002})
+    smooth = choose(params, "preview", 0.005)
+    assert smooth.start > 0.005
+    assert smooth.elements < 300_000
+    with pytest.raises(InvalidInput, match=r"te = 0\.002 .* elements") as refused:
+        choose(params, "preview", 0.3)
+    assert "mirrors" in refused.value.advice
