@@ -299,7 +299,11 @@ def _tried(mutation: Mutation, copy: Copy, limit: float) -> tuple[str, str, floa
     text = target.read_text()
     kept = target.stat()
     try:
-        target.write_text(mutation.applied(text))
+        changed = mutation.applied(text)
+    except ValueError:
+        return "does not fit its file any more", "", 0.0
+    try:
+        target.write_text(changed)
         code, said, seconds = run(mutation.tests, copy, copy.caches_without(mutation.file), limit)
     finally:
         target.write_text(text)

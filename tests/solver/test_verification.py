@@ -221,6 +221,15 @@ def test_work_of_the_loading_is_what_the_march_stores_and_moves():
 # ---------------------------------------------------------------------------------------------------------- onset
 
 
+def test_full_onset_on_a_coarse_mesh_is_near_the_exact_one():
+    """Preview has 1.5 elements to a wave, which puts the onset some 3 % too high (measured: 3.2 %)."""
+    thick = DehydrationParams.parse({"te": 0.08, "gamma": 10.0, "stone": (0.4, 0.4)})
+    full = onset_full(thick, method="exact", kappa_ratio=1000.0, quality="preview")
+    radial = onset_radial(thick, method="exact", kappa_ratio=1000.0)
+    assert full.s_cr == pytest.approx(radial.s_cr, rel=0.05)
+    assert abs(full.degree - radial.degree) <= 1
+
+
 @pytest.mark.slow
 def test_full_onset_of_a_sphere_is_within_one_percent_of_the_exact_one():
     reference = json.loads((Path(__file__).parent / "core_shell_sphere.json").read_text())["bifurcation"]
