@@ -17,7 +17,6 @@ import fcntl
 import importlib
 import json
 import os
-import platform
 import re
 import resource
 import shutil
@@ -31,6 +30,8 @@ from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from benchmarks import figures
 
 from .listed import ROOT, Mutation, listed
 
@@ -182,7 +183,7 @@ class Ledger:
 
     def _read(self) -> None:
         page = json.loads(self.path.read_text()) if self.path.exists() else {}
-        self.rows |= {row["name"]: row for row in page.get("mutations", [])}
+        self.rows |= {row["name"]: row for row in page.get("runs", [])}
 
     def known(self, mutation: Mutation, copy: Copy) -> bool:
         row = self.rows.get(mutation.name)
@@ -203,30 +204,31 @@ class Ledger:
     def _write(self, mutations: Sequence[Mutation]) -> None:
         rows = [self.rows[m.name] for m in mutations if m.name in self.rows]
         caught = sum(row["outcome"].startswith("caught") for row in rows)
-        head = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
-        page = {
-            "command": "make mutants",
-            "commit": head.stdout.strip(),
-            "processor": platform.processor() or platform.machine(),
-            "python": platform.python_version(),
-            "listed": len(mutations),
-            "run": len(rows),
-            "caught": caught,
-            "caught_share": round(caught / len(rows), 4),
-            "mutations": rows,
-        }
-        self.path.write_text(json.dumps(page, indent=1) + "\n")
-        (RESULTS / "mutants.md").write_text(_table(page))
+        figures.keep(
+            "mutants",
+            rows,
+            listed=len(mutations),
+            run=len(rows),
+            caught=caught,
+            caught_share=round(caught / len(rows), 4),
+            table={"head": ["where", "mutations", "caught"], "rows": _floors(rows)},
+        )
+        (RESULTS / "mutants.md").write_text(_table(figures.load("mutants")))
 
 
-def _table(page: dict[str, Any]) -> str:
+def _floors(rows: Sequence[dict[str, Any]]) -> list[list[str]]:
+    """Return rows of where, how many, how many caught."""
     floors: dict[str, list[int]] = {}
-    for row in page["mutations"]:
+    for row in rows:
         parts = row["file"].split("/")
         place = "/".join(parts[:2]) if parts[0] == "solver" and len(parts) > 2 else parts[0]
         counts = floors.setdefault(place, [0, 0])
         counts[0] += 1
         counts[1] += row["outcome"].startswith("caught")
+    return [[place, str(total), str(caught)] for place, (total, caught) in sorted(floors.items())]
+
+
+def _table(page: dict[str, Any]) -> str:
     lines = [
         "# Mutations",
         "",
@@ -235,12 +237,12 @@ def _table(page: dict[str, Any]) -> str:
         "",
         "| where | mutations | caught |",
         "|---|---|---|",
-        *(f"| {place} | {total} | {caught} |" for place, (total, caught) in sorted(floors.items())),
+        *("| " + " | ".join(row) + " |" for row in page["table"]["rows"]),
         "",
         "| not caught | file | what it breaks | outcome |",
         "|---|---|---|---|",
     ]
-    lost = [row for row in page["mutations"] if not row["outcome"].startswith("caught")]
+    lost = [row for row in page["runs"] if not row["outcome"].startswith("caught")]
     lines += [f"| {row['name']} | `{row['file']}` | {row['why']} | {row['outcome']} |" for row in lost]
     return "\n".join(lines) + "\n"
 

@@ -17,6 +17,7 @@ import xarray as xr
 from pydantic import Field
 
 from solver.contract import Cancelled, Context, Cost, InvalidInput, Need, NotConverged, Solver, StageAxis
+from solver.fresh import SURFACE
 from solver.fruit import Fruit, azimuths, colatitudes, lattice
 
 __all__ = ["SOLVER"]
@@ -116,4 +117,5 @@ SOLVER = Solver(
     presets={"sphere": {"radii": (1.0,) * 8, "stone": (0.4, 0.4), "exocarp_thickness": 0.04}},
     run=_run,
     cost=lambda params, need: Cost(0.01, 1000),
+    surface=SURFACE,
 )

@@ -41,7 +41,7 @@ def test_runs_of_a_table_solved_again(table: Path, tmp_path: Path) -> None:
         moved = store.get(job.key)
         store.shard_path(job.key).unlink()
         store.put(job.key, moved.assign(displacement=moved["displacement"] * 1.0001))
-    store.ledger.rebuild(store)
+    store.ledger.rebuild(store.results())
     assert wizen("table", "rebuild", "--store", copy).exit_code == 0
     result = wizen("table", "verify", "--store", copy, "--recompute", 2)
     assert result.exit_code == 1
