@@ -69,7 +69,8 @@ class Law:
         """Return J, F^-T, a with its derivatives, s and t of the head."""
         j, i1 = np.linalg.det(f), np.sum(f * f, axis=(-1, -2))
         a, b = self.a(j), self.b(j)
-        return j, np.linalg.inv(f).swapaxes(-1, -2), a, a[1] * i1 + b[1], a[2] * i1 + b[2]
+        g = np.linalg.inv(f).swapaxes(-1, -2).astype(np.float64, copy=False)
+        return j, g, a, a[1] * i1 + b[1], a[2] * i1 + b[2]
 
 
 def _on(scalar: Floats, axes: int) -> Floats:

@@ -38,7 +38,8 @@ def _least(params: WoodParams) -> int:
     """
     if params.rods == 1 or params.reach == 0 or params.unevenness == 0:
         return 0
-    return math.ceil((params.rods * (params.length / params.radius) ** 4 / _EVEN) ** (1 / 6))
+    edges: float = (params.rods * (params.length / params.radius) ** 4 / _EVEN) ** (1 / 6)
+    return math.ceil(edges)
 
 
 def choose(params: WoodParams, quality: Quality) -> Settings:
