@@ -25,8 +25,8 @@ __all__ = ["ATTEMPTS", "Run"]
 
 #: How often a job is tried; what cannot succeed (invalid input) is tried once.
 ATTEMPTS = 2
-#: Seconds that workers get to stop when their runner does: what they would finish is finished by the next run.
-_LANDING = 0.5
+#: Seconds that workers get to stop when their runner does, twice a heartbeat; what they would finish the next run does.
+_LANDING = 1.0
 
 _LOST = {
     "code": "worker-lost",

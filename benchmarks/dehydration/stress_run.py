@@ -102,8 +102,8 @@ class _Watched(Path):
 def _tiny(case: Case) -> Iterator[None]:
     """Let runs take the case's mesh and be watched."""
 
-    def chosen(params: DehydrationParams, quality: str) -> Settings:
-        usual = choose(params, quality)
+    def chosen(params: DehydrationParams, quality: str, last: float) -> Settings:
+        usual = choose(params, quality, last)
         # coarser elements have a longer critical step: what is kept is shrinkage and decay per unit of time
         finer = usual.n / case.n
         changed: dict[str, Any] = {name: getattr(usual, name) * finer for name in ("pace", "damping", "swing_damping")}

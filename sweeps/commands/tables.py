@@ -53,6 +53,7 @@ def build(
     """
     from solver import registry
     from store import scalars, tables
+    from store.errors import EmptyTable
     from store.generations.samples import Choice, finished, is_surface
     from store.store import Store
 
@@ -63,12 +64,18 @@ def build(
         made = tables.build(opened, chosen, name, plan=plan, quality=quality, resolution=resolution)
     elif resolution is not None:
         raise InvalidOption("--resolution cuts shapes, and there are none.", "Leave it out.")
-    path = scalars.build(opened, chosen, name, plan=plan, quality=quality, keys=made.keys if made else None)
-    numbers = _numbers(scalars.read(opened, name), path)
+    numbers: dict[str, Any] | None = None
+    try:
+        path = scalars.build(opened, chosen, name, plan=plan, quality=quality, keys=made.keys if made else None)
+        numbers = _numbers(scalars.read(opened, name), path)
+    except EmptyTable:
+        if made is None:  # shapes alone, without a number beside them, are a table as well
+            raise
     if made is not None:
         _show_table(made, tables.path_of(opened, made), as_json, numbers)
-    else:
-        emit({"name": name, "scalars": numbers}, as_json, lambda console: _show_numbers(console, name, numbers))
+    elif numbers is not None:
+        found = numbers
+        emit({"name": name, "scalars": found}, as_json, lambda console: _show_numbers(console, name, found))
 
 
 @table_app.command()

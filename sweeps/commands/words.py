@@ -85,7 +85,7 @@ def show_report(console: Any, report: Report, store: Path, plan: Plan) -> None:
         if count
     ]
     console.print(f"{report.plan}: {', '.join(parts)} of {report.total}, in {report.seconds:.1f} s")
-    if report.complete and "displacement" in plan.need.fields:
+    if report.complete:
         only = f" --plan {plan.name}" if plan.controls else ""
         console.print(f"next: wizen table build --store {store}{only}", markup=False)
     elif report.solved or report.reused:

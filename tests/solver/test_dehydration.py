@@ -66,9 +66,9 @@ def test_buckles_appear_past_the_exact_onset_with_its_degree():
 
 
 def test_a_blow_up_is_a_typed_error_with_the_last_good_stage(monkeypatch):
-    def reckless(params, quality):
+    def reckless(params, quality, last):
         # ten thousand times the pace: the volume shrinks faster than any wave can tell
-        settings = choose(params, quality)
+        settings = choose(params, quality, last)
         return dataclasses.replace(settings, pace=0.05, damping=0.0)
 
     monkeypatch.setattr(run_module, "choose", reckless)
@@ -129,7 +129,7 @@ def test_nothing_is_measured_that_was_not_asked_for(monkeypatch):
         raise AssertionError("nobody asked for this")
 
     params = SOLVER.parse(QUICK)
-    made = {"Surface": ("roughness",), "penetration": ("penetration",), "Sampler": ("displacement",)}
+    made = {"Surface": ("roughness",), "of_quads": ("penetration",), "Delivery": ("displacement",)}
     for name in made:
         asked = tuple(field for other, fields in made.items() for field in fields if other != name)
         with monkeypatch.context() as patch:

@@ -53,7 +53,8 @@ def test_cache_is_used_across_processes_and_never_stale(tmp_path):
     shutil.copytree(Path(package.__file__).parent, kernel, ignore=shutil.ignore_patterns("__pycache__"))
     contact = Path(package.__file__).parent.parent / "contact"
     shutil.copytree(contact, kernel.parent / "contact", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(Path(package.__file__).parents[2] / "arrays.py", kernel.parent.parent)
+    for module in ("arrays.py", "fem.py"):
+        shutil.copy(Path(package.__file__).parents[2] / module, kernel.parent.parent)
     for parent in (kernel.parent, kernel.parent.parent):
         (parent / "__init__.py").touch()
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}

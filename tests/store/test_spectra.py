@@ -178,7 +178,7 @@ WITHOUT = """
 import sys
 sys.modules["pyfftw"] = None
 import numpy as np
-from store import spectra, transforms
+from store.surfaces import spectra, transforms
 field = np.random.default_rng(0).standard_normal((8, 16))
 assert np.allclose(spectra.synthesize(spectra.spectrum(field), 8), field)
 print(transforms.backend())

@@ -23,7 +23,7 @@ def test_table_3_on_a_fruit_of_the_paper():
         {**PAPER, "porosity": 3.0, "temperature": 25.0, "humidity": 60.0, "water_content": 80.0, "growth_rate": 25.0}
     )
     colony = params.mould
-    rates = daily(colony, params)
+    rates = daily(colony, params, 40.0)
     steps = 3.5
     assert colony.pace == 7.0
     assert rates.mobility * R1**2 == pytest.approx(steps * 220 * 0.01 * 0.01, rel=1e-12)
