@@ -244,7 +244,8 @@ def main() -> None:
             seconds=seconds,
             digests={which: found[0]["digest"] for which, found in runs.items()},
         )
-    sheet.keep()
+    told = ["git", "-C", str(options.before), "rev-parse", "--short=10", "HEAD"]
+    sheet.keep(before=subprocess.run(told, capture_output=True, text=True, check=False).stdout.strip())
 
 
 if __name__ == "__main__":

@@ -127,19 +127,18 @@ class Factor:
     def solve(self, right: Floats) -> Floats:
         """Return x of A x = right, both (size,)."""
         x = np.asarray(right, dtype=float).reshape(-1, 3).copy()
-        for front, (pivot, signs, below) in zip(self.analysis.fronts, self.blocks, strict=True):
-            if not front.own:
-                continue
-            own, rest = front.nodes[: front.own], front.nodes[front.own :]
+        steps = [
+            (front.nodes[: front.own], front.nodes[front.own :], block)
+            for front, block in zip(self.analysis.fronts, self.blocks, strict=True)
+            if front.own
+        ]
+        for own, rest, (pivot, signs, below) in steps:
             part = x[own].ravel()
             part = _half(pivot, part, 0) if signs is None else lapack.dsytrs(pivot, signs, part, lower=1)[0].ravel()
             x[own] = part.reshape(-1, 3)
             if len(rest):
                 x[rest] -= (below @ part).reshape(-1, 3)
-        for front, (pivot, signs, below) in zip(self.analysis.fronts[::-1], self.blocks[::-1], strict=True):
-            if not front.own:
-                continue
-            own, rest = front.nodes[: front.own], front.nodes[front.own :]
+        for own, rest, (pivot, signs, below) in reversed(steps):
             part, above = x[own].ravel(), below.T @ x[rest].ravel()
             if signs is None:
                 part = _half(pivot, part - above, 1)

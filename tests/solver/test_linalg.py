@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_array
 
+from solver.linalg.cholesky import factor
+from solver.linalg.dissection import dissect
 from solver.linalg.krylov import conjugate_gradients, times
 from solver.linalg.multifrontal import analyse, factorise
 from solver.linalg.patterns import of_cliques, of_pairs, places
+from solver.linalg.substitution import substitute
 
 
 def springs(seed: int = 0, n: int = 150):
@@ -84,3 +87,55 @@ def test_patterns_of_pairs_and_of_cliques_are_the_same_and_know_their_places():
                 else:
                     assert (row[where[a, b]], found.indices[where[a, b]]) == (i, j)
     assert places(np.array([[0, 4]]), found.indptr, found.indices)[0, 0, 1] == -1
+
+
+@pytest.mark.parametrize("leaf_size", [3, 20, 10_000])
+def test_single_factors_solve_for_motions_across_and_within(leaf_size):
+    """Of two graph Laplacians with springs to the ground: dense algebra on each part of the right side."""
+    x, pattern, _, _ = springs()
+    rng, n = np.random.default_rng(2), len(x)
+    row = np.repeat(np.arange(n), np.diff(pattern.indptr))
+    ends = np.column_stack([row, pattern.indices])[row < pattern.indices]
+    parts = np.concatenate([ends, np.repeat(np.arange(n)[:, None], 2, axis=1)])
+    fronts = dissect(parts, x[parts].mean(axis=1), n, leaf_size)
+    assert sorted(np.concatenate(_eliminated(fronts)).tolist()) == list(range(n))
+    dense, factors = [], []
+    for _ in range(2):
+        stiff = rng.uniform(0.5, 2, len(ends))
+        matrix = np.diag(rng.uniform(0.2, 1, n))
+        for (i, j), k in zip(ends, stiff, strict=True):
+            matrix[[i, j], [i, j]] += k
+            matrix[[i, j], [j, i]] -= k
+        work = factor(fronts, pattern.indptr, pattern.indices, matrix[row, pattern.indices])
+        while True:
+            try:
+                next(work)
+            except StopIteration as done:
+                factors.append(done.value)
+                break
+        dense.append(matrix)
+    normals = rng.normal(size=(n, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    right, found = 1e6 * rng.normal(size=(n, 3)), np.empty((n, 3))
+    substitute(right, normals, fronts, *factors, found)
+    normal = (right * normals).sum(axis=1)
+    across, within = np.linalg.solve(dense[0], normal), np.linalg.solve(dense[1], right - normal[:, None] * normals)
+    # motions found within the surface of each vertex's neighbours may leave its own: that part is taken off
+    wanted = within + (across - (within * normals).sum(axis=1))[:, None] * normals
+    # the factors are of single precision
+    assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max()
+
+
+def _eliminated(fronts):
+    starts = fronts.starts[:-1, 0]
+    return [fronts.nodes[at : at + own] for at, own in zip(starts, fronts.own, strict=True)]
+
+
+def test_a_factor_of_what_is_not_finite_is_refused():
+    x, pattern, _, _ = springs()
+    row = np.repeat(np.arange(len(x)), np.diff(pattern.indptr))
+    pairs = np.column_stack([row, pattern.indices])[row <= pattern.indices]
+    fronts = dissect(pairs, x[pairs].mean(axis=1), len(x), 20)
+    data = np.where(row == pattern.indices, np.nan, 0.0)
+    with pytest.raises(np.linalg.LinAlgError):
+        list(factor(fronts, pattern.indptr, pattern.indices, data))
