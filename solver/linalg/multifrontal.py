@@ -51,14 +51,16 @@ class Analysis:
 
 
 def analyse(
-    parts: Ints, centres: Floats, indptr: Ints, indices: Ints, per_column: int = 1, leaf_size: int = LEAF
-) -> Analysis:
+    parts: Ints, centres: Floats, indptr: Ints, indices: Ints, per_column: int = 1, leaf_size: int = LEAF,
+    thin: bool = False,
+) -> Analysis:  # fmt: skip
     """Dissect what couples the nodes of a matrix until parts hold `leaf_size`.
 
     parts: (p, c) columns that each couples. centres: (p, 3) where it is. per_column: nodes of a column, those of
-    column c being c * per_column onwards. indptr, indices: pattern of the matrix by nodes, both triangles.
+    column c being c * per_column onwards. indptr, indices: pattern of the matrix by nodes, both triangles. thin: as in
+    `dissect`.
     """
-    found = dissect(parts, centres, (len(indptr) - 1) // per_column, leaf_size)
+    found = dissect(parts, centres, (len(indptr) - 1) // per_column, leaf_size, thin)
     nodes = (found.nodes[:, None] * per_column + np.arange(per_column)).ravel()
     first = found.starts[:, 0] * per_column
     fronts: list[Front] = []

@@ -30,10 +30,10 @@ def springs(seed: int = 0, n: int = 150):
     return x, pattern, blocks, dense
 
 
-def order(x, pattern, leaf_size):
+def order(x, pattern, leaf_size, thin=False):
     row = np.repeat(np.arange(len(x)), np.diff(pattern.indptr))
     pairs = np.column_stack([row, pattern.indices])[row <= pattern.indices]
-    return analyse(pairs, x[pairs].mean(axis=1), pattern.indptr, pattern.indices, leaf_size=leaf_size)
+    return analyse(pairs, x[pairs].mean(axis=1), pattern.indptr, pattern.indices, leaf_size=leaf_size, thin=thin)
 
 
 @pytest.mark.parametrize("leaf_size", [5, 40, 10_000])
@@ -139,3 +139,24 @@ def test_a_factor_of_what_is_not_finite_is_refused():
     data = np.where(row == pattern.indices, np.nan, 0.0)
     with pytest.raises(np.linalg.LinAlgError):
         list(factor(fronts, pattern.indptr, pattern.indices, data))
+
+
+def test_thin_cuts_leave_less_to_eliminate_of_a_wide_and_short_graph():
+    """Layers of 10 by 2 points, each bound to the next two layers: a cut across the layers' short side is thinnest."""
+    at = np.stack(np.meshgrid(np.arange(12) * 0.9, np.arange(10), np.arange(2), indexing="ij"), -1).reshape(-1, 3)
+    reach = np.abs(at[:, None] - at[None]) / [0.9, 1, 1]
+    pairs = np.argwhere(np.triu((reach[..., 0] <= 3) & (reach[..., 1:] <= 1).all(-1), 1))
+    pattern = of_pairs(pairs, len(at))
+    blocks = np.zeros((len(pattern.indices), 3, 3))
+    blocks[:] = -np.eye(3)
+    blocks[pattern.diagonal] = 100 * np.eye(3)
+    dense = bsr_array((blocks, pattern.indices, pattern.indptr), shape=(3 * len(at),) * 2).toarray()
+    right, work = np.random.default_rng(0).normal(size=3 * len(at)), []
+    for thin in (False, True):
+        found = order(at, pattern, 60, thin)
+        sizes = np.array([[len(front.nodes), front.own] for front in found.fronts])
+        work.append(int((sizes[:, 0] ** 3 - (sizes[:, 0] - sizes[:, 1]) ** 3).sum()))
+        assert sizes[:, 1].sum() == len(at)
+        x = factorise(found, blocks).solve(right)
+        assert np.abs(dense @ x - right).max() < 1e-12
+    assert work[1] < 0.8 * work[0]
