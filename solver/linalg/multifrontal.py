@@ -1,9 +1,8 @@
 """Sparse LDL^T of stacked meshes: nested dissection of the surface, dense fronts, BLAS-3.
 
 A fruit is thin in one direction of its graph: a few nodes along a column, many columns. Dissecting the columns and
-keeping each column whole gives fronts that are small and dense, so that LAPACK does all the work. Measured on one core
-at 17k to 46k unknowns: level with MKL Pardiso (0.8 to 1.3 times its time), 4 times faster than SuperLU; and it yields
-the inertia (Sylvester's law) without another package.
+keeping each column whole gives fronts that are small and dense, so that LAPACK does all the work: 4 times faster than
+SuperLU, and with the inertia (Sylvester's law). MKL's Pardiso factors faster and solves slower (docs/dehydration.md).
 Duff and Reid 1983 (multifrontal), George 1973 (nested dissection).
 """
 
