@@ -12,9 +12,9 @@ from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
 from ..geometry.crossings import Crossings
 from .fresh.loading import Loading
-from .measures.crossing import of_quads
 from .measures.delivery import Delivery
 from .measures.descriptors import Descriptors, Surface
+from .measures.penetration import of_quads
 from .params import DehydrationParams
 from .path import Path, State
 from .settings import Settings, choose

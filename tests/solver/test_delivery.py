@@ -7,12 +7,12 @@ import pytest
 
 from solver import registry
 from solver.dehydration.fresh.mesh import Sampler, build_mesh
-from solver.dehydration.measures.crossing import of_lattice, of_quads
 from solver.dehydration.measures.delivery import Delivery, even_out, on_triangles
+from solver.dehydration.measures.penetration import of_lattice, of_quads
 from solver.fruit import directions, lattice
 from solver.geometry.crossings import split_quads
 
-from .test_contact import grooved
+from ._skins import grooved
 
 FRUIT = registry.get("dehydration").parse({}, preset="sphere")
 

@@ -17,11 +17,12 @@ import numpy as np
 from numba import njit, prange, typeof, types
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from solver.dehydration.contact.contact import SLACK, measure
 from solver.dehydration.contact.data import make_contact
 from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
-from solver.dehydration.kernel.skin import Skin, keep_apart, search, widen
+from solver.dehydration.kernel.skin import Skin, approach, keep_apart, search, widen
 
 from ...arrays import Array, Floats, Ints, Singles
 
@@ -104,6 +105,10 @@ def _build(stamp: int) -> Callable[..., int]:
         source = stamp  # noqa: F841  a captured cell is part of numba's cache key
         keep = np.float32((1 - damping / 2) / (1 + damping / 2))
         push = np.float32(1 / (1 + damping / 2))
+        # a parallel loop takes no tuples
+        contact = skin.contact
+        before, candidates, limits = contact.before, contact.pairs, contact.limits
+        values, weights, depth, slack = contact.values, contact.weights, contact.depth, SLACK * contact.margin
         for step in range(steps):
             if touching and step % SEARCH_EVERY == 0 and not search(skin, state, velocity):
                 return step
@@ -119,8 +124,12 @@ def _build(stamp: int) -> Callable[..., int]:
                 # a part's nodes on a mirror plane feel half of what balances across it
                 stay(planes, state, velocity)
                 if touching:
-                    keep_apart(skin, state, velocity)
-                    stay(planes, state, velocity)
+                    pairs = approach(skin, state, velocity)
+                    for pair in prange(pairs):
+                        measure(before, candidates, values, weights, limits, depth, slack, np.int64(pair))
+                    if pairs:
+                        keep_apart(skin, state, velocity)
+                        stay(planes, state, velocity)
         return steps
 
     compiled_loop: Callable[..., int] = advance

@@ -18,7 +18,7 @@ from ...arrays import Bools, Floats
 from ...fruit import Fruit, lattice
 from ...geometry.crossings import Crossings
 from ..fresh.mesh import CubedSphere, FruitMesh, Sampler
-from .crossing import closed_lattice, of_lattice
+from .penetration import closed_lattice, of_lattice
 
 __all__ = ["Delivery", "even_out", "on_triangles"]
 
