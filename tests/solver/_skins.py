@@ -40,12 +40,12 @@ def state(points):
     return x
 
 
-def touching(points, quads, clearance, te, **options):
+def touching(points, quads, clearance, **options):
     """Contact of a skin; parts that do not hang together are far from each other in the fresh fruit."""
     edges = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
     graph = coo_array((np.ones(len(edges)), edges.T), (len(points), len(points)))
     rest = points + 10.0 * connected_components(graph)[1][:, None] * [0, 0, 1]
-    contact = make_contact(np.arange(len(points)), quads, rest, clearance, te, **options)
+    contact = make_contact(np.arange(len(points)), quads, rest, clearance, **options)
     assert find_pairs(contact, state(points)) <= len(contact.pairs)
     return contact
 

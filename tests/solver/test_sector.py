@@ -80,14 +80,14 @@ def test_a_step_with_walls_that_touch_across_a_plane(mirrors):
             mirrored=sector.planes,
         )
         skin = make_skin(
-            layout, part.surface_nodes[sector.image], part.sphere.quads, 0.2, 0.3,
+            layout, part.surface_nodes[sector.image], part.sphere.quads, 0.2,
             sign=sector.sign, own=sector.own, share=sector.share,
         )  # fmt: skip
         kept = np.repeat(sector.own, mesh.levels)
         state, velocity = new_state(layout, where[kept])
         touched = march(layout, state, velocity, steps, theta=(0.8, 0.8), damping=0.01, skin=skin)
         assert touched is not None
-        assert touched.contact.counts[HITS] > 10
+        assert touched.contact.counts[HITS] > 20
         found[name] = sector.whole(positions(state[part.surface_nodes])), touched.contact.counts[HITS]
         alone, quiet = new_state(layout, where[kept])
         march(layout, alone, quiet, steps, theta=(0.8, 0.8), damping=0.01)

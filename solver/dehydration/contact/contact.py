@@ -1,4 +1,4 @@
-"""Self-contact of the skin for an explicit march with unit steps: springs that keep skin from crossing skin.
+"""Self-contact of the skin for an explicit march with unit steps: springs that keep skin off skin, and no step through.
 
 The march moves v and then x by v; `push_apart` adds the same increment to both:
 
@@ -9,11 +9,13 @@ from one closest point to the other: 1 at the node and minus the triangle's coor
 Closest points and directions n are those at the beginning of the step, the gap g is the one they give for its end:
 along the normal the penalty acts as backward Euler. The turning of the normals stays explicit.
 
-A gap has the side on which its pair was first seen: what goes through within a step is sent back, not through.
+phi is 0 without lack, quadratic up to half the clearance and linear beyond, so a contact that begins does not jolt. A
+contact takes its closing speed out.
 
-phi is 0 without lack, quadratic up to half the clearance and linear beyond, so a contact that begins does not jolt; for
-what had crossed when it was found it ends at a limit that leads out rather than throws. A contact takes its closing
-speed out.
+Nothing goes through: no node ends a step farther from where it began than SAFE times the distance at which it began
+from what it might touch. Both of a pair coming, they stay apart by the rest (as in the truncations of Wu, Wang & Li
+2020, doi 10.1145/3414685.3417868). A step of a march is a thousandth of the clearance; where that bound acts at all it
+takes momentum away, as a wall does.
 
 The eigenvalues of M^-1 B k B^T stay within [0, STIFFNESS], clear of what the masses leave to the step: with
 
@@ -23,7 +25,7 @@ over all pairs within reach, touched or not, the rows of k (B^T M^-1 B) weighted
 (Gershgorin). r = w (1 at the clearance to 0 farthest off), so that none appears with a jump; w is 1 but for edges (see
 `distance`). A lone contact is resolved in about one step, crowded nodes share. No tuning by mass or mesh is left.
 
-Forces act along the line between the closest points, so linear and angular momentum balance to round-off; there is no
+Forces act along the line between the closest points, so they keep linear and angular momentum to round-off; there is no
 friction.
 """
 
@@ -41,12 +43,12 @@ __all__ = ["measure", "prepare", "push_apart", "resolve"]
 STIFFNESS = np.float32(1.0)
 """Of the 4 that a unit step carries, the masses leave 2 to contact."""
 DAMPING = np.float32(1.0)
-"""Share of a contact's closing speed that each step takes out; 0.3 let walls pulled together cross by 0.15 edges."""
+"""Share of a contact's closing speed that each step takes out; 0.3 let walls pulled together come much nearer."""
 SLACK = np.float32(0.08)
 """Of the margin: how far beyond the clearance a pair begins to share the load. With 0.25 the many pairs that are near
-but do not touch made those that do so soft that walls pulled together crossed by a quarter of an edge."""
-LOST = 2
-"""Sides of pairs that have crossed: they stay what the search said."""
+but do not touch made those that do so soft that walls pulled together came together by a quarter of an edge."""
+SAFE = np.float32(0.45)
+"""Share of a distance that each side of a pair may go in a step: both together do not meet, nor do they by rounding."""
 
 
 @njit(**OPTIONS)
@@ -64,8 +66,9 @@ def prepare(contact: Contact, x: Singles, v: Singles) -> int:
             before[i, k] = x[rows[i], k] - v[rows[i], k]
             square += (before[i, k] - contact.searched[i, k]) ** 2
         farthest = max(farthest, square)
+    contact.moved[0] = np.sqrt(farthest)
     # two nodes of a pair may both have come this far
-    near = contact.clearance + SLACK * contact.margin + np.float32(2) * np.sqrt(farthest)
+    near = contact.clearance + SLACK * contact.margin + np.float32(2) * contact.moved[0]
     last = np.int64(near * np.float32(BINS) / (contact.clearance + contact.margin)) + 1
     counts[LIVE] = contact.bins[last if last < BINS else BINS]
     return counts[LIVE]
@@ -73,26 +76,18 @@ def prepare(contact: Contact, x: Singles, v: Singles) -> int:
 
 @njit(**OPTIONS)
 def measure(
-    before: Singles, pairs: Ints32, values: Singles, weights: Singles, limits: Singles, depth: Single, slack: Single,
-    i: int,
-) -> None:  # fmt: skip
+    before: Singles, pairs: Ints32, values: Singles, weights: Singles, limits: Singles, slack: Single, i: int
+) -> None:
     """Closest points, gap and weight of pair i as the step began; each pair writes to its own place alone.
 
     The arrays are those of `Contact` by the same names, slack is SLACK of its margin: a parallel loop takes no tuples.
     """
-    out, side = values[i], pairs[i, 5]
-    known, sign = abs(side) == LOST, min(max(side, -1), 1)
+    out, weight = values[i], np.float32(1)
     if pairs[i, 4] == 0:
-        away, now = node_triangle(before, pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3], sign, out, False)
-        # what is lost is not led out around a border: the next triangle sees its foot inside
-        weight = np.float32(0) if known and now == 0 else np.float32(1)
+        node_triangle(before, pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3], out)
     else:
-        away, now, weight = edge_edge(before, pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3], sign, out)
-    if not known:
-        pairs[i, 5] = now
-    if weight > 0 and (out[7] < -depth or (out[7] > 0 and away > limits[i] + slack)):
-        weight = np.float32(0)
-    weights[i] = weight
+        weight = edge_edge(before, pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3], out)
+    weights[i] = weight if out[7] < limits[i] + slack else np.float32(0)
 
 
 @njit(**OPTIONS)
@@ -118,21 +113,48 @@ def _share_load(contact: Contact, minv: Singles) -> None:
 
 
 @njit(**OPTIONS)
-def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> tuple[Single, float]:
-    """Push what `measure` found too near; see `push_apart`."""
+def _look_around(contact: Contact) -> None:
+    """How far each node began the step from what it might touch, into `room`."""
+    room, pairs, values = contact.room, contact.pairs, contact.values
+    room[:] = contact.clearance
+    for i in range(contact.counts[LIVE]):
+        for k in range(4):
+            # an image goes as far as what it is an image of
+            node = contact.source[pairs[i, k]]
+            room[node] = min(room[node], values[i, 7])
+
+
+@njit(**OPTIONS)
+def _hold(contact: Contact, x: Singles, v: Singles) -> None:
+    """Cut short what went farther in this step than it may; see SAFE."""
+    for place in range(contact.counts[READS]):
+        i = contact.reads[place]
+        row, most = contact.surface_nodes[i], SAFE * contact.room[contact.source[i]]
+        square = v[row, 0] * v[row, 0] + v[row, 1] * v[row, 1] + v[row, 2] * v[row, 2]
+        if square > most * most:
+            share = most / np.sqrt(square)
+            for k in range(3):
+                v[row, k] *= share
+                x[row, k] = contact.before[i, k] + v[row, k]
+
+
+@njit(**OPTIONS)
+def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
+    """Push what `measure` found too near; see `push_apart`. Where nothing may touch all go as they like."""
     counts, pairs, values, hits, forces = (
         contact.counts, contact.pairs, contact.values, contact.hits, contact.hit_values,
     )  # fmt: skip
-    energy, deepest = np.float64(0), np.float32(0)
-    rows, zero, half = contact.surface_nodes, np.float32(0), np.float32(0.5)
+    energy, rows, zero, half = np.float64(0), contact.surface_nodes, np.float32(0), np.float32(0.5)
     found = 0
+    if counts[PAIRS] == 0:
+        return energy
     for i in range(counts[LIVE]):
         if contact.weights[i] > 0:
             hits[found] = i
             found += 1
     counts[HITS] = found
-    if found == 0:
-        return deepest, energy
+    _look_around(contact)
+    _hold(contact, x, v)  # so that no push answers to where nothing can be
     _share_load(contact, minv)
     for h in range(found):
         i = hits[h]
@@ -142,15 +164,12 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> tuple[Si
             for m in range(3):
                 gap += b * values[i, 4 + m] * x[row, m]
                 speed += b * values[i, 4 + m] * v[row, m]
-        deepest = max(deepest, -gap)
         lacking, soft = contact.limits[i] - gap, half * contact.clearance
         forces[h, 1] = zero
         if lacking <= 0:
             continue
         begun = min(np.float32(1), lacking / soft)
         pushed = half * soft * begun * begun + max(lacking - soft, zero)
-        if abs(pairs[i, 5]) == LOST:
-            pushed = min(pushed, contact.recovery)
         forces[h, 1] = forces[h, 0] * max(pushed - DAMPING * begun * speed, zero)
         energy += forces[h, 0] * pushed * lacking * half
         counts[ACTIVE] += 1
@@ -164,18 +183,18 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> tuple[Si
             for m in range(3):
                 x[row, m] += push * values[i, 4 + m]
                 v[row, m] += push * values[i, 4 + m]
-    return deepest, energy
+    _hold(contact, x, v)
+    return energy
 
 
 @njit(**OPTIONS)
-def push_apart(contact: Contact, x: Singles, v: Singles, minv: Singles) -> tuple[Single, float]:
+def push_apart(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
     """Push touching skin apart; call in every step right after x has moved by v, and `find_pairs` every so often.
 
     x, v (nn, 4) float32 are changed in place; minv (nn,) float32 inverse scaled masses (0: fixed). All gaps are taken
-    before any push, so the order of the pairs does not matter. Returns the deepest penetration (0 if none; a gap below
-    the clearance but positive is none) and the contact energy in units of the scaled masses.
+    before any push, so the order of pairs does not matter. Returns the contact energy in units of the scaled masses.
     """
     live, slack = prepare(contact, x, v), SLACK * contact.margin
     for i in range(live):
-        measure(contact.before, contact.pairs, contact.values, contact.weights, contact.limits, contact.depth, slack, i)
+        measure(contact.before, contact.pairs, contact.values, contact.weights, contact.limits, slack, i)
     return resolve(contact, x, v, minv)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arrays import Bools, Ints, Ints32, Singles
+from ...arrays import Ints, Ints32, Singles
 from ...geometry.crossings import split_quads
 from .features import features
 
@@ -16,10 +16,12 @@ Long = np.int64
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "arcp", "contract"}}
 
-PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, CROSSED, READS = 0, 1, 2, 3, 4, 5, 6, 7
+PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS = 0, 1, 2, 3, 4, 5, 6
 """Entries of `Contact.counts`; LIVE: pairs near enough to be looked at in this step, READS: nodes that they need."""
 ENTRIES = 16
 """Room for cell entries per triangle; one grown by half the reach overlaps about 6 cells."""
+BATCH = 1024
+"""Pairs of triangles that the search meets before it looks at their features."""
 BINS = 16
 """Classes of distance that pairs are sorted into at a search, so that a step looks at the near ones alone."""
 
@@ -39,32 +41,29 @@ class Contact(NamedTuple):
     rest: Singles  # (ns, 3) positions in the fresh fruit
     ellipsoid: Singles  # (2, 3) centre of the rest bounding box and its squared inverse half widths
     clearance: np.float32  # gap that contact keeps
-    depth: np.float32  # what lies deeper inside than this belongs to another part: left alone
     margin: np.float32  # how far beyond the clearance candidates are collected
     size: np.float32  # mean rest edge length h
-    recovery: np.float32  # largest push, as lacking clearance
-    normals: Singles  # (ns, 3) nodal normals at the last search
     searched: Singles  # (ns, 3) positions of the last search
     before: Singles  # (ns, 3) positions at the beginning of the step
     boxes: Singles  # (nt, 6) least and largest coordinates at the last search
-    crossed: Bools  # (nt,) triangles that crossed another at the last search
-    crossing: Bools  # (ns,) their corners
     keys: Ints  # (ENTRIES nt,) cell of each entry
     order: Ints32  # (ENTRIES nt,) triangle of each entry, sorted by bucket
     starts: Ints32  # (buckets + 1,) first of each bucket in `order`; buckets is a power of two
-    found: Ints32  # (capacity, 6) as the search meets them: four nodes, kind, side
+    met: Ints32  # (BATCH, 2) pairs of triangles that the search has met and not yet looked at
+    found: Ints32  # (capacity, 5) as the search meets them: four nodes, kind
     away: Singles  # (capacity, 2) their distance and clearance
-    pairs: Ints32  # (capacity, 6) the same in classes of distance: four nodes, kind (0: node and triangle), side
+    pairs: Ints32  # (capacity, 5) the same in classes of distance: four nodes, kind (0: node and triangle)
     limits: Singles  # (capacity,) clearance of each of `pairs`
     bins: Ints  # (BINS + 1,) first of each class in `pairs`
     load: Singles  # (ns,) scratch: how much contact each node takes part in
-    values: Singles  # (capacity, 8) of each live pair: shares of the nodes (4), direction (3), gap
+    room: Singles  # (ns,) scratch: how far each node is from what it might touch, the clearance at most
+    values: Singles  # (capacity, 8) of each live pair: shares of the nodes (4), direction (3), distance
     weights: Singles  # (capacity,) how much it counts
     hits: Ints32  # (capacity,) live pairs that count
     hit_values: Singles  # (capacity, 2) stiffness and impulse
     moved: Singles  # (1,) farthest that a node has moved since the last search
     reads: Ints32  # (ns,) nodes that a step looks at: own ones and those in pairs
-    counts: Ints  # (8,) PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, CROSSED, READS
+    counts: Ints  # (7,) PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS
 
 
 def make_contact(
@@ -72,18 +71,16 @@ def make_contact(
     quads: ArrayLike,
     rest: ArrayLike,
     clearance: float,
-    te: float,
     *,
     margin: float = 0.3,
-    recovery: float = 0.05,
     capacity: int = 0,
     source: ArrayLike | None = None,
 ) -> Contact:
-    """Allocate a contact for the skin with rest positions `rest` (nn, >= 3) and exocarp thickness te.
+    """Allocate a contact for the skin with rest positions `rest` (nn, >= 3).
 
     quads: (nq, 4) in surface numbering, counter-clockwise from outside; each is the two triangles of `split_quads`.
-    margin (mean rest edges h) and recovery (h per step) rarely need changing. Capacity is in pairs, 16 per node unless
-    given. source: (ns,) see `Contact`; a pair of images alone is left to the pair that it is an image of.
+    margin (mean rest edges h) rarely needs changing. Capacity is in pairs, 16 per node unless given. source: (ns,) see
+    `Contact`; a pair of images alone is left to the pair that it is an image of.
     """
     nodes = np.ascontiguousarray(surface_nodes, np.int32)
     faces = np.ascontiguousarray(quads, np.int32)
@@ -105,25 +102,21 @@ def make_contact(
         rest=positions.astype(single),
         ellipsoid=np.stack([(low + high) / 2, half**-2.0]).astype(single),
         clearance=single(clearance),
-        # two exocarps back to back are 2 te thick: half of that cannot be mistaken for the far side of a neck
-        depth=single(min(0.6 * h, 0.75 * te)),
         margin=single(margin * h),
         size=single(h),
-        recovery=single(recovery * h),
-        normals=np.zeros((ns, 3), single),
         searched=np.full((ns, 3), 1e15, single),
         before=np.zeros((ns, 3), single),
         boxes=np.zeros((nt, 6), single),
-        crossed=np.zeros(nt, np.bool_),
-        crossing=np.zeros(ns, np.bool_),
+        met=np.zeros((BATCH, 2), integer),
         keys=np.zeros(ENTRIES * nt, np.int64),
         order=np.zeros(ENTRIES * nt, integer),
         starts=np.zeros((1 << int(2 * nt - 1).bit_length()) + 1, integer),
         bins=np.zeros(BINS + 1, np.int64),
         load=np.zeros(ns, single),
+        room=np.zeros(ns, single),
         moved=np.zeros(1, single),
         reads=np.zeros(ns, integer),
-        counts=np.zeros(8, np.int64),
+        counts=np.zeros(7, np.int64),
         **_room(pairs),
     )
 
@@ -132,9 +125,9 @@ def _room(pairs: int) -> dict[str, Any]:
     """The arrays that hold one entry per pair."""
     single, integer = np.float32, np.int32
     return {
-        "found": np.zeros((pairs, 6), integer),
+        "found": np.zeros((pairs, 5), integer),
         "away": np.zeros((pairs, 2), single),
-        "pairs": np.zeros((pairs, 6), integer),
+        "pairs": np.zeros((pairs, 5), integer),
         "values": np.zeros((pairs, 8), single),
         "limits": np.zeros(pairs, single),
         "weights": np.zeros(pairs, single),

@@ -14,29 +14,13 @@ import numpy as np
 from numba import njit
 
 from ...arrays import Ints, Ints32, Singles
-from ...geometry.crossings import cross
-from .data import (
-    BINS,
-    CROSSED,
-    HITS,
-    LIVE,
-    NEEDED,
-    OPTIONS,
-    PAIRS,
-    READS,
-    SEARCHES,
-    Contact,
-    Long,
-    Single,
-)
+from .data import BATCH, BINS, HITS, LIVE, NEEDED, OPTIONS, PAIRS, READS, SEARCHES, Contact, Long, Single
 from .distance import edge_edge, node_triangle
 
 GENTLE = np.float32(0.7071)
 """Cosine to the ellipsoid's normal above which nothing faces anything: two such normals are within 90 degrees."""
 OPENING = np.float32(0.3)
 """Largest clearance of a pair, as a share of its distance in the fresh fruit."""
-APART = np.float32(3.0)
-"""Mean edges between two places of the fresh skin beyond which they face each other with their outsides."""
 WORLD = np.float32(2**20)
 """Cells counted from the origin in each direction; what lies farther out (or is not finite) touches nothing."""
 
@@ -57,16 +41,14 @@ def farthest_moved(contact: Contact, x: Singles) -> Single:
 
 
 @njit(**OPTIONS)
-def update_normals(contact: Contact) -> Single:
-    """Nodal normals at the positions of the search.
+def gentlest(contact: Contact) -> Single:
+    """Smallest cosine between a triangle's normal and the normal of the rest ellipsoid through its centre.
 
-    Returns the smallest cosine between a triangle's normal and the normal of the rest ellipsoid through its centre.
     Points that touch share that ellipsoid normal, so where every cosine is above GENTLE no two of them can face each
     other: an unfolded skin is recognised without a search.
     """
-    normals, x, corners = contact.normals, contact.searched, contact.triangles
-    normals[:] = np.float32(0)
-    gentlest = np.float32(1)
+    x, corners = contact.searched, contact.triangles
+    least = np.float32(1)
     centre, scale = contact.ellipsoid[0], contact.ellipsoid[1]
     third = np.float32(1 / 3)
     for q in range(corners.shape[0]):
@@ -75,20 +57,15 @@ def update_normals(contact: Contact) -> Single:
         ny = (x[b, 2] - x[a, 2]) * (x[c, 0] - x[a, 0]) - (x[b, 0] - x[a, 0]) * (x[c, 2] - x[a, 2])
         nz = (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
         inverse = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-30))
-        nx, ny, nz = nx * inverse, ny * inverse, nz * inverse
-        for k in (a, b, c):
-            # unit normals: weighted by area, the larger wall of a sharp crease would turn the normal into the smaller
-            normals[k, 0] += nx
-            normals[k, 1] += ny
-            normals[k, 2] += nz
         dx = third * (x[a, 0] + x[b, 0] + x[c, 0]) - centre[0]
         dy = third * (x[a, 1] + x[b, 1] + x[c, 1]) - centre[1]
         dz = third * (x[a, 2] + x[b, 2] + x[c, 2]) - centre[2]
         ex, ey, ez = dx * scale[0], dy * scale[1], dz * scale[2]
-        dot, square, level = ex * nx + ey * ny + ez * nz, ex * ex + ey * ey + ez * ez, dx * ex + dy * ey + dz * ez
+        square, level = ex * ex + ey * ey + ez * ez, dx * ex + dy * ey + dz * ez
+        dot = (ex * nx + ey * ny + ez * nz) * inverse
         # near the centre the ellipsoid's normal turns within an element: no statement possible there
-        gentlest = min(gentlest, dot / np.sqrt(square + np.float32(1e-30))) if level > 0.04 else np.float32(-1)
-    return gentlest
+        least = min(least, dot / np.sqrt(square + np.float32(1e-30))) if level > 0.04 else np.float32(-1)
+    return least
 
 
 @njit(**OPTIONS)
@@ -180,15 +157,6 @@ def _enclose(contact: Contact, reach: Single) -> None:
 
 
 @njit(**OPTIONS)
-def _share_node(triangles: Ints32, t: int, u: int) -> bool:
-    for i in range(3):
-        for j in range(3):
-            if triangles[t, i] == triangles[u, j]:
-                return True
-    return False
-
-
-@njit(**OPTIONS)
 def _overlap(boxes: Singles, t: int, u: int, reach: Single) -> bool:
     return bool(
         boxes[t, 0] <= boxes[u, 3] + reach and boxes[u, 0] <= boxes[t, 3] + reach
@@ -207,115 +175,82 @@ def _first_cell(boxes: Singles, t: int, u: int, grown: Single, cell: Single) -> 
 
 
 @njit(**OPTIONS)
-def _far_at_rest(contact: Contact, i: int, j: int) -> bool:
-    square = np.float32(0)
-    for k in range(3):
-        square += (contact.rest[i, k] - contact.rest[j, k]) ** 2
-    return bool(square > (APART * contact.size) ** 2)
+def _enter(
+    rest: Singles, clearance: Single, found: Ints32, away: Singles, place: int, a: int, b: int, c: int, d: int,
+    kind: int, distance: Single, out: Singles,
+) -> int:  # fmt: skip
+    """Enter a pair at `place` if there is room, node a and triangle b c d or edges a b and c d; returns the next place.
 
-
-@njit(**OPTIONS)
-def _enter(contact: Contact, a: int, b: int, c: int, d: int, kind: int, reach: Single, out: Singles) -> None:
-    """Take a pair in if it is in reach; node a and triangle b c d, or edges a b and c d.
-
-    A pair whose triangles have crossed is told the side on which it belongs by the outward normals; any other finds its
-    own when it is looked at first.
+    What was near in the fresh fruit keeps less than the clearance.
     """
-    x, source = contact.searched, contact.source
-    if source[a] != a and source[b] != b and source[c] != c and source[d] != d:
-        return
-    other = b if kind == 0 else c
-    lost = contact.crossing[a] and contact.crossing[other] and _far_at_rest(contact, a, other)
-    side, n = 0, contact.normals
-    if kind == 0:
-        away, fresh = node_triangle(x, a, b, c, d, 0, out, False)[0], np.float32(0)
-        if away > reach:
-            return
-        fresh = node_triangle(contact.rest, a, b, c, d, 0, out, False)[0]
-        if lost:
-            side = 1
-    else:
-        away = edge_edge(x, a, b, c, d, 0, out)[0]
-        if away > reach:
-            return
-        fresh = edge_edge(contact.rest, a, b, c, d, 0, out)[0]
-        if lost:
-            ux, uy, uz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-            vx, vy, vz = x[d, 0] - x[c, 0], x[d, 1] - x[c, 1], x[d, 2] - x[c, 2]
-            along = (uy * vz - uz * vy) * (n[c, 0] + n[d, 0] - n[a, 0] - n[b, 0])
-            along += (uz * vx - ux * vz) * (n[c, 1] + n[d, 1] - n[a, 1] - n[b, 1])
-            along += (ux * vy - uy * vx) * (n[c, 2] + n[d, 2] - n[a, 2] - n[b, 2])
-            side = 1 if along > 0 else -1
-    pair = contact.counts[NEEDED]
-    contact.counts[NEEDED] += 1
-    if pair < contact.found.shape[0]:
-        found = contact.found
-        found[pair, 0], found[pair, 1], found[pair, 2], found[pair, 3] = a, b, c, d
-        found[pair, 4], found[pair, 5] = kind, 2 * side if lost else 0
-        contact.away[pair, 0], contact.away[pair, 1] = away, min(contact.clearance, OPENING * fresh)
+    if place < found.shape[0]:
+        if kind == 0:
+            node_triangle(rest, a, b, c, d, out)
+        else:
+            edge_edge(rest, a, b, c, d, out)
+        found[place, 0], found[place, 1], found[place, 2], found[place, 3], found[place, 4] = a, b, c, d, kind
+        away[place, 0], away[place, 1] = distance, min(clearance, OPENING * out[7])
+    return place + 1
 
 
 @njit(**OPTIONS)
-def _meet(contact: Contact, t: int, u: int, reach: Single, out: Singles) -> None:
-    """Take in all pairs of features that the triangles t and u answer for."""
-    triangles, boxes, x = contact.triangles, contact.boxes, contact.searched
-    for turn in range(2):
-        mine, theirs = (t, u) if turn == 0 else (u, t)
+def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
+    """Enter all pairs of features in reach that the first `count` pairs of triangles met answer for."""
+    triangles, boxes, x, source = contact.triangles, contact.boxes, contact.searched, contact.source
+    own_nodes, own_edges, met = contact.own_nodes, contact.own_edges, contact.met
+    rest, clearance, found, away = contact.rest, contact.clearance, contact.found, contact.away
+    place = contact.counts[NEEDED]
+    for m in range(2 * count):
+        mine, theirs = met[m // 2, m % 2], met[m // 2, 1 - m % 2]
         b, c, d = triangles[theirs, 0], triangles[theirs, 1], triangles[theirs, 2]
+        images = source[b] != b and source[c] != c and source[d] != d
         for i in range(3):
-            a = contact.own_nodes[mine, i]
-            if a < 0 or a in (b, c, d):
+            a = own_nodes[mine, i]
+            if a < 0 or (a == b) | (a == c) | (a == d) or (images and source[a] != a):
                 continue
             near = True
             for k in range(3):
                 near &= x[a, k] <= boxes[theirs, 3 + k] + reach and x[a, k] >= boxes[theirs, k] - reach
             if near:
-                _enter(contact, a, b, c, d, 0, reach, out)
-    for i in range(3):
-        a, b = contact.own_edges[t, i, 0], contact.own_edges[t, i, 1]
-        if a < 0:
+                distance = node_triangle(x, a, b, c, d, out)
+                if distance < reach:
+                    place = _enter(rest, clearance, found, away, place, a, b, c, d, 0, distance, out)
+    for m in range(9 * count):
+        t, u, i, j = met[m // 9, 0], met[m // 9, 1], m % 9 // 3, m % 3
+        a, b, c, d = own_edges[t, i, 0], own_edges[t, i, 1], own_edges[u, j, 0], own_edges[u, j, 1]
+        if a < 0 or c < 0 or (a == c) | (a == d) | (b == c) | (b == d):
             continue
-        for j in range(3):
-            c, d = contact.own_edges[u, j, 0], contact.own_edges[u, j, 1]
-            if c < 0 or a in (c, d) or b in (c, d):
-                continue
-            near = True
-            for k in range(3):
-                near &= min(x[a, k], x[b, k]) <= max(x[c, k], x[d, k]) + reach
-                near &= min(x[c, k], x[d, k]) <= max(x[a, k], x[b, k]) + reach
-            if near:
-                _enter(contact, a, b, c, d, 1, reach, out)
+        if source[a] != a and source[b] != b and source[c] != c and source[d] != d:
+            continue
+        near = True
+        for k in range(3):
+            near &= min(x[a, k], x[b, k]) <= max(x[c, k], x[d, k]) + reach
+            near &= min(x[c, k], x[d, k]) <= max(x[a, k], x[b, k]) + reach
+        if near:
+            edge_edge(x, a, b, c, d, out)
+            if out[7] < reach:
+                place = _enter(rest, clearance, found, away, place, a, b, c, d, 1, out[7], out)
+    contact.counts[NEEDED] = place
 
 
 @njit(**OPTIONS)
-def _visit(contact: Contact, reach: Single, cell: Single, crossing: bool) -> None:
-    """Go through all pairs of triangles in reach: mark those that cross, or take in their features."""
-    keys, order, starts, boxes = contact.keys, contact.order, contact.starts, contact.boxes
-    half = np.float32(0.5) * reach
-    out, p, q = np.zeros(8, np.float32), np.zeros((3, 3)), np.zeros((3, 3))
+def _visit(contact: Contact, reach: Single, cell: Single) -> None:
+    """Go through all pairs of triangles in reach and take in their features."""
+    keys, order, starts, boxes, met = contact.keys, contact.order, contact.starts, contact.boxes, contact.met
+    half, count, out = np.float32(0.5) * reach, 0, np.zeros(8, np.float32)
     for bucket in range(starts.size - 1):
         for i in range(starts[bucket], starts[bucket + 1]):
             t, key = order[i], keys[i]
             for j in range(i + 1, starts[bucket + 1]):
                 u = order[j]
-                if keys[j] != key or not _overlap(boxes, t, u, np.float32(0) if crossing else reach):
+                if keys[j] != key or not _overlap(boxes, t, u, reach) or _first_cell(boxes, t, u, half, cell) != key:
                     continue
-                if _first_cell(boxes, t, u, half, cell) != key:
-                    continue
-                if not crossing:
-                    _meet(contact, t, u, reach, out)
-                    continue
-                if _share_node(contact.triangles, t, u):
-                    continue
-                for k in range(3):
-                    for m in range(3):
-                        p[k, m] = contact.searched[contact.triangles[t, k], m]
-                        q[k, m] = contact.searched[contact.triangles[u, k], m]
-                if cross(p, q):
-                    contact.counts[CROSSED] += 1
-                    for k in range(3):
-                        contact.crossing[contact.triangles[t, k]] = True
-                        contact.crossing[contact.triangles[u, k]] = True
+                met[count, 0], met[count, 1] = t, u
+                count += 1
+                if count == BATCH:
+                    _take_in(contact, count, reach, out)
+                    count = 0
+    _take_in(contact, count, reach, out)
 
 
 @njit(**OPTIONS)
@@ -335,7 +270,7 @@ def _sort_by_distance(contact: Contact, reach: Single) -> None:
         place = bins[k]
         bins[k] += 1
         contact.limits[place] = contact.away[i, 1]
-        for m in range(6):
+        for m in range(5):
             contact.pairs[place, m] = found[i, m]
     for k in range(BINS, 0, -1):
         bins[k] = bins[k - 1]
@@ -352,8 +287,14 @@ def _sort_by_distance(contact: Contact, reach: Single) -> None:
 
 
 @njit(**OPTIONS)
+def is_stale(contact: Contact) -> bool:
+    """Whether the step just made has come so near to the end of the list's validity that the next may pass it."""
+    return bool(contact.moved[0] > np.float32(0.35) * contact.margin)
+
+
+@njit(**OPTIONS)
 def find_pairs(contact: Contact, x: Singles) -> int:
-    """Collect candidate pairs at positions x (nn, 4) float32; call every 20-40 steps.
+    """Collect candidate pairs at positions x (nn, 4) float32; call every 10 steps, and when `is_stale`.
 
     Returns the number of pairs wanted. More than there is room for means that the rest was left out: `grow` and search
     again. Returns at once while no node has moved a quarter of the margin since the last search, so that the list stays
@@ -368,9 +309,9 @@ def find_pairs(contact: Contact, x: Singles) -> int:
         for k in range(3):
             contact.searched[i, k] = x[contact.surface_nodes[i], k]
             finite &= abs(contact.searched[i, k]) < np.float32(1e6)
-    gentlest = update_normals(contact)
-    counts[PAIRS] = counts[NEEDED] = counts[HITS] = counts[LIVE] = counts[CROSSED] = counts[READS] = 0
-    if gentlest > GENTLE or not finite:
+    counts[PAIRS] = counts[NEEDED] = counts[HITS] = counts[LIVE] = counts[READS] = 0
+    contact.moved[0] = 0
+    if not finite or gentlest(contact) > GENTLE:
         return counts[NEEDED]
     counts[SEARCHES] += 1
     reach = contact.clearance + contact.margin
@@ -378,9 +319,7 @@ def find_pairs(contact: Contact, x: Singles) -> int:
     _enclose(contact, reach)
     cell = contact.size + reach
     cell = sort_into_cells(contact.boxes, half, cell, contact.keys, contact.order, contact.starts)
-    contact.crossing[:] = False
-    _visit(contact, reach, cell, True)
-    _visit(contact, reach, cell, False)
+    _visit(contact, reach, cell)
     counts[PAIRS] = min(counts[NEEDED], contact.pairs.shape[0])
     _sort_by_distance(contact, reach)
     return counts[NEEDED]

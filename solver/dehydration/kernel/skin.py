@@ -41,8 +41,6 @@ class Skin(NamedTuple):
     """(ns, 4)"""
     inverse_mass: Singles
     """(ns,)"""
-    deepest: Singles
-    """(1,) deepest penetration of the last step that had pairs"""
 
 
 def make_skin(
@@ -50,7 +48,6 @@ def make_skin(
     surface_nodes: ArrayLike,
     quads: ArrayLike,
     clearance: float,
-    te: float,
     *,
     sign: ArrayLike | None = None,
     own: ArrayLike | None = None,
@@ -69,7 +66,7 @@ def make_skin(
     first[rows[owned]] = np.flatnonzero(owned)
     rest = positions(layout.fresh)[rows] * signs
     return Skin(
-        make_contact(np.arange(len(rows)), quads, rest, clearance, te, source=first[rows]),
+        make_contact(np.arange(len(rows)), quads, rest, clearance, source=first[rows]),
         rows,
         np.ascontiguousarray(signs, np.float32),
         owned,
@@ -77,16 +74,19 @@ def make_skin(
         np.zeros((len(rows), 4), np.float32),
         np.zeros((len(rows), 4), np.float32),
         layout.inverse_mass[rows] * shares.astype(np.float32),
-        np.zeros(1, np.float32),
     )
+
+
+def weigh(skin: Skin, layout: Layout) -> None:
+    """Take the layout's masses."""
+    skin.inverse_mass[:] = layout.inverse_mass[skin.rows] * skin.share
 
 
 def forget(skin: Skin, layout: Layout) -> None:
     """Take the layout's masses and drop all that earlier steps left: the next march depends on its state alone."""
-    skin.inverse_mass[:] = layout.inverse_mass[skin.rows] * skin.share
+    weigh(skin, layout)
     skin.contact.searched[:] = 1e15
     skin.contact.counts[:] = 0
-    skin.deepest[:] = 0
 
 
 def widen(skin: Skin) -> Skin:
@@ -118,7 +118,6 @@ def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
     """Read the nodes that may touch after the step just made; returns how many pairs there are to `measure`."""
     contact = skin.contact
     if contact.counts[PAIRS] == 0:
-        skin.deepest[0] = 0
         return 0
     for place in range(contact.counts[READS]):
         _read_node(skin, state, velocity, contact.reads[place])
@@ -128,7 +127,7 @@ def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
 @njit(**OPTIONS)
 def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> None:
     """Push touching skin apart in the step just made."""
-    skin.deepest[0] = resolve(skin.contact, skin.position, skin.velocity, skin.inverse_mass)[0]
+    resolve(skin.contact, skin.position, skin.velocity, skin.inverse_mass)
     for place in range(skin.contact.counts[READS]):
         i = skin.contact.reads[place]
         if not skin.own[i]:
