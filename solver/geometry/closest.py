@@ -6,10 +6,14 @@ caller has its vectors in its own layout and precision, and all is done in that 
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
 from numba import njit
 
 __all__ = ["on_triangle"]
+
+Scalar: TypeAlias = np.floating[Any]
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 _TINY = np.float32(1e-30)
@@ -17,7 +21,7 @@ _TINY = np.float32(1e-30)
 
 
 @njit(cache=True, error_model="numpy")
-def on_triangle(uu: float, uv: float, vv: float, uq: float, vq: float) -> tuple[float, float, bool]:
+def on_triangle(uu: Scalar, uv: Scalar, vv: Scalar, uq: Scalar, vq: Scalar) -> tuple[Scalar, Scalar, bool]:
     """Return s, t of the point a + s u + t v of the triangle that is nearest to p, and whether it is in the inside.
 
     u.u, u.v, v.v, u.q, v.q: scalars, all of one precision. On the border the inside is False.

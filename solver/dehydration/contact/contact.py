@@ -71,7 +71,7 @@ def prepare(contact: Contact, x: Singles, v: Singles) -> int:
     near = contact.clearance + SLACK * contact.margin + np.float32(2) * contact.moved[0]
     last = np.int64(near * np.float32(BINS) / (contact.clearance + contact.margin)) + 1
     counts[LIVE] = contact.bins[last if last < BINS else BINS]
-    return counts[LIVE]
+    return int(counts[LIVE])
 
 
 @njit(**OPTIONS)
@@ -197,4 +197,5 @@ def push_apart(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float
     live, slack = prepare(contact, x, v), SLACK * contact.margin
     for i in range(live):
         measure(contact.before, contact.pairs, contact.values, contact.weights, contact.limits, slack, i)
-    return resolve(contact, x, v, minv)
+    energy: float = resolve(contact, x, v, minv)
+    return energy

@@ -50,7 +50,8 @@ def node_triangle(x: Singles, p: int, a: int, b: int, c: int, out: Singles) -> S
         distance = np.sqrt(nx * nx + ny * ny + nz * nz)
         inverse = ONE / (distance + TINY)
     out[4], out[5], out[6], out[7] = nx * inverse, ny * inverse, nz * inverse, distance
-    return distance
+    found: Single = distance
+    return found
 
 
 @njit(**OPTIONS)

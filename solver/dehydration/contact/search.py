@@ -37,7 +37,8 @@ def farthest_moved(contact: Contact, x: Singles) -> Single:
         b = x[row, 1] - contact.searched[i, 1]
         c = x[row, 2] - contact.searched[i, 2]
         farthest = max(farthest, a * a + b * b + c * c)
-    return np.sqrt(farthest)
+    found: Single = np.sqrt(farthest)
+    return found
 
 
 @njit(**OPTIONS)
@@ -171,7 +172,8 @@ def _first_cell(boxes: Singles, t: int, u: int, grown: Single, cell: Single) -> 
     i = np.int64(np.floor((max(boxes[t, 0], boxes[u, 0]) - grown) / cell))
     j = np.int64(np.floor((max(boxes[t, 1], boxes[u, 1]) - grown) / cell))
     k = np.int64(np.floor((max(boxes[t, 2], boxes[u, 2]) - grown) / cell))
-    return cell_key(i, j, k)
+    key: int = cell_key(i, j, k)
+    return key
 
 
 @njit(**OPTIONS)
@@ -303,7 +305,7 @@ def find_pairs(contact: Contact, x: Singles) -> int:
     counts = contact.counts
     reach = contact.margin * np.float32(0.25)
     if farthest_moved(contact, x) < reach and counts[NEEDED] <= contact.pairs.shape[0]:
-        return counts[NEEDED]
+        return int(counts[NEEDED])
     finite = True
     for i in range(contact.surface_nodes.size):
         for k in range(3):
@@ -312,7 +314,7 @@ def find_pairs(contact: Contact, x: Singles) -> int:
     counts[PAIRS] = counts[NEEDED] = counts[HITS] = counts[LIVE] = counts[READS] = 0
     contact.moved[0] = 0
     if not finite or gentlest(contact) > GENTLE:
-        return counts[NEEDED]
+        return int(counts[NEEDED])
     counts[SEARCHES] += 1
     reach = contact.clearance + contact.margin
     half = np.float32(0.5) * reach
@@ -322,4 +324,4 @@ def find_pairs(contact: Contact, x: Singles) -> int:
     _visit(contact, reach, cell)
     counts[PAIRS] = min(counts[NEEDED], contact.pairs.shape[0])
     _sort_by_distance(contact, reach)
-    return counts[NEEDED]
+    return int(counts[NEEDED])

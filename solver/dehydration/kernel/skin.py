@@ -110,7 +110,7 @@ def search(skin: Skin, state: Ints32, velocity: Singles) -> bool:
     """
     for i in range(skin.rows.size):
         _read_node(skin, state, velocity, i)
-    return find_pairs(skin.contact, skin.position) <= skin.contact.pairs.shape[0]
+    return bool(find_pairs(skin.contact, skin.position) <= skin.contact.pairs.shape[0])
 
 
 @njit(**OPTIONS)
@@ -121,7 +121,7 @@ def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
         return 0
     for place in range(contact.counts[READS]):
         _read_node(skin, state, velocity, contact.reads[place])
-    return prepare(contact, skin.position, skin.velocity)
+    return int(prepare(contact, skin.position, skin.velocity))
 
 
 @njit(**OPTIONS)
