@@ -30,6 +30,7 @@ _DESCRIPTORS = (
     "crossings",
     "lattice_penetration",
     "lattice_crossings",
+    "lattice_evened",
     "least_jacobian",
 )
 
