@@ -2,13 +2,15 @@
 
 A trend is the slope of a straight line through all samples of a row, seeds among them, times the row's length; of
 positive measures it is that of their logarithm. Its uncertainty comes from what another seed changes: the scatter of
-seeds about their means, pooled over all samples of the plan. A clause holds where it does by more than twice the
+seeds about their means, pooled over all fruits of all plans. A clause holds where it does by more than twice the
 standard error, fails where it fails by as much, and is unclear between. Without two seeds nothing is judged.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +47,9 @@ class Value(NamedTuple):
     value: float
     error: float
 
+    def __str__(self) -> str:
+        return f"{self.value:+.2f} +- {self.error:.2f}" if np.isfinite(self.error) else f"{self.value:+.2f}"
+
     def above(self, bound: float) -> str:
         """Return whether it lies above the bound, as a verdict."""
         if not np.isfinite(self.error):
@@ -58,6 +63,8 @@ class Value(NamedTuple):
 
 
 Measure = Callable[[Pattern], float]
+#: What another seed changes of a measure.
+Spread = Callable[[Measure], float]
 
 
 def judge(plans: Mapping[str, Sequence[Pattern]]) -> list[Found]:
@@ -65,9 +72,10 @@ def judge(plans: Mapping[str, Sequence[Pattern]]) -> list[Found]:
 
     What a plan has too few samples of is "not judged", with the reason.
     """
+    every = tuple(dict.fromkeys(itertools.chain.from_iterable(plans.values())))
     found: list[Found] = []
     for name, decide in _DECIDE.items():
-        found += decide(list(plans.get(name, ())))
+        found += decide(list(plans.get(name, ())), partial(scatter, every))
     return found
 
 
@@ -105,6 +113,10 @@ def trend(row: Sequence[Pattern], along: Measure, measure: Measure, spread: floa
     return Value(slope * float(np.ptp(x)), error * float(np.ptp(x)))
 
 
+def _mean(samples: Sequence[Pattern], measure: Measure, spread: Spread) -> Value:
+    return Value(float(np.mean([measure(s) for s in samples])), spread(measure) / len(samples) ** 0.5)
+
+
 def _means(row: Sequence[Pattern], along: Measure, measure: Measure) -> str:
     groups: dict[float, list[float]] = {}
     for sample in row:
@@ -114,7 +126,7 @@ def _means(row: Sequence[Pattern], along: Measure, measure: Measure) -> str:
 
 def _share(change: Value) -> str:
     factor, error = np.exp(change.value) - 1, np.exp(change.value) * change.error
-    return f"{100 * factor:+.0f} +- {100 * error:.0f} %"
+    return f"{100 * factor:+.0f} +- {100 * error:.0f} %" if np.isfinite(error) else f"{100 * factor:+.0f} %"
 
 
 def _too_few(claim: str, clause: str) -> Found:
@@ -122,13 +134,13 @@ def _too_few(claim: str, clause: str) -> Found:
 
 
 def _changes(
-    claim: str, clause: str, samples: Sequence[Pattern], by: str, along: str, measure: str, rises: bool
+    claim: str, clause: str, samples: Sequence[Pattern], by: str, along: str, measure: str, rises: bool, spread: Spread
 ) -> list[Found]:
     """A positive measure that rises, or falls, along every row."""
     key, place, of = _of(by), _of(along), _of(measure)
-    spread, found = scatter(samples, _log(of)), []
+    found = []
     for value, row in _rows(samples, key, place).items():
-        change = trend(row, place, _log(of), spread)
+        change = trend(row, place, _log(of), spread(_log(of)))
         verdict = change.above(np.log1p(CLEAR)) if rises else change.below(-np.log1p(CLEAR))
         said = f"{measure.replace('_', ' ')} {_means(row, place, of)} ({_share(change)})"
         found.append(Found(claim, clause, f"{by} {value:g}, {along} {_ends(row, place)}", said, verdict))
@@ -146,59 +158,59 @@ def _of(name: str) -> Measure:
     return _NAMED.get(name) or (lambda sample: float(getattr(sample, name)))
 
 
-def _more_for_thin(claim: str, clause: str, samples: Sequence[Pattern], measure: str, rises: bool) -> list[Found]:
+def _more_for_thin(
+    claim: str, clause: str, samples: Sequence[Pattern], measure: str, rises: bool, spread: Spread
+) -> list[Found]:
     """A trend along the stone that is stronger for the thinnest skin than for the thickest."""
     place, of = _of("stone"), _log(_of(measure))
     rows = _rows(samples, _of("te"), place)
     if len(rows) < POINTS:
         return [_too_few(claim, clause)]
-    spread, sign = scatter(samples, of), 1 if rises else -1
-    thin, thick = (trend(rows[te], place, of, spread) for te in (min(rows), max(rows)))
+    sign = 1 if rises else -1
+    thin, thick = (trend(rows[te], place, of, spread(of)) for te in (min(rows), max(rows)))
     gap = Value(sign * (thin.value - thick.value), float(np.hypot(thin.error, thick.error)))
     said = f"{_share(thin)} at te {min(rows):g}, {_share(thick)} at te {max(rows):g}"
     return [Found(claim, clause, f"te {min(rows):g} and {max(rows):g}", said, gap.above(0.0))]
 
 
-def _fig7(samples: list[Pattern]) -> list[Found]:
+def _fig7(samples: list[Pattern], spread: Spread) -> list[Found]:
     return [
-        *_changes("C1", "fewer buckles with thicker skin", samples, "gamma", "te", "buckles", False),
-        *_changes("C1", "larger buckles with thicker skin", samples, "gamma", "te", "wavelength", True),
-        *_changes("C2", "larger buckles with stiffer skin", samples, "te", "gamma", "wavelength", True),
+        *_changes("C1", "fewer buckles with thicker skin", samples, "gamma", "te", "buckles", False, spread),
+        *_changes("C1", "larger buckles with thicker skin", samples, "gamma", "te", "wavelength", True, spread),
+        *_changes("C2", "larger buckles with stiffer skin", samples, "te", "gamma", "wavelength", True, spread),
     ]
 
 
-def _fig8(samples: list[Pattern]) -> list[Found]:
+def _fig8(samples: list[Pattern], spread: Spread) -> list[Found]:
     return [
-        *_changes("C3", "strips with a larger stone", samples, "te", "stone", "elongation", True),
-        *_more_for_thin("C3", "most so for thin skin", samples, "elongation", True),
+        *_changes("C3", "strips with a larger stone", samples, "te", "stone", "elongation", True, spread),
+        *_more_for_thin("C3", "most so for thin skin", samples, "elongation", True, spread),
     ]
 
 
-def _fig9(samples: list[Pattern]) -> list[Found]:
+def _fig9(samples: list[Pattern], spread: Spread) -> list[Found]:
     return [
-        *_changes("C4", "poles shallower with a longer stone", samples, "te", "stone", "poles_to_equator", False),
-        *_more_for_thin("C4", "less so for thick skin", samples, "poles_to_equator", False),
+        *_changes(
+            "C4", "poles shallower with a longer stone", samples, "te", "stone", "poles_to_equator", False, spread
+        ),
+        *_more_for_thin("C4", "less so for thick skin", samples, "poles_to_equator", False, spread),
     ]
 
 
-def _fig10(samples: list[Pattern]) -> list[Found]:
-    def anisotropy(sample: Pattern) -> float:
-        return sample.equator_anisotropy
-
-    place, spread, found = _of("r4"), scatter(samples, anisotropy), []
+def _fig10(samples: list[Pattern], spread: Spread) -> list[Found]:
+    anisotropy, place, found = _of("equator_anisotropy"), _of("r4"), []
     for te, row in _rows(samples, _of("te"), place).items():
         ends = {}
         for end in (place(row[0]), place(row[-1])):
-            values = [anisotropy(s) for s in row if place(s) == end]
-            ends[end] = Value(float(np.mean(values)), spread / len(values) ** 0.5)
+            ends[end] = _mean([s for s in row if place(s) == end], anisotropy, spread)
         slim, round_ = min(ends), max(ends)
-        along = trend(row, place, anisotropy, spread)
+        along = trend(row, place, anisotropy, spread(anisotropy))
         for clause, where, value, verdict in (
             ("ridges round the equator of slender fruits", f"r4 {slim:g}", ends[slim], ends[slim].above(RIDGED)),
             ("stronger the slenderer", f"r4 {_ends(row, place)}", along, along.below(-CLEAR)),
             ("reticular near the sphere", f"r4 {round_:g}", ends[round_], ends[round_].below(RIDGED)),
         ):
-            said = f"anisotropy {value.value:+.2f} +- {value.error:.2f}"
+            said = f"anisotropy {value}"
             found.append(Found("C5", clause, f"te {te:g}, {where}", said, verdict))
     return found or [_too_few("C5", "ridges along meridians of slender fruits")]
 
@@ -206,7 +218,7 @@ def _fig10(samples: list[Pattern]) -> list[Found]:
 _SAID = {"jujube1": True, "raisin": True, "wolfberry": True, "jujube2": False, "plum2": False}
 
 
-def _table1(samples: list[Pattern]) -> list[Found]:
+def _table1(samples: list[Pattern], spread: Spread) -> list[Found]:
     found = []
     for name in (*_SAID, "plum1"):
         own = [sample for sample in samples if sample.name == name]
@@ -215,17 +227,18 @@ def _table1(samples: list[Pattern]) -> list[Found]:
         if not own:
             found.append(Found("C6", clause, "", "", "not judged: not run, its skin is too thin to be cheap"))
             continue
-        measure: Measure = (lambda s: s.thick_to_thin) if name == "plum1" else (lambda s: s.equator_anisotropy)
-        value = Value(float(np.mean([measure(s) for s in own])), scatter(own, measure) / len(own) ** 0.5)
-        what = "times as high there" if name == "plum1" else "anisotropy"
-        bound = LOCAL if name == "plum1" else RIDGED
-        verdict = value.below(bound) if not _SAID.get(name, True) else value.above(bound)
-        error = f" +- {value.error:.2f}" if np.isfinite(value.error) else ""
-        found.append(Found("C6", clause, f"te {own[0].te:g}", f"{what} {value.value:+.2f}{error}", verdict))
+        if name == "plum1":
+            higher = _mean(own, _log(_of("thick_to_thin")), spread)
+            verdict, said = higher.above(np.log(LOCAL)), f"higher there by {_share(higher)}"
+        else:
+            there = _mean(own, _of("equator_anisotropy"), spread)
+            verdict = there.above(RIDGED) if _SAID[name] else there.below(RIDGED)
+            said = f"anisotropy {there}"
+        found.append(Found("C6", clause, f"te {own[0].te:g}", said, verdict))
     return found
 
 
-_DECIDE: dict[str, Callable[[list[Pattern]], list[Found]]] = {
+_DECIDE: dict[str, Callable[[list[Pattern], Spread], list[Found]]] = {
     "fig7": _fig7,
     "fig8": _fig8,
     "fig9": _fig9,
