@@ -62,12 +62,13 @@ def made(solver: str | None) -> Row:
 
 
 def machine() -> Row:
-    """Return processor, cores and Python of this machine."""
+    """Return processor, cores and Python of this machine, and how many processes have wanted to run of late."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists() and (found := re.search(r"model name\s*:\s*(.+)", info.read_text())):
         cpu = found[1]
-    return {"cpu": cpu, "cores": os.cpu_count(), "python": platform.python_version()}
+    load = os.getloadavg()[1] if hasattr(os, "getloadavg") else None
+    return {"cpu": cpu, "cores": os.cpu_count(), "python": platform.python_version(), "load": load}
 
 
 def load(name: str) -> Row:

@@ -86,7 +86,7 @@ def main() -> None:
             kind = f"{rods}" + ", no bonds" * (not b) + ", twist" * ("twist" in extra)
             spaced = f"{longest * rods**0.5:.1e}" if b else ""
             sheet.add(
-                (kind, b, f"{seconds / v * 1e9:.0f}", f"{longest:.1e}", spaced, f"{whole:.2g}"),
+                (kind, b, f"{seconds / v * 1e9:.0f}", f"{longest:.1e}", spaced, f"{float(f'{whole:.2g}'):.0f}"),
                 rods=rods, twist="twist" in extra, vertices=v, bonds=b, seconds_per_step=seconds, longest_step=longest,
             )  # fmt: skip
             if b:

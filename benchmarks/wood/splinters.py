@@ -62,7 +62,7 @@ def _cells(run: dict[str, Any]) -> list[str]:
         return [*begun, run["failed"], *[""] * 4]
     said = f", ended at {run['until']:.2f} s: {run['failed']}" if "failed" in run else ""
     counts = [str(run["broken_rods"]), f"{run['broken_bonds']} of {run['bonds']}{said}"]
-    return [*begun, *counts, f"{run['cpu']:.2g}", f"{run['wall']:.2g}", f"{run['balance']:.1e}"]
+    return [*begun, *counts, f"{run['cpu']:.1f}", f"{run['wall']:.1f}", f"{run['balance']:.1e}"]
 
 
 def splinters(
@@ -85,5 +85,5 @@ def splinters(
         if len(runs) > 1:  # a row of no run of its own
             mean = {name: np.mean([run[name] for run in runs]) for name in ("broken_rods", "broken_bonds", "cpu")}
             counts = [f"{mean[name]:.0f}" for name in ("broken_rods", "broken_bonds")]
-            sheet.rows.append([f"{scaling:.0f}", f"mean of {len(runs)}", *counts, f"{mean['cpu']:.2g}", "", ""])
+            sheet.rows.append([f"{scaling:.0f}", f"mean of {len(runs)}", *counts, f"{mean['cpu']:.1f}", "", ""])
     sheet.keep(until=until)

@@ -95,3 +95,11 @@ def test_all_seeds_of_a_table_are_in_it() -> None:
     shown = re.findall(r"^\| (\w+, \d+) \|", table, re.MULTILINE)
     assert sorted(shown) == sorted(f"{run['quality']}, {run['seed']}" for run in runs)
     assert any(0 in run["converged"] for run in runs)
+
+
+def test_a_busy_machine_is_said() -> None:
+    """Seconds that were taken beside other work are marked, and the mark goes when they are taken again."""
+    assert documents.busy({"load": 9.2, "cores": 2}) == (
+        "Run beside other work (load 9 on 2 cores): compare seconds within the table only."
+    )
+    assert documents.busy({"load": 1.9, "cores": 2}) == documents.busy({"cores": 2}) == documents.busy({}) == ""
