@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.figures import Sheet
+from benchmarks.figures import Sheet, short
 from solver.contract import Need
 from solver.wood import SOLVER
 from solver.wood.model.bundle import lay
@@ -86,7 +86,7 @@ def main() -> None:
             kind = f"{rods}" + ", no bonds" * (not b) + ", twist" * ("twist" in extra)
             spaced = f"{longest * rods**0.5:.1e}" if b else ""
             sheet.add(
-                (kind, b, f"{seconds / v * 1e9:.0f}", f"{longest:.1e}", spaced, f"{float(f'{whole:.2g}'):.0f}"),
+                (kind, b, f"{seconds / v * 1e9:.0f}", f"{longest:.1e}", spaced, short(whole)),
                 rods=rods, twist="twist" in extra, vertices=v, bonds=b, seconds_per_step=seconds, longest_step=longest,
             )  # fmt: skip
             if b:
