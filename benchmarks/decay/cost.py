@@ -54,7 +54,8 @@ def main() -> None:
         whole.append(ms)
         count = 10 * cells**2 + 2
         sheet.add(
-            (f"{count:,}".replace(",", " "), *(f"{short(m)} ms" for m in ms), f"{short(idle)} ms + {short(1e6 * slope)} ns"),
+            (f"{count:,}".replace(",", " "), *(f"{short(m)} ms" for m in ms),
+             f"{short(idle)} ms + {short(1e6 * slope)} ns"),
             points=count, listed=listed.tolist(), ms=ms.tolist(), idle_ms=idle, ns_per_listed_point=1e6 * slope,
         )  # fmt: skip
     points = np.log([10 * cells**2 + 2 for cells in _CELLS])
