@@ -11,7 +11,7 @@ The turning of the normals stays explicit.
 phi is 0 without lack, quadratic up to half the clearance and linear beyond, so a contact that begins does not jolt; it
 ends at a limit that leads out, rather than throws, what began deep inside. A contact takes its closing speed out.
 
-What touches is continuous as well (`contact_touch`).
+What touches is continuous as well (`touch`).
 
 The eigenvalues of M^-1 B k B^T stay within [0, STIFFNESS], clear of what the masses leave to the step: with
 
