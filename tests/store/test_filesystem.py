@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -49,7 +48,7 @@ def test_the_innermost_and_last_mount_decides(tmp_path: Path, monkeypatch: pytes
 def test_the_real_list_is_read(tmp_path: Path) -> None:
     found = filesystem(tmp_path)
     assert found is not None
-    assert os.stat(found[1]).st_dev == os.stat(tmp_path).st_dev
+    assert found[1].stat().st_dev == tmp_path.stat().st_dev
     assert Store.open(tmp_path / "store", create=True).ledger.counts() is not None
 
 
