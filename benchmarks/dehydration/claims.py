@@ -12,6 +12,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from benchmarks import figures
 from benchmarks.figures import ROOT, Sheet
 from solver.contract import Need
 from solver.dehydration import SOLVER, DehydrationParams
@@ -62,8 +63,8 @@ def keep(runs: list[dict[str, Any]], clauses: list[Found], whole: bool) -> None:
     sheet = Sheet("dehydration-claims", ("", "what the paper says", "of", f"at s = {STAGE}", "verdict"), "dehydration")
     for one in clauses:
         sheet.add(one)
-    sheet.runs = runs
-    sheet.keep(stage=STAGE, fruits="whole, as planned" if whole else "parts between planes of symmetry")
+    told = {"head": sheet.head, "rows": sheet.rows}
+    figures.keep("dehydration-claims", runs, "dehydration", stage=STAGE, whole=whole, clauses=told)
 
 
 def main() -> None:
@@ -89,7 +90,7 @@ def main() -> None:
     for name, own in wanted.items():
         for job in own:
             one = found(store, job)
-            runs.append({"plan": name, **(one._asdict() if one else {"missing": job.key})})
+            runs.append({"plan": name, "key": job.key, **(one._asdict() if one else {"missing": True})})
             plans[name] += [one] if one else []
     keep(runs, judge(plans), asked.whole)
 
