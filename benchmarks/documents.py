@@ -24,6 +24,8 @@ from . import figures
 
 DOCUMENTS = (figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").glob("*.md")))
 _BLOCK = re.compile(r"<!-- (figures|measured): ([^>]*?) -->\n(.*?)<!-- end -->", re.DOTALL)
+#: A table with one of these has times in it.
+_TIMED = re.compile(r"CPU s|wall s|seconds|\bms\b|\bns\b|\d s\b|processor")
 _NOTE = re.compile(r"\n*\*(?:Measured with version|Taken over from|Run beside)[^*]*\*\n*\Z")
 
 
@@ -38,7 +40,8 @@ def _one(kind: str, about: str, body: str) -> str:
         record = figures.load(name)
         text = "\n" + table(record, *part) + "\n"
         solver, version, source = record.get("solver"), record.get("version"), record["source"]
-        commit, beside = record["commit"], busy(record.get("machine") or {})
+        timed = bool(_TIMED.search(text))
+        commit, beside = record["commit"], busy(record.get("machine") or {}) * timed
     else:
         solver, version = about.split()
         text, source, commit, beside = _NOTE.sub("", body.rstrip("\n")) + "\n", "run", "", ""

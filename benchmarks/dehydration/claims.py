@@ -2,8 +2,8 @@
 
 Runs what is cheap of the plans examples/fig7.toml to fig10.toml and table1.toml, and judges the statements C1 to C6 of
 Liu et al. 2014, section 4, at s = 0.3: a part of each fruit between planes of symmetry, at preview, of skins not
-thinner than `--thinnest` (of Table 1 than `--thinnest-fruit`), with two seeds. With `--whole` the plans are run as they
-are written, which takes days. What is stored already is not run again; `--judge` runs nothing.
+thinner than `--thinnest` (of Table 1 than `--thinnest-fruit`), with three seeds. With `--whole` the plans are run as
+they are written, which takes days. What is stored already is not run again; `--judge` runs nothing.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from benchmarks import figures
 from benchmarks.figures import ROOT, Sheet
 from solver.contract import Need
 from solver.dehydration import SOLVER, DehydrationParams
@@ -62,14 +63,14 @@ def keep(runs: list[dict[str, Any]], clauses: list[Found], whole: bool) -> None:
     sheet = Sheet("dehydration-claims", ("", "what the paper says", "of", f"at s = {STAGE}", "verdict"), "dehydration")
     for one in clauses:
         sheet.add(one)
-    sheet.runs = runs
-    sheet.keep(stage=STAGE, fruits="whole, as planned" if whole else "parts between planes of symmetry")
+    told = {"head": sheet.head, "rows": sheet.rows}
+    figures.keep("dehydration-claims", runs, "dehydration", stage=STAGE, whole=whole, clauses=told)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--store", type=Path, default=Path("out/claims"), help="where runs are kept, and found again")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--thinnest", type=float, default=0.03, help="thinnest skin of Figs. 7 to 10 [r1]")
     parser.add_argument("--thinnest-fruit", type=float, default=0.03, help="thinnest skin of Table 1 [r1]")
     parser.add_argument("--whole", action="store_true", help="the plans as they are written")
@@ -89,7 +90,7 @@ def main() -> None:
     for name, own in wanted.items():
         for job in own:
             one = found(store, job)
-            runs.append({"plan": name, **(one._asdict() if one else {"missing": job.key})})
+            runs.append({"plan": name, "key": job.key, **(one._asdict() if one else {"missing": True})})
             plans[name] += [one] if one else []
     keep(runs, judge(plans), asked.whole)
 

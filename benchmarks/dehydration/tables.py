@@ -32,6 +32,7 @@ def table(record: Row, part: str = "") -> str:
     makers: dict[str, Callable[[Row], str]] = {
         "dehydration-spheres": lambda r: _spheres(r, 0.95),
         "dehydration-spheres past": _best,
+        "dehydration-claims": _claims,
         "dehydration-onset roads": _roads,
         "dehydration-onset fruits": _fruits,
         "dehydration-buckled whole": _whole,
@@ -57,6 +58,22 @@ def _depth(values: Sequence[float]) -> str:
 
 def _share(values: Sequence[float]) -> str:
     return " ".join(f"{100 * value:+.0f}" for value in values) + " %"
+
+
+def _claims(record: Row) -> str:
+    """The clauses, and what runs they are judged by."""
+    every = {run["key"]: run for run in record["runs"]}  # plans share some
+    runs = [run for run in every.values() if "missing" not in run]
+    of = [sorted({run[name] for run in runs}) for name in ("quality", "seed")]
+    qualities, seeds = (", ".join(map(str, values)) for values in of)
+    said = (
+        f"{len(runs)} of {len(every)} {'whole fruits' if record['whole'] else 'parts of fruits'} at {qualities}, "
+        f"seeds {seeds}, came to s = {record['stage']}. "
+        f"{sum(not run['converged'] for run in runs)} did not converge there (largest residual "
+        f"{max(run['residual'] for run in runs):.1e}), the deepest penetration is "
+        f"{max(run['penetration'] for run in runs):.2g} te."
+    )
+    return f"{markdown(record['clauses']['head'], record['clauses']['rows'])}\n\n{said}"
 
 
 _ROADS = {
