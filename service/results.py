@@ -40,7 +40,7 @@ class ResultList(BaseModel):
     next: str | None = Field(description="Address of the next page, if there is one")
 
 
-@router.get("/v1/results", summary="All results", responses=problems.responses(422, 503))
+@router.get("/v1/results", summary="All results", responses=problems.responses(414, 422, 503))
 def results(
     request: Request,
     solver: Annotated[str | None, Query(max_length=100, description="Only results of this solver")] = None,

@@ -1,1 +1,1 @@
-"""Geometry that solvers and checks share: broad phase, crossings."""
+"""Geometry that solvers and checks share: closest points, broad phase, crossings."""

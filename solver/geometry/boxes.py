@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["LEAF", "Boxes", "leaf_pairs", "sort_boxes"]
+__all__ = ["LEAF", "Boxes", "leaf_pairs", "sort_boxes", "touching"]
 
 Doubles = NDArray[np.float64]
 Longs = NDArray[np.int64]
@@ -121,3 +121,27 @@ def leaf_pairs(tree: Boxes) -> Longs:
                     stack[depth, 0], stack[depth, 1] = i, j
                     depth += 1
     return found[:room]
+
+
+def touching(low: Doubles, high: Doubles) -> Longs:
+    """Return the pairs (np, 2) of boxes with corners `low` and `high`, both (nb, 3), that touch, each once."""
+    tree = sort_boxes(low, high)
+    places = _touching(low[tree.order], high[tree.order], leaf_pairs(tree), LEAF)
+    return tree.order[places]
+
+
+@njit(cache=True, error_model="numpy")
+def _touching(low: Doubles, high: Doubles, leaves: Longs, leaf: int) -> Longs:
+    """Pairs of places whose boxes touch, among those of all pairs of leaves."""
+    found, count = np.empty((max(4 * len(low), 16), 2), np.int64), 0
+    for pair in range(len(leaves)):
+        first, second = leaves[pair, 0] * leaf, leaves[pair, 1] * leaf
+        for a in range(first, min(first + leaf, len(low))):
+            for b in range(a + 1 if first == second else second, min(second + leaf, len(low))):
+                if _apart(low, high, a, b):
+                    continue
+                if count == len(found):
+                    found = np.concatenate((found, np.empty_like(found)))
+                found[count, 0], found[count, 1] = a, b
+                count += 1
+    return found[:count]

@@ -138,12 +138,10 @@ def solve(
     wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
     """
     from solver import registry
-    from solver.contract import Context, Need
+    from solver.contract import Need
     from store import shards
 
-    from .. import tabled
     from ..plan import job
-    from . import progress
     from .words import per_stage, show_run
 
     if cut is not None:
@@ -154,10 +152,7 @@ def solve(
     asked = Need.parse({"stages": numbers(stages)} | ({"quality": quality} if quality else {}))
     need = _for_file(out, chosen, chosen.settle(asked, preset))
     spec = job(chosen, params, need)
-    begin = time.perf_counter()
-    with progress.one_run(solver) as observe, progress.stopping() as stop:
-        result = chosen.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
-    seconds = round(time.perf_counter() - begin, 3)
+    result, seconds = _run(chosen, params, need)
     document = {
         **{name: getattr(spec, name) for name in ("key", "solver", "version", "params", "need")},
         "digest": shards.digest(result),
@@ -169,6 +164,19 @@ def solve(
     if out is not None:
         _save(out, preset or (params_file.stem if params_file else solver), chosen, params, result, document, cut)
     emit(document, as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+def _run(solver: Solver, params: Parameters, need: Need) -> tuple[xr.Dataset, float]:
+    """Return the result and the seconds it took; progress is shown, and an interrupt ends it well."""
+    from solver.contract import Context
+
+    from .. import tabled
+    from . import progress
+
+    begin = time.perf_counter()
+    with progress.one_run(solver.name) as observe, progress.stopping() as stop:
+        result = solver.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
+    return result, round(time.perf_counter() - begin, 3)
 
 
 def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:

@@ -98,6 +98,7 @@ def test_a_step_with_walls_that_touch_across_a_plane(mirrors):
     assert np.abs(found[mirrors][0] - found[""][0]).max() < 1e-5 * moved
 
 
+@pytest.mark.slow  # a whole fruit past its onset; the steps above compare the two at every run
 def test_a_buckled_part_is_the_symmetric_whole(monkeypatch):
     """Past the onset of a thick skin: the whole fruit started from the part's bumps arrives at the same shape."""
     common = {"te": 0.06}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from scipy.special import eval_legendre
 from ...contract import Context
 from ..fresh.closed_form import flat_film_wavelength, onset_estimate
 from ..params import DehydrationParams
-from .radial_elements import linear_tangents, radial_mesh, smooth, tangent
+from .radial_elements import RadialMesh, linear_tangents, radial_mesh, smooth, tangent
 from .result import AxisymmetricMode, Method, Onset, Tie
 from .search import Valley
 
@@ -43,6 +45,44 @@ def short_wave_reason(thickness: float) -> str:
     )
 
 
+def _looked_at(highest: int) -> list[int]:
+    """Return the degrees at which the first valley is checked, rising."""
+    count = math.ceil(math.log(highest) / math.log(_STRIDE))
+    return sorted({*range(1, 6), *np.geomspace(5, highest, count).round().astype(int).tolist()})
+
+
+@dataclass(frozen=True, eq=False)
+class _Sphere:
+    """Degrees of one sphere, each of its own."""
+
+    mesh: RadialMesh
+    kappa_ratio: float | None
+    check: Callable[[], None]
+
+    def lowest(self, s: float, degree: int) -> float:
+        """Return the lowest eigenvalue of the tangent at shrinkage s: 0 where the degree becomes unstable."""
+        self.check()
+        matrix = tangent(self.mesh, smooth(self.mesh, s, self.kappa_ratio), degree, self.kappa_ratio)
+        return float(eigvalsh(matrix, subset_by_index=[0, 0])[0])
+
+    def exact(self, degree: int, guess: float) -> float:
+        """Return where the smooth state becomes unstable, infinite if nowhere."""
+        below, above = 0.0, guess
+        while self.lowest(above, degree) > 0:
+            if above >= SEARCHED:
+                return math.inf
+            below, above = above, min(1.25 * above, SEARCHED)
+        return float(brentq(self.lowest, below, above, args=(degree,), xtol=1e-13, rtol=1e-11))
+
+    def linear(self, degree: int) -> float:
+        """Return where it would do so if stress grew with shrinkage and nothing else changed."""
+        self.check()
+        stiff, stress = linear_tangents(self.mesh, degree, self.kappa_ratio)
+        last = len(stiff) - 1
+        largest = float(eigh(-stress, stiff, eigvals_only=True, subset_by_index=[last, last])[0])
+        return 1 / largest if largest > 1e-6 else math.inf
+
+
 def onset_radial(
     params: DehydrationParams,
     *,
@@ -56,44 +96,25 @@ def onset_radial(
     thickness, gamma = params.exocarp_thickness, params.modulus_ratio
     mesh = radial_mesh(params.stone[0], thickness, gamma, _ORDERS[quality])
     highest = max(math.ceil(_SHORTEST / thickness), 8)
-    count = math.ceil(math.log(highest) / math.log(_STRIDE))
-    degrees = sorted({*range(1, 6), *np.geomspace(5, highest, count).round().astype(int).tolist()})
 
-    def lowest(s: float, degree: int) -> float:
-        context.check_cancelled()
-        matrix = tangent(mesh, smooth(mesh, s, kappa_ratio), degree, kappa_ratio)
-        return float(eigvalsh(matrix, subset_by_index=[0, 0])[0])
-
-    def exact(degree: int, near: float) -> float:
-        below, above = 0.0, near if math.isfinite(near) else guess
-        while lowest(above, degree) > 0:
-            if above >= SEARCHED:
-                return math.inf
-            below, above = above, min(1.25 * above, SEARCHED)
-        return float(brentq(lowest, below, above, args=(degree,), xtol=1e-13, rtol=1e-11))
-
-    def linear(degree: int, near: float) -> float:
-        context.check_cancelled()
-        stiff, stress = linear_tangents(mesh, degree, kappa_ratio)
-        last = len(stiff) - 1
-        largest = float(eigh(-stress, stiff, eigvals_only=True, subset_by_index=[last, last])[0])
-        return 1 / largest if largest > 1e-6 else math.inf
-
-    critical = exact if method == "exact" else linear
+    sphere = _Sphere(mesh, kappa_ratio, context.check_cancelled)
+    guess = min(1.05 * onset_estimate(gamma, params.stone[0]), SEARCHED)
 
     def value(degree: int) -> float:
-        return critical(degree, min(found.known.values(), default=math.inf))
+        near = min(found.known.values(), default=math.inf)
+        return sphere.exact(degree, near if math.isfinite(near) else guess) if exact else sphere.linear(degree)
 
+    exact = method == "exact"
     found = Valley(value, 1, highest)
     wave = 2 * math.pi / flat_film_wavelength(thickness, gamma)
-    guess = min(1.05 * onset_estimate(gamma, params.stone[0]), SEARCHED)
     best = found.descend(min(max(round(wave), 1), highest))
     # another valley of s_cr(degree) would show as a degree that is already unstable here
+    degrees = _looked_at(highest)
     for degree in degrees:
         context.report(degrees.index(degree) / len(degrees), f"degree {degree}")
         at = found.known[best]
         limit = SEARCHED if math.isinf(at) else at * (1 - 1e-7)
-        if (lowest(limit, degree) < 0) if method == "exact" else (linear(degree, at) < at):
+        if (sphere.lowest(limit, degree) < 0) if exact else (sphere.linear(degree) < at):
             best = min(best, found.descend(degree), key=found.known.__getitem__)
     s_cr = found.known[best]
     settings = {"elements": len(mesh.core), "order": mesh.at.shape[1] - 1, "unknowns": 2 * len(mesh.position) - 2}

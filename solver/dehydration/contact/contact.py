@@ -13,9 +13,9 @@ phi is 0 without lack, quadratic up to half the clearance and linear beyond, so 
 contact takes its closing speed out.
 
 Nothing goes through: no node ends a step farther from where it began than SAFE times the distance at which it began
-from what it might touch. Both of a pair coming, they stay apart by the rest (as in the truncations of Wu, Wang & Li
-2020, doi 10.1145/3414685.3417868). A step of a march is a thousandth of the clearance; where that bound acts at all it
-takes momentum away, as a wall does.
+from what it might touch. Both of a pair coming, they stay apart by the rest (Wu, Wu, Yang & Wang, ACM
+Transactions on Graphics 40, 2020, bound steps of cloth so). A step of a march is a thousandth of an edge; where that
+bound acts at all it takes momentum away, as a wall does.
 
 The eigenvalues of M^-1 B k B^T stay within [0, STIFFNESS], clear of what the masses leave to the step: with
 

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from ...arrays import Singles
-from ...geometry.closest import on_triangle
+from ...geometry.closest import of_products
 from .data import OPTIONS, Single
 
 __all__ = ["edge_edge", "node_triangle"]
@@ -36,7 +36,7 @@ def node_triangle(x: Singles, p: int, a: int, b: int, c: int, out: Singles) -> S
     vx, vy, vz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
     qx, qy, qz = x[p, 0] - x[a, 0], x[p, 1] - x[a, 1], x[p, 2] - x[a, 2]
     uu, uv, vv = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
-    s, t, inside = on_triangle(uu, uv, vv, ux * qx + uy * qy + uz * qz, vx * qx + vy * qy + vz * qz)
+    s, t, inside = of_products(uu, uv, vv, ux * qx + uy * qy + uz * qz, vx * qx + vy * qy + vz * qz)
     out[0], out[1], out[2], out[3] = ONE, s + t - ONE, -s, -t
     if inside:
         # the normal has more digits than the way from a foot that is near

@@ -115,6 +115,22 @@ def _blocks(elements: Ints, planes_of: Any, planes: int, chunk: int = 256) -> Si
     return result
 
 
+def _planes(
+    strips: Strips, corners: Floats, shear: Floats, bulk: Floats, one_point: bool
+) -> tuple[Singles, Singles, Singles]:
+    """Planes of the core, of the one-point core (no blocks without it) and of the exocarp."""
+
+    def full(exocarp: bool) -> Any:
+        return lambda e: element_planes(corners[e], shear[e], bulk[e], exocarp)
+
+    single = strips.core if one_point else strips.core[:0]
+    return (
+        _blocks(strips.core, full(False), CORE_PLANES),
+        _blocks(single, lambda e: one_point_planes(corners[e], shear[e], bulk[e]), ONE_POINT_PLANES),
+        _blocks(strips.exocarp, full(True), EXOCARP_PLANES),
+    )
+
+
 def _checked(
     positions: ArrayLike,
     connectivity: ArrayLike,
@@ -182,24 +198,12 @@ def build_layout(
     corners = positions_of(fresh)[connect]
 
     refuse_inverted(corners)
-    element_mass = np.empty(len(connect))
-    for exocarp in (False, True):
-        chosen = skin == exocarp
-        stiffness = largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp)
-        element_mass[chosen] = safety * stiffness / 4
-
-    def planes(exocarp: bool) -> Any:
-        return lambda e: element_planes(corners[e], shear[e], bulk[e], exocarp)
-
-    core_planes = _blocks(strips.core, planes(False), CORE_PLANES)
-    exocarp_planes = _blocks(strips.exocarp, planes(True), EXOCARP_PLANES)
-    single = strips.core if one_point else strips.core[:0]
-    single_planes = _blocks(single, lambda e: one_point_planes(corners[e], shear[e], bulk[e]), ONE_POINT_PLANES)
-
-    mass = np.bincount(connect.ravel(), weights=np.repeat(element_mass, 8), minlength=nodes)
-    loose = mass == 0
+    mass = _masses(connect, corners, skin, shear, bulk, safety, nodes)
+    moving = ~held & (mass > 0)
     inverse_mass = np.zeros(nodes)
-    inverse_mass[~(held | loose)] = 1 / mass[~(held | loose)]
+    inverse_mass[moving] = 1 / mass[moving]
+
+    core_planes, single_planes, exocarp_planes = _planes(strips, corners, shear, bulk, one_point)
     row_start, rows = assembly_rows(strips, nodes)
     return Layout(
         nodes=nodes,
@@ -220,6 +224,17 @@ def build_layout(
         full_levels=full_levels,
         planes=_places(mirrored),
     )
+
+
+def _masses(
+    connect: Ints, corners: Floats, skin: Bools, shear: Floats, bulk: Floats, safety: float, nodes: int
+) -> Floats:
+    """Scaled masses (nodes,), with which the critical time step is at least sqrt(safety)."""
+    mass = np.empty(len(connect))
+    for exocarp in (False, True):
+        chosen = skin == exocarp
+        mass[chosen] = safety * largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp) / 4
+    return np.bincount(connect.ravel(), weights=np.repeat(mass, 8), minlength=nodes)
 
 
 def _places(mirrored: ArrayLike) -> Ints32:

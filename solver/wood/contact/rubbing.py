@@ -12,45 +12,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...geometry.closest import of_segments
 from ..model.arrays import Rods, Rubbing
 from .bodies import eased
 
-__all__ = ["closest", "crossed", "rub"]
+__all__ = ["crossed", "rub"]
 
 _TINY = 1e-30
 #: Weight of places away from the middles of edges, over the thickness squared.
 MIDDLE = 0.1
-
-
-@njit(cache=True, error_model="numpy")
-def closest(x: np.ndarray, a: int, b: int, c: int, d: int, middle: float) -> tuple[float, float]:
-    """Return where the edges a-b and c-d are closest, each 0 to 1 (Ericson 2005, sec. 5.1.9).
-
-    middle [m2]: weight of (s - 1/2)^2 + (t - 1/2)^2; with it they are segments in five dimensions.
-    """
-    p = middle
-    q = middle
-    e = 0.0
-    f = -0.5 * middle
-    g = 0.5 * middle
-    for k in range(3):
-        u = x[b, k] - x[a, k]
-        v = x[d, k] - x[c, k]
-        r = x[a, k] - x[c, k]
-        p += u * u
-        q += v * v
-        e += u * v
-        f += u * r
-        g += v * r
-    det = p * q - e * e
-    s = 0.5
-    if det > 1e-9 * p * q:
-        s = min(max((e * g - f * q) / det, 0.0), 1.0)
-    t = (e * s + g) / max(q, _TINY)
-    if t < 0.0 or t > 1.0:
-        t = min(max(t, 0.0), 1.0)
-        s = min(max((e * t - f) / max(p, _TINY), 0.0), 1.0)
-    return s, t
 
 
 @njit(cache=True, error_model="numpy")
@@ -67,7 +37,7 @@ def crossed(
         return np.inf
     vertex[0], vertex[1], vertex[2], vertex[3] = rods.a[e], rods.b[e], rods.a[w], rods.b[w]
     middle = MIDDLE * thick * thick
-    s, t = closest(x, vertex[0], vertex[1], vertex[2], vertex[3], middle)
+    s, t = of_segments(x, vertex[0], vertex[1], vertex[2], vertex[3], middle)
     weight[0], weight[1], weight[2], weight[3] = 1.0 - s, s, t - 1.0, -t
     apart = middle * ((s - 0.5) ** 2 + (t - 0.5) ** 2)
     for c in range(3):

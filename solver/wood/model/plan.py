@@ -77,28 +77,19 @@ def _parts(rods: Rods) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
-    """Return the plan of what is whole; strength (e, samples): strain that each place bears."""
-    edges = len(rods.a)
-    part = _parts(rods)
+def _edges(rods: Rods, strength: np.ndarray, part: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return what edges are made of (p, rows, m), the first lanes of their bonds (e + p,) and their parts (e,).
+
+    first (e + 1,): of every edge's bonds, counted through.
+    """
     parts = len(part) - 1
-    # a counting sort: stable, so that the order does not depend on what was broken before
-    first = np.zeros(edges + 1, np.int64)
-    for n in range(len(bonds.j)):
-        if bonds.on[n] == 1:
-            first[bonds.j[n] + 1] += 1
-    for e in range(edges):
-        first[e + 1] += first[e]
-    most, wide = 1, 1
+    most = 1
     for p in range(parts):
         most = max(most, part[p + 1] - part[p])
-        wide = max(wide, first[part[p + 1]] - first[part[p]])
-    most = (most + _LINE - 1) // _LINE * _LINE
-    wide = (wide + _LINE - 1) // _LINE * _LINE
-    edge = np.zeros((parts, _EDGE, most))
+    edge = np.zeros((parts, _EDGE, (most + _LINE - 1) // _LINE * _LINE))
     curve = slopes(rods)
-    lane = np.zeros(edges + parts, np.uint32)
-    own = np.zeros(edges, np.int64)
+    lane = np.zeros(len(rods.a) + parts, np.uint32)
+    own = np.zeros(len(rods.a), np.int64)
     for p in range(parts):
         for e in range(part[p], part[p + 1]):
             own[e] = p
@@ -116,6 +107,27 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
             e = rods.before[h]
             edge[own[e], STIFF, e - part[own[e]]] = 4.0 * rods.alpha[h] / rods.span[h]
             edge[own[e], BOW, e - part[own[e]]] = 4.0 / rods.span[h]
+    return edge, lane, own
+
+
+@njit(cache=True, error_model="numpy")
+def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
+    """Return the plan of what is whole; strength (e, samples): strain that each place bears."""
+    edges = len(rods.a)
+    part = _parts(rods)
+    parts = len(part) - 1
+    # a counting sort: stable, so that the order does not depend on what was broken before
+    first = np.zeros(edges + 1, np.int64)
+    for n in range(len(bonds.j)):
+        if bonds.on[n] == 1:
+            first[bonds.j[n] + 1] += 1
+    for e in range(edges):
+        first[e + 1] += first[e]
+    edge, lane, own = _edges(rods, strength, part, first)
+    wide = 1
+    for p in range(parts):
+        wide = max(wide, first[part[p + 1]] - first[part[p]])
+    wide = (wide + _LINE - 1) // _LINE * _LINE
     vertex = np.zeros((parts, wide), np.uint32)
     origin = np.zeros((parts, wide), np.uint32)
     law = np.zeros((parts, 5, wide))

@@ -1,4 +1,4 @@
-"""Contact between rods: two that cross and collide, and the grid against all pairs."""
+"""Contact between rods: two that cross and collide, and the search for pairs against all pairs."""
 
 from itertools import product
 
@@ -64,7 +64,7 @@ def test_without_contact_they_pass():
     assert np.abs(n.v[:11]).max() < 1e-6
 
 
-def test_the_grid_finds_what_all_pairs_do():
+def test_boxes_find_what_all_pairs_do():
     wood = lay(SOLVER.parse({"rods": 30, "vertices": 6, "length": 0.05, "reach": 1.2}), 6)
     x = wood.motion.x + np.random.default_rng(0).normal(0, 5e-4, wood.motion.x.shape)
     r, reach = wood.rods, 1.5e-3
