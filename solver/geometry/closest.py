@@ -21,7 +21,7 @@ _SMALL = np.float32(1e-30)
 
 @njit(cache=True, error_model="numpy")
 def of_products(uu: Scalar, uv: Scalar, vv: Scalar, uq: Scalar, vq: Scalar) -> tuple[Scalar, Scalar, bool]:
-    """Return s, t of the point a + s u + t v of a triangle nearest to p, and whether it is in its inside, not on a border.
+    """Return s, t of the point a + s u + t v of a triangle nearest to p, and whether it is off the borders.
 
     u = b - a, v = c - a and q = p - a come as their scalar products, in any layout and precision: it is kept (Ericson
     2005, sec. 5.1.5).
