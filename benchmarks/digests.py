@@ -2,7 +2,8 @@
 
     python -m benchmarks.digests [--out FILE.json] [--against FILE.json]
 
-Compare on one machine only: another processor rounds otherwise.
+Variable by variable, so that one more, or one that is measured otherwise now, does not hide what has stayed. Compare on
+one machine only: another processor rounds otherwise.
 """
 
 from __future__ import annotations
@@ -28,17 +29,25 @@ RUNS: tuple[tuple[str, dict[str, Any], tuple[float, ...], str], ...] = (
 )
 
 
-def digest(name: str, words: dict[str, Any], stages: tuple[float, ...], quality: str) -> str:
-    """Return the SHA-256 of every variable but the seconds taken, names and shapes included."""
+def digests(name: str, words: dict[str, Any], stages: tuple[float, ...], quality: str) -> dict[str, str]:
+    """Return the SHA-256 of every variable but the seconds taken, type and shape included."""
     solver = registry.get(name)
     result = solver.solve(solver.parse(words), Need(stages=stages, quality=quality))
-    total = hashlib.sha256()
-    for variable in sorted(map(str, result.variables)):
-        if variable != "seconds":
-            values = np.ascontiguousarray(result[variable].values)
-            total.update(f"{variable} {values.dtype} {values.shape}".encode())
-            total.update(values.tobytes() if values.dtype != object else repr(values.tolist()).encode())
-    return total.hexdigest()[:16]
+    found = {}
+    for variable in sorted({*map(str, result.variables)} - {"seconds"}):
+        values = np.ascontiguousarray(result[variable].values)
+        made = hashlib.sha256(f"{values.dtype} {values.shape}".encode())
+        made.update(values.tobytes() if values.dtype != object else repr(values.tolist()).encode())
+        found[variable] = made.hexdigest()[:16]
+    return found
+
+
+def compared(before: dict[str, str], now: dict[str, str]) -> str:
+    """Return which variables are the same, which are others, and which came or went."""
+    both = before.keys() & now.keys()
+    same = {name for name in both if before[name] == now[name]}
+    kinds = {"same": same, "OTHER": both - same, "new": now.keys() - both, "gone": before.keys() - both}
+    return "; ".join(f"{kind}: {', '.join(sorted(names))}" for kind, names in kinds.items() if names)
 
 
 def main() -> None:
@@ -50,9 +59,9 @@ def main() -> None:
     now = {}
     for run in RUNS:
         key = f"{run[0]} {json.dumps(run[1])} {run[3]}"
-        now[key] = digest(*run)
-        mark = "" if key not in before else "  same" if before[key] == now[key] else "  OTHER"
-        print(now[key], key, mark, flush=True)
+        now[key] = digests(*run)
+        told = compared(before[key], now[key]) if key in before else ", ".join(now[key])
+        print(f"{key}: version {registry.get(run[0]).version}\n  {told}", flush=True)
     if words.out:
         words.out.write_text(json.dumps(now, indent=1))
 

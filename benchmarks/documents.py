@@ -24,7 +24,9 @@ from . import figures
 
 DOCUMENTS = (figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").glob("*.md")))
 _BLOCK = re.compile(r"<!-- (figures|measured): ([^>]*?) -->\n(.*?)<!-- end -->", re.DOTALL)
-_NOTE = re.compile(r"\n*\*(?:Measured with version|Taken over from)[^*]*\*\n*\Z")
+#: A table with one of these has times in it.
+_TIMED = re.compile(r"CPU s|wall s|seconds|\bms\b|\bns\b|\d s\b|processor")
+_NOTE = re.compile(r"\n*\*(?:Measured with version|Taken over from|Run beside)[^*]*\*\n*\Z")
 
 
 def rendered(text: str) -> str:
@@ -38,11 +40,12 @@ def _one(kind: str, about: str, body: str) -> str:
         record = figures.load(name)
         text = "\n" + table(record, *part) + "\n"
         solver, version, source = record.get("solver"), record.get("version"), record["source"]
-        commit = record["commit"]
+        timed = bool(_TIMED.search(text))
+        commit, beside = record["commit"], busy(record.get("machine") or {}) * timed
     else:
         solver, version = about.split()
-        text, source, commit = _NOTE.sub("", body.rstrip("\n")) + "\n", "run", ""
-    said = note(solver, version, source, commit)
+        text, source, commit, beside = _NOTE.sub("", body.rstrip("\n")) + "\n", "run", "", ""
+    said = " ".join(filter(None, (note(solver, version, source, commit), beside)))
     text += f"\n*{said}*\n" if said else ""
     return f"<!-- {kind}: {about} -->\n{text}" + ("\n" if kind == "figures" else "") + "<!-- end -->"
 
@@ -64,6 +67,14 @@ def note(solver: str | None, version: str | None, source: str, commit: str = "")
         of = f", version {version}{behind}" if solver else ""
         return f"Taken over from the text at commit {commit}{of}: no record of the runs was kept."
     return f"Measured with version {version}{behind}." if version != now else ""
+
+
+def busy(machine: figures.Row) -> str:
+    """Return what has to be said of seconds that were measured on a machine that had more to do than it has cores."""
+    load, cores = machine.get("load") or 0.0, machine.get("cores") or 1
+    if load <= 1.5 * cores:
+        return ""
+    return f"Run beside other work (load {load:.0f} on {cores} cores): compare seconds within the table only."
 
 
 def stale() -> Iterator[tuple[Path, str]]:

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["RESULTS", "ROOT", "Sheet", "keep", "load", "machine", "markdown", "names"]
+__all__ = ["RESULTS", "ROOT", "Sheet", "keep", "load", "machine", "markdown", "names", "short"]
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -62,12 +62,13 @@ def made(solver: str | None) -> Row:
 
 
 def machine() -> Row:
-    """Return processor, cores and Python of this machine."""
+    """Return processor, cores and Python of this machine, and how many processes have wanted to run of late."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists() and (found := re.search(r"model name\s*:\s*(.+)", info.read_text())):
         cpu = found[1]
-    return {"cpu": cpu, "cores": os.cpu_count(), "python": platform.python_version()}
+    load = os.getloadavg()[1] if hasattr(os, "getloadavg") else None
+    return {"cpu": cpu, "cores": os.cpu_count(), "python": platform.python_version(), "load": load}
 
 
 def load(name: str) -> Row:
@@ -85,6 +86,11 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table as Markdown."""
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(row) + " |" for row in rows)]
     return "\n".join(re.sub(r"  +", " ", line) for line in lines)
+
+
+def short(value: float) -> str:
+    """Return a number by its first two digits, without a power of ten."""
+    return f"{float(f'{value:.2g}'):g}" if value < 1e5 else f"{float(f'{value:.2g}'):.0f}"
 
 
 class Sheet:

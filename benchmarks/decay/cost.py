@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from benchmarks.figures import Sheet
+from benchmarks.figures import Sheet, short
 from solver.decay import DecayParams
 from solver.decay.fields.diffusion import listed_around
 from solver.decay.fields.system import Both, System
@@ -54,7 +54,8 @@ def main() -> None:
         whole.append(ms)
         count = 10 * cells**2 + 2
         sheet.add(
-            (f"{count:,}".replace(",", " "), *(f"{m:.2g} ms" for m in ms), f"{idle:.2g} ms + {1e6 * slope:.2g} ns"),
+            (f"{count:,}".replace(",", " "), *(f"{short(m)} ms" for m in ms),
+             f"{short(idle)} ms + {short(1e6 * slope)} ns"),
             points=count, listed=listed.tolist(), ms=ms.tolist(), idle_ms=idle, ns_per_listed_point=1e6 * slope,
         )  # fmt: skip
     points = np.log([10 * cells**2 + 2 for cells in _CELLS])

@@ -11,7 +11,7 @@ import sys
 import time
 
 from benchmarks.figures import Sheet
-from solver.contract import Context
+from solver.contract import Context, SolverError
 from solver.decay import SOLVER, DecayParams
 from solver.decay.body.body import Body
 from solver.decay.body.flesh import Skin
@@ -54,12 +54,17 @@ def main(preset: str = "apple", days: str = "10,25", rate: float = 24.0, count: 
     head = ("frames about day", "fields", "body", "skin", "sum", "against the paper's 10 s")
     sheet = Sheet("decay-frames", head, "decay")
     for day in map(float, days.split(",")):
-        spent = frames(preset, day, rate, count)
+        told = {"preset": preset, "day": day, "frames_a_day": rate, "frames": count}
+        try:
+            spent = frames(preset, day, rate, count)
+        except SolverError as error:
+            sheet.add((f"{preset}, {day:g}", str(error), *[""] * 4), **told, failed=str(error))
+            continue
         whole = sum(spent.values())
         cells = [f"{took:.0f} ms" for took in (*spent.values(), whole)]
         sheet.add(
             (f"{preset}, {day:g}", *cells, f"{1e4 / whole:.0f} times"),
-            preset=preset, day=day, frames_a_day=rate, frames=count, ms=spent,
+            **told, ms=spent,
         )  # fmt: skip
     sheet.keep()
 

@@ -1,172 +1,99 @@
-"""The paper's maps as measured statements: python -m benchmarks.dehydration.claims DIR [--json FILE].
+"""The paper's maps as measured statements: python -m benchmarks.dehydration.claims [--store DIR] [--whole] [--judge].
 
-DIR holds one store per plan: fig7, fig8, fig9, fig10, table1 (`wizen sweep examples/fig7.toml --store DIR/fig7`, ...).
-Claims C1 to C6 are those of Liu et al. 2014, section 4; each gets the quantity that decides it, at s = 0.3, and a
-verdict. A plan that was not run, or a sample that is missing, is said to be missing.
+Runs what is cheap of the plans examples/fig7.toml to fig10.toml and table1.toml, and judges the statements C1 to C6 of
+Liu et al. 2014, section 4, at s = 0.3: a part of each fruit between planes of symmetry, at preview, of skins not
+thinner than `--thinnest` (of Table 1 than `--thinnest-fruit`), with three seeds. With `--whole` the plans are run as
+they are written, which takes days. What is stored already is not run again; `--judge` runs nothing.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
-import numpy as np
-from rich.console import Console
-from rich.table import Table
+from benchmarks import figures
+from benchmarks.figures import ROOT, Sheet
+from solver.contract import Need
+from solver.dehydration import SOLVER, DehydrationParams
+from store.ledger import JobSpec
+from store.store import Store
+from sweeps import executors
+from sweeps.plan import Plan
+from sweeps.runner import run_jobs
 
-from benchmarks.dehydration.pattern import Pattern, patterns
+from .criteria import Found, judge
+from .pattern import Pattern, pattern
 
 STAGE = 0.3
-#: A trend counts if its ends differ by more than twice what another seed changes (about 5 %).
-CLEAR = 0.10
-#: Wrinkles are local to the thick flesh if they are at least that many times as high there.
-LOCAL = 1.5
+PLANS = ("fig7", "fig8", "fig9", "fig10", "table1")
+#: The start of wrinkling as well, where patterns are most regular.
+_NEED = Need(stages=(0.1, STAGE), quality="preview", resolution=96)
 
 
-class Claim(NamedTuple):
-    """One statement of the paper, what was measured, and whether it holds."""
-
-    name: str
-    statement: str
-    measured: str
-    verdict: str
-
-
-def _series(values: Sequence[float]) -> str:
-    return " ".join(f"{value:.3g}" for value in values)
-
-
-def _trend(values: Sequence[float], rising: bool) -> bool | None:
-    """Whether the ends differ clearly in the wanted direction; None if they hardly differ."""
-    change = values[-1] / values[0] - 1
-    return None if abs(change) < CLEAR else (change > 0) == rising
-
-
-def _verdict(trends: Sequence[bool | None]) -> str:
-    if all(trend is True for trend in trends):
-        return "holds"
-    if any(trend is False for trend in trends):
-        return "holds in part" if any(trend is True for trend in trends) else "does not hold"
-    return "holds in part" if any(trend is True for trend in trends) else "unclear"
-
-
-def _rows(found: Sequence[Pattern], by: Callable[[Pattern], float], along: Callable[[Pattern], float]) -> dict:
-    rows: dict[float, list[Pattern]] = {}
-    for pattern in sorted(found, key=along):
-        rows.setdefault(by(pattern), []).append(pattern)
-    return dict(sorted((value, row) for value, row in rows.items() if len(row) > 1))
-
-
-def thickness_and_stiffness(found: Sequence[Pattern]) -> list[Claim]:
-    """C1 and C2, from Fig. 7."""
-    claims = []
-    for name, text, fixed, along in (
-        ("C1", "buckles fewer and larger with te", "gamma", "te"),
-        ("C2", "buckles larger with gamma", "te", "gamma"),
-    ):
-        rows = _rows(found, lambda p, k=fixed: getattr(p, k), lambda p, k=along: getattr(p, k))
-        trends, parts = [], []
-        for value, row in rows.items():
-            counts, sizes = [p.buckles for p in row], [p.wavelength for p in row]
-            trends.append(_trend(sizes, True))
-            if name == "C1":
-                trends.append(_trend(counts, False))
-            parts.append(f"{fixed} {value:g}: wavelength {_series(sizes)}, buckles {_series(counts)}")
-        claims.append(Claim(name, text, "; ".join(parts), _verdict(trends)))
-    return claims
-
-
-def stone_size(found: Sequence[Pattern]) -> Claim:
-    """C3, from Fig. 8: how long the pits are for their width."""
-    rows = _rows(found, lambda p: p.te, lambda p: p.stone[0])
+def jobs(name: str, seeds: list[int], thinnest: float, whole: bool) -> list[JobSpec]:
+    """Return the jobs of a plan: its own, or the cheap part of them with several seeds."""
+    plan = Plan.load(ROOT / "examples" / f"{name}.toml")
+    if whole:
+        return plan.jobs()
+    samples = [params for params in plan.samples if isinstance(params, DehydrationParams)]
     parts = [
-        f"te {te:g}: elongation {_series([p.elongation for p in row])}, buckles {_series([p.buckles for p in row])}"
-        for te, row in rows.items()
+        {**params.model_dump(mode="json"), "mirrors": planes(params), "seed": seed}
+        for seed in seeds
+        for params in samples
+        if params.exocarp_thickness >= thinnest
     ]
-    growth = [row[-1].elongation / row[0].elongation - 1 for row in rows.values()]
-    if len(growth) < 2:
-        return Claim("C3", "a larger stone makes strips, most for thin te", "; ".join(parts), "unclear: one skin only")
-    thin, thick = growth[0], growth[-1]
-    verdict = "holds" if thin > CLEAR and thin > thick else "unclear" if abs(thin) < CLEAR else "does not hold"
-    return Claim("C3", "a larger stone makes strips, most for thin te", "; ".join(parts), verdict)
+    return [JobSpec.of(SOLVER, SOLVER.parse(values), SOLVER.settle(_NEED)) for values in parts]
 
 
-def stone_length(found: Sequence[Pattern]) -> Claim:
-    """C4, from Fig. 9: wrinkles within 35 degrees of the poles against those within 30 degrees of the equator."""
-    rows = _rows(found, lambda p: p.te, lambda p: p.stone[0])
-    parts = [f"te {te:g}: poles/equator {_series([p.poles_to_equator for p in row])}" for te, row in rows.items()]
-    falls = [_trend([p.poles_to_equator for p in row], False) for row in rows.values()]
-    change = [row[-1].poles_to_equator / row[0].poles_to_equator for row in rows.values()]
-    less = "less so at the thickest skin" if change[-1] > change[0] else "not less so at the thickest skin"
-    return Claim("C4", "a longer stone flattens the poles", "; ".join(parts) + f" ({less})", _verdict(falls))
+def planes(params: DehydrationParams) -> str:
+    """Return the planes that a fruit is symmetric about: the equator's too where its halves are alike."""
+    outline = params.radii[:7]
+    return "xyz" if outline == outline[::-1] else "xz"
 
 
-def slenderness(found: Sequence[Pattern]) -> Claim:
-    """C5, from Fig. 10: +1 ridges along meridians, 0 reticular, -1 rings; at the equator and towards the poles."""
-    rows = _rows(found, lambda p: p.te, lambda p: p.waist)
-    parts = [
-        f"te {te:g}, r4 {_series([p.waist for p in row])}: anisotropy at the equator "
-        f"{_series([p.equator_anisotropy for p in row])}, poles {_series([p.polar_anisotropy for p in row])}"
-        for te, row in rows.items()
-    ]
-    ridged = [row[0].equator_anisotropy > 0.3 for row in rows.values()]
-    weaker = [row[0].equator_anisotropy > row[-1].equator_anisotropy + CLEAR for row in rows.values()]
-    verdict = "holds" if all(ridged) and all(weaker) else "holds in part" if any(weaker) else "does not hold"
-    return Claim("C5", "prolate fruits have ridges along meridians, stronger as r4 falls", "; ".join(parts), verdict)
+def found(store: Store, job: JobSpec) -> Pattern | None:
+    """Return the pattern of a job's result at the stage, None if it is not stored, or ended before."""
+    run = store.get(job.key) if store.has(job.key) else None
+    return None if run is None or STAGE not in run.stage else pattern(run.sel(stage=STAGE))
 
 
-def fruits(found: Sequence[Pattern]) -> Claim:
-    """C6, from Table 1: ridged or reticular, and where plum 1 buckles at all."""
-    said = {"jujube1": True, "raisin": True, "wolfberry": True, "jujube2": False, "plum2": False}
-    parts, right = [], []
-    for pattern in found:
-        if pattern.name == "plum1":
-            right.append(pattern.thick_to_thin > LOCAL)
-            parts.append(f"plum1: wrinkles {pattern.thick_to_thin:.2g} times as high where the flesh is thick")
-            continue
-        ridged = abs(pattern.equator_anisotropy) > 0.3
-        right.append(ridged == said.get(pattern.name, ridged))
-        parts.append(f"{pattern.name} {pattern.equator_anisotropy:+.2f} ({'ridged' if ridged else 'reticular'})")
-    verdict = "holds" if all(right) else f"holds for {sum(right)} of {len(right)}"
-    statement = "jujube 1, raisin, wolfberry ridged; jujube 2, plum 2 reticular; plum 1 only where thick"
-    return Claim("C6", statement, "; ".join(parts), verdict)
+def keep(runs: list[dict[str, Any]], clauses: list[Found], whole: bool) -> None:
+    """Print the clauses, and write the record."""
+    sheet = Sheet("dehydration-claims", ("", "what the paper says", "of", f"at s = {STAGE}", "verdict"), "dehydration")
+    for one in clauses:
+        sheet.add(one)
+    told = {"head": sheet.head, "rows": sheet.rows}
+    figures.keep("dehydration-claims", runs, "dehydration", stage=STAGE, whole=whole, clauses=told)
 
 
-def judge(root: Path) -> list[Claim]:
-    """All claims whose plans were run in stores under `root`."""
-    makers: dict[str, Callable[[Sequence[Pattern]], list[Claim]]] = {
-        "fig7": thickness_and_stiffness,
-        "fig8": lambda found: [stone_size(found)],
-        "fig9": lambda found: [stone_length(found)],
-        "fig10": lambda found: [slenderness(found)],
-        "table1": lambda found: [fruits(found)],
-    }
-    claims = []
-    for name, maker in makers.items():
-        found = patterns(root / name, STAGE)
-        claims += maker(found) if len(found) > 1 else [Claim(name, "", "not run", "missing")]
-    return claims
-
-
-def main() -> int:
-    """Print the claims as a table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("root", type=Path, help="folder with one store per plan")
-    parser.add_argument("--json", type=Path, help="write the claims here as well")
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--store", type=Path, default=Path("out/claims"), help="where runs are kept, and found again")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
+    parser.add_argument("--thinnest", type=float, default=0.03, help="thinnest skin of Figs. 7 to 10 [r1]")
+    parser.add_argument("--thinnest-fruit", type=float, default=0.03, help="thinnest skin of Table 1 [r1]")
+    parser.add_argument("--whole", action="store_true", help="the plans as they are written")
+    parser.add_argument("--judge", action="store_true", help="run nothing")
     asked = parser.parse_args()
-    claims = judge(asked.root)
-    table = Table("claim", "the paper says", f"measured at s = {STAGE}", "verdict", show_lines=True)
-    for claim in claims:
-        table.add_row(*claim)
-    Console(width=160).print(table)
-    if asked.json:
-        asked.json.write_text(json.dumps([claim._asdict() for claim in claims], indent=1) + "\n", encoding="utf-8")
-    return 0 if np.all([claim.verdict != "missing" for claim in claims]) else 1
+    store = Store.open(asked.store, create=True)
+    wanted = {
+        name: jobs(name, asked.seeds, asked.thinnest_fruit if name == "table1" else asked.thinnest, asked.whole)
+        for name in PLANS
+    }
+    if not asked.judge:
+        with executors.serial() as executor:
+            for name, own in wanted.items():
+                report = run_jobs(own, store, executor, name)
+                print(f"{name}: {report}", flush=True)
+    runs, plans = [], {name: list[Pattern]() for name in PLANS}
+    for name, own in wanted.items():
+        for job in own:
+            one = found(store, job)
+            runs.append({"plan": name, "key": job.key, **(one._asdict() if one else {"missing": True})})
+            plans[name] += [one] if one else []
+    keep(runs, judge(plans), asked.whole)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +14,6 @@ from solver.dehydration.fresh.mesh import inner_distance
 from solver.dehydration.measures.harmonics import remove_low
 from solver.dehydration.params import DehydrationParams
 from solver.fruit import PRESETS, azimuths, colatitudes
-from store.errors import StoreError
-from store.store import Store
 
 Array = NDArray[np.float64]
 
@@ -30,9 +27,14 @@ SMALL = 0.25
 
 
 class Pattern(NamedTuple):
-    """One sample at one stage."""
+    """One sample at one stage, and how it was run."""
 
     name: str
+    seed: int
+    quality: str
+    mirrors: str
+    version: str
+    converged: bool
     te: float
     gamma: float
     stone: tuple[float, float]
@@ -49,17 +51,8 @@ class Pattern(NamedTuple):
     penetration: float
 
 
-def patterns(root: Path, stage: float) -> list[Pattern]:
-    """All samples of the store at `root` at `stage`; none if there is no store."""
-    try:
-        store = Store.open(root)
-    except StoreError:
-        return []
-    stored = list(store.keys())
-    return [_pattern(store.get(key).sel(stage=stage)) for key in stored]
-
-
-def _pattern(data: xr.Dataset) -> Pattern:
+def pattern(data: xr.Dataset) -> Pattern:
+    """Return the pattern of a result at one stage."""
     params = DehydrationParams.model_validate(json.loads(data.attrs["params"]))
     shift = np.asarray(data["displacement"].values, float)
     n = len(shift)
@@ -89,6 +82,11 @@ def _pattern(data: xr.Dataset) -> Pattern:
 
     return Pattern(
         name=name_of(params),
+        seed=params.seed,
+        quality=str(json.loads(data.attrs["need"])["quality"]),
+        mirrors=params.mirrors,
+        version=str(data.attrs["solver_version"]),
+        converged=bool(data["converged"]),
         te=params.exocarp_thickness,
         gamma=params.modulus_ratio,
         stone=params.stone,

@@ -1,11 +1,11 @@
-"""The hostile matrix: python -m benchmarks.dehydration.stress [--quick] [--only WORD] [--json FILE].
+"""The hostile matrix: python -m benchmarks.dehydration.stress [--quick] [--only WORD].
 
 Each run ends converged, or unconverged and saying so, or in a typed error with the stages that were settled before
 it. Anything else is a violation: a hang (the worker is killed), a crash, an untyped exception, a run that is cancelled
 late, a value that is not finite, a stored stage with inverted elements. Exit code 1 if there is any.
 
 Two worker processes of one thread each. J: least J / Jd at the integration points over all stored stages. Contact:
-deepest penetration of the skin in exocarp thicknesses.
+deepest penetration of the skin in exocarp thicknesses. All of it is kept as the record dehydration-stress.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import collections
 import dataclasses
-import json
 import multiprocessing
 import os
 import queue
@@ -22,7 +21,6 @@ import threading
 import time
 from collections.abc import Sequence
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -139,6 +137,23 @@ def show(rows: Sequence[Row]) -> None:
             console.print(f"violation: {row.group}: {row.what}: {row.outcome}: {row.detail}", markup=False)
 
 
+def summary(rows: Sequence[Row]) -> dict[str, Any]:
+    """Return the matrix as a table: what the runs of each group ended in."""
+    from .stress_run import GOOD
+
+    head = ["group", "runs", *GOOD, "violations", "least J", "deepest [te]"]
+    lines = []
+    for group in dict.fromkeys(row.group for row in rows):
+        own = [row for row in rows if row.group == group]
+        counts = [sum(row.outcome == outcome for row in own) for outcome in GOOD]
+        least = [row.least for row in own if row.least is not None]
+        deepest = [row.penetration for row in own if row.penetration is not None]
+        worst = [f"{min(least):.3f}" if least else "", f"{max(deepest):.2g}" if deepest else ""]
+        ended = [str(count or "") for count in (*counts, sum(not row.good for row in own))]
+        lines.append([group, str(len(own)), *ended, *worst])
+    return {"head": head, "rows": lines}
+
+
 def _plain(text: str) -> str:
     from rich.markup import escape
 
@@ -150,7 +165,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="a few seconds' worth of it")
     parser.add_argument("--only", metavar="WORD", default="", help="cases whose group or name contains this")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     asked = parser.parse_args()
     os.environ.update(dict.fromkeys(THREADS, "1"))  # before numba and BLAS are loaded, here and in the workers
     from .stress_matrix import matrix
@@ -161,9 +175,11 @@ def main() -> int:
     show(rows)
     broken = sum(not row.good for row in rows)
     print(f"{len(rows)} runs, {broken} violations, {seconds:.0f} s")
-    if asked.json:
-        document = {"seconds": seconds, "violations": broken, "rows": [dataclasses.asdict(row) for row in rows]}
-        asked.json.write_text(json.dumps(document, indent=1) + "\n")
+    if not (asked.quick or asked.only):
+        from benchmarks.figures import keep
+
+        told = [dataclasses.asdict(row) for row in rows]
+        keep("dehydration-stress", told, "dehydration", seconds=seconds, table=summary(rows))
     return 1 if broken else 0
 
 

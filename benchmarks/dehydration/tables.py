@@ -32,6 +32,9 @@ def table(record: Row, part: str = "") -> str:
     makers: dict[str, Callable[[Row], str]] = {
         "dehydration-spheres": lambda r: _spheres(r, 0.95),
         "dehydration-spheres past": _best,
+        "dehydration-claims": _claims,
+        "dehydration-onset roads": _roads,
+        "dehydration-onset fruits": _fruits,
         "dehydration-buckled whole": _whole,
         "dehydration-buckled eighths": _eighths,
         "dehydration-scaling": _scaling,
@@ -55,6 +58,56 @@ def _depth(values: Sequence[float]) -> str:
 
 def _share(values: Sequence[float]) -> str:
     return " ".join(f"{100 * value:+.0f}" for value in values) + " %"
+
+
+def _claims(record: Row) -> str:
+    """The clauses, and what runs they are judged by."""
+    every = {run["key"]: run for run in record["runs"]}  # plans share some
+    runs = [run for run in every.values() if "missing" not in run]
+    of = [sorted({run[name] for run in runs}) for name in ("quality", "seed")]
+    qualities, seeds = (", ".join(map(str, values)) for values in of)
+    said = (
+        f"{len(runs)} of {len(every)} {'whole fruits' if record['whole'] else 'parts of fruits'} at {qualities}, "
+        f"seeds {seeds}, came to s = {record['stage']}. "
+        f"{sum(not run['converged'] for run in runs)} did not converge there (largest residual "
+        f"{max(run['residual'] for run in runs):.1e}), the deepest penetration is "
+        f"{max(run['penetration'] for run in runs):.2g} te."
+    )
+    return f"{markdown(record['clauses']['head'], record['clauses']['rows'])}\n\n{said}"
+
+
+_ROADS = {
+    "radial": ("concentric spheres", "one dimension per degree"),
+    "meridional": ("r4 = r8", "Q2 in the meridional plane per azimuthal wavenumber"),
+    "full": ("any", "Q2 between symmetry planes, all parities, Lanczos"),
+}
+
+
+def _roads(record: Row) -> str:
+    """Each road with the cases that it was tried on, seconds from the fastest to the slowest, and its worst error."""
+    lines = []
+    for road, (shapes, method) in _ROADS.items():
+        own = [row for row in record["runs"] if row["road"] == road]
+        if own:
+            seconds = sorted(row["seconds"] for row in own)
+            worst = max((row["error"] for row in own), key=abs)
+            took = f"{seconds[0]:.2g} to {seconds[-1]:.2g}" if len(own) > 1 else f"{seconds[0]:.2g}"
+            lines.append([road, shapes, method, str(len(own)), took, f"{worst:+.1e}"])
+    return markdown(("road", "fruits", "method", "spheres tried", "seconds", "worst error of s_cr"), lines)
+
+
+def _fruits(record: Row) -> str:
+    exact = {row["preset"]: row for row in record["fruits"] if row["method"] == "exact"}
+    linear = {row["preset"]: row for row in record["fruits"] if row["method"] == "linear"}
+    lines = [
+        [
+            name, f"{row['s_cr']:.4f}", str(row["wavenumber"]), str(row["degree"]), f"{row['seconds']:.2g}",
+            f"{linear[name]['s_cr']:.4f} ({100 * (linear[name]['s_cr'] / row['s_cr'] - 1):+.0f} %)",
+            str(linear[name]["degree"]),
+        ]
+        for name, row in exact.items()
+    ]  # fmt: skip
+    return markdown(("fruit", "s_cr", "m", "degree", "seconds", "Eq. 11", "its degree"), lines)
 
 
 def _whole(record: Row) -> str:

@@ -22,7 +22,7 @@ import tempfile
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -258,6 +258,39 @@ def swaps(root: Path, times: int, resolution: int = 48) -> dict[str, Any]:
     return {"swaps": done, "requests": len(found.latencies), "failed": found.failed, "p99_ms": found.quantile(0.99)}
 
 
+#: Of each part: the head of its table, and what it says of a run.
+_TABLES: dict[str, tuple[list[str], Callable[[dict[str, Any]], list[str]]]] = {
+    "start": (
+        ["from the start to the first answer", "of it processor"],
+        lambda run: [f"{run['first_answer_s']:.2f} s", f"{run['of_it_processor_s']:.2f} s"],
+    ),
+    "load": (
+        ["server, 16 clients", "requests/s", "p50", "p99", "processor", "body", "failed"],
+        lambda run: [
+            run["server"], f"{run['rate']:.0f}", f"{run['p50_ms']:.3g} ms", f"{run['p99_ms']:.3g} ms",
+            f"{run['processor_ms']:.2f} ms", f"{run['body'] / 1e3:.0f} kB", str(run["failed"]),
+        ],
+    ),
+    "batch": (
+        ["resolution", "one by one [ms]", "in one request [ms a shape]", "ratio"],
+        lambda run: [
+            str(run["resolution"]), f"{run['single_ms']:.2f}", f"{run['batch_ms']:.2f}", f"{run['ratio']:.1f}",
+        ],
+    ),
+    "memory": (
+        ["processes", "table", "memory of all, which have read it", "over a tiny table", "more, over the table"],
+        lambda run: [
+            str(run["workers"]), f"{run['table_mb']:.0f} MB", f"{run['pss_mb']:.0f} MB", f"{run['tiny_mb']:.0f} MB",
+            f"{(run['pss_mb'] - run['tiny_mb']) / run['table_mb']:.2f}",
+        ],
+    ),
+    "swaps": (
+        ["generations swapped under load", "requests", "failed", "p99"],
+        lambda run: [str(run["swaps"]), str(run["requests"]), str(run["failed"]), f"{run['p99_ms']:.0f} ms"],
+    ),
+}  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all without")
@@ -305,7 +338,9 @@ def main() -> None:
             found["swaps"] = row = swaps(root, options.swaps)
             print("{swaps} swaps under load: {requests} requests, {failed} failed, p99 {p99_ms:.1f} ms".format(**row))
     for part, rows in found.items():
-        keep(f"service-{part}", rows if isinstance(rows, list) else [rows])
+        runs = rows if isinstance(rows, list) else [rows]
+        head, cells = _TABLES[part]
+        keep(f"service-{part}", runs, table={"head": head, "rows": [cells(run) for run in runs]})
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Time of one look-up on one core: python -m benchmarks.service.lookup.
+"""Processor time of one look-up on one core: python -m benchmarks.service.lookup.
 
 Rows go by resolution, by what is asked for (in the default method), and by method (positions).
 
@@ -73,14 +73,14 @@ def fill(store: Store) -> None:
 
 
 def median(call: Callable[[], Any], seconds: float = 1.0) -> float:
-    """Return the median time [ms] of calls over about `seconds`, after a warm-up."""
+    """Return the median processor time [ms] of calls over about `seconds`, after a warm-up."""
     for _ in range(3):
         call()
     times: list[float] = []
     while sum(times) < seconds and len(times) < 1000:
-        start = time.perf_counter()
+        start = time.process_time()
         call()
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     return statistics.median(times) * 1e3
 
 
@@ -116,7 +116,7 @@ def main() -> None:
             rows.append({"resolution": n, "what": "normals", "ms": round(ms, 4)})
         ms = median(lambda: table.at(QUERY, STAGE, m=8, fields=()), options.seconds)
         rows.append({"resolution": 0, "what": "descriptors only", "ms": round(ms, 4)})
-    print(f"fft: {transforms.backend()}, one core, medians [ms]")
+    print(f"fft: {transforms.backend()}, one core, medians [ms of processor]")
     for row in rows:
         print(f"{row['resolution']:>5} {row['what']:<17} {row['ms']:9.3f}")
     usual = {row["resolution"]: row["ms"] for row in rows if row["what"] == "position"}

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.figures import Sheet, short
 from solver.contract import Need
 from solver.wood import SOLVER
 from solver.wood.model.bundle import lay
@@ -68,41 +69,56 @@ def bandwidth() -> float:
 
 
 def main() -> None:
-    print(
-        "rods  bonded  twist  vertices    bonds  ns/vertex-step  longest step [s]  times sqrt(rods)"
-        "  CPU s per 3 s at 0.4 of it"
+    head = (
+        "rods",
+        "bonds",
+        "ns per vertex and step",
+        "longest step [s]",
+        "times sqrt(rods)",
+        "CPU s of 3 s at 0.4 of it",
     )
+    sheet = Sheet("wood-cost", head, "wood")
     speed, cost, plain = bandwidth(), [], 0.0
     for rods in (50, 100, 200, 500, 1000, 2000):
         for extra in ({"reach": 0.0}, {"reach": 0.0, "twist": True}, {}) if rods == 200 else ({},):
             v, b, seconds, longest = per_step(rods=rods, bend=0.005, **extra)
-            kind = f"{'yes' if b else 'no':>6}  {'yes' if 'twist' in extra else 'no':>5}"
             whole = 3 / (0.4 * longest) * seconds
-            print(
-                f"{rods:4d}  {kind}  {v:8d} {b:8d}  {seconds / v * 1e9:14.0f}  {longest:16.2e}"
-                f"  {longest * rods**0.5:16.2e}  {whole:10.0f}",
-                flush=True,
-            )
+            kind = f"{rods}" + ", no bonds" * (not b) + ", twist" * ("twist" in extra)
+            spaced = f"{longest * rods**0.5:.1e}" if b else ""
+            sheet.add(
+                (kind, b, f"{seconds / v * 1e9:.0f}", f"{longest:.1e}", spaced, short(whole)),
+                rods=rods, twist="twist" in extra, vertices=v, bonds=b, seconds_per_step=seconds, longest_step=longest,
+            )  # fmt: skip
             if b:
                 cost.append((rods, seconds, whole, (seconds - plain * v) / b))
             else:
                 plain = plain or seconds / v
-    for name, column in (("a step", 1), ("3 s", 2)):
-        slope = np.polyfit(np.log([c[0] for c in cost]), np.log([c[column] for c in cost]), 1)[0]
+    slopes = {
+        name: float(np.polyfit(np.log([c[0] for c in cost]), np.log([c[column] for c in cost]), 1)[0])
+        for name, column in (("a step", 1), ("3 s", 2))
+    }
+    for name, slope in slopes.items():
         print(f"cost of {name} grows with rods to the power {slope:.2f}")
     print(
         f"a bond takes {cost[-1][3] * 1e9:.0f} ns of CPU at {cost[-1][0]} rods;"
         f" its {_BOND} bytes at {speed / 1e9:.1f} GB/s would take {_BOND / speed * 1e9:.1f} ns"
     )
-    print("\nFig. 4.1: a bent bundle of 50 rods swings freely; largest error of the energy balance")
+    sheet.keep(powers_of_rods=slopes, ns_per_bond=cost[-1][3] * 1e9, bytes_per_second=speed)
+    balance()
+
+
+def balance() -> None:
+    """Let the bent bundle of Fig. 4.1 swing freely for 4 ms, at three steps."""
+    sheet = Sheet("wood-balance", ("step over the longest", "largest error of the energy balance", "slope"), "wood")
     longest = longest_step(lay(SOLVER.parse({}, preset="fig-4.1"), 30))
     times, last = tuple(np.linspace(2e-4, 4e-3, 20)), None
     for share in (0.4, 0.2, 0.1):
         params = SOLVER.parse({"step": share * longest}, preset="fig-4.1")
         off = float(SOLVER.solve(params, Need(stages=times)).residual.max())
-        slope = f", slope {np.log2(last / off):.2f}" if last else ""
-        print(f"step {share:.1f} of the longest: {off:.2e}{slope}", flush=True)
+        slope = f"{np.log2(last / off):.2f}" if last else ""
+        sheet.add((share, f"{off:.1e}", slope), share=share, error=off)
         last = off
+    sheet.keep()
 
 
 def _asked() -> None:
@@ -113,10 +129,12 @@ def _asked() -> None:
     parser.add_argument("--until", type=float, default=3.0, help="seconds that are simulated")
     parser.add_argument("--seeds", type=int, nargs="*", default=[1])
     parser.add_argument("--modes", nargs="+", choices=("scaled", "explicit"), default=["scaled"])
+    parser.add_argument("--scaling", type=float, nargs="+", default=[1e4], help="masses over real ones when scaled")
     parser.add_argument("--no-elastic", action="store_true", help="leave the run without fracture out")
     asked = parser.parse_args()
     if asked.fig42:
-        splinters(asked.rods, asked.vertices, asked.seeds, asked.until, asked.modes, not asked.no_elastic)
+        masses = [1.0] * ("explicit" in asked.modes) + asked.scaling * ("scaled" in asked.modes)
+        splinters(asked.rods, asked.vertices, asked.seeds, asked.until, masses, not asked.no_elastic)
     else:
         main()
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_bvp
 
+from benchmarks.figures import Sheet
 from solver.contract import Need
 from solver.wood import SOLVER
 
@@ -40,7 +41,7 @@ def build(rods, n, load, damping):
             s.dampen(rod).using(ea.AnalyticalLinearDamper, uniform_damping_constant=damping, time_step=g["step"])
     s.finalize()
     return s, made
-out = {}
+out = {"version": ea.__version__}
 s, made = build(100, 29, 0.0, 0.0)
 st, t = ea.PositionVerlet(), 0.0
 for _ in range(3): t = st.step(s, t, 1e-7)
@@ -103,17 +104,24 @@ def main(python: str) -> None:
     asked = json.dumps({**_ROD, "elements": _ELEMENTS})
     said = subprocess.run([python, "-c", _PEER, asked], check=True, capture_output=True, text=True).stdout
     peer = json.loads(said.splitlines()[-1])
-    print("| | CPU ns per vertex and step, 100 rods of 30 vertices |\n|---|---|")
-    print(f"| PyElastica | {peer['ns']:.0f} |")
+    speed = Sheet("wood-peer", ("100 rods of 30 vertices", "CPU ns per vertex and step"), "wood")
+    speed.add(("PyElastica", f"{peer['ns']:.0f}"), code="PyElastica", ns=peer["ns"])
     for name, extra in (("ours, twist", {"twist": True}), ("ours", {})):
         vertices, _, seconds, _ = per_step(rods=100, vertices=30, reach=0.0, bend=0.005, **extra)
-        print(f"| {name} | {seconds / vertices * 1e9:.0f} |", flush=True)
-    print(
-        "\n| elements | error of the tip, PyElastica | ours | CPU s of PyElastica, damped to rest |\n|---|---|---|---|"
+        ns = seconds / vertices * 1e9
+        speed.add((name, f"{ns:.0f}"), code=name, ns=ns)
+    speed.keep(peer=peer["version"])
+    tips = Sheet(
+        "wood-peer-tip",
+        ("elements", "error of the tip, PyElastica", "ours (`static`)", "CPU s of PyElastica, damped to rest"),
+        "wood",
     )
     for elements, (x, z, cpu) in zip(_ELEMENTS, peer["tips"], strict=True):
-        off = _off(np.array([x, z]) / _ROD["length"])
-        print(f"| {elements} | {off:.1e} | {_ours(elements):.1e} | {cpu:.1f} |")
+        off, ours = _off(np.array([x, z]) / _ROD["length"]), _ours(elements)
+        tips.add(
+            (elements, f"{off:.1e}", f"{ours:.1e}", f"{cpu:.1f}"), elements=elements, peer=off, ours=ours, cpu_peer=cpu
+        )
+    tips.keep(peer=peer["version"], load=_ROD["load"])
 
 
 if __name__ == "__main__":

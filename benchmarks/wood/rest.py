@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from benchmarks.figures import Sheet
 from solver.contract import Context
 from solver.wood import SOLVER, WoodParams
 from solver.wood.model.bundle import lay
@@ -42,8 +43,8 @@ def fragments(wood: Wood) -> np.ndarray:
     return found
 
 
-def resting(values: dict[str, Any], until: float, slowest: float) -> str:
-    """Return a row of the table: fragments at the end, those at rest, and shares of the bonds and edges."""
+def resting(values: dict[str, Any], until: float, slowest: float) -> dict[str, Any]:
+    """Return what became of a scene: fragments at the end, those at rest, and shares of the bonds and edges."""
     params = SOLVER.parse(values)
     assert isinstance(params, WoodParams)
     settings = choose(params, "preview")
@@ -66,11 +67,19 @@ def resting(values: dict[str, Any], until: float, slowest: float) -> str:
         before = speed
     parts = np.unique(of)
     asleep = len(np.unique(of[still]))
-    return (
-        f"{len(wood.grid)} rods, {until:g} s | {reached.state.rods}, {reached.state.bonds} | {len(parts)} | {asleep}"
-        f" | {100 * loose:.1f} % | {100 * shares[-1]:.1f} % | {100 * float(np.mean(shares)):.1f} %"
-        f" | {time.process_time() - begun:.0f}"
-    )
+    return {
+        "rods": len(wood.grid),
+        "seed": params.seed,
+        "until": until,
+        "broken_rods": reached.state.rods,
+        "broken_bonds": reached.state.bonds,
+        "fragments": len(parts),
+        "at_rest": asleep,
+        "work_outside_the_largest": loose,
+        "work_at_rest": shares[-1],
+        "work_at_rest_mean": float(np.mean(shares)),
+        "cpu": time.process_time() - begun,
+    }
 
 
 def main(slowest: float) -> None:
@@ -78,16 +87,20 @@ def main(slowest: float) -> None:
     press = tomllib.loads(file.read_text()) | {"rods": 30, "vertices": 24, "seed": 1}
     floor = {"size": (1.0, 1.0, 0.02), "path": [{"time": 0, "position": (0.075, 0, -0.03)}], "friction": 0.6}
     on_floor = press | {"bodies": [*press["bodies"], floor], "damping": 200.0}
-    print(
-        "| scene | breaks of rods, bonds | fragments | at rest | work outside the largest"
-        " | work at rest | on the mean | CPU s |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
+    head = ("scene", "breaks of rods, bonds", "fragments", "at rest", "work outside the largest", "work at rest")
+    sheet = Sheet("wood-rest", (*head, "on the mean", "CPU s"), "wood")
     for name, values, until in (
         ("three blocks", press, 0.06),
         ("three blocks above a floor, damped four times as much", on_floor, 0.12),
     ):
-        print(f"| {name}, {resting(values, until, slowest)} |", flush=True)
+        run = resting(values, until, slowest)
+        shares = (run[share] for share in ("work_outside_the_largest", "work_at_rest", "work_at_rest_mean"))
+        sheet.add(
+            (f"{name}, {run['rods']} rods, {until:g} s", f"{run['broken_rods']}, {run['broken_bonds']}",
+             run["fragments"], run["at_rest"], *(f"{100 * share:.1f} %" for share in shares), f"{run['cpu']:.0f}"),
+            scene=name, **run,
+        )  # fmt: skip
+    sheet.keep(slowest=slowest)
 
 
 if __name__ == "__main__":

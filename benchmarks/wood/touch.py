@@ -13,7 +13,8 @@ import time
 import numpy as np
 import xarray as xr
 
-from solver.contract import Need
+from benchmarks.figures import Sheet
+from solver.contract import Need, SolverError
 from solver.wood import SOLVER, WoodParams
 from solver.wood.contact.listing import law
 from solver.wood.contact.pairs import distances, pairs
@@ -40,8 +41,8 @@ def overlap(found: xr.Dataset, wood: Wood, thick: float) -> float:
 
 def main(seeds: tuple[int, ...]) -> None:
     """Print a row for every seed, with and without contact."""
-    print("| seed | contact of rods | breaks of rods | of bonds | largest overlap | worst balance | CPU s |")
-    print("|---|---|---|---|---|---|---|")
+    head = ("seed", "contact of rods", "breaks of rods", "of bonds", "largest overlap", "worst balance", "CPU s")
+    sheet = Sheet("wood-touch", head, "wood")
     # compiles, so that the rows do not
     SOLVER.solve(SOLVER.parse({**_PRESS, "rods": 9, "vertices": 6}, preset="fig-4.2"), Need(stages=(1e-3,)))
     for seed in seeds:
@@ -49,16 +50,24 @@ def main(seeds: tuple[int, ...]) -> None:
             params = SOLVER.parse({**_PRESS, "seed": seed, "rod_contact": touching}, preset="fig-4.2")
             assert isinstance(params, WoodParams)
             begun = time.process_time()
-            found = SOLVER.solve(params, Need(stages=_STAGES, fields=_FIELDS, quality="preview"))
+            told = {"seed": seed, "contact": touching}
+            try:
+                found = SOLVER.solve(params, Need(stages=_STAGES, fields=_FIELDS, quality="preview"))
+            except SolverError as error:
+                sheet.add((seed, "yes" if touching else "no", str(error), *[""] * 4), **told, failed=str(error))
+                continue
             cpu = time.process_time() - begun
             wood = lay(params, found.attrs["vertices"])
             most = overlap(found, wood, float(law(wood, params)[0]))
             broken = int(found.broken_rods[-1]), int(found.broken_bonds[-1])
-            print(
-                f"| {seed} | {'yes' if touching else 'no'} | {broken[0]} | {broken[1]}"
-                f" of {found.attrs['bonds']} | {most:.2f} | {float(found.residual.max()):.1e} | {cpu:.0f} |",
-                flush=True,
-            )
+            balance, bonds = float(found.residual.max()), int(found.attrs["bonds"])
+            sheet.add(
+                (seed, "yes" if touching else "no", broken[0], f"{broken[1]} of {bonds}", f"{most:.2f}",
+                 f"{balance:.1e}", f"{cpu:.0f}"),
+                **told, broken_rods=broken[0], broken_bonds=broken[1], bonds=bonds, overlap=most, balance=balance,
+                cpu=cpu,
+            )  # fmt: skip
+    sheet.keep()
 
 
 if __name__ == "__main__":

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -95,3 +97,51 @@ def test_all_seeds_of_a_table_are_in_it() -> None:
     shown = re.findall(r"^\| (\w+, \d+) \|", table, re.MULTILINE)
     assert sorted(shown) == sorted(f"{run['quality']}, {run['seed']}" for run in runs)
     assert any(0 in run["converged"] for run in runs)
+
+
+def test_a_busy_machine_is_said() -> None:
+    """Seconds that were taken beside other work are marked, and the mark goes when they are taken again."""
+    assert documents.busy({"load": 9.2, "cores": 2}) == (
+        "Run beside other work (load 9 on 2 cores): compare seconds within the table only."
+    )
+    assert documents.busy({"load": 1.9, "cores": 2}) == documents.busy({"cores": 2}) == documents.busy({}) == ""
+
+
+@pytest.fixture
+def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of a document and of all records, which the check then looks at in place of the real ones."""
+    path = tmp_path / "docs" / "decay.md"
+    path.parent.mkdir()
+    text = documents.rendered((figures.ROOT / "docs" / "decay.md").read_text(encoding="utf-8"))
+    path.write_text(text, encoding="utf-8")
+    monkeypatch.setattr(figures, "RESULTS", Path(shutil.copytree(figures.RESULTS, tmp_path / "results")))
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    monkeypatch.setattr(documents, "DOCUMENTS", (path,))
+    monkeypatch.setattr("sys.argv", ["documents", "--check"])
+    return path
+
+
+def test_the_check_fails_on_a_changed_digit(
+    copy: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = copy.read_text(encoding="utf-8")
+    assert documents.main() == 0
+    wrong = re.sub(r"(?<=\| default \| 96 \| 92 162 \| )\d", lambda at: str((int(at[0]) + 1) % 10), text)
+    assert wrong != text
+    copy.write_text(wrong, encoding="utf-8")
+    assert documents.main() == 1
+    assert "decay.md" in capsys.readouterr().out
+    assert copy.read_text(encoding="utf-8") == wrong  # looked at, not mended
+    monkeypatch.setattr("sys.argv", ["documents"])
+    assert documents.main() == 0
+    assert copy.read_text(encoding="utf-8") == text
+
+
+def test_the_check_fails_on_a_record_of_an_old_version(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Both ways: a record that stayed behind, and a document that does not say so."""
+    path = figures.RESULTS / "decay-published.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    assert documents.main() == 0
+    path.write_text(json.dumps(record | {"version": "0"}), encoding="utf-8")
+    assert documents.main() == 1
+    assert "Measured with version 0 of `decay`" in capsys.readouterr().out

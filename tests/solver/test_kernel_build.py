@@ -47,6 +47,7 @@ def test_back_end_is_chosen_by_environment_and_falls_back(monkeypatch, caplog):
         choose()
 
 
+@pytest.mark.slow  # it compiles the kernel twice from nothing
 def test_cache_is_used_across_processes_and_never_stale(tmp_path):
     """numba keys its cache by the file of the function; ours by every source the function is made of."""
     kernel = tmp_path / "solver" / "dehydration" / "kernel"

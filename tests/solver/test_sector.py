@@ -80,7 +80,7 @@ def test_a_step_with_walls_that_touch_across_a_plane(mirrors):
             mirrored=sector.planes,
         )
         skin = make_skin(
-            layout, part.surface_nodes[sector.image], part.sphere.quads, 0.2, 0.3,
+            layout, part.surface_nodes[sector.image], part.sphere.quads, 0.2,
             sign=sector.sign, own=sector.own, share=sector.share,
         )  # fmt: skip
         kept = np.repeat(sector.own, mesh.levels)
@@ -94,10 +94,11 @@ def test_a_step_with_walls_that_touch_across_a_plane(mirrors):
         found[name] += (np.abs(positions(alone) - positions(state)).max(),)
     moved = np.abs(found[""][0] - where[mesh.surface_nodes]).max()
     assert found[""][2] > 0.02 * moved  # contact has a part in it
-    assert found[mirrors][1] == found[""][1]
+    assert found[mirrors][1] <= found[""][1]  # images alone are left to what they are images of
     assert np.abs(found[mirrors][0] - found[""][0]).max() < 1e-5 * moved
 
 
+@pytest.mark.slow  # a whole fruit past its onset; the steps above compare the two at every run
 def test_a_buckled_part_is_the_symmetric_whole(monkeypatch):
     """Past the onset of a thick skin: the whole fruit started from the part's bumps arrives at the same shape."""
     common = {"te": 0.06}
