@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import anyio.to_thread
 from fastapi import Depends, FastAPI
+from starlette.middleware.cors import CORSMiddleware
 from starlette.routing import Route
 
 from solver import __version__
@@ -17,6 +18,7 @@ from store.tokens import Tokens
 
 from . import catalogue, memory, page, problems, results
 from .admission import Admission
+from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
 from .jobs import routes as jobs
@@ -109,6 +111,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Limits, settings=settings)
     if settings.public_read and settings.cache_bytes:
         app.add_middleware(Repeats, state=app.state)
+    if settings.compress != "off":
+        app.add_middleware(Coding, settings=settings)
+    if settings.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.cors_origins,
+            allow_methods=["GET", "POST", "DELETE"],
+            allow_headers=["Authorization", "Content-Type", "If-None-Match"],
+            expose_headers=["ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID"],
+        )
     app.add_middleware(Telemetry, metrics=metrics)
     return app
 

@@ -14,7 +14,7 @@ import typer
 
 from sweeps.commands import watchdog
 from sweeps.commands.cli import app
-from sweeps.commands.console import note
+from sweeps.commands.console import emit, note
 from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from sweeps.formats import Encoder, Made
 
     from .formats import Format
+    from .settings import Settings
 
 __all__ = ["app", "main"]
 
@@ -63,21 +64,13 @@ def serve(
     wizen serve --store /shared/fruits --scheduler tcp://10.0.0.1:8786
     """
     import uvicorn
-    from pydantic import ValidationError
 
     from .app import create_app
     from .connections import GuardedProtocol
     from .hints import hints
-    from .settings import Settings
     from .stopping import PATIENCE
 
-    given: dict[str, Any] = {"store": store, "host": host, "port": port, "workers": workers, "scheduler": scheduler}
-    try:
-        settings = Settings(**{name: value for name, value in given.items() if value is not None})
-    except ValidationError as error:
-        item = error.errors()[0]
-        name = "_".join(str(part) for part in item["loc"]).upper()
-        raise InvalidOption(f"WIZEN_{name}: {item['msg']}.") from None
+    settings = _settings(store=store, host=host, port=port, workers=workers, scheduler=scheduler)
     listener = _listen(settings.host, settings.port)
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{where}:{listener.getsockname()[1]}"
@@ -97,6 +90,53 @@ def serve(
         if getattr(settings, name) is not None:
             os.environ[f"WIZEN_{name.upper()}"] = str(getattr(settings, name))
     uvicorn.run("service.app:app", host=settings.host, port=port, workers=settings.workers, **options)
+
+
+@app.command()
+def doctor(
+    store: Annotated[Path | None, typer.Option("--store", metavar="DIR", help="The store to look at.")] = None,
+    host: Annotated[str | None, typer.Option("--host", help="The address that the service would listen on.")] = None,
+    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="The port.")] = None,
+    deep: Annotated[bool, typer.Option("--deep", help="Read every byte of results and tables as well.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+) -> None:
+    """Say what is wrong with this machine, the store and the port, and what to do. Exits with 1 if something is.
+
+    [bold]Examples[/bold]
+
+    wizen doctor
+
+    wizen doctor --store demo --deep
+    """
+    from .doctor import examine
+
+    given = {"store": store, "host": host, "port": port}
+    findings = []
+    for finding in examine(_settings(**given), deep):
+        findings.append(finding)
+        if not as_json:
+            mark = {"good": "ok  ", "note": "note", "bad": "BAD "}[finding.state]
+            typer.echo(f"{mark}  {finding.what}: {finding.seen}")
+            if finding.advice:
+                typer.echo(f"      {finding.advice}")
+    if as_json:
+        emit([finding._asdict() for finding in findings], True, lambda _: None)
+    if any(finding.state == "bad" for finding in findings):
+        raise typer.Exit(1)
+
+
+def _settings(**given: Any) -> Settings:
+    """Return the settings of the environment, but for what is given."""
+    from pydantic import ValidationError
+
+    from .settings import Settings
+
+    try:
+        return Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        item = error.errors()[0]
+        name = "_".join(str(part) for part in item["loc"]).upper()
+        raise InvalidOption(f"WIZEN_{name}: {item['msg']}.") from None
 
 
 def main() -> None:

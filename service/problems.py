@@ -50,6 +50,7 @@ STATUS: Mapping[type[Exception], int] = {
     stored.UnknownJob: 404,
     stored.QueueFull: 429,
     stored.ReadOnlyStore: 409,
+    stored.NetworkFileSystem: 503,
     stored.CorruptTokens: 503,
     stored.InvalidToken: 422,
     stored.UnknownToken: 404,

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Annotated, Literal
 
 import platformdirs
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import Field, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from store.starter import own_or_starter
 
 from .page import BUILT
 
 __all__ = ["Settings", "page"]
+
+_ORIGIN = re.compile(r"https?://[^/?#\s]+")
 
 
 class Settings(BaseSettings):
@@ -55,6 +59,13 @@ class Settings(BaseSettings):
     cache_bytes: int = Field(
         16 << 20, ge=0, description="Answers kept for those who ask again, in each process [bytes]"
     )
+    cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
+        (),
+        description="Pages elsewhere that may ask, by origin, e.g. `https://a.example,https://b.example`; `*`: all",
+    )
+    compress: Literal["off", "elsewhere", "always"] = Field(
+        "elsewhere", description="Whose answers are compressed (zstd, br, gzip): none, those to other machines, or all"
+    )
     public_read: bool = Field(True, description="Serve shapes, tables, solvers and the state of jobs without a token")
     jobs_workers: int = Field(
         1, ge=0, le=1024, description="Processes that run jobs; 0 leaves them to `wizen work` or another service"
@@ -69,12 +80,24 @@ class Settings(BaseSettings):
     page: Path = Field(BUILT, description="Directory of the built web page; `make page` makes it")
     metrics: bool = Field(True, description="Serve /metrics in Prometheus' text format")
 
+    @field_validator("cors_origins", mode="before")
+    @classmethod
+    def _origins(cls, value: object) -> object:
+        """Take a list with commas, and name what no browser sends as an origin."""
+        parts = [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
+        for part in parts if isinstance(parts, list | tuple) else ():
+            if part != "*" and not _ORIGIN.fullmatch(str(part)):
+                raise ValueError(
+                    f"{part!r} is no origin: write scheme, host and port alone, e.g. https://a.example:8443"
+                )
+        return parts
+
 
 def page() -> str:
     """Return docs/settings.md: every setting with its default and its meaning."""
     rows = []
     for name, field in Settings.model_fields.items():
-        default = "" if field.default_factory or field.default == BUILT else f"`{field.default}`"
+        default = "" if field.default_factory or field.default in (BUILT, ()) else f"`{field.default}`"
         rows.append(f"| `WIZEN_{name.upper()}` | {default} | {field.description} |")
     return "\n".join(
         [

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from .errors import CorruptLedger, ReadOnlyStore, StorageFull
+from .filesystem import refuse_network
 
 __all__ = ["Database"]
 
@@ -53,6 +54,7 @@ class Database:
 
         Raises:
             CorruptLedger: the file is no database, or one of another version.
+            NetworkFileSystem: it is where locks do not hold.
 
         """
         with self._transaction("DEFERRED") as connection:
@@ -92,6 +94,7 @@ class Database:
         return self._lock
 
     def _open(self) -> sqlite3.Connection:
+        refuse_network(self._path)
         self._path.parent.mkdir(parents=True, exist_ok=True)
         connection = sqlite3.connect(self._path, timeout=_PATIENCE, isolation_level=None, check_same_thread=False)
         try:

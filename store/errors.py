@@ -17,6 +17,7 @@ __all__ = [
     "InvalidToken",
     "MissingStore",
     "MixedSamples",
+    "NetworkFileSystem",
     "OutsideTable",
     "QueueFull",
     "ReadOnlyStore",
@@ -104,6 +105,12 @@ class QueueFull(StoreError):
     """As many jobs wait as may."""
 
     code = "queue-full"
+
+
+class NetworkFileSystem(StoreError):
+    """The ledger would lie where the locks of two machines do not see each other."""
+
+    code = "network-file-system"
 
 
 class ReadOnlyStore(StoreError):

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from service.errors import InvalidQuery, NotAcceptable
-from service.formats import FORMATS, negotiate, write
+from service.formats import FORMATS, gltf, negotiate, write
 from service.formats import mesh as topology
 
 from ._shapes import ABOUT, HALF_AXES, ellipsoid, polyhedron_volume
@@ -194,3 +194,15 @@ def test_json_has_numbers_with_units_and_no_surface() -> None:
 def test_a_mesh_without_positions_is_refused() -> None:
     with pytest.raises(ValueError, match="look the shape up with"):
         write(replace(ellipsoid(4), position=None), "glb")
+
+
+def test_every_view_of_a_buffer_starts_on_four_bytes() -> None:
+    buffer = gltf.Buffer()
+    given = [bytes(range(n)) for n in (3, 4, 5, 1, 8)]
+    for data in given:
+        buffer.raw(data)
+    whole = b"".join(buffer.parts)
+    assert len(whole) == buffer.length
+    for view, data in zip(buffer.views, given, strict=True):
+        assert view["byteOffset"] % 4 == 0
+        assert whole[view["byteOffset"] :][: view["byteLength"]] == data

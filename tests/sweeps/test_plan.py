@@ -40,6 +40,13 @@ def test_shared_samples_share_keys() -> None:
     assert keys[2] < keys[0]
 
 
+def test_generated_values_are_the_ones_that_people_write() -> None:
+    """A division leaves 0.060000000000000005, whose key is another than that of 0.06."""
+    ranged = plan(axes={"te": {"from": 0.01, "to": 0.1, "count": 10}})
+    written = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1]
+    assert [sample.model_dump()["exocarp_thickness"] for sample in ranged.samples] == written
+
+
 PATTERN = {"sample": {"te": 0.03}, "stage": 0.1, "controls": [{"te": 0.02}]}
 
 

@@ -117,6 +117,21 @@ def test_no_run_is_wasted_on_fruits_that_cannot_exist(site: None, tmp_path: Path
             assert low - 1e-9 <= value <= high + 1e-9
 
 
+def test_a_line_of_a_grid_with_an_impossible_fruit_is_left_out(
+    site: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, plan = made(tmp_path / "store", GRID)
+    state = refine.read(store, "default", "rgh")
+    lines = list(refine.propose(plan, state))
+    assert [len(line.samples) for line in lines] == [len(line.points) for line in lines]
+    hole = lines[0].points[0]
+    parse = refine._parse
+    monkeypatch.setattr(refine, "_parse", lambda p, s, node: None if node == hole else parse(p, s, node))
+    rest = list(refine.propose(plan, state))
+    assert rest == [line for line in lines if hole not in line.points]
+    assert len(rest) < len(lines)
+
+
 def test_plan_and_table_must_fit(site: None, tmp_path: Path) -> None:
     store, plan = made(tmp_path / "store", GRID)
     other = Plan.parse({**GRID, "set": {"rs1": 0.3, "rs2": 0.3}})

@@ -1,0 +1,111 @@
+"""What the doctor says of things that are wrong for real: a taken port, a broken ledger, a flipped byte."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from service import doctor
+from service.cli import app
+from service.doctor import Finding, examine
+from service.settings import Settings
+from store import tables
+from store.filesystem import filesystem
+from store.store import Store
+
+from .conftest import client_of
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return int(free.getsockname()[1])
+
+
+def found(root: Path, port: int, deep: bool = False, **settings: object) -> dict[str, Finding]:
+    return {f.what: f for f in examine(Settings(store=root, port=port, **settings), deep)}  # type: ignore[arg-type]
+
+
+def test_a_sound_store_is_found_sound(own: Store, port: int) -> None:
+    seen = found(own.root, port, deep=True)
+    assert not [f for f in seen.values() if f.state == "bad"]
+    assert seen["ledger"].seen.endswith(" done")
+    assert seen["bytes"].state == seen["tables"].state == seen["writing"].state == "good"
+    assert f"port {port} is free" in seen["port"].seen
+    done = CliRunner().invoke(app, ["doctor", "--store", str(own.root), "--port", str(port)])
+    assert done.exit_code == 0, done.output
+    assert "ok    ledger" in done.output
+    assert {path.name for path in own.root.iterdir()} == {"shards", "tables", "ledger.sqlite"} | {
+        path.name for path in own.root.glob("ledger.sqlite-*")
+    }
+
+
+def test_a_port_that_another_has_is_told_from_our_own(own: Store) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        taken = other.getsockname()[1]
+        seen = found(own.root, taken)["port"]
+        assert (seen.state, "--port 0" in seen.advice) == ("bad", True)
+        done = CliRunner().invoke(app, ["doctor", "--store", str(own.root), "--port", str(taken), "--json"])
+        assert done.exit_code == 1
+    with client_of(own.root) as client:
+        seen = found(own.root, int(client.base_url.port or 0))["port"]
+        assert seen.state == "good"
+        assert "a wizen service answers" in seen.seen
+
+
+def test_a_broken_ledger_and_a_flipped_byte(own: Store, port: int) -> None:
+    own.ledger.close()
+    (own.root / "ledger.sqlite").write_bytes(b"no database" * 999)
+    seen = found(own.root, port)
+    assert seen["ledger"].state == "bad"
+    assert "wizen sweep" in seen["ledger"].advice
+    path = tables.path_of(own, tables.info(own))
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    assert "bytes" not in seen
+    for _ in range(2):
+        assert found(own.root, port, deep=True)["bytes"].state == "bad"
+        for name in ("ledger.sqlite", "ledger.sqlite-wal", "ledger.sqlite-shm"):
+            (own.root / name).unlink(missing_ok=True)  # as advised
+
+
+def test_no_store_no_table_no_room(tmp_path: Path, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    none = found(tmp_path / "none", port)
+    assert (none["store"].state, "ledger" in none) == ("note", False)
+    root = Store.open(tmp_path / "new", create=True).root
+    assert "table build" in found(root, port)["tables"].advice
+    monkeypatch.setattr(doctor, "_ROOM", 1e30)
+    assert "Make room" in found(root, port)["disk"].advice
+
+
+def test_a_network_file_system_is_bad(own: Store, port: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from store import filesystem as module
+
+    text = f"1 1 0:1 / / rw - ext4 a rw\n2 1 0:2 / {own.root} rw - nfs4 b rw\n"
+    (tmp_path / "mounts").write_text(text)
+    monkeypatch.setattr(module, "_MOUNTS", tmp_path / "mounts")
+    assert filesystem(own.root) == ("nfs4", own.root)
+    seen = found(own.root, port)
+    assert seen["file system"].state == "bad"
+    assert "ledger" not in seen
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_store_of_somebody_else_is_noted(own: Store, port: int) -> None:
+    own.root.chmod(0o500)
+    try:
+        assert found(own.root, port)["writing"].state == "note"
+    finally:
+        own.root.chmod(0o700)
+
+
+def test_a_wrong_setting_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WIZEN_THREADS", "many")
+    done = CliRunner().invoke(app, ["doctor"])
+    assert done.exit_code == 2
+    assert "WIZEN_THREADS" in done.output
