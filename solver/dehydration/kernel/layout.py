@@ -199,9 +199,6 @@ def build_layout(
 
     refuse_inverted(corners)
     mass = _masses(connect, corners, skin, shear, bulk, safety, nodes)
-    moving = ~held & (mass > 0)
-    inverse_mass = np.zeros(nodes)
-    inverse_mass[moving] = 1 / mass[moving]
 
     core_planes, single_planes, exocarp_planes = _planes(strips, corners, shear, bulk, one_point)
     row_start, rows = assembly_rows(strips, nodes)
@@ -215,7 +212,7 @@ def build_layout(
         exocarp_planes=exocarp_planes,
         row_start=aligned_copy(row_start, np.int32),
         rows=aligned_copy(ROW * rows, np.int32),
-        inverse_mass=aligned_copy(inverse_mass, np.float32),
+        inverse_mass=aligned_copy(_inverse(mass, held), np.float32),
         core_elements=np.where(strips.core_real, strips.core, -1),
         exocarp_elements=np.where(strips.exocarp_real, strips.exocarp, -1),
         connectivity=connect,
@@ -235,6 +232,14 @@ def _masses(
         chosen = skin == exocarp
         mass[chosen] = safety * largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp) / 4
     return np.bincount(connect.ravel(), weights=np.repeat(mass, 8), minlength=nodes)
+
+
+def _inverse(mass: Floats, held: Bools) -> Floats:
+    """1 / mass (nodes,), 0 of nodes that are held or in no element."""
+    inverse = np.zeros(len(mass))
+    moving = ~held & (mass > 0)
+    inverse[moving] = 1 / mass[moving]
+    return inverse
 
 
 def _places(mirrored: ArrayLike) -> Ints32:
