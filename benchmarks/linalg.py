@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 #: A use: what is done once outside of the clock returns what is timed, which returns arrays to compare.
 Use = Callable[[], list[np.ndarray]]
@@ -140,16 +141,40 @@ def meridional() -> Use:
 
 
 def wood_static() -> Use:
-    """A whole bending test of a bundle at rest, contacts and forces included."""
-    from solver import registry
-    from solver.contract import Context, Need
+    """Order, three factors and solves of a bundle's stiffness: 61 rods of 20 vertices, each tied to its neighbours.
 
-    solver = registry.get("wood")
-    params = solver.parse(
-        {"mode": "static", "rods": 60, "vertices": 20, "tip_load": (0.0, 0.0, -1.0), "fracture": "none"}
-    )
-    need = Need(fields=("tip_position",), stages=(0.5, 1.0))
-    return lambda: [solver.run(params, need, Context()).tip_position.values]
+    The matrix is made here: how bonds couple vertices has changed.
+    """
+    multifrontal = _named("solver.linalg.multifrontal", "solver.multifrontal")
+    i, j = (part.ravel() for part in np.meshgrid(np.arange(-4, 5), np.arange(-4, 5)))
+    ring = np.stack([i + 0.5 * j, np.sqrt(0.75) * j], -1)[np.abs(i + j) <= 4]
+    x = np.concatenate([np.stack([np.full(len(ring), 2.0 * z), *ring.T], -1) for z in range(20)])
+    x[:, 0] += np.tile(np.random.default_rng(1).uniform(-0.5, 0.5, len(ring)), 20)
+    pairs = np.argwhere(np.triu(np.linalg.norm(x[:, None] - x[None], axis=-1) < 2.1, 1))
+    graph = sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=(len(x), len(x))).tocsr()
+    graph = sparse.csr_array(graph + graph.T + sparse.eye_array(len(x)))
+    graph.sort_indices()
+    indptr, indices = graph.indptr.astype(np.int64), graph.indices.astype(np.int64)
+    row = np.repeat(np.arange(len(x)), np.diff(indptr))
+    way = x[indices] - x[row]
+    blocks = -np.einsum("ni,nj->nij", way, way) / np.maximum((way**2).sum(1), 1e-9)[:, None, None]
+    own = np.zeros((len(x), 3, 3))
+    np.add.at(own, row, -blocks)
+    blocks[row == indices] = own + 0.1 * np.eye(3)
+    right = np.random.default_rng(0).normal(size=3 * len(x))
+    pairs = np.column_stack([row, indices])[row <= indices]
+
+    def order() -> Any:
+        if multifrontal.__name__ == "solver.multifrontal":
+            return importlib.import_module("solver.wood.dissection").dissected(x, indptr, indices)
+        leaf = importlib.import_module("solver.wood.stepping.static")._LEAF
+        return multifrontal.analyse(pairs, x[pairs].mean(axis=1), indptr, indices, leaf_size=leaf, thin=True)
+
+    def use() -> list[np.ndarray]:
+        found = order()
+        return [multifrontal.factorise(found, blocks).solve(right) for _ in range(3)]
+
+    return use
 
 
 def decay_body() -> Use:
@@ -244,7 +269,8 @@ def main() -> None:
             seconds=seconds,
             digests={which: found[0]["digest"] for which, found in runs.items()},
         )
-    sheet.keep()
+    told = ["git", "-C", str(options.before), "rev-parse", "--short=10", "HEAD"]
+    sheet.keep(before=subprocess.run(told, capture_output=True, text=True, check=False).stdout.strip())
 
 
 if __name__ == "__main__":

@@ -94,6 +94,9 @@ register(
     crossings=Quantity("1", "pairs of triangles of the finite-element surface that cross", "n_x"),
     lattice_penetration=Quantity("1", "deepest crossing of two triangles of the delivered lattice, in r1", "g_l"),
     lattice_crossings=Quantity("1", "pairs of triangles of the delivered lattice that cross", "n_l"),
+    lattice_evened=Quantity(
+        "1", "farthest that a point of the delivered lattice was moved off the solved surface, r1", "e"
+    ),
     least_jacobian=Quantity("1", "least elastic volume ratio J/Jd of all integration points; inverted below 0", "J"),
     strain_energy=Quantity("1", "strain energy of the settled fruit, in units of mu r1^3, mu of the sarcocarp", "E"),
     released_energy=Quantity("1", "strain energy that settling released, in units of mu r1^3", "dE"),

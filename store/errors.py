@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 __all__ = [
+    "Advised",
     "CorruptLedger",
     "CorruptShard",
     "CorruptTable",
@@ -33,10 +34,10 @@ __all__ = [
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
-class StoreError(Exception):
-    """Something the store refuses or cannot do. `code` is stable; `advice` says what to change."""
+class Advised(Exception):
+    """What is refused or cannot be done, and what to change. `code` is stable."""
 
-    code: ClassVar[str] = "store-error"
+    code: ClassVar[str] = "error"
 
     def __init__(self, message: str, advice: str = "") -> None:
         super().__init__(message, advice)
@@ -45,6 +46,12 @@ class StoreError(Exception):
 
     def __str__(self) -> str:
         return f"{self.message} {self.advice}".strip()
+
+
+class StoreError(Advised):
+    """Something the store refuses or cannot do. `code` is stable; `advice` says what to change."""
+
+    code: ClassVar[str] = "store-error"
 
 
 class MissingStore(StoreError):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from store.errors import Advised
+
 __all__ = ["BAD_INPUT", "InvalidOption", "PlanError", "SweepError", "describe", "exit_code", "installing"]
 
 #: Codes that mean "what was asked for is wrong", as opposed to "it could not be done".
@@ -20,18 +22,10 @@ BAD_INPUT = frozenset(
 )
 
 
-class SweepError(Exception):
+class SweepError(Advised):
     """Something that a sweep or the command line refuses or cannot do. `advice` says what to change."""
 
     code: ClassVar[str] = "sweep-error"
-
-    def __init__(self, message: str, advice: str = "") -> None:
-        super().__init__(message, advice)
-        self.message = message
-        self.advice = advice
-
-    def __str__(self) -> str:
-        return f"{self.message} {self.advice}".strip()
 
 
 class PlanError(SweepError):

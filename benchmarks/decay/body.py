@@ -58,7 +58,7 @@ def main(preset: str = "apple", day: float = 20.0) -> None:
         gap = ours.on_surface(balance) - there
         row = {"layers": settings.layers, "tetrahedra": len(ours.solid.tets), "body_ms": took, "newton": balance.steps}
         row["error"] = float(np.sqrt(np.sum(gap**2) / np.sum(there**2)))
-        shell = Wrinkles(params, Skin(), ours, settings)
+        shell = Wrinkles(params, Skin(shrinkage=0.5), ours, settings)
         found, row["skin_ms"] = least(lambda shell=shell, balance=balance: shell.at(balance), 1)  # type: ignore[misc]
         row |= {"skin_vertices": len(found[0]), "skin_steps": found[2]}
         sheet.add(

@@ -23,12 +23,12 @@ from solver.decay.settings import choose
 
 def frames(preset: str, day: float, rate: float, count: int) -> dict[str, float]:
     """Return milliseconds of fields, body and skin of a frame."""
-    params = SOLVER.parse({"body": "quasi-static", "te": 0.03, "skin": {}}, preset)
+    params = SOLVER.parse({"body": "quasi-static", "te": 0.03, "skin": {"shrinkage": 0.5}}, preset)
     assert isinstance(params, DecayParams)
     settings = choose(params, "default")
     system = System(params, settings.cells, True)
     body = Body(params, system.surface, settings.cells, settings.layers, settings.balance)
-    skin = Wrinkles(params, Skin(), body, settings)
+    skin = Wrinkles(params, Skin(shrinkage=0.5), body, settings)
     # the first two frames compile and find the shape to start from
     days = tuple(day + k / rate for k in range(count + 2))
     balance, folds = None, None

@@ -47,7 +47,7 @@ def smooth(rng: np.random.Generator, stages: int, band: int) -> np.ndarray:
 
 
 def put(store: Store, params: Params, need: Need, rng: np.random.Generator) -> None:
-    """Put a made-up result of the displacement into the store."""
+    """Put a made-up result into the store: the displacement, and any number of each stage that the need names."""
     band = need.resolution or BAND
     coords = {
         "stage": np.array(need.stages),
@@ -56,7 +56,8 @@ def put(store: Store, params: Params, need: Need, rng: np.random.Generator) -> N
         "component": ["x", "y", "z"],
     }
     moved = smooth(rng, len(need.stages), band)
-    data = {"displacement": (("stage", "colatitude", "azimuth", "component"), moved)}
+    data: dict[str, Any] = {"displacement": (("stage", "colatitude", "azimuth", "component"), moved)}
+    data |= {name: ("stage", 0.1 * rng.random(len(moved))) for name in need.fields or () if name != "displacement"}
     result = finish(xr.Dataset(data, coords), SOLVER, params, need)
     job = JobSpec.of(SOLVER, params, need)
     store.ledger.want([job])

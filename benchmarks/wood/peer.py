@@ -24,7 +24,7 @@ from .__main__ import per_step
 _ROD = {"length": 0.15, "radius": 0.002, "modulus": 1e10, "density": 600.0, "load": 1.0}
 _ELEMENTS = (10, 20)
 _PEER = """
-import json, sys, time, numpy as np, elastica as ea
+import importlib.metadata, json, sys, time, numpy as np, elastica as ea
 g = json.loads(sys.argv[1])
 class Sim(ea.BaseSystemCollection, ea.Constraints, ea.Forcing, ea.Damping): pass
 L, r, E, rho = g["length"], g["radius"], g["modulus"], g["density"]
@@ -41,7 +41,7 @@ def build(rods, n, load, damping):
             s.dampen(rod).using(ea.AnalyticalLinearDamper, uniform_damping_constant=damping, time_step=g["step"])
     s.finalize()
     return s, made
-out = {"version": ea.__version__}
+out = {"version": importlib.metadata.version("pyelastica")}
 s, made = build(100, 29, 0.0, 0.0)
 st, t = ea.PositionVerlet(), 0.0
 for _ in range(3): t = st.step(s, t, 1e-7)

@@ -30,6 +30,7 @@ _DESCRIPTORS = (
     "crossings",
     "lattice_penetration",
     "lattice_crossings",
+    "lattice_evened",
     "least_jacobian",
 )
 
@@ -59,7 +60,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="6",
+    version="7",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", *_DESCRIPTORS, "strain_energy", "released_energy"),

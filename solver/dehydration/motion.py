@@ -31,6 +31,7 @@ from .kernel import (
     rests,
     reweigh,
     stiffness_bounds,
+    weigh,
 )
 from .kernel.march import SEARCH_EVERY
 from .params import DehydrationParams
@@ -101,7 +102,6 @@ class Motion:
             mesh.surface_nodes[sector.image],
             mesh.sphere.quads,
             settings.clearance * te,
-            te,
             sign=sector.sign,
             own=sector.own,
             share=sector.share,
@@ -219,7 +219,7 @@ class Motion:
         layout = self._ready(layout, shrinkage, rest)
         scale = internal_force(layout, state, theta, one_point=True).scale
         moved, kick = state.copy(), np.zeros((layout.nodes, 4), np.float32)
-        forget(self._skin, layout)
+        weigh(self._skin, layout)  # pairs are still those of the steps before, or are looked for anew
         march(layout, moved, kick, 1, theta=(theta, theta), damping=damping, one_point=True, skin=self._skin)
         momentum = (1 + damping / 2) * (kick[:, :3] * layout.mass[:, None])[layout.free]
         # a fruit without stress has nothing but round-off; that is no lack of balance

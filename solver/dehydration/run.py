@@ -10,11 +10,10 @@ import xarray as xr
 
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
-from ..geometry.crossings import Crossings
 from .fresh.loading import Loading
-from .measures.crossing import of_quads
 from .measures.delivery import Delivery
 from .measures.descriptors import Descriptors, Surface
+from .measures.penetration import of_quads
 from .params import DehydrationParams
 from .path import Path, State
 from .settings import Settings, choose
@@ -24,7 +23,7 @@ __all__ = ["run"]
 _FIELDS = ("position", "displacement")
 
 #: What is measured on the lattice that the need's resolution asks for, all of it whatever the region.
-_DELIVERED = ("lattice_crossings", "lattice_penetration")
+_DELIVERED = ("lattice_crossings", "lattice_penetration", "lattice_evened")
 
 
 class _Record:
@@ -54,17 +53,17 @@ class _Record:
         }
         nodes = state.surface
         if self._wants_fields or self._measures_delivered:
-            displacement, position, found = self._delivered(nodes)
-            for name, field in (("displacement", displacement), ("position", position)):
+            given = self._delivered(nodes)
+            for name, field in (("displacement", given.displacement), ("position", given.position)):
                 if name in self._need.fields:
                     row[name] = field[self._inside]
-            row.update(_told(found, _DELIVERED, self._need))
+            row.update(_told((given.found.count, given.found.depth, given.moved), _DELIVERED, self._need))
         if self._surface is not None:
             described = self._surface.describe(nodes)
             row.update({name: getattr(described, name) for name in self._descriptors})
         if "penetration" in self._need.fields or "crossings" in self._need.fields:
             found = of_quads(nodes, self._path.mesh.sphere.quads)
-            row.update(_told(found, ("crossings", "penetration"), self._need))
+            row.update(_told((found.count, found.depth), ("crossings", "penetration"), self._need))
         for name, value in (
             ("least_jacobian", state.least_ratio),
             ("strain_energy", state.energy),
@@ -97,10 +96,9 @@ class _Record:
         return xr.Dataset(data, coords, attrs)
 
 
-def _told(found: Crossings, names: tuple[str, str], need: Need) -> dict[str, float]:
-    """Return number and depth of crossings under their names, those that are asked for."""
-    values = zip(names, (float(found.count), found.depth), strict=True)
-    return {name: value for name, value in values if name in need.fields}
+def _told(values: tuple[float, ...], names: tuple[str, ...], need: Need) -> dict[str, float]:
+    """Return the values under their names, those that are asked for."""
+    return {name: float(value) for name, value in zip(names, values, strict=True) if name in need.fields}
 
 
 def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:

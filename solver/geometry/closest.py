@@ -2,40 +2,56 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
 from numba import njit
 
 from ..arrays import Floats
 
-__all__ = ["of_segments", "on_triangle"]
+__all__ = ["of_products", "of_segments", "on_triangle"]
+
+Scalar: TypeAlias = np.floating[Any]
 
 _TINY = 1e-30
+_ZERO, _ONE = np.float32(0), np.float32(1)
+_SMALL = np.float32(1e-30)
+"""Keeps what has no size from dividing by 0, without making doubles of singles."""
+
+
+@njit(cache=True, error_model="numpy")
+def of_products(uu: Scalar, uv: Scalar, vv: Scalar, uq: Scalar, vq: Scalar) -> tuple[Scalar, Scalar, bool]:
+    """Return s, t of the point a + s u + t v of a triangle nearest to p, and whether it is off the borders.
+
+    u = b - a, v = c - a and q = p - a come as their scalar products, in any layout and precision: it is kept (Ericson
+    2005, sec. 5.1.5).
+    """
+    zero, one = uu * _ZERO, uu * _ZERO + _ONE  # of the caller's precision
+    d3, d4 = uq - uu, vq - uv
+    d5, d6 = uq - uv, vq - vv
+    wa, wb, wc = d3 * d6 - d5 * d4, d5 * vq - uq * d6, uq * d4 - d3 * vq
+    if uq <= 0 and vq <= 0:
+        return zero, zero, False
+    if d3 >= 0 and d4 <= d3:
+        return one, zero, False
+    if d6 >= 0 and d5 <= d6:
+        return zero, one, False
+    if wc <= 0 and uq >= 0 and d3 <= 0:
+        return uq / (uq - d3 + _SMALL), zero, False
+    if wb <= 0 and vq >= 0 and d6 <= 0:
+        return zero, vq / (vq - d6 + _SMALL), False
+    if wa <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
+        t = (d4 - d3) / ((d4 - d3) + (d5 - d6) + _SMALL)
+        return one - t, t, False
+    inverse = one / (wa + wb + wc)
+    return wb * inverse, wc * inverse, True
 
 
 @njit(cache=True, error_model="numpy")
 def on_triangle(p: Floats, a: Floats, b: Floats, c: Floats, weights: Floats) -> float:
-    """Write the weights of the point of triangle a b c nearest to p, and return its squared distance (Ericson 2005)."""
+    """Write the weights of the point of triangle a b c nearest to p, and return its squared distance."""
     ab, ac, ap = b - a, c - a, p - a
-    d1, d2 = np.dot(ab, ap), np.dot(ac, ap)
-    bp, cp = p - b, p - c
-    d3, d4, d5, d6 = np.dot(ab, bp), np.dot(ac, bp), np.dot(ab, cp), np.dot(ac, cp)
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    v, w = 0.0, 0.0
-    if d1 <= 0 and d2 <= 0:
-        v, w = 0.0, 0.0
-    elif d3 >= 0 and d4 <= d3:
-        v, w = 1.0, 0.0
-    elif d6 >= 0 and d5 <= d6:
-        v, w = 0.0, 1.0
-    elif vc <= 0 and d1 >= 0 and d3 <= 0:
-        v, w = d1 / (d1 - d3), 0.0
-    elif vb <= 0 and d2 >= 0 and d6 <= 0:
-        v, w = 0.0, d2 / (d2 - d6)
-    elif va <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        v = 1 - w
-    else:
-        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    v, w, _ = of_products(np.dot(ab, ab), np.dot(ab, ac), np.dot(ac, ac), np.dot(ab, ap), np.dot(ac, ap))
     weights[0], weights[1], weights[2] = 1 - v - w, v, w
     gap = p - (a + v * ab + w * ac)
     found: float = np.dot(gap, gap)

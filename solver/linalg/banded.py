@@ -12,6 +12,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded, solve_banded
 
 from ..arrays import Bools, Floats, Ints
+from .patterns import of_cliques, places
 
 __all__ = ["Factor", "Pattern", "pattern"]
 
@@ -87,11 +88,7 @@ class Factor:
 
 def pattern(unknowns: Ints, size: int) -> Pattern:
     """Return the pattern of element matrices whose unknowns are numbered `unknowns` (ne, n), -1 for held ones."""
-    count, n = unknowns.shape
-    rows = np.broadcast_to(unknowns[:, :, None], (count, n, n)).ravel()
-    columns = np.broadcast_to(unknowns[:, None, :], (count, n, n)).ravel()
-    code = np.where((rows < 0) | (columns < 0), np.iinfo(np.int64).max, rows * size + columns)
-    distinct, places = np.unique(code, return_inverse=True)
-    if distinct[-1] == np.iinfo(np.int64).max:
-        distinct = distinct[:-1]
-    return Pattern(unknowns, size, distinct // size, distinct % size, places)
+    found = of_cliques(unknowns, size)
+    rows = np.repeat(np.arange(size), np.diff(found.indptr))
+    place = places(unknowns, found.indptr, found.indices).ravel()
+    return Pattern(unknowns, size, rows, found.indices, np.where(place < 0, len(rows), place))

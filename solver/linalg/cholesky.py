@@ -87,6 +87,7 @@ def _eliminate(
         # four columns at a time, so that the rest of the front is read and written a fourth as often
         for p in range(0, pivots, 4):
             q = min(p + 4, pivots)
+            near = q if q - p == 4 else size
             for c in range(p, q):
                 if np.isnan(w[c, c]):
                     return False
@@ -96,22 +97,15 @@ def _eliminate(
                     w[c, c] = 1.0
                 column = w[c, c:]
                 column /= np.sqrt(w[c, c])
-                for e in range(c + 1, q):
+                for e in range(c + 1, near):
                     a, row, tail = w[c, e], w[e, e:], w[c, e:]
                     for r in range(len(row)):
                         row[r] -= a * tail[r]
-            if q - p == 4:
-                for e in range(q, size):
-                    row, w0, w1, w2, w3 = w[e, e:], w[p, e:], w[p + 1, e:], w[p + 2, e:], w[p + 3, e:]
-                    a0, a1, a2, a3 = w0[0], w1[0], w2[0], w3[0]
-                    for r in range(len(row)):
-                        row[r] -= a0 * w0[r] + a1 * w1[r] + a2 * w2[r] + a3 * w3[r]
-            else:
-                for c in range(p, q):
-                    for e in range(q, size):
-                        a, row, tail = w[c, e], w[e, e:], w[c, e:]
-                        for r in range(len(row)):
-                            row[r] -= a * tail[r]
+            for e in range(near, size):
+                row, w0, w1, w2, w3 = w[e, e:], w[p, e:], w[p + 1, e:], w[p + 2, e:], w[p + 3, e:]
+                a0, a1, a2, a3 = w0[0], w1[0], w2[0], w3[0]
+                for r in range(len(row)):
+                    row[r] -= a0 * w0[r] + a1 * w1[r] + a2 * w2[r] + a3 * w3[r]
         at = starts[f, 1]
         for c in range(pivots):
             for r in range(c, size):

@@ -32,15 +32,15 @@ class Fronts(NamedTuple):
     children: Ints
 
 
-def dissect(parts: Ints, centres: Floats, vertices: int, leaf_size: int) -> Fronts:
+def dissect(parts: Ints, centres: Floats, vertices: int, leaf_size: int, thin: bool = False) -> Fronts:
     """Return the fronts of the graph whose cliques are `parts` (p, c), which lie at `centres` (p, 3).
 
     leaf_size: parts in the smallest front: fewer make more fronts, more make them fuller. Every vertex must be in a
-    part.
+    part. thin: cut across the axis that leaves the fewest vertices to both halves instead of the longest one.
     """
     depth = max(0, int(np.ceil(np.log2(max(len(parts), 1) / leaf_size))))
     leaf = np.empty(len(parts), np.int64)
-    _halve(centres, depth, leaf)
+    _halve(parts, centres, vertices, depth, thin, leaf)
     leaves = np.repeat(leaf, parts.shape[1])
     low, high = np.full(vertices, 1 << depth), np.full(vertices, -1)
     np.minimum.at(low, parts.ravel(), leaves)
@@ -72,9 +72,24 @@ def dissect(parts: Ints, centres: Floats, vertices: int, leaf_size: int) -> Fron
 
 
 @njit(cache=True)
-def _halve(centres: Floats, depth: int, leaf: Ints) -> None:
+def _shared(parts: Ints, order: Ints, mark: Ints) -> int:
+    """Return how many vertices both halves of `order` touch; mark (vertices,): zeros on entry and exit."""
+    half, found = (len(order) + 1) // 2, 0
+    for p in order[:half]:
+        mark[parts[p]] = 1
+    for p in order[half:]:
+        for v in parts[p]:
+            found += mark[v] == 1
+            mark[v] = min(mark[v], 0)
+    for p in order[:half]:
+        mark[parts[p]] = 0
+    return found
+
+
+@njit(cache=True)
+def _halve(parts: Ints, centres: Floats, vertices: int, depth: int, thin: bool, leaf: Ints) -> None:
     """Write the leaf of each part."""
-    count = len(centres)
+    count, mark = len(centres), np.zeros(vertices if thin else 0, np.int64)
     order = np.arange(count)
     bounds = np.array([0, count])
     for _ in range(depth):
@@ -82,8 +97,14 @@ def _halve(centres: Floats, depth: int, leaf: Ints) -> None:
         for k in range(len(bounds) - 1):
             first, last = bounds[k], bounds[k + 1]
             part = order[first:last].copy()
-            best, widest = 0, -1.0
+            best, widest, fewest = 0, -1.0, vertices + 1
             for axis in range(3):
+                if thin:
+                    ranked = part[np.argsort(centres[part, axis], kind="mergesort")]
+                    shared = _shared(parts, ranked, mark)
+                    if shared < fewest:
+                        best, fewest = axis, shared
+                    continue
                 small, large = np.inf, -np.inf
                 for p in part:
                     small, large = min(small, centres[p, axis]), max(large, centres[p, axis])

@@ -1,9 +1,8 @@
 """Sparse LDL^T of stacked meshes: nested dissection of the surface, dense fronts, BLAS-3.
 
 A fruit is thin in one direction of its graph: a few nodes along a column, many columns. Dissecting the columns and
-keeping each column whole gives fronts that are small and dense, so that LAPACK does all the work. Measured on one core
-at 17k to 46k unknowns: level with MKL Pardiso (0.8 to 1.3 times its time), 4 times faster than SuperLU; and it yields
-the inertia (Sylvester's law) without another package.
+keeping each column whole gives fronts that are small and dense, so that LAPACK does all the work: 4 times faster than
+SuperLU, and with the inertia (Sylvester's law). MKL's Pardiso factors faster and solves slower (docs/dehydration.md).
 Duff and Reid 1983 (multifrontal), George 1973 (nested dissection).
 """
 
@@ -51,14 +50,16 @@ class Analysis:
 
 
 def analyse(
-    parts: Ints, centres: Floats, indptr: Ints, indices: Ints, per_column: int = 1, leaf_size: int = LEAF
-) -> Analysis:
+    parts: Ints, centres: Floats, indptr: Ints, indices: Ints, per_column: int = 1, leaf_size: int = LEAF,
+    thin: bool = False,
+) -> Analysis:  # fmt: skip
     """Dissect what couples the nodes of a matrix until parts hold `leaf_size`.
 
     parts: (p, c) columns that each couples. centres: (p, 3) where it is. per_column: nodes of a column, those of
-    column c being c * per_column onwards. indptr, indices: pattern of the matrix by nodes, both triangles.
+    column c being c * per_column onwards. indptr, indices: pattern of the matrix by nodes, both triangles. thin: as in
+    `dissect`.
     """
-    found = dissect(parts, centres, (len(indptr) - 1) // per_column, leaf_size)
+    found = dissect(parts, centres, (len(indptr) - 1) // per_column, leaf_size, thin)
     nodes = (found.nodes[:, None] * per_column + np.arange(per_column)).ravel()
     first = found.starts[:, 0] * per_column
     fronts: list[Front] = []
@@ -127,19 +128,18 @@ class Factor:
     def solve(self, right: Floats) -> Floats:
         """Return x of A x = right, both (size,)."""
         x = np.asarray(right, dtype=float).reshape(-1, 3).copy()
-        for front, (pivot, signs, below) in zip(self.analysis.fronts, self.blocks, strict=True):
-            if not front.own:
-                continue
-            own, rest = front.nodes[: front.own], front.nodes[front.own :]
+        steps = [
+            (front.nodes[: front.own], front.nodes[front.own :], block)
+            for front, block in zip(self.analysis.fronts, self.blocks, strict=True)
+            if front.own
+        ]
+        for own, rest, (pivot, signs, below) in steps:
             part = x[own].ravel()
             part = _half(pivot, part, 0) if signs is None else lapack.dsytrs(pivot, signs, part, lower=1)[0].ravel()
             x[own] = part.reshape(-1, 3)
             if len(rest):
                 x[rest] -= (below @ part).reshape(-1, 3)
-        for front, (pivot, signs, below) in zip(self.analysis.fronts[::-1], self.blocks[::-1], strict=True):
-            if not front.own:
-                continue
-            own, rest = front.nodes[: front.own], front.nodes[front.own :]
+        for own, rest, (pivot, signs, below) in reversed(steps):
             part, above = x[own].ravel(), below.T @ x[rest].ravel()
             if signs is None:
                 part = _half(pivot, part - above, 1)

@@ -34,7 +34,8 @@ from ._blocks import DOCUMENTS, ROOT, Block, blocks, commands
 
 #: What answers within seconds. Whatever is not here solves, and runs with the slow tests.
 _QUICK = re.compile(
-    r"curl|wizen (presets|status|query|export|table (build|rebuild.* 24|verify|compare|score)|refine .*--dry|.*--help)"
+    r"curl|wizen (presets|status|results|query|export|table (build|rebuild.* 24|verify|compare|score)|refine .*--dry|"
+    r".*--help)"
 )
 #: What is tested elsewhere: `make` is what runs these tests, and equations are no commands.
 _COMMAND = re.compile(r"(wizen|curl|TOKEN=|python) ?")
@@ -73,7 +74,7 @@ preset = "sphere"
 set = {mirrors = "xyz"}
 axes = {te = [0.03, 0.04], gamma = [10, 30, 50]}
 sampling = {kind = "grid"}
-need = {stages = [0.1, 0.2, 0.3], quality = "preview", resolution = 32, fields = ["displacement"]}
+need = {stages = [0.1, 0.2, 0.3], quality = "preview", resolution = 32, fields = ["displacement", "roughness"]}
 """
 
 

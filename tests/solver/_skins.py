@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from solver.dehydration.contact.data import make_contact
 from solver.dehydration.contact.search import find_pairs
@@ -38,9 +40,13 @@ def state(points):
     return x
 
 
-def touching(points, quads, clearance, te, **options):
-    contact = make_contact(np.arange(len(points)), quads, points, clearance, te, **options)
-    assert find_pairs(contact, state(points)) <= len(contact.pair_nodes)
+def touching(points, quads, clearance, **options):
+    """Contact of a skin; parts that do not hang together are far from each other in the fresh fruit."""
+    edges = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    graph = coo_array((np.ones(len(edges)), edges.T), (len(points), len(points)))
+    rest = points + 10.0 * connected_components(graph)[1][:, None] * [0, 0, 1]
+    contact = make_contact(np.arange(len(points)), quads, rest, clearance, **options)
+    assert find_pairs(contact, state(points)) <= len(contact.pairs)
     return contact
 
 
@@ -53,3 +59,15 @@ def two_plates(gap, rng, lower=9, upper=6, wave=0.0):
     quads = np.concatenate([sheet(lower, lower), sheet(upper, upper)[:, ::-1] + lower * lower])
     minv = rng.uniform(0.2, 0.4, len(below) + len(above)).astype(SINGLE)
     return np.concatenate([below, above]), quads.astype(np.int32), minv, lower * lower
+
+
+def grooved(points, width):
+    """A closed skin with a groove around its waist, half as deep as the body and 2 width wide at its mouth."""
+    polar = np.arcsin(np.clip(abs(points[:, 2]), 0, 1))
+    floor, rim, top = 0.15, 0.65, np.pi / 2
+    z = 0.15 * np.minimum(polar / floor, 1) + (width - 0.15) * np.clip((polar - floor) / (rim - floor), 0, 1)
+    r = 0.5 + 0.5 * np.clip((polar - floor) / (rim - floor), 0, 1)
+    cap = np.clip((polar - rim) / (top - rim), 0, 1) * np.pi / 2
+    r, z = np.where(cap > 0, np.cos(cap), r), z + 0.8 * np.sin(cap)
+    around = points[:, :2] / (np.linalg.norm(points[:, :2], axis=1, keepdims=True) + 1e-12)
+    return np.column_stack([around * r[:, None], np.sign(points[:, 2]) * z])

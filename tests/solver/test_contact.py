@@ -7,20 +7,19 @@ import pytest
 from numba import get_num_threads, njit, prange, set_num_threads
 
 from solver.dehydration.contact.contact import push_apart
-from solver.dehydration.contact.data import ACTIVE
-from solver.dehydration.contact.search import find_pairs
-from solver.dehydration.measures.penetration import penetration
+from solver.dehydration.contact.data import ACTIVE, LIVE
+from solver.dehydration.contact.search import find_pairs, is_stale
+from solver.geometry.crossings import crossings, split_quads
 
-from ._skins import SINGLE, cubed_sphere, sheet, state, touching, two_plates
+from ._skins import SINGLE, cubed_sphere, grooved, sheet, state, touching, two_plates
 
 
 @njit
 def march(contact, x, v, minv, anchors, hold, drift, weight, links, lengths, spring, keep, steps, kinetic):
-    """Mass-spring explicit steps: anchors that drift, weights (nn, 3), links (nl, 2); returns the deepest."""
-    deepest = 0.0
+    """Mass-spring explicit steps: anchors that drift, weights (nn, 3), links (nl, 2)."""
     force = np.zeros((x.shape[0], 3), np.float32)
     for step in range(steps):
-        if step % 10 == 0:
+        if step % 10 == 0 or is_stale(contact):
             find_pairs(contact, x)
         for i in range(x.shape[0]):
             for k in range(3):
@@ -38,12 +37,11 @@ def march(contact, x, v, minv, anchors, hold, drift, weight, links, lengths, spr
             for k in range(3):
                 v[i, k] = keep * v[i, k] + minv[i] * force[i, k]
                 x[i, k] += v[i, k]
-        deepest = max(deepest, push_apart(contact, x, v, minv)[0])
+        push_apart(contact, x, v, minv)
         kinetic[step] = 0.0
         for i in range(x.shape[0]):
             if minv[i] > 0:
                 kinetic[step] += (v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2) / minv[i] / 2
-    return deepest
 
 
 NO_LINKS = (np.zeros((0, 2), np.int64), np.zeros(0, SINGLE))
@@ -54,11 +52,11 @@ def run(
 ):
     full = np.zeros((len(x), 3), SINGLE)
     kinetic = np.zeros(steps)
-    deepest = march(
+    march(
         contact, x, v, minv, anchors.astype(SINGLE), np.array(hold, SINGLE), (full + drift).astype(SINGLE),
         (full + weight).astype(SINGLE), *links, SINGLE(spring), SINGLE(keep), steps, kinetic,
     )  # fmt: skip
-    return deepest, kinetic
+    return kinetic
 
 
 def membrane(quads, points):
@@ -70,15 +68,15 @@ def membrane(quads, points):
 
 def test_pressed_plates_settle_at_the_clearance_and_stay_quiet():
     points, quads, minv, lower = two_plates(0.4, np.random.default_rng(1))
-    contact = touching(points, quads, 0.1, 1.0)
+    contact = touching(points, quads, 0.1)
     x, v = state(points), np.zeros((len(points), 4), SINGLE)
     weight = np.zeros((len(points), 3))
     weight[lower:, 2] = -1e-3
     minv[:lower] = 0
     springs = {"links": membrane(quads[64:], points), "spring": 0.1, "hold": (0.02, 0.02, 0)}
-    deepest, kinetic = run(contact, x, v, minv, x[:, :3].copy(), 5000, weight=weight, **springs)
+    kinetic = run(contact, x, v, minv, x[:, :3].copy(), 5000, weight=weight, **springs)
     assert contact.counts[ACTIVE] >= 25
-    assert deepest == 0
+    assert crossings(x, split_quads(quads)).count == 0
     assert abs(x[lower:, 2] - 0.1).max() < 0.02
     assert np.isfinite(kinetic).all()
     assert kinetic[-500:].max() < 0.02 * kinetic.max()
@@ -87,31 +85,32 @@ def test_pressed_plates_settle_at_the_clearance_and_stay_quiet():
 def test_contact_gives_no_energy_to_plates_on_springs():
     """The upper plate is held half an edge behind the lower one, which gives way; nothing but contact damps."""
     points, quads, minv, lower = two_plates(0.2, np.random.default_rng(2))
-    contact = touching(points, quads, 0.1, 1.0)
+    contact = touching(points, quads, 0.1)
     x, v = state(points), np.zeros((len(points), 4), SINGLE)
     links, lengths = membrane(quads, points)
     springs = {"links": (links, lengths), "spring": 0.3, "hold": (0.05, 0.05, 0.05)}
     anchors = points.copy()
     anchors[lower:, 2] -= 0.7
     drift = (anchors - points) / 2000
-    deepest, _ = run(contact, x, v, minv, points, 2000, drift=drift, **springs)
+    run(contact, x, v, minv, points, 2000, drift=drift, **springs)
     energies = []
     for _ in range(10):
-        depth, kinetic = run(contact, x, v, minv, anchors, 500, **springs)
-        deepest = max(deepest, depth)
+        kinetic = run(contact, x, v, minv, anchors, 500, **springs)
+        assert crossings(x, split_quads(quads)).count == 0
         stretch = np.linalg.norm(x[links[:, 0], :3] - x[links[:, 1], :3], axis=1) - lengths
         energies.append(kinetic[-1] + 0.15 * (stretch**2).sum() + 0.025 * ((x[:, :3] - anchors) ** 2).sum())
     assert contact.counts[ACTIVE] >= 25
-    assert max(deepest, penetration(x, quads)) < 0.02
     assert x[:lower, 2].min() < -0.1
     assert max(np.diff(energies)) < 1e-3 * energies[0]
 
 
-@pytest.mark.parametrize("gap", [0.07, -0.2])
+@pytest.mark.parametrize("gap", [0.19, 0.16])
 def test_momentum_is_balanced_to_round_off(gap):
+    """Plates whose waves come nearer than the clearance, not so near that a push is farther than a node may go."""
     rng = np.random.default_rng(3)
     points, quads, minv, _ = two_plates(gap, rng, wave=0.06)
-    contact = touching(points, quads, 0.1, 1.0)
+    assert crossings(points, split_quads(quads)).count == 0
+    contact = touching(points, quads, 0.1)
     x, v = state(points), state(rng.normal(size=points.shape) * 1e-3)
     before, start = x.astype(float), v.astype(float)
     push_apart(contact, x, v, minv)
@@ -127,7 +126,7 @@ def test_momentum_is_balanced_to_round_off(gap):
 def test_push_never_overshoots_the_clearance():
     """The operator's eigenvalues are within [0, 1]: repeated pushes approach the clearance and do not ring."""
     points, quads, minv, lower = two_plates(0.05, np.random.default_rng(4))
-    contact = touching(points, quads, 0.1, 1.0, recovery=1.0)
+    contact = touching(points, quads, 0.1)
     x, v = state(points), np.zeros((len(points), 4), SINGLE)
     sizes = []
     for _ in range(300):
@@ -150,17 +149,19 @@ def test_force_is_continuous_when_a_node_slides_across_an_edge(fold):
     quads = np.concatenate([sheet(3, 3), [[9, 10, 11, 12]]]).astype(np.int32)
     minv = np.array([0.0] * 9 + [0.3] * 4, SINGLE)
     jumps = []
-    for steps in (150, 600):
+    for steps in (300, 1200):  # pairs of edges fade in over a twentieth of an edge
         pushes = []
         for shift in np.linspace(-0.15, 0.15, steps + 1):
             points = np.concatenate([ground, probe + np.array([shift, 0, 0])])
             points[9:, 2] += fold * abs(points[9:, 0])
-            contact = touching(points, quads, 0.1, 1.0, recovery=1.0)
+            contact = touching(points, quads, 0.1)
             x, v = state(points), np.zeros((13, 4), SINGLE)
             push_apart(contact, x, v, minv)
             pushes.append(v[9, :3].copy())
         size = np.linalg.norm(pushes, axis=1)
-        assert size.min() > 0.01  # lacking 0.04 of a clearance of 0.1: phi pushes by 0.016 where one quad is near
+        # lacking 0.04 of a clearance of 0.1, phi pushes by 0.016 where one pair is near; several that see the same
+        # place share, and do not push it equally far
+        assert size.min() > 0.4 * size.max() > 0.4 * 0.01
         turn = np.linalg.norm(np.diff(np.array(pushes) / size[:, None], axis=0), axis=1)
         jumps.append((abs(np.diff(size)).max() / size.max(), turn.max()))
     # what is continuous jumps less the finer it is sampled
@@ -171,36 +172,36 @@ def test_force_is_continuous_when_a_node_slides_across_an_edge(fold):
     assert turns < turned / 1.5
 
 
-def grooved(points, width):
-    """A closed skin with a groove around its waist, half as deep as the body and 2 width wide at its mouth."""
-    polar = np.arcsin(np.clip(abs(points[:, 2]), 0, 1))
-    floor, rim, top = 0.15, 0.65, np.pi / 2
-    z = 0.15 * np.minimum(polar / floor, 1) + (width - 0.15) * np.clip((polar - floor) / (rim - floor), 0, 1)
-    r = 0.5 + 0.5 * np.clip((polar - floor) / (rim - floor), 0, 1)
-    cap = np.clip((polar - rim) / (top - rim), 0, 1) * np.pi / 2
-    r, z = np.where(cap > 0, np.cos(cap), r), z + 0.8 * np.sin(cap)
-    around = points[:, :2] / (np.linalg.norm(points[:, :2], axis=1, keepdims=True) + 1e-12)
-    return np.column_stack([around * r[:, None], np.sign(points[:, 2]) * z])
-
-
 def test_closing_sulcus_never_goes_through_itself():
     """Springs pull the walls of a deep groove a whole edge through each other."""
     ball, quads = cubed_sphere(16)
     start, end = grooved(ball, 0.15), grooved(ball, -0.05)
-    contact = touching(start, quads, 0.1 * 0.1, 0.1)
-    h = float(contact.size)
+    contact = touching(start, quads, 0.1 * 0.1)
     x, v = state(start), np.zeros((len(ball), 4), SINGLE)
     minv = np.random.default_rng(11).uniform(0.2, 0.4, len(ball)).astype(SINGLE)
     springs = {"hold": (0.05, 0.05, 0.05), "links": membrane(quads, start), "spring": 0.1, "keep": 0.99}
     steps, parts = 3000, 6
-    worst = 0.0
     for part in range(parts):
         anchors = start + (end - start) * part / parts
-        deepest, kinetic = run(contact, x, v, minv, anchors, steps // parts, drift=(end - start) / steps, **springs)
-        worst = max(worst, deepest, penetration(x, quads))
+        kinetic = run(contact, x, v, minv, anchors, steps // parts, drift=(end - start) / steps, **springs)
+        assert crossings(x, split_quads(quads)).count == 0
         assert kinetic.max() < 1e-4
     assert contact.counts[ACTIVE] > 150
-    assert worst < 0.1 * h
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.3, 5.0])
+def test_nothing_is_thrown_through(speed):
+    """Wavy plates, free of all springs, fly at each other by up to 100 clearances a step."""
+    points, quads, minv, lower = two_plates(0.3, np.random.default_rng(7), wave=0.08)
+    contact = touching(points, quads, 0.05)
+    x, v = state(points), np.zeros((len(points), 4), SINGLE)
+    v[lower:, 2], v[:lower, 2] = -speed, speed / 3
+    nearest = []
+    for _ in range(20):
+        run(contact, x, v, minv, points, 3)
+        assert crossings(x, split_quads(quads)).count == 0
+        nearest.append(contact.values[: contact.counts[LIVE], 7].min(initial=0.05))
+    assert min(nearest) < 0.05  # they have met
 
 
 @njit(parallel=True)
@@ -222,7 +223,7 @@ def test_same_bytes_whatever_the_thread_count():
     for count in (1, threads, threads):
         set_num_threads(count)
         points, quads, minv, lower = two_plates(0.2, np.random.default_rng(6), wave=0.05)
-        contact = touching(points, quads, 0.1, 1.0)
+        contact = touching(points, quads, 0.1)
         x, v = state(points), np.zeros((len(points), 4), SINGLE)
         pull = np.where(np.arange(len(x)) < lower, 1e-4, -2e-4).astype(SINGLE)
         parallel_march(contact, x, v, minv, pull, 200)

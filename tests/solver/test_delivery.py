@@ -7,12 +7,12 @@ import pytest
 
 from solver import registry
 from solver.dehydration.fresh.mesh import Sampler, build_mesh
-from solver.dehydration.measures.crossing import of_lattice, of_quads
 from solver.dehydration.measures.delivery import Delivery, even_out, on_triangles
+from solver.dehydration.measures.penetration import of_lattice, of_quads
 from solver.fruit import directions, lattice
 from solver.geometry.crossings import split_quads
 
-from .test_contact import grooved
+from ._skins import grooved
 
 FRUIT = registry.get("dehydration").parse({}, preset="sphere")
 
@@ -34,8 +34,8 @@ def test_lattice_points_lie_on_the_triangles(n):
 def test_a_smooth_surface_is_read_by_splines():
     mesh = build_mesh(FRUIT, 12, np.linspace(0, 1, 3))
     nodes = 0.9 * mesh.positions[mesh.surface_nodes]
-    displacement, position, found = Delivery(FRUIT, mesh, 32, "float64")(nodes)
-    assert found.count == 0
+    displacement, position, found, moved = Delivery(FRUIT, mesh, 32, "float64")(nodes)
+    assert found.count == moved == 0
     assert abs(np.linalg.norm(position, axis=-1) - 0.9 * 1.04).max() < 1e-5  # facets are off by 2e-3
     assert abs(np.linalg.norm(displacement, axis=-1) - 0.1 * 1.04).max() < 1e-5
 
@@ -48,9 +48,13 @@ def test_folds_that_do_not_cross_are_delivered_so(resolution):
     assert of_quads(nodes, mesh.sphere.quads).count == 0
     fresh = mesh.positions[mesh.surface_nodes]
     spline = FRUIT.surface(*lattice(resolution)) + Sampler(mesh.sphere, resolution)(nodes - fresh)
-    found = Delivery(FRUIT, mesh, resolution, "float32")(nodes)
-    assert found[2].count == 0
-    assert of_lattice(found[1].astype(float)).count == 0
+    given = Delivery(FRUIT, mesh, resolution, "float32")(nodes)
+    assert given.found.count == 0
+    assert of_lattice(given.position.astype(float)).count == 0
+    linear = (on_triangles(mesh.sphere, Sampler(mesh.sphere, resolution)) @ nodes).reshape(given.position.shape)
+    off = np.linalg.norm(given.position - linear, axis=-1).max()
+    assert given.moved == pytest.approx(off, abs=1e-6)  # float32 rounds by 1e-7
+    assert given.moved < 0.05
     assert of_lattice(spline).count > 0
 
 

@@ -80,7 +80,7 @@ def test_a_step_with_walls_that_touch_across_a_plane(mirrors):
             mirrored=sector.planes,
         )
         skin = make_skin(
-            layout, part.surface_nodes[sector.image], part.sphere.quads, 0.2, 0.3,
+            layout, part.surface_nodes[sector.image], part.sphere.quads, 0.2,
             sign=sector.sign, own=sector.own, share=sector.share,
         )  # fmt: skip
         kept = np.repeat(sector.own, mesh.levels)
@@ -94,7 +94,7 @@ def test_a_step_with_walls_that_touch_across_a_plane(mirrors):
         found[name] += (np.abs(positions(alone) - positions(state)).max(),)
     moved = np.abs(found[""][0] - where[mesh.surface_nodes]).max()
     assert found[""][2] > 0.02 * moved  # contact has a part in it
-    assert found[mirrors][1] == found[""][1]
+    assert found[mirrors][1] <= found[""][1]  # images alone are left to what they are images of
     assert np.abs(found[mirrors][0] - found[""][0]).max() < 1e-5 * moved
 
 

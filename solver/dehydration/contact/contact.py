@@ -1,27 +1,31 @@
-"""Self-contact of the skin for an explicit march with unit steps: springs that keep skin from crossing skin.
+"""Self-contact of the skin for an explicit march with unit steps: springs that keep skin off skin, and no step through.
 
 The march moves v and then x by v; `push_apart` adds the same increment to both:
 
     dx_j = dv_j = minv_j sum_c f_c b_cj n_c,   f_c = k_c phi(lacking_c) - damping,   lacking_c = clearance - g_c,
 
-with b = +1 at the node and minus the shape functions at the quad's corners. Feet and directions n are those at the
-beginning of the step, the gap g is the one they give for its end: along the normal the penalty acts as backward Euler.
-The turning of the normals stays explicit.
+over all pairs c of a node and a triangle or of two edges, b being the shares of the pair's four nodes in the vector
+from one closest point to the other: 1 at the node and minus the triangle's coordinates, or those of both edges.
+Closest points and directions n are those at the beginning of the step, the gap g is the one they give for its end:
+along the normal the penalty acts as backward Euler. The turning of the normals stays explicit.
 
-phi is 0 without lack, quadratic up to half the clearance and linear beyond, so a contact that begins does not jolt; it
-ends at a limit that leads out, rather than throws, what began deep inside. A contact takes its closing speed out.
+phi is 0 without lack, quadratic up to half the clearance and linear beyond, so a contact that begins does not jolt. A
+contact takes its closing speed out.
 
-What touches is continuous as well (`touch`).
+Nothing goes through: no node ends a step farther from where it began than SAFE times the distance at which it began
+from what it might touch. Both of a pair coming, they stay apart by the rest (Wu, Wu, Yang & Wang, ACM
+Transactions on Graphics 40, 2020, bound steps of cloth so). A step of a march is a thousandth of an edge; where that
+bound acts at all it takes momentum away, as a wall does.
 
 The eigenvalues of M^-1 B k B^T stay within [0, STIFFNESS], clear of what the masses leave to the step: with
 
-    k_c = STIFFNESS / sum_j |b_cj| minv_j S_j,   S_j = sum_d r_d |b_dj|,
+    k_c = STIFFNESS w_c / sum_j |b_cj| minv_j S_j,   S_j = sum_d r_d |b_dj|,
 
-over all quads within reach, touched or not, the rows of k (B^T M^-1 B) weighted by r sum to at
-most STIFFNESS (Gershgorin). r rises from 0 for those farthest off, so that none appears with a jump. A lone contact
-is resolved in about one step, crowded nodes share. No tuning by mass or mesh is left.
+over all pairs within reach, touched or not, the rows of k (B^T M^-1 B) weighted by r sum to at most STIFFNESS
+(Gershgorin). r = w (1 at the clearance to 0 farthest off), so that none appears with a jump; w is 1 but for edges (see
+`distance`). A lone contact is resolved in about one step, crowded nodes share. No tuning by mass or mesh is left.
 
-Forces act along the line from the foot to the node, so linear and angular momentum balance to round-off; there is no
+Forces act along the line between the closest points, so they keep linear and angular momentum to round-off; there is no
 friction.
 """
 
@@ -30,84 +34,168 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.dehydration.contact.data import ACTIVE, HITS, OPTIONS, PAIRS, Contact, Single, Singles
-from solver.dehydration.contact.touch import SLACK, collect
+from ...arrays import Ints32, Singles
+from .data import ACTIVE, BINS, HITS, LIVE, OPTIONS, PAIRS, READS, Contact, Single
+from .distance import edge_edge, node_triangle
 
-__all__ = ["push_apart"]
+__all__ = ["measure", "prepare", "push_apart", "resolve"]
 
 STIFFNESS = np.float32(1.0)
 """Of the 4 that a unit step carries, the masses leave 2 to contact."""
 DAMPING = np.float32(1.0)
-"""Share of a contact's closing speed that each step takes out; 0.3 let walls pulled together cross by 0.15 edges."""
+"""Share of a contact's closing speed that each step takes out; 0.3 let walls pulled together come much nearer."""
+SLACK = np.float32(0.08)
+"""Of the margin: how far beyond the clearance a pair begins to share the load. With 0.25 the many pairs that are near
+but do not touch made those that do so soft that walls pulled together came together by a quarter of an edge."""
+SAFE = np.float32(0.45)
+"""Share of a distance that each side of a pair may go in a step: both together do not meet, nor do they by rounding."""
 
 
 @njit(**OPTIONS)
-def _share_load(contact: Contact, hits: int, minv: Singles) -> None:
-    """Stiffness of each hit into `hit_values`, from how much contact each node takes part in."""
-    load, places, values, quads = contact.load, contact.hits, contact.hit_values, contact.quads
-    rows, corners = contact.surface_nodes, contact.quad_nodes
-    one, slack = np.float32(1), SLACK * contact.margin
-    load[:] = np.float32(0)
-    for c in range(hits):
-        share = values[c, 11] * min(one, (contact.clearance + slack - values[c, 7]) / slack)
-        load[places[c, 0]] += share
-        for k in range(4):
-            load[quads[places[c, 1], k]] += share * values[c, k]
-    for c in range(hits):
-        node, quad = places[c, 0], places[c, 1]
-        crowd = minv[rows[node]] * max(load[node], one)
-        for k in range(4):
-            crowd += values[c, k] * minv[corners[quad, k]] * max(load[quads[quad, k]], values[c, k])
-        values[c, 8] = STIFFNESS * values[c, 11] / crowd if crowd > 0 else np.float32(0)
-
-
-@njit(**OPTIONS)
-def push_apart(contact: Contact, x: Singles, v: Singles, minv: Singles) -> tuple[Single, float]:
-    """Push touching skin apart; call in every step right after x has moved by v, and `find_pairs` every so often.
-
-    x, v (nn, 4) float32 are changed in place; minv (nn,) float32 inverse scaled masses (0: fixed). All gaps are taken
-    before any push, so the order of the pairs does not matter. Returns the deepest penetration (0 if none; a gap below
-    the clearance but positive is none) and the contact energy in units of the scaled masses.
-    """
-    counts = contact.counts
-    energy, deepest = np.float64(0), np.float32(0)
-    counts[ACTIVE] = 0
+def prepare(contact: Contact, x: Singles, v: Singles) -> int:
+    """Positions at the beginning of the step, before x moved by v, and the number of pairs near enough to `measure`."""
+    before, rows, counts = contact.before, contact.surface_nodes, contact.counts
+    counts[LIVE] = counts[ACTIVE] = counts[HITS] = 0
     if counts[PAIRS] == 0:
-        return deepest, energy
-    counts[HITS] = collect(contact, x, v)
-    _share_load(contact, counts[HITS], minv)
-    rows, hits, values, corners = contact.surface_nodes, contact.hits, contact.hit_values, contact.quad_nodes
-    zero, half = np.float32(0), np.float32(0.5)
-    for c in range(counts[HITS]):
-        row, quad = rows[hits[c, 0]], hits[c, 1]
+        return 0
+    farthest = np.float32(0)
+    for place in range(counts[READS]):
+        i = contact.reads[place]
+        square = np.float32(0)
+        for k in range(3):
+            before[i, k] = x[rows[i], k] - v[rows[i], k]
+            square += (before[i, k] - contact.searched[i, k]) ** 2
+        farthest = max(farthest, square)
+    contact.moved[0] = np.sqrt(farthest)
+    # two nodes of a pair may both have come this far
+    near = contact.clearance + SLACK * contact.margin + np.float32(2) * contact.moved[0]
+    last = np.int64(near * np.float32(BINS) / (contact.clearance + contact.margin)) + 1
+    counts[LIVE] = contact.bins[last if last < BINS else BINS]
+    return int(counts[LIVE])
+
+
+@njit(**OPTIONS)
+def measure(
+    before: Singles, pairs: Ints32, values: Singles, weights: Singles, limits: Singles, slack: Single, i: int
+) -> None:
+    """Closest points, gap and weight of pair i as the step began; each pair writes to its own place alone.
+
+    The arrays are those of `Contact` by the same names, slack is SLACK of its margin: a parallel loop takes no tuples.
+    """
+    out, weight = values[i], np.float32(1)
+    if pairs[i, 4] == 0:
+        node_triangle(before, pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3], out)
+    else:
+        weight = edge_edge(before, pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3], out)
+    weights[i] = weight if out[7] < limits[i] + slack else np.float32(0)
+
+
+@njit(**OPTIONS)
+def _share_load(contact: Contact, minv: Singles) -> None:
+    """Stiffness of each hit into `hit_values`, from how much contact each node takes part in."""
+    load, pairs, values, hits = contact.load, contact.pairs, contact.values, contact.hits
+    rows, source = contact.surface_nodes, contact.source
+    one, slack, count = np.float32(1), SLACK * contact.margin, contact.counts[HITS]
+    load[:] = np.float32(0)
+    for h in range(count):
+        i = hits[h]
+        share = contact.weights[i] * min(one, (contact.limits[i] + slack - values[i, 7]) / slack)
+        for k in range(4):
+            load[pairs[i, k]] += share * abs(values[i, k])
+    for h in range(count):
+        i = hits[h]
+        crowd = np.float32(0)
+        for k in range(4):
+            node, b = pairs[i, k], abs(values[i, k])
+            # an image takes part in what its source does, whether or not those pairs are looked at
+            crowd += b * minv[rows[node]] * max(load[source[node]], b)
+        contact.hit_values[h, 0] = STIFFNESS * contact.weights[i] / crowd if crowd > 0 else np.float32(0)
+
+
+@njit(**OPTIONS)
+def _look_around(contact: Contact) -> None:
+    """How far each node began the step from what it might touch, into `room`."""
+    room, pairs, values = contact.room, contact.pairs, contact.values
+    room[:] = contact.clearance
+    for i in range(contact.counts[LIVE]):
+        for k in range(4):
+            # an image goes as far as what it is an image of
+            node = contact.source[pairs[i, k]]
+            room[node] = min(room[node], values[i, 7])
+
+
+@njit(**OPTIONS)
+def _hold(contact: Contact, x: Singles, v: Singles) -> None:
+    """Cut short what went farther in this step than it may; see SAFE."""
+    for place in range(contact.counts[READS]):
+        i = contact.reads[place]
+        row, most = contact.surface_nodes[i], SAFE * contact.room[contact.source[i]]
+        square = v[row, 0] * v[row, 0] + v[row, 1] * v[row, 1] + v[row, 2] * v[row, 2]
+        if square > most * most:
+            share = most / np.sqrt(square)
+            for k in range(3):
+                v[row, k] *= share
+                x[row, k] = contact.before[i, k] + v[row, k]
+
+
+@njit(**OPTIONS)
+def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
+    """Push what `measure` found too near; see `push_apart`. Where nothing may touch all go as they like."""
+    counts, pairs, values, hits, forces = (
+        contact.counts, contact.pairs, contact.values, contact.hits, contact.hit_values,
+    )  # fmt: skip
+    energy, rows, zero, half = np.float64(0), contact.surface_nodes, np.float32(0), np.float32(0.5)
+    found = 0
+    if counts[PAIRS] == 0:
+        return energy
+    for i in range(counts[LIVE]):
+        if contact.weights[i] > 0:
+            hits[found] = i
+            found += 1
+    counts[HITS] = found
+    _look_around(contact)
+    _hold(contact, x, v)  # so that no push answers to where nothing can be
+    _share_load(contact, minv)
+    for h in range(found):
+        i = hits[h]
         gap = speed = zero
-        for i in range(3):
-            away, rate = x[row, i], v[row, i]
-            for k in range(4):
-                away -= values[c, k] * x[corners[quad, k], i]
-                rate -= values[c, k] * v[corners[quad, k], i]
-            gap += values[c, 4 + i] * away
-            speed += values[c, 4 + i] * rate
-        deepest = max(deepest, -gap)
-        lacking, soft = values[c, 10] - gap, half * contact.clearance
-        values[c, 9] = zero
+        for k in range(4):
+            row, b = rows[pairs[i, k]], values[i, k]
+            for m in range(3):
+                gap += b * values[i, 4 + m] * x[row, m]
+                speed += b * values[i, 4 + m] * v[row, m]
+        lacking, soft = contact.limits[i] - gap, half * contact.clearance
+        forces[h, 1] = zero
         if lacking <= 0:
             continue
         begun = min(np.float32(1), lacking / soft)
-        pushed = min(half * soft * begun * begun + max(lacking - soft, zero), contact.recovery)
-        values[c, 9] = values[c, 8] * max(pushed - DAMPING * begun * speed, zero)
-        energy += values[c, 8] * pushed * lacking * half
+        pushed = half * soft * begun * begun + max(lacking - soft, zero)
+        forces[h, 1] = forces[h, 0] * max(pushed - DAMPING * begun * speed, zero)
+        energy += forces[h, 0] * pushed * lacking * half
         counts[ACTIVE] += 1
-    for c in range(counts[HITS]):
-        if values[c, 9] == 0:
+    for h in range(found):
+        if forces[h, 1] == 0:
             continue
-        row, quad = rows[hits[c, 0]], hits[c, 1]
-        for i in range(3):
-            push = values[c, 9] * values[c, 4 + i]
-            x[row, i] += minv[row] * push
-            v[row, i] += minv[row] * push
-            for k in range(4):
-                corner = corners[quad, k]
-                x[corner, i] -= values[c, k] * minv[corner] * push
-                v[corner, i] -= values[c, k] * minv[corner] * push
-    return deepest, energy
+        i = hits[h]
+        for k in range(4):
+            row = rows[pairs[i, k]]
+            push = minv[row] * values[i, k] * forces[h, 1]
+            for m in range(3):
+                x[row, m] += push * values[i, 4 + m]
+                v[row, m] += push * values[i, 4 + m]
+    _hold(contact, x, v)
+    return energy
+
+
+@njit(**OPTIONS)
+def push_apart(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
+    """Push touching skin apart; call in every step right after x has moved by v, and `find_pairs` every so often.
+
+    x, v (nn, 4) float32 are changed in place; minv (nn,) float32 inverse scaled masses (0: fixed). All gaps are taken
+    before any push, so the order of pairs does not matter. Returns the contact energy in units of the scaled masses.
+    """
+    live, slack = prepare(contact, x, v), SLACK * contact.margin
+    for i in range(live):
+        measure(contact.before, contact.pairs, contact.values, contact.weights, contact.limits, slack, i)
+    energy: float = resolve(contact, x, v, minv)
+    return energy

@@ -1,10 +1,11 @@
-"""Which nodes of the outer skin may touch which of its quads: a cell search over the moving surface.
+"""Which nodes of the outer skin may touch which triangles, and which edges which: a search over the moving surface.
 
-Candidates are node-to-quad. The outer face of a hex8 element *is* a bilinear quad, so no diagonal has to be chosen and
-the shape functions of the face carry the contact force to its corners. Quads that contain the node are its
-neighbourhood; the next ones already count, because a deep sulcus closes on a crease that is one quad wide on each side.
+Each quad of the skin is two triangles, those that anybody sees who looks at it, so what contact keeps apart is what is
+counted as crossing. Nodes and triangles, edges and edges: skin that passes through skin does one of the two first.
+Nothing is left out as a neighbour but what shares a node: a sulcus closes on a crease one element wide on each side.
 
-The candidates stay complete while no node has moved farther than `margin` / 2 since the search (Verlet's list, 1967).
+The candidates stay complete while no node has moved farther than a quarter of `margin` since the search (Verlet's list,
+1967). They are sorted by distance: a step looks at the near ones alone.
 """
 
 from __future__ import annotations
@@ -12,261 +13,227 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.dehydration.contact.data import (
-    ASKEW,
-    NEEDED,
-    OPPOSED,
-    OPTIONS,
-    PAIRS,
-    SEARCHES,
-    Contact,
-    Integers,
-    Long,
-    Longs,
-    Single,
-    Singles,
-)
+from ...arrays import Ints32, Singles
+from .cells import first_cell, overlap, sort_into_cells
+from .data import BATCH, BINS, HITS, LIVE, NEEDED, OPTIONS, PAIRS, READS, SEARCHES, Contact, Single
+from .distance import edge_edge, node_triangle
 
 GENTLE = np.float32(0.7071)
 """Cosine to the ellipsoid's normal above which nothing faces anything: two such normals are within 90 degrees."""
-CREASED = np.float32(0.35)
-"""Length of the mean of the unit normals around a node below which the node lies in a closed crease (its walls are
-within 41 degrees of each other). Its own normal says nothing there, and its walls shield it: it touches nothing."""
-WORLD = np.float32(2**20)
-"""Cells counted from the origin in each direction; what lies farther out (or is not finite) touches nothing."""
+OPENING = np.float32(0.3)
+"""Largest clearance of a pair, as a share of its distance in the fresh fruit."""
 
 
 @njit(**OPTIONS)
-def _moved(contact: Contact, x: Singles) -> Single:
-    """Largest squared distance of a surface node from where the last search saw it."""
+def farthest_moved(contact: Contact, x: Singles) -> Single:
+    """Largest distance of a node that is nobody's image from where the last search saw it; images move as they do."""
     farthest = np.float32(0)
     for i in range(contact.surface_nodes.size):
+        if contact.source[i] != i:
+            continue
         row = contact.surface_nodes[i]
         a = x[row, 0] - contact.searched[i, 0]
         b = x[row, 1] - contact.searched[i, 1]
         c = x[row, 2] - contact.searched[i, 2]
         farthest = max(farthest, a * a + b * b + c * c)
-    return farthest
+    found: Single = np.sqrt(farthest)
+    return found
 
 
 @njit(**OPTIONS)
-def update_normals(contact: Contact, x: Singles) -> Single:
-    """Quad centres, radii and normals, and nodal normals, at positions x.
+def gentlest(contact: Contact) -> Single:
+    """Smallest cosine between a triangle's normal and the normal of the rest ellipsoid through its centre.
 
-    Returns the smallest cosine between a quad's normal and the normal of the rest ellipsoid through its centre. Points
-    that touch share that ellipsoid normal, so where every cosine is above GENTLE no two of them can face each other:
-    an unfolded skin is recognised without a search.
+    Points that touch share that ellipsoid normal, so where every cosine is above GENTLE no two of them can face each
+    other: an unfolded skin is recognised without a search.
     """
-    normals, frames, corners = contact.normals, contact.frames, contact.quad_nodes
-    normals[:] = np.float32(0)
-    contact.load[:] = np.float32(0)
-    gentlest = np.float32(1)
+    x, corners = contact.searched, contact.triangles
+    least = np.float32(1)
     centre, scale = contact.ellipsoid[0], contact.ellipsoid[1]
+    third = np.float32(1 / 3)
     for q in range(corners.shape[0]):
-        a, b, c, d = corners[q, 0], corners[q, 1], corners[q, 2], corners[q, 3]
-        nx = (x[c, 1] - x[a, 1]) * (x[d, 2] - x[b, 2]) - (x[c, 2] - x[a, 2]) * (x[d, 1] - x[b, 1])
-        ny = (x[c, 2] - x[a, 2]) * (x[d, 0] - x[b, 0]) - (x[c, 0] - x[a, 0]) * (x[d, 2] - x[b, 2])
-        nz = (x[c, 0] - x[a, 0]) * (x[d, 1] - x[b, 1]) - (x[c, 1] - x[a, 1]) * (x[d, 0] - x[b, 0])
+        a, b, c = corners[q, 0], corners[q, 1], corners[q, 2]
+        nx = (x[b, 1] - x[a, 1]) * (x[c, 2] - x[a, 2]) - (x[b, 2] - x[a, 2]) * (x[c, 1] - x[a, 1])
+        ny = (x[b, 2] - x[a, 2]) * (x[c, 0] - x[a, 0]) - (x[b, 0] - x[a, 0]) * (x[c, 2] - x[a, 2])
+        nz = (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
         inverse = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-30))
-        frames[q, 4], frames[q, 5], frames[q, 6] = nx * inverse, ny * inverse, nz * inverse
-        for i in range(3):
-            frames[q, i] = np.float32(0.25) * (x[a, i] + x[b, i] + x[c, i] + x[d, i])
-        radius = np.float32(0)
-        for k in range(4):
-            square = np.float32(0)
-            for i in range(3):
-                square += (x[corners[q, k], i] - frames[q, i]) ** 2
-                # unit normals: weighted by area, the larger wall of a sharp crease would turn the normal into the
-                # smaller one
-                normals[contact.quads[q, k], i] += frames[q, 4 + i]
-            contact.load[contact.quads[q, k]] += np.float32(1)
-            radius = max(radius, square)
-        frames[q, 3] = np.sqrt(radius)
-        dot = square = level = np.float32(0)
-        for i in range(3):
-            offset = frames[q, i] - centre[i]
-            direction = offset * scale[i]
-            dot += direction * frames[q, 4 + i]
-            square += direction * direction
-            level += offset * direction
+        dx = third * (x[a, 0] + x[b, 0] + x[c, 0]) - centre[0]
+        dy = third * (x[a, 1] + x[b, 1] + x[c, 1]) - centre[1]
+        dz = third * (x[a, 2] + x[b, 2] + x[c, 2]) - centre[2]
+        ex, ey, ez = dx * scale[0], dy * scale[1], dz * scale[2]
+        square, level = ex * ex + ey * ey + ez * ez, dx * ex + dy * ey + dz * ez
+        dot = (ex * nx + ey * ny + ez * nz) * inverse
         # near the centre the ellipsoid's normal turns within an element: no statement possible there
-        gentlest = min(gentlest, dot / np.sqrt(square + np.float32(1e-30))) if level > 0.04 else np.float32(-1)
-    for i in range(normals.shape[0]):
-        square = normals[i, 0] ** 2 + normals[i, 1] ** 2 + normals[i, 2] ** 2
-        inverse = np.float32(1) / np.sqrt(square + np.float32(1e-30))
-        if square < (CREASED * contact.load[i]) ** 2:
-            inverse = np.float32(0)
+        least = min(least, dot / np.sqrt(square + np.float32(1e-30))) if level > 0.04 else np.float32(-1)
+    return least
+
+
+@njit(**OPTIONS)
+def _enclose(contact: Contact, reach: Single) -> None:
+    """Boxes of the triangles; one out of reach of all nodes that are nobody's image gets none."""
+    x, boxes = contact.searched, contact.boxes
+    low, high = np.full(3, np.float32(np.inf)), np.full(3, np.float32(-np.inf))
+    for i in range(x.shape[0]):
+        if contact.source[i] == i:
+            for k in range(3):
+                low[k], high[k] = min(low[k], x[i, k] - reach), max(high[k], x[i, k] + reach)
+    for t in range(boxes.shape[0]):
+        a, b, c = contact.triangles[t, 0], contact.triangles[t, 1], contact.triangles[t, 2]
+        near = True
         for k in range(3):
-            normals[i, k] *= inverse
-    return gentlest
+            boxes[t, k] = min(x[a, k], x[b, k], x[c, k])
+            boxes[t, 3 + k] = max(x[a, k], x[b, k], x[c, k])
+            near &= boxes[t, k] <= high[k] and boxes[t, 3 + k] >= low[k]
+        if not near:
+            boxes[t, :3], boxes[t, 3:] = np.float32(np.inf), np.float32(-np.inf)
 
 
 @njit(**OPTIONS)
-def cell_key(i: int, j: int, k: int) -> int:
-    """One integer per cell, 21 bits a direction."""
-    return ((i & 0x1FFFFF) << 42) | ((j & 0x1FFFFF) << 21) | (k & 0x1FFFFF)
+def _enter(
+    rest: Singles, clearance: Single, found: Ints32, away: Singles, place: int, a: int, b: int, c: int, d: int,
+    kind: int, distance: Single, out: Singles,
+) -> int:  # fmt: skip
+    """Enter a pair at `place` if there is room, node a and triangle b c d or edges a b and c d; returns the next place.
 
-
-@njit(**OPTIONS)
-def bucket_of(key: int, buckets: int) -> Long:
-    """Multiplicative hash of a cell; buckets is a power of two."""
-    mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
-    return np.int64((mixed ^ (mixed >> np.uint64(32))) & np.uint64(buckets - 1))
-
-
-@njit(**OPTIONS)
-def _first_and_last(x: Singles, corners: Integers, q: int, i: int, reach: Single, cell: Single) -> tuple[Long, Long]:
-    """First and last cell in direction i that quad q's bounding box, grown by reach, overlaps; (0, -1) if far away."""
-    low = high = x[corners[q, 0], i]
-    for k in range(1, 4):
-        low = min(low, x[corners[q, k], i])
-        high = max(high, x[corners[q, k], i])
-    if not (low - reach > -WORLD * cell and high + reach < WORLD * cell):
-        return np.int64(0), np.int64(-1)
-    return np.int64(np.floor((low - reach) / cell)), np.int64(np.floor((high + reach) / cell))
-
-
-@njit(**OPTIONS)
-def sort_into_cells(
-    x: Singles, quad_nodes: Integers, reach: Single, cell: Single, keys: Longs, order: Integers, starts: Integers
-) -> Single:
-    """Enter each quad, grown by reach, into every cell it overlaps; equal input gives equal order.
-
-    A counting sort by hashed cell fills `order` (entries,) with quads and `keys` with their cells; `starts` holds the
-    first entry of each bucket. A point then meets all quads within reach in its own cell. Cells widen until the
-    entries fit, so that a few stretched quads cost memory nowhere. Returns the width of the cells.
+    What was near in the fresh fruit keeps less than the clearance.
     """
-    buckets = starts.size - 1
-    while True:
-        entries = 0
-        for q in range(quad_nodes.shape[0]):
-            block = 1
-            for i in range(3):
-                first, last = _first_and_last(x, quad_nodes, q, i, reach, cell)
-                block *= last - first + 1
-            entries += block
-        if entries <= order.size:
-            break
-        cell *= np.float32(1.5)
-    starts[:] = 0
-    for filling in range(2):
-        for q in range(quad_nodes.shape[0]):
-            i0, i1 = _first_and_last(x, quad_nodes, q, 0, reach, cell)
-            j0, j1 = _first_and_last(x, quad_nodes, q, 1, reach, cell)
-            k0, k1 = _first_and_last(x, quad_nodes, q, 2, reach, cell)
-            for i in range(i0, i1 + 1):
-                for j in range(j0, j1 + 1):
-                    for k in range(k0, k1 + 1):
-                        key = cell_key(i, j, k)
-                        bucket = bucket_of(key, buckets)
-                        if filling:
-                            order[starts[bucket + 1]] = q
-                            keys[starts[bucket + 1]] = key
-                        starts[bucket + 1] += 1
-        if filling:
-            break
-        for bucket in range(buckets):
-            starts[bucket + 1] += starts[bucket]
-        # starts[b + 1] serves as bucket b's cursor: it begins at its first entry and ends at the next bucket's
-        for bucket in range(buckets, 0, -1):
-            starts[bucket] = starts[bucket - 1]
-        starts[0] = 0
-    return cell
+    if place < found.shape[0]:
+        if kind == 0:
+            node_triangle(rest, a, b, c, d, out)
+        else:
+            edge_edge(rest, a, b, c, d, out)
+        found[place, 0], found[place, 1], found[place, 2], found[place, 3], found[place, 4] = a, b, c, d, kind
+        away[place, 0], away[place, 1] = distance, min(clearance, OPENING * out[7])
+    return place + 1
 
 
 @njit(**OPTIONS)
-def _near(
-    x: Singles, row: int, quad_nodes: Integers, frames: Singles, quad: int, outward: Single, depth: Single
-) -> tuple[bool, Single, Single]:
-    """Whether the node is within reach of the quad by its mean plane, and a first guess of u and v."""
-    a, b, c, d = quad_nodes[quad, 0], quad_nodes[quad, 1], quad_nodes[quad, 2], quad_nodes[quad, 3]
-    quarter, one = np.float32(0.25), np.float32(1)
-    gap = uu = uv = vv = pu = pv = np.float32(0)
-    for i in range(3):
-        offset = x[row, i] - frames[quad, i]
-        along_u = quarter * (x[b, i] + x[c, i] - x[a, i] - x[d, i])
-        along_v = quarter * (x[c, i] + x[d, i] - x[a, i] - x[b, i])
-        gap += offset * frames[quad, 4 + i]
-        uu += along_u * along_u
-        uv += along_u * along_v
-        vv += along_v * along_v
-        pu += offset * along_u
-        pv += offset * along_v
-    # a warped quad leaves its mean plane by up to about a quarter of its radius
-    warp = quarter * frames[quad, 3]
-    inverse = one / (uu * vv - uv * uv + np.float32(1e-30))
-    u = (pu * vv - pv * uv) * inverse
-    v = (pv * uu - pu * uv) * inverse
-    near = gap < outward + warp and gap > -depth - warp
-    near &= (abs(u) - one) * np.sqrt(uu) < outward + warp and (abs(v) - one) * np.sqrt(vv) < outward + warp
-    return near, min(max(u, -one), one), min(max(v, -one), one)
+def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
+    """Enter all pairs of features in reach that the first `count` pairs of triangles met answer for."""
+    triangles, boxes, x, source = contact.triangles, contact.boxes, contact.searched, contact.source
+    own_nodes, own_edges, met = contact.own_nodes, contact.own_edges, contact.met
+    rest, clearance, found, away = contact.rest, contact.clearance, contact.found, contact.away
+    place = contact.counts[NEEDED]
+    for m in range(2 * count):
+        mine, theirs = met[m // 2, m % 2], met[m // 2, 1 - m % 2]
+        b, c, d = triangles[theirs, 0], triangles[theirs, 1], triangles[theirs, 2]
+        images = source[b] != b and source[c] != c and source[d] != d
+        for i in range(3):
+            a = own_nodes[mine, i]
+            if a < 0 or (a == b) | (a == c) | (a == d) or (images and source[a] != a):
+                continue
+            near = True
+            for k in range(3):
+                near &= x[a, k] <= boxes[theirs, 3 + k] + reach and x[a, k] >= boxes[theirs, k] - reach
+            if near:
+                distance = node_triangle(x, a, b, c, d, out)
+                if distance < reach:
+                    place = _enter(rest, clearance, found, away, place, a, b, c, d, 0, distance, out)
+    for m in range(9 * count):
+        t, u, i, j = met[m // 9, 0], met[m // 9, 1], m % 9 // 3, m % 3
+        a, b, c, d = own_edges[t, i, 0], own_edges[t, i, 1], own_edges[u, j, 0], own_edges[u, j, 1]
+        if a < 0 or c < 0 or (a == c) | (a == d) | (b == c) | (b == d):
+            continue
+        if source[a] != a and source[b] != b and source[c] != c and source[d] != d:
+            continue
+        near = True
+        for k in range(3):
+            near &= min(x[a, k], x[b, k]) <= max(x[c, k], x[d, k]) + reach
+            near &= min(x[c, k], x[d, k]) <= max(x[a, k], x[b, k]) + reach
+        if near:
+            edge_edge(x, a, b, c, d, out)
+            if out[7] < reach:
+                place = _enter(rest, clearance, found, away, place, a, b, c, d, 1, out[7], out)
+    contact.counts[NEEDED] = place
 
 
 @njit(**OPTIONS)
-def _own_corners(contact: Contact, node: int, quad: int) -> int:
-    """Bits of the quad's corners that share another quad with the node."""
-    bits = 0
-    for k in range(4):
-        for other in contact.rings[node]:
-            if other == contact.quads[quad, k]:
-                bits |= 1 << k
-    return bits
+def _visit(contact: Contact, reach: Single, cell: Single) -> None:
+    """Go through all pairs of triangles in reach and take in their features."""
+    keys, order, starts, boxes, met = contact.keys, contact.order, contact.starts, contact.boxes, contact.met
+    half, count, out = np.float32(0.5) * reach, 0, np.zeros(8, np.float32)
+    for bucket in range(starts.size - 1):
+        for i in range(starts[bucket], starts[bucket + 1]):
+            t, key = order[i], keys[i]
+            for j in range(i + 1, starts[bucket + 1]):
+                u = order[j]
+                if keys[j] != key or not overlap(boxes, t, u, reach) or first_cell(boxes, t, u, half, cell) != key:
+                    continue
+                met[count, 0], met[count, 1] = t, u
+                count += 1
+                if count == BATCH:
+                    _take_in(contact, count, reach, out)
+                    count = 0
+    _take_in(contact, count, reach, out)
+
+
+@njit(**OPTIONS)
+def _sort_by_distance(contact: Contact, reach: Single) -> None:
+    """Put the pairs found into classes of distance, and list the nodes that steps will look at."""
+    bins, pairs, found = contact.bins, contact.counts[PAIRS], contact.found
+    bins[:] = 0
+    scale = np.float32(BINS) / reach
+    for i in range(pairs):
+        k = int(contact.away[i, 0] * scale)
+        bins[k + 1 if k < BINS else BINS] += 1
+    for k in range(BINS):
+        bins[k + 1] += bins[k]
+    for i in range(pairs):
+        k = int(contact.away[i, 0] * scale)
+        k = k if k < BINS else BINS - 1
+        place = bins[k]
+        bins[k] += 1
+        contact.limits[place] = contact.away[i, 1]
+        for m in range(5):
+            contact.pairs[place, m] = found[i, m]
+    for k in range(BINS, 0, -1):
+        bins[k] = bins[k - 1]
+    bins[0] = 0
+    contact.load[:] = np.float32(0)
+    for i in range(pairs):
+        for m in range(4):
+            contact.load[found[i, m]] = np.float32(1)
+    contact.counts[READS] = 0
+    for i in range(contact.source.size):
+        if contact.source[i] == i or contact.load[i] > 0:
+            contact.reads[contact.counts[READS]] = i
+            contact.counts[READS] += 1
+
+
+@njit(**OPTIONS)
+def is_stale(contact: Contact) -> bool:
+    """Whether the step just made has come so near to the end of the list's validity that the next may pass it."""
+    return bool(contact.moved[0] > np.float32(0.35) * contact.margin)
 
 
 @njit(**OPTIONS)
 def find_pairs(contact: Contact, x: Singles) -> int:
-    """Collect candidate pairs at positions x (nn, 4) float32; call every 20-40 steps.
+    """Collect candidate pairs at positions x (nn, 4) float32; call every 10 steps, and when `is_stale`.
 
-    Returns the number of pairs wanted. More than `contact.pair_nodes.size` means that the rest was left out: `grow`
-    and search again. Returns at once while no surface node has moved a quarter of the margin since the last search, so
-    that list and normals stay valid for as long again. Pairs ascend by node, then by a fixed order of cells.
+    Returns the number of pairs wanted. More than there is room for means that the rest was left out: `grow` and search
+    again. Returns at once while no node has moved a quarter of the margin since the last search, so that the list stays
+    valid for as long again. Pairs come in a fixed order of cells, then by distance.
     """
     counts = contact.counts
     reach = contact.margin * np.float32(0.25)
-    if _moved(contact, x) < reach * reach and counts[NEEDED] <= contact.pair_nodes.size:
+    if farthest_moved(contact, x) < reach and counts[NEEDED] <= contact.pairs.shape[0]:
         return int(counts[NEEDED])
+    finite = True
     for i in range(contact.surface_nodes.size):
         for k in range(3):
             contact.searched[i, k] = x[contact.surface_nodes[i], k]
-    gentlest = update_normals(contact, x)
-    counts[PAIRS] = counts[NEEDED] = 0
-    if gentlest > GENTLE:
+            finite &= abs(contact.searched[i, k]) < np.float32(1e6)
+    counts[PAIRS] = counts[NEEDED] = counts[HITS] = counts[LIVE] = counts[READS] = 0
+    contact.moved[0] = 0
+    if not finite or gentlest(contact) > GENTLE:
         return int(counts[NEEDED])
     counts[SEARCHES] += 1
-    outward = contact.clearance + contact.margin
-    reach = max(outward, contact.depth)
-    cell = contact.size + np.float32(2) * reach
-    cell = sort_into_cells(x, contact.quad_nodes, reach, cell, contact.keys, contact.order, contact.starts)
-    normals, frames, quads = contact.normals, contact.frames, contact.quads
-    keys, order, starts = contact.keys, contact.order, contact.starts
-    capacity = contact.pair_nodes.size
-    for node in range(contact.surface_nodes.size):
-        row = contact.surface_nodes[node]
-        px, py, pz = x[row, 0], x[row, 1], x[row, 2]
-        if not max(abs(px), abs(py), abs(pz)) < WORLD * cell:
-            continue
-        nx, ny, nz = normals[node, 0], normals[node, 1], normals[node, 2]
-        if nx == 0 and ny == 0 and nz == 0:
-            continue
-        key = cell_key(np.int64(np.floor(px / cell)), np.int64(np.floor(py / cell)), np.int64(np.floor(pz / cell)))
-        bucket = bucket_of(key, starts.size - 1)
-        for place in range(starts[bucket], starts[bucket + 1]):
-            quad = order[place]
-            opposed = nx * frames[quad, 4] + ny * frames[quad, 5] + nz * frames[quad, 6] < OPPOSED
-            away = (px - frames[quad, 0]) ** 2 + (py - frames[quad, 1]) ** 2 + (pz - frames[quad, 2]) ** 2
-            if away > (frames[quad, 3] + reach) ** 2 or keys[place] != key:
-                continue
-            if node in (quads[quad, 0], quads[quad, 1], quads[quad, 2], quads[quad, 3]):
-                continue
-            depth = contact.depth if opposed else contact.shallow
-            near, u, v = _near(x, row, contact.quad_nodes, frames, quad, outward, depth)
-            if not near:
-                continue
-            pair = counts[NEEDED]
-            if pair < capacity:
-                contact.pair_nodes[pair], contact.pair_quads[pair] = node, quad
-                contact.pair_own[pair] = _own_corners(contact, node, quad) | (0 if opposed else ASKEW)
-                contact.feet[pair, 0], contact.feet[pair, 1] = u, v
-            counts[NEEDED] += 1
-    counts[PAIRS] = min(counts[NEEDED], contact.pair_nodes.size)
+    reach = contact.clearance + contact.margin
+    half = np.float32(0.5) * reach
+    _enclose(contact, reach)
+    cell = contact.size + reach
+    cell = sort_into_cells(contact.boxes, half, cell, contact.keys, contact.order, contact.starts)
+    _visit(contact, reach, cell)
+    counts[PAIRS] = min(counts[NEEDED], contact.pairs.shape[0])
+    _sort_by_distance(contact, reach)
     return int(counts[NEEDED])

@@ -18,7 +18,7 @@ from solver.dehydration.kernel.march import (
     new_state,
 )
 from solver.dehydration.kernel.reweigh import reweigh, stiffness_bounds
-from solver.dehydration.kernel.skin import Skin, forget, make_skin
+from solver.dehydration.kernel.skin import Skin, forget, make_skin, weigh
 
 __all__ = [
     "Backend",
@@ -44,4 +44,5 @@ __all__ = [
     "reweigh",
     "stiffness_bounds",
     "strain_energy",
+    "weigh",
 ]

@@ -14,6 +14,7 @@ def source_digest(backend: str) -> str:
     All files of the package count, needed or not: a needless compilation costs seconds, a stale kernel a wrong table.
     """
     digest = hashlib.sha256(backend.encode())
-    for path in sorted(HERE.glob("*.py")) + sorted((HERE.parent / "contact").glob("*.py")):
+    shared = [HERE.parents[1] / "geometry" / name for name in ("closest.py", "crossings.py")]
+    for path in sorted(HERE.glob("*.py")) + sorted((HERE.parent / "contact").glob("*.py")) + shared:
         digest.update(b"\0" + path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()

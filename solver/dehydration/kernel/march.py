@@ -17,11 +17,13 @@ import numpy as np
 from numba import njit, prange, typeof, types
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from solver.dehydration.contact.data import make_contact
+from solver.dehydration.contact.contact import SLACK, measure
+from solver.dehydration.contact.data import PAIRS, make_contact
+from solver.dehydration.contact.search import is_stale
 from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
-from solver.dehydration.kernel.skin import Skin, keep_apart, search, widen
+from solver.dehydration.kernel.skin import Skin, approach, keep_apart, search, widen
 
 from ...arrays import Array, Floats, Ints, Singles
 
@@ -44,9 +46,9 @@ SEARCH_EVERY = 10
 def _nobody() -> Skin:
     """A skin of one quad: stands in where no contact is wanted, and gives numba the type."""
     node = np.zeros(1, np.float32)
-    contact = make_contact(range(4), [[0, 1, 2, 3]], [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 0.0, 1.0)
+    contact = make_contact(range(4), [[0, 1, 2, 3]], [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 0.0)
     image, own = np.ones((1, 3), np.float32), np.ones(1, np.bool_)
-    return Skin(contact, np.zeros(1, np.int32), image, own, node, node.reshape(1, 1), node.reshape(1, 1), node, node)
+    return Skin(contact, np.zeros(1, np.int32), image, own, node, node.reshape(1, 1), node.reshape(1, 1), node)
 
 
 @njit(error_model="numpy")
@@ -104,8 +106,12 @@ def _build(stamp: int) -> Callable[..., int]:
         source = stamp  # noqa: F841  a captured cell is part of numba's cache key
         keep = np.float32((1 - damping / 2) / (1 + damping / 2))
         push = np.float32(1 / (1 + damping / 2))
+        # a parallel loop takes no tuples
+        contact = skin.contact
+        before, candidates, limits = contact.before, contact.pairs, contact.limits
+        values, weights, slack = contact.values, contact.weights, SLACK * contact.margin
         for step in range(steps):
-            if touching and step % SEARCH_EVERY == 0 and not search(skin, state, velocity):
+            if touching and (step % SEARCH_EVERY == 0 or is_stale(contact)) and not search(skin, state, velocity):
                 return step
             theta = np.float32(theta0 + (theta1 - theta0) * (step + 1) / steps)
             for strip in prange(strips.shape[0]):
@@ -119,8 +125,12 @@ def _build(stamp: int) -> Callable[..., int]:
                 # a part's nodes on a mirror plane feel half of what balances across it
                 stay(planes, state, velocity)
                 if touching:
-                    keep_apart(skin, state, velocity)
-                    stay(planes, state, velocity)
+                    pairs = approach(skin, state, velocity)
+                    for pair in prange(pairs):
+                        measure(before, candidates, values, weights, limits, slack, np.int64(pair))
+                    if contact.counts[PAIRS]:
+                        keep_apart(skin, state, velocity)
+                        stay(planes, state, velocity)
         return steps
 
     compiled_loop: Callable[..., int] = advance

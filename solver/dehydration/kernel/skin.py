@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from solver.dehydration.contact.contact import push_apart
-from solver.dehydration.contact.data import PAIRS, Contact, grow, make_contact
+from solver.dehydration.contact.contact import prepare, resolve
+from solver.dehydration.contact.data import PAIRS, READS, Contact, grow, make_contact
 from solver.dehydration.contact.search import find_pairs
 from solver.dehydration.kernel.fixed_point import QUANTUM, positions
 from solver.dehydration.kernel.layout import Layout
@@ -41,8 +41,6 @@ class Skin(NamedTuple):
     """(ns, 4)"""
     inverse_mass: Singles
     """(ns,)"""
-    deepest: Singles
-    """(1,) deepest penetration of the last step that had pairs"""
 
 
 def make_skin(
@@ -50,7 +48,6 @@ def make_skin(
     surface_nodes: ArrayLike,
     quads: ArrayLike,
     clearance: float,
-    te: float,
     *,
     sign: ArrayLike | None = None,
     own: ArrayLike | None = None,
@@ -64,27 +61,32 @@ def make_skin(
     rows = np.ascontiguousarray(surface_nodes, np.int32)
     signs = np.ones((len(rows), 3)) if sign is None else np.asarray(sign)
     shares = np.ones(len(rows)) if share is None else np.asarray(share)
+    owned = np.ones(len(rows), np.bool_) if own is None else np.ascontiguousarray(own, np.bool_)
+    first = np.zeros(layout.nodes, np.int64)
+    first[rows[owned]] = np.flatnonzero(owned)
     rest = positions(layout.fresh)[rows] * signs
     return Skin(
-        make_contact(np.arange(len(rows)), quads, rest, clearance, te),
+        make_contact(np.arange(len(rows)), quads, rest, clearance, source=first[rows]),
         rows,
         np.ascontiguousarray(signs, np.float32),
-        np.ones(len(rows), np.bool_) if own is None else np.ascontiguousarray(own, np.bool_),
+        owned,
         np.ascontiguousarray(shares, np.float32),
         np.zeros((len(rows), 4), np.float32),
         np.zeros((len(rows), 4), np.float32),
         layout.inverse_mass[rows] * shares.astype(np.float32),
-        np.zeros(1, np.float32),
     )
+
+
+def weigh(skin: Skin, layout: Layout) -> None:
+    """Take the layout's masses."""
+    skin.inverse_mass[:] = layout.inverse_mass[skin.rows] * skin.share
 
 
 def forget(skin: Skin, layout: Layout) -> None:
     """Take the layout's masses and drop all that earlier steps left: the next march depends on its state alone."""
-    skin.inverse_mass[:] = layout.inverse_mass[skin.rows] * skin.share
-    skin.contact.searched[:] = 1e30
+    weigh(skin, layout)
+    skin.contact.searched[:] = 1e15
     skin.contact.counts[:] = 0
-    skin.contact.feet[:] = 0
-    skin.deepest[:] = 0
 
 
 def widen(skin: Skin) -> Skin:
@@ -93,32 +95,41 @@ def widen(skin: Skin) -> Skin:
 
 
 @njit(**OPTIONS)
-def read_skin(skin: Skin, state: Ints32, velocity: Singles) -> None:
-    """Copy the skin's positions and velocities out of the flat state (4 nn,) int32 and velocity (4 nn,)."""
-    for i in range(skin.rows.size):
-        first = 4 * np.int64(skin.rows[i])
-        for k in range(3):
-            skin.position[i, k] = skin.sign[i, k] * (np.float32(state[first + k]) * UNIT)
-            skin.velocity[i, k] = skin.sign[i, k] * velocity[first + k]
+def _read_node(skin: Skin, state: Ints32, velocity: Singles, i: int) -> None:
+    first = 4 * np.int64(skin.rows[i])
+    for k in range(3):
+        skin.position[i, k] = skin.sign[i, k] * (np.float32(state[first + k]) * UNIT)
+        skin.velocity[i, k] = skin.sign[i, k] * velocity[first + k]
 
 
 @njit(**OPTIONS)
 def search(skin: Skin, state: Ints32, velocity: Singles) -> bool:
-    """Look for pairs that may touch; False if there are more than the contact has room for."""
-    read_skin(skin, state, velocity)
-    found: bool = find_pairs(skin.contact, skin.position) <= skin.contact.pair_nodes.size
-    return found
+    """Look for pairs that may touch, at positions and velocities of the flat state (4 nn,) int32 and velocity (4 nn,).
+
+    False if there are more than the contact has room for.
+    """
+    for i in range(skin.rows.size):
+        _read_node(skin, state, velocity, i)
+    return bool(find_pairs(skin.contact, skin.position) <= skin.contact.pairs.shape[0])
+
+
+@njit(**OPTIONS)
+def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
+    """Read the nodes that may touch after the step just made; returns how many pairs there are to `measure`."""
+    contact = skin.contact
+    if contact.counts[PAIRS] == 0:
+        return 0
+    for place in range(contact.counts[READS]):
+        _read_node(skin, state, velocity, contact.reads[place])
+    return int(prepare(contact, skin.position, skin.velocity))
 
 
 @njit(**OPTIONS)
 def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> None:
     """Push touching skin apart in the step just made."""
-    if skin.contact.counts[PAIRS] == 0:
-        skin.deepest[0] = 0
-        return
-    read_skin(skin, state, velocity)
-    skin.deepest[0] = push_apart(skin.contact, skin.position, skin.velocity, skin.inverse_mass)[0]
-    for i in range(skin.rows.size):
+    resolve(skin.contact, skin.position, skin.velocity, skin.inverse_mass)
+    for place in range(skin.contact.counts[READS]):
+        i = skin.contact.reads[place]
         if not skin.own[i]:
             continue
         first = 4 * np.int64(skin.rows[i])

@@ -9,7 +9,7 @@ the surface, rms 0.0016 r1.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -18,12 +18,25 @@ from ...arrays import Bools, Floats
 from ...fruit import Fruit, lattice
 from ...geometry.crossings import Crossings
 from ..fresh.mesh import CubedSphere, FruitMesh, Sampler
-from .crossing import closed_lattice, of_lattice
+from .penetration import closed_lattice, of_lattice
 
-__all__ = ["Delivery", "even_out", "on_triangles"]
+__all__ = ["Delivered", "Delivery", "even_out", "on_triangles"]
 
 #: Rounds of evening out; what crosses after them is delivered, and said.
 _ROUNDS = 60
+
+
+class Delivered(NamedTuple):
+    """A surface on the lattice, as it is handed over."""
+
+    displacement: Any
+    """(n, 2n, 3) in the type that was asked for"""
+    position: Any
+    """(n, 2n, 3) likewise"""
+    found: Crossings
+    """where it crosses itself"""
+    moved: float
+    """farthest that evening out moved a point off the solved triangles"""
 
 
 class Delivery:
@@ -35,14 +48,15 @@ class Delivery:
         self._fresh = fruit.surface(*lattice(resolution))
         self._fresh_nodes = mesh.positions[mesh.surface_nodes]
 
-    def __call__(self, nodes: Floats) -> tuple[Any, Any, Crossings]:
-        """Return displacement and position (n, 2n, 3), as they are handed over, and where they cross; nodes (nc, 3)."""
-        position = self._fresh + self._sampler(nodes - self._fresh_nodes)
+    def __call__(self, nodes: Floats) -> Delivered:
+        """Return what is handed over of nodes (nc, 3)."""
+        position, moved = self._fresh + self._sampler(nodes - self._fresh_nodes), 0.0
         found = of_lattice(self._rounded(position))
         if found.count:
-            linear = on_triangles(self._mesh.sphere, self._sampler) @ nodes
-            position, found = even_out(linear.reshape(position.shape), self._rounded)
-        return (position - self._fresh).astype(self._dtype), position.astype(self._dtype), found
+            linear = (on_triangles(self._mesh.sphere, self._sampler) @ nodes).reshape(position.shape)
+            position, found = even_out(linear, self._rounded)
+            moved = float(np.linalg.norm(position - linear, axis=-1).max())
+        return Delivered((position - self._fresh).astype(self._dtype), position.astype(self._dtype), found, moved)
 
     def _rounded(self, position: Floats) -> Floats:
         return position.astype(self._dtype).astype(np.float64)

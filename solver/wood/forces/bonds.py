@@ -65,17 +65,20 @@ def _over(lane: np.ndarray, edge: np.ndarray, first: int, x: np.ndarray, y: np.n
 
 
 @njit(cache=True, error_model="numpy")
+def _parts(u: float) -> tuple[float, float, float, float]:
+    """Return the parts of p and q in the curve's place at u, and in its slope."""
+    v = min(max(u, 0.0), 1.0)
+    w = 1.0 - v
+    # beyond its ends the curve goes straight on
+    return v * w * w + min(u, 0.0), max(u - 1.0, 0.0) - v * v * w, w * (1.0 - 3.0 * v), v * (3.0 * v - 2.0)
+
+
+@njit(cache=True, error_model="numpy")
 def _reach(count: int, law: np.ndarray, row: np.ndarray) -> None:
     """Overwrite the rows 0 to 5 of bonds by d and t."""
     for n in range(count):
         u = law[SHARE, n]
-        v = min(max(u, 0.0), 1.0)
-        w = 1.0 - v
-        # beyond its ends the curve goes straight on
-        a = v * w * w + min(u, 0.0)
-        b = max(u - 1.0, 0.0) - v * v * w
-        a1 = w * (1.0 - 3.0 * v)
-        b1 = v * (3.0 * v - 2.0)
+        a, b, a1, b1 = _parts(u)
         ex, ey, ez = row[6, n], row[7, n], row[8, n]
         px, py, pz = row[9, n], row[10, n], row[11, n]
         qx, qy, qz = row[12, n], row[13, n], row[14, n]
@@ -115,12 +118,7 @@ def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
     """Write the forces on p and q to the rows 6 to 11, and on the edge over those by t."""
     for n in range(count):
         u = law[SHARE, n]
-        v = min(max(u, 0.0), 1.0)
-        w = 1.0 - v
-        a = v * w * w + min(u, 0.0)
-        b = max(u - 1.0, 0.0) - v * v * w
-        a1 = w * (1.0 - 3.0 * v)
-        b1 = v * (3.0 * v - 2.0)
+        a, b, a1, b1 = _parts(u)
         fx, fy, fz = force[0, n], force[1, n], force[2, n]
         tx, ty, tz = force[3, n], force[4, n], force[5, n]
         force[3, n] = tx - u * fx

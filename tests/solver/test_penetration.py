@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from service.formats import mesh as drawn
-from solver.dehydration.measures.crossing import closed_lattice, of_lattice, of_quads
+from solver.dehydration.measures.penetration import closed_lattice, of_lattice, of_quads
 from solver.fruit import directions, lattice
 
 from ._skins import cubed_sphere
@@ -47,3 +47,16 @@ def test_balls_that_overlap_cross_no_deeper_than_they_do():
     assert depths[0] == 0
     assert 0.005 < depths[1] < 0.03
     assert depths[1] < depths[2] < 0.08
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.004, 0.01])
+def test_balls_whose_poles_meet_overlap_as_deep_as_they_cross(overlap):
+    """The poles are nodes, one below the other; facets lie inside their ball by h^2 / 8.
+
+    Deeper, whole triangles are through, and depth is a lower bound: see the test before.
+    """
+    ball, quads = cubed_sphere(12)
+    both = np.concatenate([ball, ball * [1, 1, -1] + [0, 0, 2 - overlap]])
+    found = of_quads(both, np.concatenate([quads, quads[:, ::-1] + len(ball)]))
+    assert (found.count > 0) == (overlap > 0)
+    assert found.depth == pytest.approx(overlap, abs=0.003)
