@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["QUANTITIES", "Quantity", "attrs", "register"]
+__all__ = ["QUANTITIES", "Quantity", "attrs", "register", "unit_attrs"]
 
 
 class Quantity(NamedTuple):
@@ -48,6 +48,19 @@ def attrs(name: str) -> dict[str, str]:
     """
     quantity = QUANTITIES[name]
     return {"units": quantity.units, "long_name": quantity.long_name, "symbol": quantity.symbol}
+
+
+def unit_attrs(units: str) -> dict[str, str]:
+    """Return the netCDF attributes that say a unit in words that UDUNITS reads, as the CF conventions ask.
+
+    A length over the fruit's own, `r1`, is a number: what it was divided by is named beside it. Decibels are tenths of
+    a logarithm to the base of ten.
+    """
+    if units == "dB":
+        return {"units": "0.1 lg(re 1)"}
+    if "r1" in units or "shape's unit" in units:
+        return {"units": "1", "normalised_by": units}
+    return {"units": units}
 
 
 # axes and convergence data that every solver shares

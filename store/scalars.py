@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from solver import __version__, quantities
 from solver.contract import Solver
 from solver.quantities import QUANTITIES
 
@@ -68,7 +69,7 @@ def build(
     units = solver.axis_units()
     for axis in table.coords:
         if axis in units:
-            table[axis].attrs["units"] = units[str(axis)]
+            table[axis].attrs.update(quantities.unit_attrs(units[str(axis)]))
     table = table.assign_attrs(_about(solver, chosen))
     path = path_of(store, name)
     shards.write(path, table, name)
@@ -163,6 +164,7 @@ def _about(solver: Solver, chosen: Sequence[tuple[Job, Mapping[str, Any]]]) -> d
     }
     return {
         "title": f"numbers of {solver.name} runs",
+        "history": f"put together from {len(chosen)} results by wizen {__version__}",
         "solver": solver.name,
         "solver_version": first.version,
         "params": canonical(first.params).decode(),

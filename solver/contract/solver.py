@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .. import quantities
+from .. import __version__, quantities
 from .context import Context
 from .errors import InvalidInput, Unstable
 from .looks import Looks
@@ -188,6 +188,9 @@ def finish(result: xr.Dataset, solver: Solver, params: Params, need: Need) -> xr
         solver_version=solver.version,
         params=params.model_dump_json(),
         need=need.model_dump_json(),
+        title=solver.title,
+        # without the time: the same question gives the same bytes
+        history=f"solved by {solver.name} {solver.version} of wizen {__version__}",
         Conventions="CF-1.11",
     )
     return result

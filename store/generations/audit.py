@@ -135,7 +135,11 @@ def _trust(opened: xr.Dataset) -> Iterator[str]:
     names = {f"left_out_{name}": unit for name, unit in UNITS.items()}
     if "left_out_rgh" in opened:
         for name, unit in names.items():
-            if name not in opened or opened[name].attrs.get("units") != unit:
+            # tables of before write units as people do
+            if name not in opened or opened[name].attrs.get("units") not in (
+                unit,
+                quantities.unit_attrs(unit)["units"],
+            ):
                 yield f"{name} is missing, or not in {unit!r}. {_REBUILD}"
     for name in ("spectrum", "degree_power", "neighbour_correlation", *names):
         if name in opened and not np.isfinite(opened[name].values).all():

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import h5netcdf  # type: ignore[import-untyped]
 import numpy as np
 
-from solver import quantities
+from solver import __version__, quantities
 from solver.arrays import Array
 from solver.contract import Solver
 
@@ -141,6 +141,7 @@ def _small(samples: Samples, rows: list[Rows], solver: Solver, band: int) -> xr.
     }
     attrs = {
         "title": f"look-up table of {solver.name}",
+        "history": f"built from {len(samples.keys)} results by wizen {__version__}",
         "solver": solver.name,
         "solver_version": samples.version,
         "params": canonical(samples.template).decode(),
@@ -174,7 +175,7 @@ def _judge(stored: Array, samples: Samples, solver: Solver) -> dict[str, xr.Vari
             ("sample", "stage"),
             _rounded(errors[..., i]),
             {
-                "units": UNITS[name],
+                **quantities.unit_attrs(UNITS[name]),
                 "long_name": f"{name} of the sample predicted from the others",
                 "method": str(method),
             },
@@ -198,5 +199,5 @@ def axis(samples: Samples, name: str, units: Mapping[str, str]) -> tuple[str, Ar
     where = field if index is None else f"{field}[{index}]"
     attrs = {"long_name": f"parameter {where}"}
     if name in units:
-        attrs["units"] = units[name]
+        attrs |= quantities.unit_attrs(units[name])
     return "sample", np.array([values[name] for values in samples.values]), attrs

@@ -14,6 +14,7 @@ import trimesh
 from service.errors import InvalidQuery, NotAcceptable
 from service.formats import FORMATS, gltf, negotiate, write
 from service.formats import mesh as topology
+from solver import lattice
 
 from ._shapes import ABOUT, HALF_AXES, ellipsoid, polyhedron_volume
 
@@ -58,6 +59,14 @@ def test_a_collapsed_surface_still_has_unit_normals() -> None:
     position = np.repeat(np.repeat(np.float32([[[0.5, 0.5, 0.0]]]), 8, axis=0), 16, axis=1)
     lattice_normals, _ = topology.normals(position)
     assert np.allclose(np.linalg.norm(lattice_normals, axis=-1), 1)
+
+
+def test_a_texture_is_laid_out_as_latitude_and_longitude() -> None:
+    """Of a map of n rows the i-th texel's middle, (i + 1/2) / n from the top, is the i-th colatitude over pi."""
+    n = 6
+    uv = topology.texture(n)[: n * (2 * n + 1)].reshape(n, 2 * n + 1, 2)
+    assert np.allclose(uv[..., 1], (lattice.colatitudes(n) / np.pi)[:, None], atol=1e-7)
+    assert np.allclose(uv[:, :-1, 0], lattice.azimuths(n) / (2 * np.pi), atol=1e-7)
 
 
 def test_the_seam_repeats_the_closed_mesh() -> None:

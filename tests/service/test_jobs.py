@@ -214,7 +214,11 @@ def test_streams_of_events_are_counted(store: Store) -> None:
         with client.stream("GET", url) as one, client.stream("GET", url) as two:
             lines = [stream.iter_lines() for stream in (one, two)]  # kept: a dropped one would close its stream
             assert {next(each) for each in lines} == {"retry: 1000"}
-            checked(client.get(url), 429, "too-many-listeners")
+            # a stream, were there one, would not end
+            with client.stream("GET", url) as third:
+                assert third.status_code == 429
+                third.read()
+            checked(third, 429, "too-many-listeners")
 
         def free() -> bool:
             with client.stream("GET", url) as again:

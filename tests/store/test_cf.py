@@ -1,0 +1,75 @@
+"""Files as the CF conventions have them: readers that know nothing of wizen understand units, title and history."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from solver import registry
+from solver.dehydration import SOLVER
+from solver.quantities import QUANTITIES, unit_attrs
+from store import scalars, tables
+from store.store import Store
+from store.surfaces.measures import UNITS
+
+#: What this project writes of UDUNITS' words; the slow test below asks UDUNITS itself.
+KNOWN = {
+    "1",
+    "s",
+    "day",
+    "m",
+    "m s-2",
+    "radian",
+    "degree",
+    "degC",
+    "percent",
+    "J",
+    "J m-3",
+    "N s",
+    "Pa",
+    "0.1 lg(re 1)",
+}
+
+
+def test_every_unit_that_leaves_is_one_that_others_read() -> None:
+    said = {quantity.units for quantity in QUANTITIES.values()} | set(UNITS.values())
+    for name in registry.names():
+        solver = registry.get(name)
+        said |= {*solver.axis_units().values(), solver.stages.units}
+    assert {unit_attrs(unit)["units"] for unit in said} <= KNOWN
+    assert unit_attrs("1/r1") == {"units": "1", "normalised_by": "1/r1"}
+
+
+def files(store: Store) -> list[Path]:
+    table = tables.build(store, SOLVER)
+    return [store.shard_path(table.keys[0]), tables.path_of(store, table), scalars.build(store, SOLVER, "numbers")]
+
+
+def test_every_file_says_what_it_is_and_how_it_came_about(filled: Store) -> None:
+    for path in files(filled):
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            assert opened.attrs["Conventions"] == "CF-1.11"
+            assert opened.attrs["title"]
+            assert "wizen" in opened.attrs["history"]
+            for name, variable in opened.variables.items():
+                if variable.dtype.kind in "fiu":
+                    assert variable.attrs["units"] in KNOWN, name
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_the_compliance_checker_finds_nothing(filled: Store, tmp_path: Path) -> None:
+    """In an environment of its own: it brings netCDF4, which xarray would then prefer in every other test."""
+    python = tmp_path / "env" / "bin" / "python"
+    subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", "compliance-checker>=6"], check=True)
+    for number, path in enumerate(files(filled)):
+        named = shutil.copy(path, tmp_path / f"{number}.nc")
+        words = [python.with_name("compliance-checker"), "--test=cf:1.11", "--criteria=strict", named]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        assert "All tests passed!" in done.stdout, done.stdout + done.stderr
