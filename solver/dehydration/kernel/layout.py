@@ -231,7 +231,8 @@ def _masses(
     for exocarp in (False, True):
         chosen = skin == exocarp
         mass[chosen] = safety * largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp) / 4
-    return np.bincount(connect.ravel(), weights=np.repeat(mass, 8), minlength=nodes)
+    masses: Floats = np.bincount(connect.ravel(), weights=np.repeat(mass, 8), minlength=nodes).astype(np.float64)
+    return masses
 
 
 def _inverse(mass: Floats, held: Bools) -> Floats:
