@@ -29,7 +29,7 @@ def _cost(params: GrowthParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="growth",
-    version="2",
+    version="3",
     title="Growth of thin shells",
     params=GrowthParams,
     fields=("mesh_position", "elastic_strain", "mesh_area", "stored_energy", "rest_area"),

@@ -172,12 +172,14 @@ def _eliminate(panel: Floats, rest: Floats) -> tuple[_Block, int]:
     return _Block(factor, signs, below), _negatives(factor, signs)
 
 
-def factorise(analysis: Analysis, data: Floats, watch: Callable[[], None] | None = None) -> Factor:
+def factorise(
+    analysis: Analysis, data: Floats, watch: Callable[[], None] | None = None, definite: bool = False
+) -> Factor:
     """Return the factor of the symmetric matrix with blocks `data` (nnz, 3, 3) on the analysed pattern.
 
-    watch: called before each front; what it raises ends the factorisation.
+    watch: called before each front; what it raises ends the factorisation. definite: end it where it is not.
 
-    Raises numpy.linalg.LinAlgError if a front is exactly singular.
+    Raises numpy.linalg.LinAlgError if a front is exactly singular; with `definite`, if one is not positive definite.
     """
     place = np.full(len(analysis.indptr) - 1, -1)
     blocks: list[_Block] = []
@@ -196,6 +198,8 @@ def factorise(analysis: Analysis, data: Floats, watch: Callable[[], None] | None
             _extend(panel, rest, open_.pop(child), below.nodes[below.own :], place, pivots)
         place[front.nodes] = -1
         block, below_zero = _eliminate(panel, rest) if pivots else (_Block(panel, None, panel), 0)
+        if definite and block.signs is not None:
+            raise np.linalg.LinAlgError("the matrix is not positive definite")
         blocks.append(block)
         negative += below_zero
         open_[number] = rest

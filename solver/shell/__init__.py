@@ -7,7 +7,7 @@ solver's unit of length), forces in mu l. Every kernel takes arrays and returns 
 from .bending import angles, bending, bending_tangent, hinge_stiffness
 from .contact import candidates, contact, contact_diagonal
 from .curvature import added_angles, from_angles, to_angles
-from .hessian import bending_hessian, membrane_hessian
+from .hessian import bending_hessian, membrane_hessian, volume_hessian
 from .material import Material
 from .mean import mean_bending, mean_stiffness
 from .membrane import areas, membrane, membrane_tangent, metric, metric_of_lengths
@@ -40,4 +40,5 @@ __all__ = [
     "pattern",
     "to_angles",
     "topology",
+    "volume_hessian",
 ]

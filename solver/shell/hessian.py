@@ -12,7 +12,7 @@ from numba import njit
 
 from ..arrays import Floats, Ints
 
-__all__ = ["bending_hessian", "hinge_hessian", "membrane_hessian"]
+__all__ = ["bending_hessian", "hinge_hessian", "membrane_hessian", "volume_hessian"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -158,3 +158,24 @@ def membrane_hessian(x: Floats, triangles: Ints, g: Floats, lame: float, places:
                                         )
                                         total += tensor * weight[m, a] * edge[b, c] * weight[n, h] * edge[k2, d]
                         blocks[at, c, d] += area * total
+
+
+@njit(cache=True, error_model="numpy")
+def volume_hessian(x: Floats, triangles: Ints, factor: float, places: Ints, blocks: Floats) -> None:
+    """Add factor times the second derivative of the volume inside, sum of x_i . (x_j x x_k) / 6, to `blocks`.
+
+    The derivative of x_j x x_k by x_j is -[x_k], by x_k it is [x_j], [a] b = a x b. x (n, 3), triangles (f, 3) closed,
+    places (f, 9) as in `Pattern`.
+    """
+    for t in range(len(triangles)):
+        for corner in range(3):
+            a, b = (corner + 1) % 3, (corner + 2) % 3
+            for row, column, vertex, sign in ((corner, a, b, -1.0), (corner, b, a, 1.0)):
+                block, v = blocks[places[t, 3 * row + column]], x[triangles[t, vertex]]
+                part = sign * factor / 6
+                block[0, 1] -= part * v[2]
+                block[0, 2] += part * v[1]
+                block[1, 0] += part * v[2]
+                block[1, 2] -= part * v[0]
+                block[2, 0] -= part * v[1]
+                block[2, 1] += part * v[0]

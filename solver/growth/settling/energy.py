@@ -1,4 +1,8 @@
-"""The energy of one growth step: membrane, bending, pressure as a dead load, solids as penalties, held vertices."""
+"""The energy of one growth step: membrane, bending, pressure, solids as penalties, held vertices.
+
+Pressure is a dead load, laid anew along the normals from time to time. What it does to a closed surface is the work on
+the volume inside, -p V(x), so there it may follow every move (`following`): then its second derivative is at hand too.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,18 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import bsr_array, csc_array, diags_array
+from scipy.sparse import bsr_array
 
 from ... import shell
 from ...arrays import Floats, Ints
 from ...linalg.dissection import Fronts
+from ...linalg.multifrontal import Analysis, analyse
 from ...shell.inverse import Inverse, fronts_of, inverse_of
 from ...shell.normals import normals
 from ..params import Bending, Plane, SolidBall
 from ..state import State
 
-__all__ = ["StepEnergy", "Tangent", "ahead", "elastic"]
+__all__ = ["StepEnergy", "Tangent", "ahead", "area_vectors", "elastic"]
 
 
 #: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
@@ -29,6 +34,8 @@ _STIFFEST = 10.0
 _SLACK = 0.5
 #: Penalty of solids per area and depth [mu / l^2].
 _HARDNESS = 30.0
+#: Pairs of vertices in the smallest front: below some twenty, calls take longer than their arithmetic.
+_LEAF = 24
 
 
 class Tangent:
@@ -38,11 +45,20 @@ class Tangent:
         self.mesh = mesh
         self.fronts: Fronts | None = None
         self.inverse = inverse
+        self._analysis: Analysis | None = None
 
     @cached_property
     def pattern(self) -> shell.Pattern:
         """Where blocks go."""
         return shell.pattern(self.mesh)
+
+    def analysis(self, x: Floats) -> Analysis:
+        """Return the order in which the whole second derivative is eliminated; x (n, 3) of the first call decides."""
+        if self._analysis is None:
+            pairs = np.concatenate([self.mesh.edges, self.mesh.hinges[:, 2:]])
+            indptr, indices = self.pattern.indptr, self.pattern.indices
+            self._analysis = analyse(pairs, x[pairs].mean(axis=1), indptr, indices, leaf_size=_LEAF)
+        return self._analysis
 
     def copy(self) -> Tangent:
         """Return a tangent that starts from this one's inverse, and may take another."""
@@ -89,7 +105,10 @@ class StepEnergy:
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         distance: float = 0.0,
         bending: Bending = "hinges",
+        following: bool = False,
     ) -> None:
+        #: Whether the pressure does its work on the volume: it cannot where the surface has a border.
+        self.following = following and bool(pressure) and not len(state.mesh.border)
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self._pressure, self._gravity, self._bending = pressure, gravity, bending
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
@@ -105,12 +124,12 @@ class StepEnergy:
 
     def follow(self, x: Floats) -> None:
         """Lay the pressure along the normals at x (n, 3); it is a dead load until it is laid again."""
-        self._last = None
-        if self._pressure:
-            self.load = self._pressure * _area_vectors(x, self.state.mesh.triangles)
+        self._last, self.load = None, None
+        if self._pressure and not self.following:
+            self.load = self._pressure * area_vectors(x, self.state.mesh.triangles)
         if any(self._gravity):
             weight = self.areas[:, None] * np.array(self._gravity)
-            self.load = weight if self.load is None or not self._pressure else self.load + weight
+            self.load = weight if self.load is None else self.load + weight
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient; the gradient of held directions is 0. What was asked last is remembered."""
@@ -128,6 +147,10 @@ class StepEnergy:
         if self.load is not None:
             energy -= float(np.vdot(self.load, x - state.x))
             gradient -= self.load
+        if self.following:
+            outward = area_vectors(x, state.mesh.triangles)
+            energy -= self._pressure * float(np.vdot(outward, x)) / 3
+            gradient -= self._pressure * outward
         if self._distance:
             if float(np.abs(x - self._looked).max()) > _SLACK * self._distance:
                 self._pairs, self._looked = self._look(x), x
@@ -179,8 +202,8 @@ class StepEnergy:
         """Whether `hessian` is that of this energy: bending by mean curvature has none here."""
         return self._mean is None
 
-    def hessian(self, x: Floats) -> csc_array:
-        """Return the second derivative (3n, 3n) of positions (n, 3); unit rows and columns where held.
+    def hessian(self, x: Floats) -> bsr_array:
+        """Return the second derivative (3n, 3n) of positions (n, 3) in blocks; unit rows and columns where held.
 
         Exact but for contact of the sheet with itself, which counts by its stiffness at each vertex.
         """
@@ -190,10 +213,23 @@ class StepEnergy:
         shell.membrane_hessian(x, mesh.triangles, state.g, lame, pattern.of_triangles, blocks)
         angles = shell.angles(x, mesh.hinges)
         shell.bending_hessian(x, mesh.hinges, angles, state.rest, self.stiffness, pattern.of_hinges, blocks)
+        if self.following:
+            shell.volume_hessian(x, mesh.triangles, -self._pressure, pattern.of_triangles, blocks)
         self._add_obstacles(x, blocks)
-        matrix = bsr_array((blocks, pattern.indices, pattern.indptr)).tocsc()
-        free = diags_array((~state.held.ravel()).astype(float))
-        return csc_array(free @ matrix @ free + diags_array(state.held.ravel().astype(float)))
+        free = ~state.held
+        rows = np.repeat(np.arange(len(x)), np.diff(pattern.indptr))
+        blocks *= free[rows][:, :, None] & free[pattern.indices][:, None, :]
+        blocks[pattern.diagonal] += np.eye(3) * state.held[:, None, :]
+        return bsr_array((blocks, pattern.indices, pattern.indptr))
+
+    @property
+    def diagonal(self) -> Ints:
+        """Which blocks of `hessian` are on the diagonal (n,)."""
+        return self.tangent.pattern.diagonal
+
+    def analysis(self, x: Floats) -> Analysis:
+        """Return the order in which to eliminate `hessian`."""
+        return self.tangent.analysis(x)
 
     def rigid(self, x: Floats) -> Floats:
         """Return motions (3n, k), orthonormal, that no force is felt along: turns and shifts that no held vertex stops.
@@ -252,7 +288,7 @@ class StepEnergy:
         return found
 
 
-def _area_vectors(x: Floats, triangles: Ints) -> Floats:
+def area_vectors(x: Floats, triangles: Ints) -> Floats:
     """Return a third of the area vectors of each vertex's triangles (n, 3)."""
     p = x[triangles]
     third = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
-from scipy.sparse import csc_array, eye_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import bsr_array
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
+from ...linalg.multifrontal import Analysis, factorise
 from .minimise import Energy, Point, descend
 
 __all__ = ["Curved", "newton"]
@@ -27,8 +27,15 @@ _FIRST, _LARGEST, _RISE, _FALL = 1e-8, 1e2, 8.0, 0.125
 class Curved(Energy, Protocol):
     """An energy with second derivatives."""
 
-    def hessian(self, x: Floats) -> csc_array:
+    def hessian(self, x: Floats) -> bsr_array:
         """Return the second derivative (3n, 3n), rows and columns of what is held those of the unit matrix."""
+
+    @property
+    def diagonal(self) -> Ints:
+        """Which of its blocks are on the diagonal (n,)."""
+
+    def analysis(self, x: Floats) -> Analysis:
+        """Return the order in which to eliminate it."""
 
     def rigid(self, x: Floats) -> Floats:
         """Return an orthonormal basis (3n, k) of motions that change no energy."""
@@ -43,10 +50,10 @@ def newton(energy: Curved, x: Floats) -> Iterator[Point]:
         yield Point(x, f, size)
         if size == 0.0:
             return
-        matrix, rigid = energy.hessian(x), energy.rigid(x)
+        matrix, rigid, order = energy.hessian(x), energy.rigid(x), energy.analysis(x)
         t, d = 0.0, g
         while t == 0.0:
-            found = _direction(matrix, g, shift)
+            found = _direction(order, _shifted(matrix.data, energy.diagonal, shift), g)
             if found is not None:
                 # along these the matrix is rounding, and so is what it divides by
                 d = found - (rigid @ (found.ravel() @ rigid)).reshape(-1, 3)
@@ -66,17 +73,20 @@ def newton(energy: Curved, x: Floats) -> Iterator[Point]:
             return
 
 
-def _direction(matrix: csc_array, gradient: Floats, shift: float) -> Floats | None:
-    """Return -(matrix + shift)^-1 gradient (n, 3), or None where that matrix is not positive definite."""
-    shifted = csc_array(matrix + shift * eye_array(gradient.size, format="csc", dtype=np.float64)) if shift else matrix
+def _shifted(blocks: Floats, diagonal: Ints, shift: float) -> Floats:
+    """Return the blocks (nnz, 3, 3) of matrix + shift."""
+    if not shift:
+        return blocks
+    found = blocks.copy()
+    found[diagonal] += shift * np.eye(3)
+    return found
+
+
+def _direction(order: Analysis, blocks: Floats, gradient: Floats) -> Floats | None:
+    """Return -matrix^-1 gradient (n, 3), or None where the matrix is not positive definite."""
     try:
-        # pivots from the diagonal only: then those of U have the signs of the eigenvalues
-        factor = splu(
-            shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}
-        )
-    except RuntimeError:
-        return None
-    if not np.array_equal(factor.perm_r, factor.perm_c) or (factor.U.diagonal() <= 0).any():
+        factor = factorise(order, blocks, definite=True)
+    except np.linalg.LinAlgError:
         return None
     found: Floats = -factor.solve(gradient.ravel()).reshape(-1, 3)
     return found

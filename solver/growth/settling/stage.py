@@ -36,8 +36,8 @@ def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[St
     """Settle a state until no force is above tolerance x `force_unit`, or as far as it goes; yields after each step.
 
     And until nothing moves any more: Newton's last step, which is the distance that is left, is below 0.3 % of an edge.
-    Pressure follows the normals, which were frozen on the way here. The last value is the result, `forces` of which is
-    what is left.
+    Pressure follows the normals, which were frozen on the way here: within each step where the surface is closed, else
+    it is laid again until nothing changes. The last value is the result, `forces` of which is what is left.
 
     Raises:
         Unstable: the shape left the finite.
@@ -53,6 +53,7 @@ def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[St
         params.gravity,
         params.contact,
         params.bending,
+        following=params.bending == "hinges",
     )
     goal = tolerance * force_unit(state, material)
     way = newton if energy.curved else quasi_newton
@@ -70,7 +71,7 @@ def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[St
             yield state
         energy.follow(point.x)
         left = _measured(energy, replace(state, x=point.x))[1]
-        if left <= goal or not params.pressure:
+        if left <= goal or energy.following or not params.pressure:
             break
     iterations = state.iterations + steps
     yield replace(state, x=point.x, forces=left / state.length, iterations=iterations)

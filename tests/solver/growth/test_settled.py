@@ -7,6 +7,7 @@ from solver import shell
 from solver.contract import Context
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
+from solver.growth.settling import newton
 from solver.growth.settling.energy import StepEnergy, Tangent
 
 RIM = {"kind": "surface", "where": {"kind": "rim", "width": 0.3}, "stretch": (1.5, 1.0)}
@@ -78,17 +79,39 @@ def test_stages_do_not_depend_on_each_other():
     assert np.array_equal(end(), end(0.2, 0.45))
 
 
-def test_second_derivatives_are_those_of_differences():
-    """Of membrane and bending, on a mesh that is far from rest; gradients by differences, column by column."""
-    engine = Engine(GrowthParams.parse({"shape": "disc", "thickness": 0.5, "tools": []}), 60)
+@pytest.mark.parametrize(("shape", "pressure"), [("disc", 0.0), ("sphere", 0.7)])
+def test_second_derivatives_are_those_of_differences(shape: str, pressure: float):
+    """Of membrane, bending and the volume inside, on a mesh that is far from rest: differences, column by column."""
+    engine = Engine(GrowthParams.parse({"shape": shape, "thickness": 0.5, "tools": []}), 60)
     state, generator = engine.state, np.random.default_rng(0)
     x = state.x + 0.1 * state.length * generator.normal(size=state.x.shape)
-    energy = StepEnergy(state, shell.Material(0.5), 0.0, (), Tangent(state.mesh))
+    energy = StepEnergy(state, shell.Material(0.5), pressure, (), Tangent(state.mesh), following=True)
+    assert energy.following == (pressure > 0)
     matrix = energy.hessian(x).toarray()
-    columns = np.empty_like(matrix)
+    columns, slopes = np.empty_like(matrix), np.empty(x.size)
     for k in range(x.size):
         move = np.zeros(x.size)
         move[k] = 1e-6
         move = move.reshape(x.shape)
         columns[:, k] = (energy(x + move)[1] - energy(x - move)[1]).ravel() / 2e-6
+        slopes[k] = (energy(x + move)[0] - energy(x - move)[0]) / 2e-6
     assert np.abs(matrix - columns).max() <= 1e-7 * np.abs(columns).max()
+    gradient = energy(x)[1].ravel()
+    assert np.abs(gradient - slopes).max() <= 1e-6 * np.abs(gradient).max()
+
+
+def test_a_direction_is_newton_s_where_the_matrix_is_definite():
+    """Against a dense solve; none is given where an eigenvalue is negative."""
+    engine = Engine(GrowthParams.parse({"shape": "sphere", "thickness": 0.5, "tools": []}), 160)
+    state = engine.state
+    x = state.x + 0.02 * state.length * np.random.default_rng(1).normal(size=state.x.shape)
+    energy = StepEnergy(state, shell.Material(0.5), 0.0, (), Tangent(state.mesh))
+    matrix, gradient, order = energy.hessian(x), energy(x)[1], energy.analysis(x)
+    dense = matrix.toarray()
+    least = float(np.linalg.eigvalsh(dense)[0])
+    assert least < -1e-6, "both cases are to be seen"
+    exact = -np.linalg.solve(dense + 1.2 * abs(least) * np.eye(x.size), gradient.ravel())
+    found = newton._direction(order, newton._shifted(matrix.data, energy.diagonal, 1.2 * abs(least)), gradient)
+    assert found is not None
+    assert np.abs(found.ravel() - exact).max() <= 1e-9 * np.abs(exact).max()
+    assert newton._direction(order, newton._shifted(matrix.data, energy.diagonal, 0.8 * abs(least)), gradient) is None
