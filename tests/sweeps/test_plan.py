@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from solver import registry
+from sweeps import points
 from sweeps.errors import PlanError
 from sweeps.plan import Plan
 
@@ -193,6 +194,23 @@ def test_errors_say_where_and_what(tables: dict[str, Any], said: str) -> None:
         plan(**tables)
     assert caught.value.code == "invalid-plan"
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("most", "fits"), [(6, True), (5, False)])
+@pytest.mark.parametrize("kind", ["grid", "range", "sobol"])
+def test_a_plan_may_have_so_many_samples(monkeypatch: pytest.MonkeyPatch, kind: str, most: int, fits: bool) -> None:
+    monkeypatch.setattr(points, "MAX_SAMPLES", most)
+    box = {"te": {"from": 0.02, "to": 0.06}}
+    asked: dict[str, Any] = {
+        "grid": {"axes": {"te": [0.02, 0.03], "gamma": [10, 20, 30]}},
+        "range": {"axes": {"te": {**box["te"], "count": 6}}},
+        "sobol": {"axes": box, "sampling": {"kind": "sobol", "count": 6}},
+    }[kind]
+    if fits:
+        assert len(plan(**asked).samples) == 6
+    else:
+        with pytest.raises(PlanError, match="6 samples, more than 5"):
+            plan(**asked)
 
 
 def test_files_that_are_no_plans(tmp_path: Path) -> None:
