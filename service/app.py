@@ -85,7 +85,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     metrics = Metrics()
     problems.install(app)
     guards = [] if settings.public_read else [Depends(requires("read"))]
-    declared = {} if settings.public_read else problems.responses(401, 403)
+    # a query may be too long wherever it goes
+    declared = problems.responses(414, *(() if settings.public_read else (401, 403)))
     guarded = (
         catalogue.router,
         shapes.router,
@@ -95,10 +96,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         jobs_results.router,
         results.router,
     )
-    app.include_router(catalogue.open_router)
+    app.include_router(catalogue.open_router, responses=problems.responses(414))
     for router in guarded:
         app.include_router(router, dependencies=guards, responses=declared)
-    app.include_router(jobs.writing)
+    app.include_router(jobs.writing, responses=problems.responses(414))
     routers = (*guarded, catalogue.open_router, jobs.writing)
     app.state.paths = sorted({route.path for router in routers for route in router.routes if isinstance(route, Route)})
     page.install(app, settings.page)

@@ -64,8 +64,8 @@ def store(tmp_path: Path) -> Store:
 
 
 def test_three_hundred_answers_are_as_the_page_says(store: Store, tmp_path: Path) -> None:
-    """Twenty questions to each of fifteen operations: the quick part of what follows."""
-    fuzz(store, tmp_path, examples=20, phases="fuzzing")
+    """Some twenty questions to each operation whose answers end: the quick part of what follows."""
+    fuzz(store, tmp_path, "--exclude-path-regex", "events$", examples=24, phases="fuzzing")
 
 
 @pytest.mark.slow

@@ -43,6 +43,7 @@ EXPECTED: dict[type[Exception], int] = {
     stored.UnknownJob: 404,
     stored.QueueFull: 429,
     stored.ReadOnlyStore: 409,
+    stored.NetworkFileSystem: 503,
     stored.CorruptTokens: 503,
     stored.InvalidToken: 422,
     stored.UnknownToken: 404,
