@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -75,6 +76,18 @@ def test_held_out_runs_and_the_floor_of_another_seed(tmp_path: Path) -> None:
     floor = rows["seed", 0.2]
     np.testing.assert_allclose(floor[:4], (1, 0, 0, 0), atol=1e-2)
     assert floor.corr < 0.5
+
+
+def test_the_floor_of_another_seed_is_taken_both_ways_round(tmp_path: Path) -> None:
+    """Whichever of two seeds is named first: one a fifth rougher is 1.2 over the other, and the other 1 / 1.2."""
+    table = ShapeTable.open(starter.ROOT, surfaces=registry.surface)
+    (case,) = score.cases(Store.open(starter.ROOT), table, held_out(tmp_path / "held", table).root)[0]
+    rougher = dataclasses.replace(case, truth=lambda s: 1.2 * case.truth(s))
+    floors = [score.score(table, (), [pair], ()).rows for pair in ((case, rougher), (rougher, case))]
+    assert [row.method for row in floors[0]] == ["seed"] * len(table.stages)
+    for one, other in zip(*floors, strict=True):
+        np.testing.assert_allclose(one.measures, other.measures, rtol=1e-12, atol=1e-12)
+        assert one.measures.rgh > 1.005  # of r and 1 / r the mean is above 1
 
 
 def test_the_table_for_people() -> None:
