@@ -22,8 +22,17 @@ __all__ = ["Coding"]
 
 #: Bodies below this size gain nothing [bytes].
 _LEAST = 1024
-#: Meshes and tables of numbers, which the library does not know; netCDF, zip and PNG are compressed already.
-_TYPES = ("model/gltf-binary", "model/obj", "model/stl", "model/vnd.usdz+zip", "application/x-ply", "text/csv")
+#: What the library does not know. Archives, netCDF and USD's binary form are packed already, and points of live views
+#: are not worth the wait.
+_TYPES = (
+    "application/x-mdd",
+    "application/x-ndjson",
+    "application/x-pc2",
+    "model/gltf-binary",
+    "model/obj",
+    "model/vnd.usda",
+    "model/x-ply",
+)
 #: Fast levels: a shape is computed in a millisecond, and higher ones cost ten times that for a few percent.
 _ZSTD, _BROTLI, _GZIP = 3, 4, 2
 _TAGGED = re.compile(r'-(zstd|br|gzip)(?=")')

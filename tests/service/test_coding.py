@@ -12,6 +12,9 @@ import pytest
 import zstandard
 from pydantic import ValidationError
 
+from service import coding
+from service.formats import FORMATS
+from service.sequences import EXPORTS
 from service.settings import Settings
 
 from .conftest import QUERY, SHAPE, client_of
@@ -36,23 +39,32 @@ def raw(client: httpx.Client, coding: str, **headers: str) -> tuple[httpx.Respon
         return answer, b"".join(answer.iter_raw())
 
 
-@pytest.mark.parametrize("coding", UNPACK)
-def test_a_coded_answer_is_the_plain_one_under_another_tag(client: httpx.Client, coding: str) -> None:
+@pytest.mark.parametrize("name", UNPACK)
+def test_a_coded_answer_is_the_plain_one_under_another_tag(client: httpx.Client, name: str) -> None:
     plain, body = raw(client, "identity")
     assert "content-encoding" not in plain.headers
     for _ in range(2):  # the second time the answer comes from those kept
-        answer, packed = raw(client, coding)
-        assert answer.headers["content-encoding"] == coding
+        answer, packed = raw(client, name)
+        assert answer.headers["content-encoding"] == name
         assert "accept-encoding" in answer.headers["vary"].lower()
-        assert UNPACK[coding](packed) == body
+        assert UNPACK[name](packed) == body
         assert len(packed) < 0.6 * len(body)
         tag = answer.headers["etag"]
-        assert tag == f'{plain.headers["etag"][:-1]}-{coding}"'
-    again, nothing = raw(client, coding, **{"If-None-Match": f'"other", {tag}'})
+        assert tag == f'{plain.headers["etag"][:-1]}-{name}"'
+    again, nothing = raw(client, name, **{"If-None-Match": f'"other", {tag}'})
     assert (again.status_code, nothing, again.headers["etag"]) == (304, b"", tag)
     # the same shape, whichever coding it came in
     assert raw(client, "identity", **{"If-None-Match": tag})[0].status_code == 304
-    assert raw(client, coding, **{"If-None-Match": '"other-gzip"'})[0].status_code == 200
+    assert raw(client, name, **{"If-None-Match": '"other-gzip"'})[0].status_code == 200
+
+
+def test_every_format_is_compressed_or_packed_already() -> None:
+    known = {each.media_type.partition(";")[0] for each in (*FORMATS.values(), *EXPORTS.values())}
+    packed = {"application/zip", "application/x-npz", "model/vnd.usdc", "application/vnd.wizen.points"}
+    packed |= {"image/png", "image/x-exr"}
+    assert known - packed <= {"application/json", *coding._TYPES}
+    assert set(coding._TYPES) <= known | {"application/x-ndjson"}  # of batches
+    assert not packed & set(coding._TYPES)
 
 
 def test_refused_codings_are_not_used(client: httpx.Client) -> None:
