@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES, Vector
 from solver.dehydration.kernel.elements import core_forces, exocarp_forces, one_point_forces
 from solver.dehydration.kernel.fixed_point import QUANTUM
-from solver.dehydration.kernel.lanes import (
+from solver.dehydration.kernel.generate.lanes import (
     FAST,
     FOUR,
     FOUR_INT,

@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 
 from solver.dehydration.kernel.fixed_point import QUANTUM
-from solver.dehydration.kernel.generate import load_generated
+from solver.dehydration.kernel.generate.source import load_generated
 from solver.dehydration.kernel.strips import LANES
 
-from ...arrays import Ints, Ints32, Singles
+from ....arrays import Ints, Ints32, Singles
 
 _generated = load_generated()
 core_block = _generated.core_block

@@ -23,8 +23,8 @@ from solver.dehydration.kernel.algebra import (
     Vector,
     refine_inverse_cube_root,
 )
-from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.elements import core_forces, exocarp_forces, one_point_forces
+from solver.dehydration.kernel.generate.digest import source_digest
 from solver.dehydration.kernel.strips import LANES
 
 
@@ -112,7 +112,7 @@ HEAD = '''"""Generated from the element algebra of wizen's dehydration kernel; d
 import numpy as np
 from numba import njit
 
-from solver.dehydration.kernel.bits import guess_inverse_cube_root
+from solver.dehydration.kernel.generate.bits import guess_inverse_cube_root
 
 OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"}, "boundscheck": False}
 '''
