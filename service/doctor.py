@@ -23,9 +23,9 @@ from urllib.request import urlopen
 
 from solver import registry
 from store import tables
+from store.checking import audit
 from store.errors import NetworkFileSystem, StoreError
-from store.filesystem import filesystem, refuse_network
-from store.generations import audit
+from store.ledger.filesystem import filesystem, refuse_network
 from store.store import Store
 
 from .settings import Settings

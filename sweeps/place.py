@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from store.clock import Clock
+from store.ledger.clock import Clock
 
 __all__ = ["Place"]
 

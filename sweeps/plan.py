@@ -19,7 +19,7 @@ from typing import Any, Self
 
 from solver import registry
 from solver.contract import InvalidGeometry, InvalidInput, Need, Params, Solver
-from store.ledger import JobSpec
+from store.ledger.jobs import JobSpec
 
 from . import planfile
 from .errors import PlanError

@@ -21,7 +21,7 @@ from store.blending import methods
 from store.blending.methods.weights import Samples
 from store.generations import trust
 from store.generations.samples import read_axes
-from store.jobs import Job, JobSpec
+from store.ledger.jobs import Job, JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces.measures import Surface, compare

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from typing import Any
 
-from store.ledger import Job, JobSpec
-from store.queue import Queue
+from store.ledger.jobs import Job, JobSpec
+from store.ledger.queue import Queue
 from store.store import Store
 
 from .errors import SweepError

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, wait
 
-from store.ledger import JobSpec
+from store.ledger.jobs import JobSpec
 from store.store import Store
 
 from .plan import Plan

@@ -17,7 +17,7 @@ from solver.lattice import lattice
 from store import keys
 from store.blending import methods
 from store.generations.samples import read_axes
-from store.jobs import Job
+from store.ledger.jobs import Job
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import measures, spectra

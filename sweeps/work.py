@@ -21,7 +21,7 @@ from solver import registry
 from solver.contract import Cancelled, Context, InvalidInput, Need, Solver, SolverError, finish
 from store import shards
 from store.errors import CorruptShard, StoreError
-from store.ledger import Job, JobSpec
+from store.ledger.jobs import Job, JobSpec
 from store.store import Store
 
 from . import tabled

@@ -16,7 +16,7 @@ from benchmarks import figures
 from benchmarks.figures import ROOT, Sheet
 from solver.contract import Need
 from solver.dehydration import SOLVER, DehydrationParams
-from store.ledger import JobSpec
+from store.ledger.jobs import JobSpec
 from store.store import Store
 from sweeps import executors
 from sweeps.plan import Plan

@@ -15,7 +15,7 @@ import anyio.to_thread
 from fastapi import APIRouter, Header, Request
 from starlette.responses import Response, StreamingResponse
 
-from store.jobs import Job
+from store.ledger.jobs import Job
 
 from .. import problems
 from ..clients import client_of

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from store.queue import Queue
+from store.ledger.queue import Queue
 from store.starter import ROOT as STARTER
 from store.store import Store
 

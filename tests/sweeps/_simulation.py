@@ -18,9 +18,9 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from pathlib import Path
 from typing import Any
 
-from store.clock import Clock
-from store.jobs import JobSpec
-from store.ledger import MAX_LOST, Job, Ledger
+from store.ledger.clock import Clock
+from store.ledger.jobs import Job, JobSpec
+from store.ledger.ledger import MAX_LOST, Ledger
 from sweeps.place import Place
 from sweeps.run import Run
 from sweeps.work import Hold, Outcome, Task, beat

@@ -10,9 +10,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import seal
-from ..canonical import canonical
-from ..errors import CorruptTable, UnknownTable
+from . import seal
+from .canonical import canonical
+from .errors import CorruptTable, UnknownTable
 
 __all__ = ["TableInfo", "directory", "read_manifest", "write_manifest"]
 

@@ -17,8 +17,8 @@ from .. import seal
 from ..blending.blend import complex_view
 from ..canonical import canonical
 from ..errors import CorruptTable, MixedSamples
+from ..generations import generation
 from ..surfaces import harmonics, spectra
-from . import generation
 
 __all__ = ["Comparison", "Difference", "Side", "compare"]
 

@@ -17,10 +17,10 @@ from solver.arrays import Array
 
 from .. import seal
 from ..errors import CorruptShard, CorruptTable, MixedSamples, UnknownJob
+from ..generations import generate, generation
 from ..store import Store
 from ..surfaces.measures import UNITS
 from ..tables import TableInfo, info, path_of
-from . import generate, generation
 
 __all__ = ["Finding", "verify"]
 

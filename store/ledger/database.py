@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import CorruptLedger, ReadOnlyStore, StorageFull
+from ..errors import CorruptLedger, ReadOnlyStore, StorageFull
 from .filesystem import refuse_network
 
 __all__ = ["Database"]

@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass
 from sqlite3 import Connection
 
-from .errors import QueueFull
+from ..errors import QueueFull
 from .jobs import Job, JobSpec, State, read_row
 from .ledger import SELECT, Ledger, enter, get
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from .errors import NetworkFileSystem
+from ..errors import NetworkFileSystem
 
 __all__ = ["filesystem", "refuse_network"]
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, Self, get_args
 
 from solver.contract import Need, Params, Solver
 
-from . import keys
+from .. import keys
 
 __all__ = ["STATES", "Job", "JobSpec", "State", "read_row"]
 

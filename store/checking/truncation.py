@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..blending.blend import complex_view
+from ..generations import generation
 from ..store import Store
 from ..surfaces import harmonics, spectra
 from ..tables import TableInfo, path_of
-from . import generation
 
 __all__ = ["Loss", "losses"]
 

@@ -16,10 +16,10 @@ from pathlib import Path
 from sqlite3 import Connection
 from typing import TYPE_CHECKING, Any
 
-from .canonical import canonical
+from ..canonical import canonical
+from ..errors import UnknownJob
 from .clock import Clock
 from .database import Database
-from .errors import UnknownJob
 from .jobs import STATES, Job, JobSpec, State, read_row
 
 if TYPE_CHECKING:
