@@ -11,54 +11,27 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
-from sqlite3 import Connection
 from typing import TYPE_CHECKING, Any
 
-from ..canonical import canonical
-from ..errors import UnknownJob
 from .clock import Clock
 from .database import Database
 from .jobs import STATES, Job, JobSpec, State, read_row
+from .leases import Leases
+from .recovery import rebuild
+from .rows import SELECT, among, enter, get
+from .schema import SCHEMA, UPGRADES
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Job", "JobSpec", "Ledger", "State"]
+__all__ = ["MAX_LOST", "Ledger"]
 
 #: A job that took its worker down this often (out of memory, a crash) is given up.
 MAX_LOST = 5
-#: Seconds without a sign after which a job is taken over whose lease was noted before leases had clocks.
-_OLD_LEASE = 60.0
-
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS jobs (
-    key TEXT PRIMARY KEY, solver TEXT NOT NULL, version TEXT NOT NULL, params TEXT NOT NULL, need TEXT NOT NULL,
-    plan TEXT NOT NULL DEFAULT '', state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, worker TEXT,
-    lease_until REAL, digest TEXT, error TEXT, seconds REAL, created REAL NOT NULL, updated REAL NOT NULL,
-    progress REAL NOT NULL DEFAULT 0,
-    claims INTEGER NOT NULL DEFAULT 0, clock TEXT, lease REAL, failures INTEGER NOT NULL DEFAULT 0
-);
-CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
--- a job may belong to several plans, of which jobs.plan is the one that asked first
-CREATE TABLE IF NOT EXISTS plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) WITHOUT ROWID;
--- what a running job says of itself
-CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) WITHOUT ROWID
-"""
-
-#: What older files lack: by the version that they have, how they become the next.
-_UPGRADES = {
-    1: "ALTER TABLE jobs ADD COLUMN claims INTEGER NOT NULL DEFAULT 0; "
-    "ALTER TABLE jobs ADD COLUMN clock TEXT; ALTER TABLE jobs ADD COLUMN lease REAL",
-    2: "ALTER TABLE jobs ADD COLUMN failures INTEGER NOT NULL DEFAULT 0",
-}
-
 #: The claim that a job's worker holds, or gave back without anybody having taken the job since.
 _HELD = "key = ? AND claims = ? AND (worker = ? OR worker IS NULL AND state = 'wanted')"
-
-#: Reads whole jobs.
-SELECT = "SELECT jobs.*, notes.message FROM jobs LEFT JOIN notes ON notes.key = jobs.key"
 
 _LOST = {
     "code": "worker-lost",
@@ -75,10 +48,8 @@ class Ledger:
 
     def __init__(self, path: Path | str, clock: Clock | None = None) -> None:
         self.path = Path(path)
-        self.database = Database(self.path, _SCHEMA, _UPGRADES)
-        self._clock = clock or Clock.of_host()
-        #: Leases by another clock than ours: what was last seen of them, and when, by our clock.
-        self._watched: dict[str, tuple[tuple[Any, ...], float]] = {}
+        self.database = Database(self.path, SCHEMA, UPGRADES)
+        self._leases = Leases(clock or Clock.of_host())
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path,)
@@ -110,7 +81,7 @@ class Ledger:
         among = "" if keys is None else "AND key IN (SELECT value FROM json_each(?))"
         listed = () if keys is None else (json.dumps(sorted(keys)),)
         with self.database.write() as connection:
-            late = json.dumps(self._late(connection))
+            late = json.dumps(self._leases.late(connection))
             connection.execute(
                 "UPDATE jobs SET state = 'failed', error = ?, worker = NULL, lease_until = NULL, updated = ? "
                 "WHERE key IN (SELECT value FROM json_each(?)) AND attempts >= ?",
@@ -126,29 +97,10 @@ class Ledger:
             connection.execute(
                 "UPDATE jobs SET state = 'running', worker = ?, clock = ?, lease = ?, lease_until = ?, "
                 "attempts = attempts + 1, claims = claims + 1, progress = 0, updated = ? WHERE key = ?",
-                (worker, self._clock.name, lease, self._clock.now() + lease, now, row["key"]),
+                (worker, *self._leases.until(lease), now, row["key"]),
             )
             connection.execute("DELETE FROM notes WHERE key = ?", (row["key"],))
             return get(connection, row["key"])
-
-    def _late(self, connection: Connection) -> list[str]:
-        """Return the running jobs whose workers let their leases run out.
-
-        The lease of a worker that counts by another clock (another boot) is watched: it has run out when nothing was
-        heard of it for its whole length by our own.
-        """
-        now, late, watched = self._clock.now(), list[str](), dict[str, tuple[tuple[Any, ...], float]]()
-        rows = connection.execute("SELECT key, claims, clock, lease, lease_until FROM jobs WHERE state = 'running'")
-        for key, *sign in rows:
-            _, clock, lease, until = sign
-            if clock != self._clock.name:
-                seen, since = self._watched.get(key, ((), now))
-                watched[key] = tuple(sign), since if seen == tuple(sign) else now
-                until = watched[key][1] + (lease or _OLD_LEASE)
-            if until < now:
-                late.append(key)
-        self._watched = watched
-        return late
 
     def renew(self, job: Job, lease: float, progress: float | None = None, message: str = "") -> bool:
         """Keep a claimed job for `lease` [s] more and note its progress, 0 to 1, and what it says.
@@ -159,7 +111,7 @@ class Ledger:
             changed = connection.execute(
                 "UPDATE jobs SET clock = ?, lease = ?, lease_until = ?, progress = coalesce(?, progress), updated = ? "
                 f"WHERE {_HELD} AND state = 'running'",
-                (self._clock.name, lease, self._clock.now() + lease, progress, time.time(), *_held(job)),
+                (*self._leases.until(lease), progress, time.time(), *_held(job)),
             ).rowcount
             if changed and message:
                 connection.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (job.key, message))
@@ -225,7 +177,7 @@ class Ledger:
 
     def jobs(self, state: State | None = None, plan: str | None = None) -> list[Job]:
         """Return the jobs of a state and a plan (None: any), oldest first."""
-        where, values = _among(plan)
+        where, values = among(plan)
         if state is not None:
             where, values = f"{where} AND state = ?", (*values, state)
         with self.database.read() as connection:
@@ -240,7 +192,7 @@ class Ledger:
 
     def counts(self, plan: str | None = None) -> dict[str, int]:
         """Return how many jobs (of a plan) are in each state; every state is listed."""
-        where, values = _among(plan)
+        where, values = among(plan)
         with self.database.read() as connection:
             rows = connection.execute(f"SELECT state, count(*) FROM jobs WHERE {where} GROUP BY state", values)
             return {**dict.fromkeys(STATES, 0), **{row[0]: row[1] for row in rows}}
@@ -250,37 +202,7 @@ class Ledger:
 
         Each result becomes a done job; a job noted as done whose result is not among them waits again.
         """
-        good: list[str] = []
-        for dataset in results:
-            attrs, now = dataset.attrs, time.time()
-            key = attrs["key"]
-            seconds = float(dataset["seconds"].max()) if "seconds" in dataset else None
-            with self.database.write() as connection:
-                connection.execute(
-                    "INSERT INTO jobs (key, solver, version, params, need, state, digest, seconds, created, updated, "
-                    "progress) VALUES (?, ?, ?, ?, ?, 'done', ?, ?, ?, ?, 1) ON CONFLICT (key) DO UPDATE SET "
-                    "state = 'done', digest = excluded.digest, error = NULL, worker = NULL, lease_until = NULL, "
-                    "progress = 1, updated = excluded.updated",
-                    (
-                        key,
-                        str(attrs.get("solver", "")),
-                        str(attrs.get("solver_version", "")),
-                        canonical(json.loads(attrs.get("params", "{}"))).decode(),
-                        canonical(json.loads(attrs.get("need", "{}"))).decode(),
-                        attrs["digest"],
-                        seconds,
-                        now,
-                        now,
-                    ),
-                )
-            good.append(key)
-        with self.database.write() as connection:
-            connection.execute(
-                "UPDATE jobs SET state = 'wanted', attempts = 0, failures = 0, digest = NULL, progress = 0, "
-                "updated = ? WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
-                (time.time(), json.dumps(good)),
-            )
-        return len(good)
+        return rebuild(self.database, results)
 
     def _end(self, job: Job, change: str, *values: Any, only: str = "1") -> bool:
         """Apply `change` to a job that is still as `job`, the claim, says; return whether it is."""
@@ -295,39 +217,3 @@ class Ledger:
 def _held(job: Job) -> tuple[Any, ...]:
     """Return the values of `_HELD`."""
     return job.key, job.claims, job.worker
-
-
-def enter(connection: Connection, job: JobSpec, plan: str, revived: Sequence[State]) -> int:
-    """Ask for a job within a transaction; return 1 if it waits now and did not before.
-
-    A job in one of the states `revived` waits again.
-    """
-    now = time.time()
-    texts = canonical(job.params).decode(), canonical(job.need).decode()
-    count = connection.execute(
-        "INSERT INTO jobs (key, solver, version, params, need, plan, state, created, updated) "
-        "VALUES (?, ?, ?, ?, ?, ?, 'wanted', ?, ?) ON CONFLICT (key) DO UPDATE SET "
-        "state = 'wanted', attempts = 0, failures = 0, error = NULL, worker = NULL, progress = 0, "
-        f"updated = excluded.updated WHERE state IN ({','.join('?' * len(revived))})",
-        (job.key, job.solver, job.version, *texts, plan, now, now, *revived),
-    ).rowcount
-    if plan:
-        connection.execute("INSERT OR IGNORE INTO plans VALUES (?, ?)", (plan, job.key))
-    return count
-
-
-def get(connection: Connection, key: str) -> Job:
-    """Return a job within a transaction.
-
-    Raises:
-        UnknownJob: nobody asked for it.
-
-    """
-    row = connection.execute(f"{SELECT} WHERE jobs.key = ?", (key,)).fetchone()
-    if row is None:
-        raise UnknownJob(f"there is no job {key}.", "Ask for it first.")
-    return read_row(row)
-
-
-def _among(plan: str | None) -> tuple[str, tuple[Any, ...]]:
-    return ("1", ()) if plan is None else ("jobs.key IN (SELECT key FROM plans WHERE plan = ?)", (plan,))

@@ -12,7 +12,8 @@ from sqlite3 import Connection
 
 from ..errors import QueueFull
 from .jobs import Job, JobSpec, State, read_row
-from .ledger import SELECT, Ledger, enter, get
+from .ledger import Ledger
+from .rows import SELECT, enter, get
 
 __all__ = ["PLAN", "Queue", "Quota"]
 
