@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sweeps.commands import watchdog
 from sweeps.commands.cli import app
-from sweeps.commands.console import emit, note
+from sweeps.commands.terminal import watchdog
+from sweeps.commands.terminal.console import emit, note
 from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sweeps.commands.console import emit, note
-from sweeps.commands.grouped import grouped
-from sweeps.commands.options import As_json
+from sweeps.commands.terminal.console import emit, note
+from sweeps.commands.terminal.grouped import grouped
+from sweeps.commands.terminal.options import As_json
 from sweeps.errors import InvalidOption
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def export(asked: _Asked) -> None:
 
     wizen export run.h5 --mesh my.obj --format pc2
     """
-    from sweeps.commands import progress
+    from sweeps.commands.terminal import progress
 
     from .sequences import Options, prepared
 
