@@ -28,8 +28,8 @@ from .blending.methods.weights import Samples
 from .blending.neighbours import SAME, Weighted
 from .errors import CorruptTable, OutsideTable
 from .generations import generation, trust
-from .generations.manifest import TableInfo
 from .generations.samples import insert
+from .manifest import TableInfo
 from .shape import Shape
 from .store import Store
 from .surfaces import surface

@@ -21,9 +21,9 @@ from solver.quantities import QUANTITIES
 from . import shards
 from .canonical import canonical
 from .errors import CorruptShard, CorruptTable, EmptyTable, UnknownTable
-from .generations.manifest import directory
 from .generations.samples import Choice, agree, finished, fullest, read_axes, rest_of
-from .jobs import Job
+from .ledger.jobs import Job
+from .manifest import directory
 from .store import Store
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 from . import seal, shards
 from .errors import CorruptShard, MissingStore, UnknownJob
 from .keys import is_key
-from .ledger import Ledger
+from .ledger.ledger import Ledger
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,8 +20,8 @@ from solver.contract import Solver
 from . import seal
 from .errors import EmptyTable, MixedSamples
 from .generations import generate, generation
-from .generations.manifest import TableInfo, directory, read_manifest, write_manifest
 from .generations.samples import Choice, Samples, collect
+from .manifest import TableInfo, directory, read_manifest, write_manifest
 from .store import Store
 
 if TYPE_CHECKING:

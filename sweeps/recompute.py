@@ -10,7 +10,7 @@ import numpy as np
 from solver import registry
 from solver.contract import Context, Need, SolverError
 from store import shards
-from store.generations.audit import Finding
+from store.checking.audit import Finding
 from store.store import Store
 from store.tables import TableInfo
 

@@ -16,11 +16,11 @@ from benchmarks import figures
 from benchmarks.figures import ROOT, Sheet
 from solver.contract import Need
 from solver.dehydration import SOLVER, DehydrationParams
-from store.ledger import JobSpec
+from store.ledger.jobs import JobSpec
 from store.store import Store
-from sweeps import executors
-from sweeps.plan import Plan
-from sweeps.runner import run_jobs
+from sweeps.planning.plan import Plan
+from sweeps.running import executors
+from sweeps.running.runner import run_jobs
 
 from .criteria import Found, judge
 from .pattern import Pattern, pattern

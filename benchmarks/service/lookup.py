@@ -26,7 +26,7 @@ from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
 from store import tables
 from store.blending import methods
-from store.ledger import JobSpec
+from store.ledger.jobs import JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import spectra, surface, transforms

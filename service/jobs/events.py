@@ -15,11 +15,11 @@ import anyio.to_thread
 from fastapi import APIRouter, Header, Request
 from starlette.responses import Response, StreamingResponse
 
-from store.jobs import Job
+from store.ledger.jobs import Job
 
 from .. import problems
-from ..clients import client_of
 from ..errors import TooManyListeners
+from ..limits.clients import client_of
 from ..settings import Settings
 from .routes import JobId, stored_job
 from .views import ENDED, view

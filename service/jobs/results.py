@@ -15,7 +15,7 @@ from solver.contract import Params, Solver, SolverError
 from solver.lattice import lattice
 from store import seal
 from store.errors import CorruptShard, UnknownJob
-from store.jobs import Job
+from store.ledger.jobs import Job
 from store.store import Store
 from sweeps.pictures import colours
 

@@ -9,11 +9,11 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 
 from store.errors import UnknownJob
-from store.jobs import Job
-from store.jobs import State as JobState
 from store.keys import is_key
-from store.ledger import Ledger
-from store.queue import Queue
+from store.ledger.jobs import Job
+from store.ledger.jobs import State as JobState
+from store.ledger.ledger import Ledger
+from store.ledger.queue import Queue
 from store.store import Store
 from store.tokens import Token
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from fastapi.datastructures import State
 
 from solver.contract import Need, Params, Quality, Solver
-from store.jobs import Job, JobSpec
-from store.queue import Queue, Quota
+from store.ledger.jobs import Job, JobSpec
+from store.ledger.queue import Queue, Quota
 from store.starter import check_own
 from store.store import Store
 

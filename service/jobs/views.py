@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from solver import registry
 from solver.contract import Cost, Need, SolverError
 from store.canonical import canonical
-from store.jobs import Job, State
+from store.ledger.jobs import Job, State
 
 from ..problems import URN
 

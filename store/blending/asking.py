@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import OutsideTable
-from ..generations.manifest import TableInfo
+from ..manifest import TableInfo
 
 __all__ = ["check_names", "check_number", "settle", "settle_stage"]
 

@@ -1,1 +1,1 @@
-"""Generations of tables: written from results, read, checked and compared."""
+"""Generations of tables: collected from results, written, read and judged."""

@@ -12,7 +12,7 @@ from solver.contract import Fresh, Surface
 
 from ..canonical import canonical
 from ..errors import EmptyTable, MixedSamples, UnknownJob
-from ..jobs import Job
+from ..ledger.jobs import Job
 from ..store import Store
 
 __all__ = [

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 from ..errors import InvalidOption
-from .console import emit, grid
-from .options import As_json, StorePath, TableName
+from .terminal.console import emit, grid
+from .terminal.options import As_json, StorePath, TableName
 
 __all__ = ["add_to"]
 
@@ -45,8 +45,8 @@ def rebuild(
     """
     from solver import registry
     from store import tables
+    from store.checking import truncation
     from store.errors import CorruptTable
-    from store.generations import truncation
     from store.store import Store
 
     opened = Store.open(store)
@@ -112,11 +112,11 @@ def verify(
     wizen table verify --store demo --recompute 2
     """
     from store import tables
-    from store.generations import audit
+    from store.checking import audit
     from store.store import Store
 
     from ..recompute import recompute as solve_again
-    from . import progress
+    from .terminal import progress
 
     opened = Store.open(store)
     findings = audit.verify(opened, name)
@@ -174,7 +174,7 @@ def compare(
 
     wizen table compare demo/tables/default/0123456789abcdef.h5 demo
     """
-    from store.generations import compare as comparing
+    from store.checking import compare as comparing
 
     found = comparing.compare(_generation(a, store, name), _generation(b, store, name))
 

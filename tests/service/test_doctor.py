@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from service import doctor
 from service.cli import app
-from service.doctor import Finding, examine
+from service.commands import doctor
+from service.commands.doctor import Finding, examine
 from service.settings import Settings
 from store import tables
-from store.filesystem import filesystem
+from store.ledger.filesystem import filesystem
 from store.store import Store
 
 from .conftest import client_of
@@ -83,7 +83,7 @@ def test_no_store_no_table_no_room(tmp_path: Path, port: int, monkeypatch: pytes
 
 
 def test_a_network_file_system_is_bad(own: Store, port: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from store import filesystem as module
+    from store.ledger import filesystem as module
 
     text = f"1 1 0:1 / / rw - ext4 a rw\n2 1 0:2 / {own.root} rw - nfs4 b rw\n"
     (tmp_path / "mounts").write_text(text)

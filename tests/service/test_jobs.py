@@ -16,7 +16,7 @@ from openapi_spec_validator import validate
 
 from service.app import create_app
 from service.settings import Settings
-from store.queue import Queue
+from store.ledger.queue import Queue
 from store.store import Store
 
 from ._asking import ROOT, answers, checked, until

@@ -22,8 +22,8 @@ from solver.fruit import lattice
 from store import seal, tables
 from store.blending import methods
 from store.generations import generation
+from store.ledger.queue import Queue
 from store.lookup import ShapeTable
-from store.queue import Queue
 from store.starter import ROOT as STARTER
 from store.store import Store
 from store.surfaces.measures import Measures

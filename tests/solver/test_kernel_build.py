@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import solver.dehydration.kernel as package
-from solver.dehydration.kernel import generate
 from solver.dehydration.kernel import march as march_module_function  # the function; its module is reached below
+from solver.dehydration.kernel.generate import source
 
 BACKENDS = ("vector", "scalar")
 march_module = sys.modules[march_module_function.__module__]
@@ -85,11 +85,11 @@ def test_cache_is_used_across_processes_and_never_stale(tmp_path):
 def test_generated_module_finds_a_writable_directory(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.touch()
-    monkeypatch.setattr(generate, "cache_directories", lambda: iter([blocked / "sub", tmp_path / "good"]))
-    path = generate.generated_path()
+    monkeypatch.setattr(source, "cache_directories", lambda: iter([blocked / "sub", tmp_path / "good"]))
+    path = source.generated_path()
     assert path.parent == tmp_path / "good"
-    assert path.read_text() == generate.module_source()
+    assert path.read_text() == source.module_source()
     assert list(path.parent.iterdir()) == [path]
-    monkeypatch.setattr(generate, "cache_directories", lambda: iter([blocked / "sub"]))
+    monkeypatch.setattr(source, "cache_directories", lambda: iter([blocked / "sub"]))
     with pytest.raises(OSError, match="NUMBA_CACHE_DIR"):
-        generate.generated_path()
+        source.generated_path()

@@ -20,7 +20,7 @@ from solver.dehydration import SOLVER, DehydrationParams
 from solver.fruit import azimuths, colatitudes, directions, lattice
 from store import tables
 from store.keys import key
-from store.ledger import JobSpec
+from store.ledger.jobs import JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
 

@@ -11,9 +11,9 @@ import pytest
 
 from solver.dehydration import SOLVER
 from store import seal, tables
+from store.checking import audit, compare, truncation
 from store.errors import CorruptTable, UnknownJob
-from store.generations import audit, compare, truncation
-from store.generations.manifest import write_manifest
+from store.manifest import write_manifest
 from store.store import Store
 
 from .conftest import fill

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from store import filesystem as module
 from store.errors import NetworkFileSystem
-from store.filesystem import filesystem, refuse_network
-from store.ledger import Ledger
+from store.ledger import filesystem as module
+from store.ledger.filesystem import filesystem, refuse_network
+from store.ledger.ledger import Ledger
 from store.store import Store
 
 LINE = "{number} 1 0:{number} / {mount} rw,relatime shared:{number} - {kind} {source} rw\n"

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from store import clock
-from store.clock import Clock
 from store.errors import CorruptLedger, UnknownJob
-from store.ledger import MAX_LOST, Job, JobSpec, Ledger
+from store.ledger import clock
+from store.ledger.clock import Clock
+from store.ledger.jobs import Job, JobSpec
+from store.ledger.ledger import MAX_LOST, Ledger
 from store.store import Store
 
 from .conftest import fill, python, spec
@@ -220,7 +221,7 @@ def test_want_is_all_or_nothing(ledger: Ledger) -> None:
 
 CLAIM = """
 import sys
-from store.ledger import Ledger
+from store.ledger.ledger import Ledger
 ledger = Ledger(sys.argv[1])
 while (job := ledger.claim(sys.argv[2], 600.0)) is not None:
     print(job.key, flush=True)
@@ -238,7 +239,7 @@ def test_no_job_is_handed_out_twice(ledger: Ledger) -> None:
     assert ledger.counts()["done"] == 240
 
 
-CREATE = "import sys; from store.ledger import Ledger; print(Ledger(sys.argv[1]).counts()['done'])"
+CREATE = "import sys; from store.ledger.ledger import Ledger; print(Ledger(sys.argv[1]).counts()['done'])"
 
 
 def test_processes_race_to_create_the_file(ledger: Ledger) -> None:
@@ -264,7 +265,8 @@ def test_threads_share_a_ledger(ledger: Ledger) -> None:
 
 FORK = """
 import os, sys
-from store.ledger import Ledger, JobSpec
+from store.ledger.jobs import JobSpec
+from store.ledger.ledger import Ledger
 ledger = Ledger(sys.argv[1])
 ledger.want([JobSpec(str(i), "s", "1", {}, {}) for i in range(40)])
 children = []

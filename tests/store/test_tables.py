@@ -13,8 +13,8 @@ import xarray as xr
 from solver import registry
 from solver.dehydration import SOLVER
 from store import tables
+from store.checking import audit
 from store.errors import CorruptShard, CorruptTable, EmptyTable, MixedSamples, StorageFull, UnknownTable
-from store.generations import audit
 from store.lookup import ShapeTable
 from store.store import Store
 

@@ -18,12 +18,12 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from pathlib import Path
 from typing import Any
 
-from store.clock import Clock
-from store.jobs import JobSpec
-from store.ledger import MAX_LOST, Job, Ledger
-from sweeps.place import Place
-from sweeps.run import Run
-from sweeps.work import Hold, Outcome, Task, beat
+from store.ledger.clock import Clock
+from store.ledger.jobs import Job, JobSpec
+from store.ledger.ledger import MAX_LOST, Ledger
+from sweeps.running.place import Place
+from sweeps.running.run import Run
+from sweeps.running.work import Hold, Outcome, Task, beat
 
 __all__ = ["Broken", "World"]
 

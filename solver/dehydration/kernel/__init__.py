@@ -1,8 +1,8 @@
 """Explicit dynamics of nearly incompressible neo-Hookean hex8 elements with mean dilatation (Q1/P0).
 
 `build_layout` prepares a mesh, `new_state` its state, `march` steps it. `internal_force`, `element_report`,
-`strain_energy` and `kinetic_energy` look at it. The element algebra is in `algebra` and `elements`; `vector_ir` and
-`scalar` are its two compiled back ends (chosen by WIZEN_KERNEL = auto, vector or scalar).
+`strain_energy` and `kinetic_energy` look at it. The element algebra is in `algebra` and `elements`; `generate`
+holds its two compiled back ends (chosen by WIZEN_KERNEL = auto, vector or scalar).
 """
 
 from solver.dehydration.kernel.bulk import dilatations, rested, rests

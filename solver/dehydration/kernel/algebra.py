@@ -1,9 +1,9 @@
 """Element algebra of the explicit kernel, written once over an abstract number.
 
 Every function here is ordinary arithmetic on values that overload ``+ - * /``. What a "value" is decides the
-back end: 16 lanes of LLVM vector IR (`vector_ir`), a name in generated source text (`generate`), or a numpy array
-of float64, one entry per element (`diagnostics`). So the force that marches, the energy that is reported and the
-volume that is checked cannot drift apart.
+back end: 16 lanes of LLVM vector IR (`vector_ir`), a name in generated source text (`source`), or a numpy array of
+float64, one entry per element (`diagnostics`). So the force that marches, the energy that is reported and the volume
+that is checked cannot drift apart.
 
 Physics (Liu et al. 2014, Eq. 1-4; page ``physics/dehydration.md``): F = Fe Fd with Fd = theta I in the sarcocarp
 ("core") and Fd = I in the exocarp, Jd = theta^3, and the energy per fresh volume

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from solver.dehydration.contact.contact import SLACK, measure
 from solver.dehydration.contact.data import PAIRS, make_contact
 from solver.dehydration.contact.search import is_stale
-from solver.dehydration.kernel.digest import source_digest
 from solver.dehydration.kernel.fixed_point import place
+from solver.dehydration.kernel.generate.digest import source_digest
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
 from solver.dehydration.kernel.skin import Skin, approach, keep_apart, search, widen
 
@@ -142,7 +142,7 @@ def compiled(backend: Backend) -> Callable[..., int]:
     """The time loop on one back end."""
     global strip_forces, update_node
     functions: Any = importlib.import_module(
-        "solver.dehydration.kernel." + ("vector_ir" if backend == "vector" else "scalar")
+        "solver.dehydration.kernel.generate." + ("vector_ir" if backend == "vector" else "scalar")
     )
     strip_forces, update_node = functions.strip_forces, functions.update_node
     return _build(int(source_digest(backend)[:15], 16))

@@ -1,0 +1,148 @@
+"""Limits on connections: how many, from whom, and how long and how large the head of a request may be.
+
+uvicorn's parser takes heads of any length at any pace. Nobody who is honest sends a head of 32 kB, or needs ten seconds
+for it; whoever does either is told so and let go, so that slow and silent connections cannot use up the service.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from functools import cache
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import orjson
+from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
+from uvicorn.server import ServerState
+
+from ..problems import MEDIA_TYPE, URN
+from ..settings import Settings
+from .clients import address
+
+__all__ = ["GuardedProtocol"]
+
+#: Connections of each server by client.
+_clients: WeakKeyDictionary[ServerState, Counter[str]] = WeakKeyDictionary()
+
+
+@cache
+def _settings() -> Settings:
+    # uvicorn makes the protocols, of a class: there is nobody to hand them settings but the environment
+    return Settings()
+
+
+class GuardedProtocol(HttpToolsProtocol):
+    """HTTP/1.1 with limits; a request that is over them never reaches the application."""
+
+    def __init__(self, *values: Any, **named: Any) -> None:
+        super().__init__(*values, **named)
+        self._limits = _settings()
+        self._name = ""
+        self._head = 0
+        self._in_head = True
+        self._refused = False
+        self._timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a connection, if there is room for one more."""
+        super().connection_made(transport)
+        limits = self._limits
+        counts = _clients.setdefault(self.server_state, Counter())
+        self._name = address(self.client[0]) if self.client else ""
+        counts[self._name] += 1
+        if len(self.connections) > limits.max_connections:
+            self._refuse(503, "too-many-connections", f"{limits.max_connections} connections are open already.")
+        elif self._name and counts[self._name] > limits.max_connections_per_client:
+            most = limits.max_connections_per_client
+            self._refuse(503, "too-many-connections", f"{most} connections of this client are open already.")
+        else:
+            self._await_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget a connection."""
+        self._stop_timer()
+        counts = _clients[self.server_state]
+        counts[self._name] -= 1
+        if counts[self._name] <= 0:
+            del counts[self._name]
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Parse what has come, unless the head is too long by now."""
+        if self._refused:
+            return
+        if self._in_head:
+            self._head += len(data)
+        super().data_received(data)
+        # a header that never ends stays inside the parser, which says nothing of it
+        if self._in_head and self._head > self._limits.max_head:
+            self._too_long()
+
+    def on_message_begin(self) -> None:
+        """Begin a request, perhaps not the first of this connection."""
+        super().on_message_begin()
+        self._in_head = True
+        if self._timer is None:
+            self._await_head()
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """Take a header."""
+        super().on_header(name, value)
+        if len(self.headers) > self._limits.max_headers:
+            most = self._limits.max_headers
+            self._refuse(431, "too-many-headers", f"the request has more than {most} headers.")
+
+    def on_headers_complete(self) -> None:
+        """Hand the request to the application."""
+        self._in_head, self._head = False, 0
+        self._stop_timer()
+        if not self._refused and sum(len(n) + len(v) + 4 for n, v in self.headers) > self._limits.max_head:
+            self._too_long()  # it came in one piece
+        if not self._refused:
+            super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        """Take a piece of the body."""
+        if not self._refused:
+            super().on_body(body)
+
+    def on_message_complete(self) -> None:
+        """End a request."""
+        if not self._refused:
+            super().on_message_complete()
+
+    def _await_head(self) -> None:
+        self._timer = self.loop.call_later(self._limits.head_timeout, self._too_slow)
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _too_slow(self) -> None:
+        self._timer = None
+        if self._head or self.headers:
+            self._refuse(408, "request-timeout", f"no whole request came within {self._limits.head_timeout:g} s.")
+        else:
+            self.transport.close()  # nothing was said: there is nothing to answer
+
+    def _too_long(self) -> None:
+        self._refuse(431, "head-too-long", f"the head of the request is longer than {self._limits.max_head} bytes.")
+
+    def _refuse(self, status: int, code: str, detail: str) -> None:
+        """Send a problem and close."""
+        if self._refused or self.transport.is_closing():
+            return
+        self._refused = True
+        self._stop_timer()
+        title = code.replace("-", " ").capitalize()
+        body = orjson.dumps({"type": URN + code, "title": title, "status": status, "detail": detail})
+        head = [
+            STATUS_LINE[status],
+            f"content-type: {MEDIA_TYPE}\r\ncontent-length: {len(body)}\r\n".encode(),
+            b"retry-after: 5\r\n" if status == 503 else b"",
+            b"cache-control: no-store\r\nconnection: close\r\n\r\n",
+        ]
+        self.transport.write(b"".join([*head, body]))
+        self.transport.close()

@@ -1,0 +1,1 @@
+"""Tables looked at again: against their results, against each other, and at what truncation takes."""

@@ -1,0 +1,137 @@
+"""One SQLite file in WAL mode: short transactions, safe among threads, forks and processes."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import CorruptLedger, ReadOnlyStore, StorageFull
+from .filesystem import refuse_network
+
+__all__ = ["Database"]
+
+#: Seconds to wait for another process's transaction; each lasts milliseconds.
+_PATIENCE = 60.0
+
+#: Connections inherited through a fork: SQLite forbids to use or to close them in the child.
+_inherited: list[sqlite3.Connection] = []
+
+
+class Database:
+    """A connection that opens itself on first use, in every process anew.
+
+    `schema` is a list of statements that may be said again: `CREATE ... IF NOT EXISTS`. `upgrades` make a file of an
+    earlier version one of the next; the version is kept in the file.
+    """
+
+    def __init__(self, path: Path, schema: str, upgrades: Mapping[int, str]) -> None:
+        self._path = path
+        self._schema = schema
+        self._upgrades = upgrades
+        self._version = 1 + max(upgrades, default=0)
+        self._pid = os.getpid()
+        self._lock = threading.RLock()
+        self._connection: sqlite3.Connection | None = None
+
+    def close(self) -> None:
+        """Close the connection; the next use opens it again."""
+        with self._own_lock():
+            if self._connection is not None:
+                self._connection.close()
+                self._connection = None
+
+    def __del__(self) -> None:
+        if self._connection is not None and self._pid == os.getpid():
+            self._connection.close()
+
+    @contextmanager
+    def read(self) -> Iterator[sqlite3.Connection]:
+        """Yield a connection that sees one state of the file.
+
+        Raises:
+            CorruptLedger: the file is no database, or one of another version.
+            NetworkFileSystem: it is where locks do not hold.
+
+        """
+        with self._transaction("DEFERRED") as connection:
+            yield connection
+
+    @contextmanager
+    def write(self) -> Iterator[sqlite3.Connection]:
+        """Yield a connection that alone may write; all of it is on the disk on leaving, or nothing on an error.
+
+        Raises:
+            CorruptLedger: the file is no database, or one of another version.
+            ReadOnlyStore: it may not be written.
+            StorageFull: the disk is full.
+
+        """
+        with self._transaction("IMMEDIATE") as connection:
+            yield connection
+
+    @contextmanager
+    def _transaction(self, kind: str) -> Iterator[sqlite3.Connection]:
+        with self._own_lock(), self._typed():
+            connection = self._connection or self._open()
+            connection.execute(f"BEGIN {kind}")
+            try:
+                yield connection
+                connection.execute("COMMIT")
+            except BaseException:
+                if connection.in_transaction:
+                    connection.execute("ROLLBACK")
+                raise
+
+    def _own_lock(self) -> threading.RLock:
+        if self._pid != os.getpid():
+            if self._connection is not None:
+                _inherited.append(self._connection)
+            self._pid, self._lock, self._connection = os.getpid(), threading.RLock(), None
+        return self._lock
+
+    def _open(self) -> sqlite3.Connection:
+        refuse_network(self._path)
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        connection = sqlite3.connect(self._path, timeout=_PATIENCE, isolation_level=None, check_same_thread=False)
+        try:
+            connection.row_factory = sqlite3.Row
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = FULL")  # what was reported as done survives a power cut
+            connection.execute("BEGIN IMMEDIATE")
+            found = connection.execute("PRAGMA user_version").fetchone()[0]
+            if found > self._version:
+                raise self._unreadable(f"has version {found}, this program reads {self._version}")
+            changes = [self._upgrades[old] for old in range(found, self._version)] if found else []
+            # what is there already stays: a table that a later program added appears in older files too
+            for statement in ";".join([*changes, self._schema]).split(";"):
+                connection.execute(statement)
+            connection.execute(f"PRAGMA user_version = {self._version}")
+            connection.execute("COMMIT")
+        except BaseException:
+            connection.close()
+            raise
+        self._connection = connection
+        return connection
+
+    @contextmanager
+    def _typed(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.DatabaseError as error:
+            name = getattr(error, "sqlite_errorname", "")
+            if name == "SQLITE_FULL":
+                raise StorageFull(f"there is no space left to write {self._path}.", "Free space and go on.") from error
+            if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")):
+                raise ReadOnlyStore(f"{self._path} cannot be written.", "Name a store of your own.") from error
+            if name in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
+                raise self._unreadable(f"is not a sound database ({error})") from error
+            raise
+
+    def _unreadable(self, why: str) -> CorruptLedger:
+        return CorruptLedger(
+            f"{self._path} {why}.", "Delete it (with its -wal and -shm files) and rebuild it from the shards."
+        )

@@ -1,0 +1,94 @@
+"""How commands speak: results on stdout, everything else on stderr, errors in one line, `--json` as one document."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import typer
+from typer.core import TyperGroup
+
+from ...errors import describe, exit_code
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["Root", "emit", "grid", "note"]
+
+
+def note(text: str) -> None:
+    """Say something to a person: on stderr."""
+    typer.echo(text, err=True)
+
+
+def emit(document: Any, as_json: bool, show: Callable[[Console], None]) -> None:
+    """Print a result: as the JSON document, or as `show` writes it for people."""
+    if as_json:
+        typer.echo(json.dumps(document, indent=2, allow_nan=False))
+        return
+    from rich.console import Console
+
+    show(Console(highlight=False, soft_wrap=True))
+
+
+def grid(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> None:
+    """Print a table for people."""
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(*head, title=title or None, title_justify="left", box=box.SIMPLE_HEAD)
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    console.print(table)
+
+
+class Root(TyperGroup):
+    """The `wizen` command: whatever goes wrong below it ends in one line and the right exit code."""
+
+    def main(self, args: Sequence[str] | None = None, *rest: Any, **more: Any) -> Any:
+        """Run a command line. Exits with 2 for bad input, 1 for other failures, 130 after Ctrl-C."""
+        given = list(sys.argv[1:] if args is None else args)
+        try:
+            code = super().main(given, *rest, **{**more, "standalone_mode": False})
+        except Exception as error:
+            if os.environ.get("WIZEN_DEBUG") == "1":
+                raise
+            sys.exit(_complain(error, "--json" in given))
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def _complain(error: Exception, as_json: bool) -> int:
+    if isinstance(error, BrokenPipeError):
+        # the reader of our output has left (`| head`); Python must not stumble over it again at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    # the usage errors of typer's parser know how to put themselves in words
+    usage = getattr(error, "format_message", None)
+    if usage is not None:
+        said = {"code": "invalid-usage", "message": usage().rstrip("."), "advice": "`--help` shows examples."}
+        said["message"] += "."
+        code = getattr(error, "exit_code", 2)
+    elif isinstance(error, typer.Abort):
+        said, code = {"code": "aborted", "message": "stopped.", "advice": ""}, 130
+    elif isinstance(error, OSError):
+        said, code = _system(error), 1
+    else:
+        said, code = describe(error), exit_code(error)
+        if said["code"] == "cancelled":
+            code = 130
+        if said["code"] == "internal-error":
+            said["advice"] = "This is a defect of wizen; WIZEN_DEBUG=1 shows where."
+    note(" ".join(f"error: {said['message']} {said['advice']}".split()))
+    if as_json:
+        typer.echo(json.dumps({"error": said}, indent=2))
+    return code
+
+
+def _system(error: OSError) -> dict[str, Any]:
+    where = f"{error.filename}: " if error.filename else ""
+    advice = "Name a place that can be written." if isinstance(error, PermissionError) else ""
+    return {"code": "system-error", "message": f"{where}{error.strerror or error}.", "advice": advice}

@@ -1,0 +1,139 @@
+"""The grammar that all commands share: presets, `--set NAME=VALUE`, stages, quality, outputs."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...errors import InvalidOption
+
+__all__ = [
+    "As_json",
+    "Out",
+    "Params",
+    "Preset",
+    "Quality",
+    "Seed",
+    "Set",
+    "Stages",
+    "StorePath",
+    "StoreToRead",
+    "TableName",
+    "assignments",
+    "numbers",
+    "parameters",
+]
+
+Preset = Annotated[str | None, typer.Option("--preset", help="Named parameters to start from (`wizen presets`).")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter, e.g. te=0.04 or stone=0.4,0.3. Repeatable."),
+]
+Params = Annotated[
+    Path | None,
+    typer.Option(
+        "--params", metavar="FILE", help="Parameters as TOML or JSON; they go over --preset, --set over them."
+    ),
+]
+Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]
+Quality = Annotated[str | None, typer.Option("--quality", help="preview, default or fine.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of everything random in the run.")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Where the result goes; the suffix says how.")]
+As_json = Annotated[bool, typer.Option("--json", help="Print one JSON document; everything else goes to stderr.")]
+StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", envvar="WIZEN_STORE", help="The store's directory.")]
+StoreToRead = Annotated[
+    Path | None,
+    typer.Option(
+        "--store",
+        metavar="DIR",
+        envvar="WIZEN_STORE",
+        help="The store's directory; the package's own table if left out.",
+    ),
+]
+TableName = Annotated[str, typer.Option("--name", help="Name of the table.")]
+
+
+def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
+    """Return the values of `--set NAME=VALUE` options.
+
+    VALUE is TOML or JSON, a list without brackets, @ and a mesh file, or plain text.
+
+    Raises:
+        InvalidOption: no NAME=, a name given twice, or a mesh file that cannot be read.
+
+    """
+    values: dict[str, Any] = {}
+    for pair in pairs or ():
+        name, equals, text = (part.strip() for part in pair.partition("="))
+        if not (name and equals and text):
+            raise InvalidOption(f"--set {pair!r} is not NAME=VALUE.", "Write for example --set te=0.04.")
+        if name in values:
+            raise InvalidOption(f"--set {name} is given twice.", "Keep one of them.")
+        values[name] = _value(text)
+    return values
+
+
+def parameters(path: Path | None) -> dict[str, Any]:
+    """Return the parameters in a file of TOML or JSON; none for None.
+
+    Raises:
+        InvalidOption: no such file, or it cannot be read as its suffix says.
+
+    """
+    if path is None:
+        return {}
+    try:
+        text = path.read_text(encoding="utf-8")
+        values = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+    except OSError as error:
+        raise InvalidOption(f"--params {path}: {error.strerror}.", "Name a TOML or JSON file.") from None
+    except ValueError as error:  # both libraries' errors, and what is no text
+        raise InvalidOption(f"--params {path}: {error}.", "Write TOML, or JSON in a .json file.") from None
+    if not isinstance(values, dict):
+        raise InvalidOption(f"--params {path} holds no names and values.", 'Write for example {"thickness": 0.02}.')
+    return values
+
+
+def _value(text: str) -> Any:
+    if text.startswith("@"):
+        from . import meshfile
+
+        return meshfile.read(Path(text[1:]))
+    readers: list[Callable[[], Any]] = [lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)]
+    if "," in text:
+        readers.append(lambda: tomllib.loads(f"value = [{text}]")["value"])
+    for read in readers:
+        try:
+            return read()
+        except ValueError:  # both libraries' errors are ValueErrors
+            continue
+    return text
+
+
+def numbers(text: str | None, option: str = "--stages") -> tuple[float, ...]:
+    """Return the numbers of a comma-separated list; none for None.
+
+    Raises:
+        InvalidOption: something in it is not a finite number.
+
+    """
+    values = []
+    for part in (text or "").split(","):
+        if text is None:
+            break
+        try:
+            value = float(part)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InvalidOption(
+                f"{option} {text!r}: {part!r} is not a number.", f"Write for example {option} 0.05,0.1."
+            )
+        values.append(value)
+    return tuple(values)
