@@ -142,7 +142,7 @@ def meridional() -> Use:
 
 
 def wood_matrix() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return places, pattern, coupled pairs and blocks of a bundle: 61 rods of 20 vertices, each tied to its neighbours.
+    """Return places, pattern, coupled pairs and blocks of a bundle: 61 rods of 20 vertices, tied to their neighbours.
 
     The matrix is made here: how bonds couple vertices has changed.
     """

@@ -1,7 +1,8 @@
 """Our multifrontal factor against MKL's Pardiso, user by user: python -m benchmarks.peers.pardiso.
 
 Needs the extra `mkl`. Both work with one thread, in turns, in CPU seconds. Pardiso is told either that a matrix is
-positive definite, or only that it is symmetric, which ours needs not; it analyses a pattern once, outside of the ratios.
+positive definite, or only that it is symmetric (pivots of one and two rows, as ours has them); it analyses a pattern
+once, outside of the ratios.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ def _peer(upper: sparse.csr_matrix, right: np.ndarray, kind: int) -> Callable[[i
     """Return what runs a phase of Pardiso with the settings of `solver.linalg.pardiso`."""
     peer = pypardiso.PyPardisoSolver(mtype=kind)
     peer.libmkl.MKL_Set_Num_Threads_Local(1)
-    for number, value in {1: 1, 2: 2, 10: 13 if kind > 0 else 8}.items():
+    for number, value in ({1: 1, 2: 2, 10: 13} if kind > 0 else {1: 1, 2: 2, 10: 8, 21: 1}).items():
         peer.set_iparm(number, value)
 
     def phase(number: int) -> np.ndarray:
