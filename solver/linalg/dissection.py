@@ -88,11 +88,12 @@ def _shared(parts: Ints, order: Ints, mark: Ints) -> int:
 
 
 @njit(cache=True)
-def _along(order: Ints, part: Ints, bounds: Ints, rank: Ints) -> Ints:
-    """Return `order` sorted by rank within each part, stably and by counting: parts are sorted level after level."""
-    cursor = np.zeros(len(rank) + 1, np.int64)
-    for r in rank:
-        cursor[r + 1] += 1
+def _sorted(order: Ints, part: Ints, bounds: Ints, ranks: Ints, axes: Ints) -> Ints:
+    """Return `order` sorted within each part by rank along the part's axis: stably, by counting, all parts at once."""
+    rank, cursor = np.empty_like(order), np.zeros(len(order) + 1, np.int64)
+    for p in range(len(order)):
+        rank[p] = ranks[axes[part[p]], p]
+        cursor[rank[p] + 1] += 1
     cursor = np.cumsum(cursor)
     ranked, found, at = np.empty_like(order), np.empty_like(order), bounds[:-1].copy()
     for p in order:
@@ -111,22 +112,29 @@ def _halve(parts: Ints, centres: Floats, ranks: Ints, vertices: int, depth: int,
     order, bounds = np.arange(count), np.array([0, count])
     leaf[:] = 0
     for _ in range(depth):
-        ways = [_along(order, leaf, bounds, ranks[axis]) for axis in range(3)]
-        finer = np.empty(2 * len(bounds) - 1, np.int64)
-        for k in range(len(bounds) - 1):
+        halved = len(bounds) - 1
+        axes, least = np.zeros(halved, np.int64), np.full(halved, np.inf)
+        for axis in range(3):
+            way = _sorted(order, leaf, bounds, ranks, np.full(halved, axis)) if thin else order
+            for k in range(halved):
+                part = way[bounds[k] : bounds[k + 1]]
+                cost = float(_shared(parts, part, mark)) if thin else -_extent(centres, part, axis)
+                if cost < least[k]:
+                    axes[k], least[k] = axis, cost
+        order = _sorted(order, leaf, bounds, ranks, axes)
+        finer = np.empty(2 * halved + 1, np.int64)
+        for k in range(halved):
             first, last = bounds[k], bounds[k + 1]
-            best, least = 0, np.inf
-            for axis in range(3):
-                way = ways[axis][first:last]
-                if thin:
-                    cost = float(_shared(parts, way, mark))
-                else:
-                    cost = centres[way[0], axis] - centres[way[-1], axis] if len(way) else 0.0
-                if cost < least:
-                    best, least = axis, cost
             middle = (first + last + 1) // 2
-            order[first:last] = ways[best][first:last]
             leaf[order[first:middle]], leaf[order[middle:last]] = 2 * k, 2 * k + 1
             finer[2 * k], finer[2 * k + 1] = first, middle
         finer[-1] = count
         bounds = finer
+
+
+@njit(cache=True)
+def _extent(centres: Floats, part: Ints, axis: int) -> float:
+    small, large = np.inf, -np.inf
+    for p in part:
+        small, large = min(small, centres[p, axis]), max(large, centres[p, axis])
+    return large - small
