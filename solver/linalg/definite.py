@@ -1,6 +1,7 @@
 """Whose factor of a positive definite matrix: ours, or that of MKL's Pardiso where somebody asks for it.
 
-It is due where a factor serves one solve: by the definite factor MKL gains 1.6 times or more there, and nowhere else.
+It is due where a factor serves one solve and the matrix must be definite: in growth's Newton steps it gains 1.6 times
+or more, elsewhere less (docs/dehydration.md, "Sparse factors").
 """
 
 from __future__ import annotations

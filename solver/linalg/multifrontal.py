@@ -2,7 +2,7 @@
 
 A fruit is thin in one direction of its graph: a few nodes along a column, many columns. Dissecting the columns and
 keeping each column whole gives fronts that are small and dense, so that LAPACK does all the work: 4 times faster than
-SuperLU, and with the inertia (Sylvester's law). MKL's Pardiso factors faster and solves slower (docs/dehydration.md).
+SuperLU, and with the inertia (Sylvester's law). MKL's Pardiso is measured in docs/dehydration.md.
 Duff and Reid 1983 (multifrontal), George 1973 (nested dissection).
 """
 

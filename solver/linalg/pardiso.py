@@ -1,7 +1,7 @@
 """Factors of positive definite matrices by MKL's Pardiso, which is not ours: the extra `mkl` brings it.
 
-One of a matrix is level with `multifrontal` up to rounding; for one solve per factor it is the faster one
-(docs/growth.md). A pattern is analysed once, which costs about as much as a factor.
+They are those of `multifrontal` up to rounding, and faster where each serves one solve (docs/dehydration.md). A pattern
+is analysed once, which costs about as much as a factor.
 Schenk and Gärtner 2004.
 """
 
