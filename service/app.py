@@ -16,14 +16,15 @@ from starlette.routing import Route
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, memory, page, problems, results
-from .admission import Admission
+from . import catalogue, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
 from .jobs import routes as jobs
 from .jobs.runner import JobRunner
-from .limits import Limits
+from .limits import memory
+from .limits.admission import Admission
+from .limits.requests import Limits
 from .openapi import Documented, operation_id
 from .security import requires
 from .settings import Settings

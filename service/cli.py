@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sweeps.commands import watchdog
 from sweeps.commands.cli import app
-from sweeps.commands.console import emit, note
+from sweeps.commands.terminal import watchdog
+from sweeps.commands.terminal.console import emit, note
 from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
 
-from . import cli_export
+from .commands import export as cli_export
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,8 +66,8 @@ def serve(
     import uvicorn
 
     from .app import create_app
-    from .connections import GuardedProtocol
-    from .hints import hints
+    from .commands.hints import hints
+    from .limits.connections import GuardedProtocol
     from .stopping import PATIENCE
 
     settings = _settings(store=store, host=host, port=port, workers=workers, scheduler=scheduler)
@@ -108,7 +108,7 @@ def doctor(
 
     wizen doctor --store demo --deep
     """
-    from .doctor import examine
+    from .commands.doctor import examine
 
     given = {"store": store, "host": host, "port": port}
     findings = []

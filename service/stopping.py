@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from sweeps.commands import watchdog
+from sweeps.commands.terminal import watchdog
 
 __all__ = ["PATIENCE", "at_signals"]
 

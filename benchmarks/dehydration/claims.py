@@ -18,9 +18,9 @@ from solver.contract import Need
 from solver.dehydration import SOLVER, DehydrationParams
 from store.ledger.jobs import JobSpec
 from store.store import Store
-from sweeps import executors
-from sweeps.plan import Plan
-from sweeps.runner import run_jobs
+from sweeps.planning.plan import Plan
+from sweeps.running import executors
+from sweeps.running.runner import run_jobs
 
 from .criteria import Found, judge
 from .pattern import Pattern, pattern

@@ -16,7 +16,7 @@ from store import starter
 from store.blending import methods
 from store.lookup import ShapeTable
 from store.store import Store
-from sweeps import score as scores
+from sweeps.refining import score as scores
 
 _HEAD = ("", "s", "roughness", "bands [dB]", "slopes W1 [degree]", "patchiness", "correlation", "neighbours correlate")
 _NAMES = {methods.DEFAULT: f"default, `{methods.DEFAULT}`", "idw": "the paper's, `idw`"}

@@ -18,8 +18,8 @@ from starlette.responses import Response, StreamingResponse
 from store.ledger.jobs import Job
 
 from .. import problems
-from ..clients import client_of
 from ..errors import TooManyListeners
+from ..limits.clients import client_of
 from ..settings import Settings
 from .routes import JobId, stored_job
 from .views import ENDED, view

@@ -22,7 +22,7 @@ from ..settings import Settings
 from ..telemetry import LOGGER
 
 if TYPE_CHECKING:
-    from sweeps.executors import Workers
+    from sweeps.running.executors import Workers
 
 __all__ = ["JobRunner"]
 
@@ -88,14 +88,14 @@ class JobRunner:
             store.ledger.close()
 
     def _work(self) -> None:
-        from sweeps.runner import run_queue
+        from sweeps.running.runner import run_queue
 
         with self._workers() as workers:
             LOGGER.info("jobs: running on %s", workers.title)
             run_queue(Store.open(self._settings.store), workers, self._stop, _PATIENCE)
 
     def _workers(self) -> AbstractContextManager[Workers]:
-        from sweeps import executors
+        from sweeps.running import executors
 
         if self._settings.scheduler is not None:
             return executors.dask_cluster(self._settings.scheduler)

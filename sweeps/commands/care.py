@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 from ..errors import InvalidOption
-from .console import emit, grid
-from .options import As_json, StorePath, TableName
+from .terminal.console import emit, grid
+from .terminal.options import As_json, StorePath, TableName
 
 __all__ = ["add_to"]
 
@@ -116,7 +116,7 @@ def verify(
     from store.store import Store
 
     from ..recompute import recompute as solve_again
-    from . import progress
+    from .terminal import progress
 
     opened = Store.open(store)
     findings = audit.verify(opened, name)

@@ -20,8 +20,8 @@ from . import refine as cli_refine
 from . import results as cli_results
 from . import shapes as cli_shapes
 from . import tables as cli_tables
-from .console import Root, emit, grid, note
-from .options import (
+from .terminal.console import Root, emit, grid, note
+from .terminal.options import (
     As_json,
     Out,
     Params,
@@ -84,7 +84,7 @@ def presets(as_json: As_json = False) -> None:
     """
     from solver import registry
 
-    from .words import short
+    from .terminal.words import short
 
     solvers = {name: registry.get(name) for name in registry.names()}
     document = {
@@ -141,8 +141,8 @@ def solve(
     from solver.contract import Need
     from store import shards
 
-    from ..plan import job
-    from .words import per_stage, show_run
+    from ..planning.plan import job
+    from .terminal.words import per_stage, show_run
 
     if cut is not None:
         _check_cut(cut, out)
@@ -171,7 +171,7 @@ def _run(solver: Solver, params: Parameters, need: Need) -> tuple[xr.Dataset, fl
     from solver.contract import Context
 
     from .. import tabled
-    from . import progress
+    from .terminal import progress
 
     begin = time.perf_counter()
     with progress.one_run(solver.name) as observe, progress.stopping() as stop:
@@ -251,11 +251,11 @@ def sweep(
     """
     from store.store import Store
 
-    from .. import executors
-    from ..plan import Plan
-    from ..runner import run_plan
-    from . import progress
-    from .words import readers, report_document, show_report
+    from ..planning.plan import Plan
+    from ..running import executors
+    from ..running.runner import run_plan
+    from .terminal import progress
+    from .terminal.words import readers, report_document, show_report
 
     read = Plan.load(plan)
     with executors.choose(workers, dask, scheduler) as pool:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InvalidOption
-from .console import emit, grid
-from .options import As_json, Preset, Quality, Set, assignments
+from .terminal.console import emit, grid
+from .terminal.options import As_json, Preset, Quality, Set, assignments
 
 if TYPE_CHECKING:
     from solver.contract import Fresh, Solver
@@ -64,7 +64,7 @@ def onset(
         _check(mode_out)
     from solver.contract import Context
 
-    from . import progress
+    from .terminal import progress
 
     chosen = _solver(solver)
     assert chosen.onset is not None

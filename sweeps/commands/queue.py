@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InvalidOption
-from .console import emit, grid, note
-from .options import As_json, StorePath
+from .terminal.console import emit, grid, note
+from .terminal.options import As_json, StorePath
 
 __all__ = ["add_to"]
 
@@ -52,9 +52,9 @@ def work(
     from store.starter import check_own
     from store.store import Store
 
-    from .. import executors
-    from ..runner import run_queue
-    from . import progress
+    from ..running import executors
+    from ..running.runner import run_queue
+    from .terminal import progress
 
     check_own(store)
     with executors.choose(workers, scheduler=scheduler) as pool, progress.stopping(progress.GIVEN_BACK) as stop:

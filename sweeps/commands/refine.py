@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import emit, grid, note
-from .grouped import grouped
-from .options import As_json, StorePath, TableName
+from .terminal.console import emit, grid, note
+from .terminal.grouped import grouped
+from .terminal.options import As_json, StorePath, TableName
 
 if TYPE_CHECKING:
-    from ..rounds import Round
+    from ..refining.rounds import Round
 
 __all__ = ["add_to"]
 
@@ -64,12 +64,12 @@ def refine(asked: _Asked) -> None:
     from store import tables
     from store.store import Store
 
-    from .. import executors
-    from .. import refine as refining
-    from ..plan import Plan
-    from ..rounds import rounds
-    from . import progress
-    from .words import readers
+    from ..planning.plan import Plan
+    from ..refining import refine as refining
+    from ..refining.rounds import rounds
+    from ..running import executors
+    from .terminal import progress
+    from .terminal.words import readers
 
     read, opened, measure = Plan.load(asked.plan), Store.open(asked.store), asked.measure
     if asked.dry_run:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InvalidOption
-from .console import emit
-from .options import As_json, StorePath
+from .terminal.console import emit
+from .terminal.options import As_json, StorePath
 
 if TYPE_CHECKING:
     from ..results import Row
@@ -103,7 +103,7 @@ def show(
     from store.store import Store
 
     from ..results import resolve
-    from .words import per_stage, short, show_run
+    from .terminal.words import per_stage, short, show_run
 
     opened = Store.open(store)
     key = resolve(opened, result)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InvalidOption
-from .console import emit, grid
-from .options import As_json, Out, Set, Stages, StoreToRead, TableName, assignments, numbers
+from .terminal.console import emit, grid
+from .terminal.options import As_json, Out, Set, Stages, StoreToRead, TableName, assignments, numbers
 
 if TYPE_CHECKING:
     from store.shape import Shape

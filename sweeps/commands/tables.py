@@ -9,15 +9,15 @@ import typer
 
 from ..errors import InvalidOption
 from . import care as cli_tools
-from .console import emit, grid
-from .options import As_json, Quality, StorePath, StoreToRead, TableName
+from .terminal.console import emit, grid
+from .terminal.options import As_json, Quality, StorePath, StoreToRead, TableName
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from store.store import Store
 
-    from ..score import Report
+    from ..refining.score import Report
 
 __all__ = ["add_to"]
 
@@ -136,7 +136,7 @@ def score(
     from store.lookup import ShapeTable
     from store.store import Store
 
-    from .. import score as scores
+    from ..refining import score as scores
 
     if picture is not None and picture.suffix != ".png":
         raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")

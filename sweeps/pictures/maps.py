@@ -14,7 +14,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 
 from ..errors import InvalidOption
-from ..planfile import suggest
+from ..planning.planfile import suggest
 from .sheet import Panel, sheet
 
 __all__ = ["Map"]

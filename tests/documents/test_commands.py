@@ -26,7 +26,7 @@ from solver.contract import Need
 from solver.dehydration import SOLVER
 from store import shards
 from store.store import Store
-from sweeps.plan import Plan
+from sweeps.planning.plan import Plan
 from tests.service._asking import until
 from tests.service._runs import rotting
 

@@ -19,9 +19,10 @@ def environment(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPat
 
 
 def test_folders_without_python_hide_nothing(environment: Environment, tmp_path: Path) -> None:
-    for name in (*FLOORS, "store/shards", "solver/contract", "sweeps/runner", "service/app"):
+    for name in (*FLOORS, "store/shards", "solver/contract", "sweeps/running", "service/app"):
         (tmp_path / name).mkdir(exist_ok=True)
-    asked = "import store.store, store.shards, solver.contract, sweeps.runner, service.app; print(store.shards.write)"
+    named = "store.store, store.shards, solver.contract, sweeps.running.runner, service.app"
+    asked = f"import {named}; print(store.shards.write)"
     done = environment.run("python", "-c", asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "function write" in done.stdout

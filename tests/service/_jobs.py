@@ -10,8 +10,8 @@ import httpx
 
 from store.store import Store
 from store.tokens import Tokens
-from sweeps import executors
-from sweeps.runner import run_queue
+from sweeps.running import executors
+from sweeps.running.runner import run_queue
 
 
 def bearer(store: Store, name: str = "tester", scope: Any = "run") -> dict[str, str]:

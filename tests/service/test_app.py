@@ -17,9 +17,9 @@ HEAVY = {
     "distributed",
     "typer",
     "sweeps.commands.cli",
-    "sweeps.executors",
-    "sweeps.plan",
-    "sweeps.runner",
+    "sweeps.running.executors",
+    "sweeps.planning.plan",
+    "sweeps.running.runner",
 }
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from service import doctor
 from service.cli import app
-from service.doctor import Finding, examine
+from service.commands import doctor
+from service.commands.doctor import Finding, examine
 from service.settings import Settings
 from store import tables
 from store.ledger.filesystem import filesystem

@@ -17,7 +17,7 @@ from solver import registry
 from solver.contract import Need
 from store import shards
 from store.store import Store
-from sweeps.plan import job
+from sweeps.planning.plan import job
 
 from ._asking import checked
 from ._runs import splitting

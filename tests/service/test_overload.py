@@ -15,10 +15,10 @@ import httpx
 import pytest
 import uvicorn
 
-from service import connections
-from service.admission import Load
-from service.clients import address, client_of
-from service.connections import GuardedProtocol
+from service.limits import connections
+from service.limits.admission import Load
+from service.limits.clients import address, client_of
+from service.limits.connections import GuardedProtocol
 from service.settings import Settings, page
 
 from ._asking import ROOT, checked

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 #: Each takes a tenth of a second to a second to import.
-HEAVY = {"xarray", "pandas", "dask", "numba", "distributed", "matplotlib", "sweeps.runner"}
+HEAVY = {"xarray", "pandas", "dask", "numba", "distributed", "matplotlib", "sweeps.running.runner"}
 
 CODE = """
 import sys

@@ -21,9 +21,9 @@ from typing import Any
 from store.ledger.clock import Clock
 from store.ledger.jobs import Job, JobSpec
 from store.ledger.ledger import MAX_LOST, Ledger
-from sweeps.place import Place
-from sweeps.run import Run
-from sweeps.work import Hold, Outcome, Task, beat
+from sweeps.running.place import Place
+from sweeps.running.run import Run
+from sweeps.running.work import Hold, Outcome, Task, beat
 
 __all__ = ["Broken", "World"]
 

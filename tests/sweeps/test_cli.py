@@ -22,7 +22,7 @@ from conftest import Solves
 from solver import registry
 from store import seal
 from store.store import Store
-from sweeps.commands.options import assignments
+from sweeps.commands.terminal.options import assignments
 
 
 def test_help_answers_at_once_and_imports_nothing_heavy() -> None:

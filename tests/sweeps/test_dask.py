@@ -13,11 +13,11 @@ import pytest
 from conftest import Solves
 
 from store.store import Store
-from sweeps import executors
-from sweeps.executors import SchedulerLost
-from sweeps.plan import Plan
-from sweeps.report import Event
-from sweeps.runner import run_plan
+from sweeps.planning.plan import Plan
+from sweeps.running import executors
+from sweeps.running.executors import SchedulerLost
+from sweeps.running.report import Event
+from sweeps.running.runner import run_plan
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:distributed", "ignore::ResourceWarning")
 

@@ -11,10 +11,10 @@ import pytest
 from conftest import Solves
 
 from store.store import Store
-from sweeps import executors
 from sweeps.errors import InvalidOption, SweepError
-from sweeps.plan import Plan
-from sweeps.runner import run_plan
+from sweeps.planning.plan import Plan
+from sweeps.running import executors
+from sweeps.running.runner import run_plan
 
 Write = Callable[..., Path]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.decay.surfaces.surface import geodesic
-from sweeps.commands.options import assignments
+from sweeps.commands.terminal.options import assignments
 from sweeps.errors import InvalidOption
 
 trimesh = pytest.importorskip("trimesh")

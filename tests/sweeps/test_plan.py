@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from solver import registry
-from sweeps import points
 from sweeps.errors import PlanError
-from sweeps.plan import Plan
+from sweeps.planning import points
+from sweeps.planning.plan import Plan
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -14,11 +14,12 @@ from service.cli import app
 from store import tables
 from store.errors import MixedSamples
 from store.store import Store
-from sweeps import executors, refine
 from sweeps.errors import PlanError
-from sweeps.plan import Plan
-from sweeps.rounds import Round, held_out_error, rounds
-from sweeps.runner import run_plan
+from sweeps.planning.plan import Plan
+from sweeps.refining import refine
+from sweeps.refining.rounds import Round, held_out_error, rounds
+from sweeps.running import executors
+from sweeps.running.runner import run_plan
 
 NEED = {"stages": [0.2], "quality": "fine", "fields": ["displacement", "mean_radius"]}
 BOX = {"te": {"from": 0.02, "to": 0.06}, "gamma": {"from": 10, "to": 200, "scale": "log"}}

@@ -15,11 +15,11 @@ import xarray as xr
 from conftest import Solves
 
 from store.store import Store
-from sweeps import executors
-from sweeps.place import Place
-from sweeps.plan import Plan
-from sweeps.report import Event
-from sweeps.runner import run_jobs, run_plan
+from sweeps.planning.plan import Plan
+from sweeps.running import executors
+from sweeps.running.place import Place
+from sweeps.running.report import Event
+from sweeps.running.runner import run_jobs, run_plan
 
 Write = Callable[..., Path]
 
@@ -202,8 +202,8 @@ def sweep_script(folder: Path) -> Path:
     script.write_text(
         "import sys\n"
         "from store.store import Store\n"
-        "from sweeps import executors, runner\n"
-        "from sweeps.plan import Plan\n"
+        "from sweeps.planning.plan import Plan\n"
+        "from sweeps.running import executors, runner\n"
         "if __name__ == '__main__':\n"
         "    with executors.processes(2) as workers:\n"
         "        runner.run_plan(Plan.load(sys.argv[1]), Store.open(sys.argv[2]), workers)\n"

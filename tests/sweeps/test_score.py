@@ -19,8 +19,9 @@ from store import starter
 from store.blending import methods
 from store.lookup import ShapeTable
 from store.store import Store
-from sweeps import plan, score
 from sweeps.errors import InvalidOption
+from sweeps.planning import plan
+from sweeps.refining import score
 
 
 def test_samples_predicted_from_each_other(tmp_path: Path) -> None:

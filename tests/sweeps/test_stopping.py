@@ -15,10 +15,10 @@ import pytest
 from conftest import Solves
 
 from store.store import Store
-from sweeps import executors
-from sweeps.plan import Plan
-from sweeps.report import Event
-from sweeps.runner import run_jobs, run_plan
+from sweeps.planning.plan import Plan
+from sweeps.running import executors
+from sweeps.running.report import Event
+from sweeps.running.runner import run_jobs, run_plan
 
 Write = Callable[..., Path]
 
@@ -119,8 +119,8 @@ def test_what_was_suspended_past_its_lease_comes_too_late(
     path = write_plan("[0.03]", "[10]", "pause = 2")
     script = tmp_path / "run.py"
     script.write_text(
-        "import sys\nfrom store.store import Store\nfrom sweeps import executors, runner\n"
-        "from sweeps.plan import Plan\nif __name__ == '__main__':\n    with executors.serial() as workers:\n"
+        "import sys\nfrom store.store import Store\nfrom sweeps.running import executors, runner\n"
+        "from sweeps.planning.plan import Plan\nif __name__ == '__main__':\n    with executors.serial() as workers:\n"
         "        report = runner.run_plan(Plan.load(sys.argv[1]), Store.open(sys.argv[2]), workers, lease=1.0)\n"
         "    print(report.solved, report.reused)\n"
     )

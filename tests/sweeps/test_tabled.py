@@ -13,8 +13,8 @@ from store import starter
 from store.lookup import ShapeTable
 from store.store import Store
 from sweeps import tabled
-from sweeps.plan import job
-from sweeps.work import Task, work
+from sweeps.planning.plan import job
+from sweeps.running.work import Task, work
 
 FRUIT = {"body": "table", "transpiration": 14.1, "weight": 87.0, "water_content": 88.0, "wounds": []}
 

@@ -1,4 +1,4 @@
-"""One runner, step by step: what it claims, hands out, takes in and gives back. `sweeps.runner` lets it run.
+"""One runner, step by step: what it claims, hands out, takes in and gives back. `sweeps.running.runner` lets it run.
 
 Its steps are generators that yield how long to wait for a result at most, so that a simulation can drive the very
 same code by a clock of its own.
@@ -15,7 +15,7 @@ from store.ledger.jobs import Job, JobSpec
 from store.ledger.queue import Queue
 from store.store import Store
 
-from .errors import SweepError
+from ..errors import SweepError
 from .executors import SchedulerLost
 from .place import Place
 from .report import Event, Failure, Kind, Report

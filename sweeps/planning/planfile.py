@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
 
-from .errors import PlanError
+from ..errors import PlanError
 
 __all__ = ["Axis", "Pattern", "PlanFile", "Range", "Sampling", "load", "parse", "suggest"]
 
@@ -77,7 +77,7 @@ class Pattern(_Strict):
 
 
 class PlanFile(_Strict):
-    """A plan as it is written; `sweeps.plan.Plan` is what it means."""
+    """A plan as it is written; `sweeps.planning.plan.Plan` is what it means."""
 
     solver: str = Field(description="Name of the solver")
     preset: str | None = Field(None, description="Named parameters to start from")

@@ -28,7 +28,7 @@ from store.errors import NetworkFileSystem, StoreError
 from store.ledger.filesystem import filesystem, refuse_network
 from store.store import Store
 
-from .settings import Settings
+from ..settings import Settings
 
 __all__ = ["Finding", "examine"]
 
@@ -80,7 +80,7 @@ def examine(settings: Settings, deep: bool = False) -> Iterator[Finding]:
 
 def _installation() -> Finding:
     """The four packages are the ones that were installed, and no folder of the working directory hides them."""
-    here = Path(__file__).resolve().parents[1]
+    here = Path(__file__).resolve().parents[2]
     for name in ("solver", "store", "sweeps", "service"):
         origin = getattr(importlib.import_module(name), "__file__", None)
         if origin is None or Path(origin).resolve().parents[1] != here:
@@ -104,7 +104,7 @@ def _kernels() -> Finding:
     import numba
 
     chosen = os.environ.get("NUMBA_CACHE_DIR")
-    place = Path(chosen) if chosen else Path(__file__).resolve().parents[1] / "solver"
+    place = Path(chosen) if chosen else Path(__file__).resolve().parents[2] / "solver"
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     processor = os.environ.get("NUMBA_CPU_NAME") or llvmlite.binding.get_host_cpu_name()
     said = f"compiled for {processor}, {cores} cores, {numba.get_num_threads()} threads"

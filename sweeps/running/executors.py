@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from .errors import InvalidOption, SweepError, installing
+from ..errors import InvalidOption, SweepError, installing
 from .processes import Processes
 
 __all__ = ["SchedulerLost", "Workers", "choose", "cores", "dask_cluster", "dask_local", "processes", "serial"]

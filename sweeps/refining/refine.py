@@ -27,8 +27,8 @@ from store.store import Store
 from store.surfaces.measures import Measures
 from store.tables import TableInfo
 
-from .errors import PlanError
-from .plan import Plan
+from ..errors import PlanError
+from ..planning.plan import Plan
 
 __all__ = ["Proposal", "State", "check", "name_of", "propose", "read", "with_samples"]
 

@@ -15,10 +15,10 @@ from collections.abc import Callable
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import problems
+from .. import problems
+from ..errors import Overloaded
+from ..settings import Settings
 from .clients import client_of
-from .errors import Overloaded
-from .settings import Settings
 
 __all__ = ["Admission", "Load"]
 

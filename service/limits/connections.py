@@ -16,9 +16,9 @@ import orjson
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 from uvicorn.server import ServerState
 
+from ..problems import MEDIA_TYPE, URN
+from ..settings import Settings
 from .clients import address
-from .problems import MEDIA_TYPE, URN
-from .settings import Settings
 
 __all__ = ["GuardedProtocol"]
 

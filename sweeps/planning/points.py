@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from .errors import PlanError
+from ..errors import PlanError
 from .planfile import Axis, PlanFile, Range
 
 __all__ = ["MAX_SAMPLES", "points"]

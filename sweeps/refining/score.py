@@ -23,9 +23,9 @@ from store.store import Store
 from store.surfaces import measures, spectra
 from store.surfaces.measures import LATTICE, Measures, Surface
 
-from .errors import InvalidOption
-from .pictures.sheet import Panel, sheet
-from .plan import Plan
+from ..errors import InvalidOption
+from ..pictures.sheet import Panel, sheet
+from ..planning.plan import Plan
 
 __all__ = ["Case", "Report", "Row", "cases", "picture", "score"]
 

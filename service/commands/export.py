@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sweeps.commands.console import emit, note
-from sweeps.commands.grouped import grouped
-from sweeps.commands.options import As_json
+from sweeps.commands.terminal.console import emit, note
+from sweeps.commands.terminal.grouped import grouped
+from sweeps.commands.terminal.options import As_json
 from sweeps.errors import InvalidOption
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from .sequences import Export, Options, Sequence
-    from .sequences.imported import Bound
+    from ..sequences import Export, Options, Sequence
+    from ..sequences.imported import Bound
 
 __all__ = ["add_to"]
 
@@ -88,9 +88,9 @@ def export(asked: _Asked) -> None:
 
     wizen export run.h5 --mesh my.obj --format pc2
     """
-    from sweeps.commands import progress
+    from sweeps.commands.terminal import progress
 
-    from .sequences import Options, prepared
+    from ..sequences import Options, prepared
 
     chosen, out = _format(asked.format, asked.out, asked.result)
     run = _read(asked.result, asked.store)
@@ -135,7 +135,7 @@ def _format(name: str | None, out: Path | None, result: str) -> tuple[Export | N
         InvalidOption: there is no such format, or no place for the file.
 
     """
-    from .sequences import EXPORTS
+    from ..sequences import EXPORTS
 
     known = [*EXPORTS, "obj"]
     if out is None:
@@ -170,14 +170,14 @@ def _read(result: str, store: Path | None) -> xr.Dataset:
 
 
 def _written(sequence: Sequence, chosen: Export | None, options: Options) -> bytes:
-    from .sequences import STILLS, write
+    from ..sequences import STILLS, write
 
     return STILLS["obj"](sequence, options) if chosen is None else write(sequence, chosen, options)
 
 
 def _bound(mesh: Path, run: xr.Dataset, options: Options, binding: str | None, fit: str) -> Bound:
-    from .sequences import of_run
-    from .sequences.imported import bind, load
+    from ..sequences import of_run
+    from ..sequences.imported import bind, load
 
     if binding not in (None, "nearest", "direction"):
         raise InvalidOption(f"--binding {binding}: there is no such binding.", "Take nearest or direction.")
@@ -190,7 +190,7 @@ def _bound(mesh: Path, run: xr.Dataset, options: Options, binding: str | None, f
 
 
 def _moved(bound: Bound, sequence: Sequence, chosen: Export | None, options: Options) -> bytes:
-    from .sequences.caches import mdd_of, pc2_of
+    from ..sequences.caches import mdd_of, pc2_of
 
     encoders = {"pc2": pc2_of, "mdd": mdd_of}
     if chosen is None or chosen.name not in encoders:

@@ -24,8 +24,8 @@ from store.errors import CorruptShard, StoreError
 from store.ledger.jobs import Job, JobSpec
 from store.store import Store
 
-from . import tabled
-from .errors import SweepError, describe
+from .. import tabled
+from ..errors import SweepError, describe
 
 __all__ = ["GRACE", "Hold", "Outcome", "Task", "beat", "quarantine_path", "stop_mark", "work"]
 

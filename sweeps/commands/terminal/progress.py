@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ..report import Event
+from ...running.report import Event
 from .console import note
 
 if TYPE_CHECKING:

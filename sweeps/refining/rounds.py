@@ -27,11 +27,11 @@ from store.store import Store
 from store.surfaces.measures import Surface, compare
 from store.tables import TableInfo
 
+from ..planning.plan import Plan
+from ..running.report import Event
+from ..running.runner import run_jobs
 from . import refine, score
-from .plan import Plan
 from .refine import Proposal, State
-from .report import Event
-from .runner import run_jobs
 
 __all__ = ["Round", "held_out_error", "rounds"]
 

@@ -7,8 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..plan import Plan
-from ..report import Report
+from ...planning.plan import Plan
+from ...running.report import Report
 from .console import grid
 
 __all__ = ["per_stage", "readers", "report_document", "short", "show_report", "show_run"]

@@ -21,8 +21,8 @@ from solver import registry
 from solver.contract import InvalidGeometry, InvalidInput, Need, Params, Solver
 from store.ledger.jobs import JobSpec
 
+from ..errors import PlanError
 from . import planfile
-from .errors import PlanError
 from .planfile import PlanFile
 from .points import points
 

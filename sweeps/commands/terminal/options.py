@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import InvalidOption
+from ...errors import InvalidOption
 
 __all__ = [
     "As_json",

@@ -10,9 +10,9 @@ import asyncio
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import problems
-from .errors import BodyTooLarge, QueryTooLong, ServiceError, SlowBody, TimedOut
-from .settings import Settings
+from .. import problems
+from ..errors import BodyTooLarge, QueryTooLong, ServiceError, SlowBody, TimedOut
+from ..settings import Settings
 
 __all__ = ["Limits"]
 

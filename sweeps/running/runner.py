@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, wait
 from store.ledger.jobs import JobSpec
 from store.store import Store
 
-from .plan import Plan
+from ..planning.plan import Plan
 from .report import Event, Report
 from .run import Run
 
@@ -55,7 +55,7 @@ def run_jobs(
     Args:
         jobs: what to compute, in this order.
         store: where results go.
-        executor: any `concurrent.futures.Executor`; `sweeps.executors` makes good ones.
+        executor: any `concurrent.futures.Executor`; `sweeps.running.executors` makes good ones.
         name: name of the plan in the ledger.
         observe: is told of every start, progress and end, in the calling thread.
         lease: seconds after which others may take over a job whose worker gives no sign of life.

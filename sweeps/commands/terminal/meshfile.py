@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InvalidOption, installing
+from ...errors import InvalidOption, installing
 
 __all__ = ["KINDS", "read"]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.core import TyperGroup
 
-from ..errors import describe, exit_code
+from ...errors import describe, exit_code
 
 if TYPE_CHECKING:
     from rich.console import Console

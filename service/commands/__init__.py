@@ -1,0 +1,1 @@
+"""Commands of `wizen` that the service adds, and what `wizen serve` prints."""

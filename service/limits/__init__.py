@@ -1,0 +1,1 @@
+"""What a service refuses rather than suffer: too many, too long, too slow, too large."""

@@ -1,0 +1,1 @@
+"""What all commands share: options, words, and how they speak to a terminal."""

@@ -1,0 +1,1 @@
+"""Plans: the grammar of their files, their points, and what they ask for."""

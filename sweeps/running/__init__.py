@@ -1,0 +1,1 @@
+"""Jobs run: claimed, handed to executors, stored, noted, and told of."""
