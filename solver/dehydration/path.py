@@ -1,8 +1,8 @@
 """The way along shrinkage: from a smooth start, past the onset, up a ladder of settled states.
 
 Rungs stand every 0.05 of shrinkage, whatever is asked for, and each is marched to from the one below. So buckles merge
-once on the way, not again for every stage, and a stage's folds are grown from those of the stage before. A stage between
-two rungs is settled on a copy. What else was asked for never changes a stage's shape.
+once on the way, not again for every stage, and a stage's folds are grown from those of the stage before. A stage
+between two rungs is settled on a copy. What else was asked for never changes a stage's shape.
 """
 
 from __future__ import annotations
@@ -128,9 +128,7 @@ class Path:
     def _pressed(self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, times: int) -> Floats:
         """Let rest volumes catch up with the pressure, and return them; state and velocity change in place."""
         for _ in range(times):
-            rest = self.motion.advance(
-                state, velocity, rest, _PRESSING_STEPS, shrinkage, shrinkage, _PRESSING_DAMPING
-            )
+            rest = self.motion.advance(state, velocity, rest, _PRESSING_STEPS, shrinkage, shrinkage, _PRESSING_DAMPING)
         return rest
 
     def _settle(self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> State:
