@@ -53,7 +53,7 @@ def made(solver: str | None) -> Row:
     called = f"python -m {spec.name.removesuffix('.__main__')}" if spec else Path(sys.argv[0]).name
     version = {"solver": solver, "version": registry.get(solver).version} if solver else {}
     return {
-        "command": shlex.join([*called.split(), *sys.argv[1:]]),
+        "command": shlex.join([*called.split(), *map(_relative, sys.argv[1:])]),
         "commit": _commit(),
         **version,
         "machine": machine(),
@@ -123,6 +123,12 @@ def _commit() -> str:
 
     commit = git("rev-parse", "--short=10", "HEAD")
     return commit + "+" * bool(git("status", "--porcelain", "--untracked-files=no", "--", "*.py", "*.toml"))
+
+
+def _relative(word: str) -> str:
+    """Return a word of a command without the place where this machine keeps what it names."""
+    path = Path(word)
+    return path.name if path.is_absolute() else word
 
 
 def _rounded(value: Any) -> Any:

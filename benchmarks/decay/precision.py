@@ -219,11 +219,14 @@ def main(path: Path, python: str | None) -> None:
         round_ = where == "sphere"
         exact = reference(rates, round_)
         meshes = ((16, 12), (32, 24), (64, 48), (128, 96)) if round_ else ((33, 12), (65, 24), (129, 48), (257, 96))
-        found = [ours(rates, n, steps, round_, exact) for n, steps in meshes]
-        found += [euler(rates, n, round_, exact) for n in (32, 64, 128, 256)]
-        if python and not round_:
-            found += [peer(python, rates, n, exact) for n in (64, 128)]
-        rows += [{"where": where, **row} for row in found]
+        found = []
+        for (n, steps), count in zip(meshes, (32, 64, 128, 256), strict=True):
+            # in turn, so that other work on the machine falls on all
+            found += [ours(rates, n, steps, round_, exact), euler(rates, count, round_, exact)]
+            if python and not round_ and count in (64, 128):
+                found.append(peer(python, rates, count, exact))
+        order = list(dict.fromkeys(row["code"] for row in found))
+        rows += [{"where": where, **row} for row in sorted(found, key=lambda row: order.index(row["code"]))]
     sheet = Sheet("decay-precision", ("on a", "code", "points", "steps", "CPU s", "error"), "decay")
     for row in rows:
         cells = (row["where"], row["code"], row["points"], row["steps"], f"{row['seconds']:.3f}", f"{row['error']:.1e}")

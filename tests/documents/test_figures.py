@@ -42,6 +42,7 @@ def test_records_say_what_made_them(name: str) -> None:
     record = figures.load(name)
     assert record["name"] == name
     assert record["command"]
+    assert not re.search(r"(^|\s)/", record["command"])  # where one machine keeps things says nothing to others
     assert re.fullmatch(r"[0-9a-f]{7,40}\+?", record["commit"])
     assert re.fullmatch(r"\d{4}-\d\d-\d\d", record["date"])
     assert ("solver" in record) == ("version" in record)
