@@ -81,20 +81,25 @@ class Row:
 
 
 class _Watched(Path):
-    """A path that notes the least J / Jd of each settled stage."""
+    """A path that notes the least J / Jd of each stage that was asked for."""
 
     made: _Watched | None = None
 
     def __init__(self, *asked: Any, **named: Any) -> None:
         super().__init__(*asked, **named)
         self.settled: list[tuple[float, float]] = []
+        self._ratio = 1.0
         _Watched.made = self
+
+    def stage(self, shrinkage: float, last: float) -> State:
+        found = super().stage(shrinkage, last)
+        self.settled.append((shrinkage, self._ratio))
+        return found
 
     def _settle(self, state: Any, *rest: Any, **named: Any) -> State:
         found = super()._settle(state, *rest, **named)
         layout = self.motion.drive.loaded(self.motion.layout, found.shrinkage)
-        ratio = element_report(layout, state, 1 - found.shrinkage).least_ratio.min()
-        self.settled.append((found.shrinkage, float(ratio)))
+        self._ratio = float(element_report(layout, state, 1 - found.shrinkage).least_ratio.min())
         return found
 
 

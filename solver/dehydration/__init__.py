@@ -60,7 +60,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="7",
+    version="8",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", *_DESCRIPTORS, "strain_energy", "released_energy"),

@@ -1,10 +1,13 @@
-"""The march along shrinkage: from a smooth start, past the onset, to stages that are settled on the side.
+"""The way along shrinkage: from a smooth start, past the onset, up a ladder of settled states.
 
-The march depends on the parameters and the quality alone. A stage is settled on a copy of the marching state, so what
-else was asked for never changes a stage's shape.
+Rungs stand every 0.05 of shrinkage, whatever is asked for, and each is marched to from the one below. So buckles merge
+once on the way, not again for every stage, and a stage's folds are grown from those of the stage before. A stage
+between two rungs is settled on a copy. What else was asked for never changes a stage's shape.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +18,7 @@ from .fresh.mesh import FruitMesh
 from .kernel import new_state
 from .motion import Motion
 from .params import DehydrationParams
-from .settings import Settings
+from .settings import RUNG, Settings
 from .settle import State, settle
 
 __all__ = ["Path", "State"]
@@ -25,8 +28,12 @@ Fixed = NDArray[np.int32]
 #: Shrinkage after which the scaled masses are taken anew.
 _REWEIGH = 0.01
 
-#: Updates of the rest volumes before a stage settles, and calm steps between two: what rings is gone by the next.
-_PRESSINGS, _PRESSING_STEPS = 6, 150
+#: Updates of the rest volumes before a state settles, steps between two, and their damping: what rings is gone by the
+#: next. A march's volumes lag by 0.03 of shrinkage; those of a smooth start know no pressure.
+_PRESSINGS, _PRESSINGS_AT_START, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 3, 150, 0.12
+
+#: Shrinkage that a stage may be off a rung by rounding.
+_ROUNDING = 1e-9
 
 
 class Path:
@@ -40,7 +47,10 @@ class Path:
         self.motion = Motion(params, settings, context)
         self._rest = self.motion.rest
         self._state, self._velocity = new_state(self.motion.layout)
-        self._place = 0
+        # where the march set out last, and the steps made since
+        self._foot, self._place = settings.start, 0
+        self._rung = math.floor(settings.start / RUNG)
+        self._settled: State | None = None
         self._begun = False
 
     @property
@@ -63,39 +73,39 @@ class Path:
         """
         settings = self._settings
         if shrinkage <= settings.start:
-            return self._settle(*self._pressed(*self.motion.smooth(shrinkage), self._rest, shrinkage), shrinkage)
-        target = int((shrinkage - settings.start) / settings.pace)
-        self._march(target, last)
-        state, velocity, rest = self._state.copy(), self._velocity.copy(), self._rest
-        if target > self._place:
-            a, b = self._at(self._place), self._at(target)
-            # what is left to a stage is done on its copy
-            rest = self.motion.advance(state, velocity, rest, target - self._place, a, b, settings.damping)
-        return self._settle(*self._pressed(state, velocity, rest, shrinkage), shrinkage)
-
-    def _at(self, place: int) -> float:
-        """Return the shrinkage after `place` steps of the march."""
-        return self._settings.start + place * self._settings.pace
-
-    def _pressed(
-        self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float
-    ) -> tuple[Fixed, Singles, Floats]:
-        """Let rest volumes catch up with the pressure: a march's lag by 0.03 of shrinkage, a smooth start's know none.
-
-        Returns state, velocity (both changed in place) and rest volumes.
-        """
-        for _ in range(_PRESSINGS):
-            rest = self.motion.advance(
-                state, velocity, rest, _PRESSING_STEPS, shrinkage, shrinkage, self._settings.calm_damping
-            )
-        return state, velocity, rest
-
-    def _march(self, target: int, last: float) -> None:
-        """March in whole slices to at most `target` steps, whatever stages were asked for."""
-        settings = self._settings
+            state, velocity = self.motion.smooth(shrinkage)
+            rest = self._pressed(state, velocity, self._rest, shrinkage, _PRESSINGS_AT_START)
+            return self._settle(state, velocity, rest, shrinkage)
         if not self._begun:
             self._state, self._velocity = self.motion.smooth(settings.start)
             self._begun = True
+        top = math.floor(shrinkage / RUNG + _ROUNDING)
+        while self._rung < top:
+            self._climb(last)
+        if self._settled is not None and abs(shrinkage - top * RUNG) < _ROUNDING:
+            return self._settled
+        self._march(shrinkage, last)
+        state, velocity = self._state.copy(), self._velocity.copy()
+        return self._settle(state, velocity, self._arrived(state, velocity, shrinkage), shrinkage)
+
+    def _climb(self, last: float) -> None:
+        """March to the next rung and settle there."""
+        self._rung += 1
+        shrinkage = round(self._rung * RUNG, 12)
+        self._march(shrinkage, last)
+        self._rest = self._arrived(self._state, self._velocity, shrinkage)
+        self._settled = self._settle(self._state, self._velocity, self._rest, shrinkage)
+        self._velocity[:] = 0
+        self._foot, self._place = shrinkage, 0
+
+    def _at(self, place: int) -> float:
+        """Return the shrinkage after `place` steps from the foot."""
+        return self._foot + place * self._settings.pace
+
+    def _march(self, shrinkage: float, last: float) -> None:
+        """March towards `shrinkage` in whole slices, whatever stages were asked for."""
+        settings = self._settings
+        target = int((shrinkage - self._foot) / settings.pace)
         chunk = max(20, min(self.motion.slice, round(_REWEIGH / settings.pace)))
         every = max(1, round(_REWEIGH / (chunk * settings.pace)))
         while self._place + chunk <= target:
@@ -105,6 +115,21 @@ class Path:
             self._rest = self.motion.advance(self._state, self._velocity, self._rest, chunk, a, b, settings.damping)
             self._place += chunk
             self._context.report(b / last if last else 1.0, f"shrinkage s = {b:.3f}")
+
+    def _arrived(self, state: Fixed, velocity: Singles, shrinkage: float) -> Floats:
+        """Take what the march left to `shrinkage`, less than a slice, and return the rest volumes there."""
+        rest = self._rest
+        count = int((shrinkage - self._at(self._place)) / self._settings.pace)
+        if count > 0:
+            a, b = self._at(self._place), self._at(self._place + count)
+            rest = self.motion.advance(state, velocity, rest, count, a, b, self._settings.damping)
+        return self._pressed(state, velocity, rest, shrinkage, _PRESSINGS)
+
+    def _pressed(self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, times: int) -> Floats:
+        """Let rest volumes catch up with the pressure, and return them; state and velocity change in place."""
+        for _ in range(times):
+            rest = self.motion.advance(state, velocity, rest, _PRESSING_STEPS, shrinkage, shrinkage, _PRESSING_DAMPING)
+        return rest
 
     def _settle(self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> State:
         return settle(self.motion, state, velocity, rest, shrinkage, self._with_release)

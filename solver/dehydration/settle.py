@@ -17,7 +17,7 @@ Fixed = NDArray[np.int32]
 
 #: Looks at the kinetic energy per swing, and those between two weighings: what moves that fast folds meanwhile, and
 #: on masses that are 800 steps old it can blow up.
-_LOOKS, _WEIGH_EVERY = 30, 6
+_LOOKS, _WEIGH_EVERY = 15, 6
 
 #: Steps over which the surface's drift is measured.
 _REST_STEPS = 200
