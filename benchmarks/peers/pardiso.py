@@ -20,7 +20,7 @@ from benchmarks.linalg import shell_matrix, wood_matrix
 from solver.dehydration.implicit import build_model, build_quadratic_mesh, graded_layers
 from solver.dehydration.implicit.newton import masked
 from solver.dehydration.params import DehydrationParams
-from solver.growth.settling import energy
+from solver.growth.settling.tangent import LEAF
 from solver.linalg.multifrontal import Analysis, analyse, factorise
 from solver.wood.stepping import static
 
@@ -44,8 +44,7 @@ def _implicit(size: int) -> Made:
 def _growth() -> Made:
     mesh, pattern, x, blocks = shell_matrix()
     pairs = np.concatenate([mesh.edges, mesh.hinges[:, 2:]])
-    leaf = energy._LEAF
-    return analyse(pairs, x[pairs].mean(axis=1), pattern.indptr, pattern.indices, leaf_size=leaf), blocks
+    return analyse(pairs, x[pairs].mean(axis=1), pattern.indptr, pattern.indices, leaf_size=LEAF), blocks
 
 
 def _wood() -> Made:
