@@ -37,7 +37,8 @@ def _named(*names: str) -> Any:
     raise ModuleNotFoundError(names[0])
 
 
-def _shell() -> tuple[Any, Any, np.ndarray, Any, np.ndarray]:
+def shell_matrix() -> tuple[Any, Any, np.ndarray, np.ndarray]:
+    """Return mesh, pattern, places and blocks of a growing shell's tangent, 3,025 vertices."""
     from solver import shell
     from solver.growth import shapes
 
@@ -48,7 +49,7 @@ def _shell() -> tuple[Any, Any, np.ndarray, Any, np.ndarray]:
     shell.membrane_tangent(1.05 * x, triangles, g, 1.0, pattern.of_triangles, blocks)
     shell.bending_tangent(1.05 * x, mesh.hinges, shell.hinge_stiffness(g, mesh, 0.01), pattern.of_hinges, blocks)
     blocks[pattern.diagonal] += 1e-3 * np.eye(3)
-    return mesh, pattern, x, blocks, triangles
+    return mesh, pattern, x, blocks
 
 
 def _sheet(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -62,7 +63,7 @@ def _sheet(n: int) -> tuple[np.ndarray, np.ndarray]:
 def shell_factor() -> Use:
     """Order, factors and ten solves of a growing shell's inverse, 3,025 vertices."""
     inverse = importlib.import_module("solver.shell.inverse")
-    mesh, pattern, x, blocks, _ = _shell()
+    mesh, pattern, x, blocks = shell_matrix()
     normals = np.tile([0.0, 0.0, 1.0], (len(x), 1))
     held, right = np.zeros(len(x), bool), np.random.default_rng(0).normal(size=x.shape)
 
@@ -83,7 +84,7 @@ def shell_pattern() -> Use:
     """The pattern of the same shell, as after each remeshing."""
     from solver import shell
 
-    mesh = _shell()[0]
+    mesh = shell_matrix()[0]
 
     def use() -> list[np.ndarray]:
         found = [shell.pattern(mesh) for _ in range(5)]
@@ -140,12 +141,11 @@ def meridional() -> Use:
     return use
 
 
-def wood_static() -> Use:
-    """Order, three factors and solves of a bundle's stiffness: 61 rods of 20 vertices, each tied to its neighbours.
+def wood_matrix() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return places, pattern, coupled pairs and blocks of a bundle: 61 rods of 20 vertices, tied to their neighbours.
 
     The matrix is made here: how bonds couple vertices has changed.
     """
-    multifrontal = _named("solver.linalg.multifrontal", "solver.multifrontal")
     i, j = (part.ravel() for part in np.meshgrid(np.arange(-4, 5), np.arange(-4, 5)))
     ring = np.stack([i + 0.5 * j, np.sqrt(0.75) * j], -1)[np.abs(i + j) <= 4]
     x = np.concatenate([np.stack([np.full(len(ring), 2.0 * z), *ring.T], -1) for z in range(20)])
@@ -161,8 +161,14 @@ def wood_static() -> Use:
     own = np.zeros((len(x), 3, 3))
     np.add.at(own, row, -blocks)
     blocks[row == indices] = own + 0.1 * np.eye(3)
+    return x, indptr, indices, np.column_stack([row, indices])[row <= indices], blocks
+
+
+def wood_static() -> Use:
+    """Order, three factors and solves of a bundle's stiffness."""
+    multifrontal = _named("solver.linalg.multifrontal", "solver.multifrontal")
+    x, indptr, indices, pairs, blocks = wood_matrix()
     right = np.random.default_rng(0).normal(size=3 * len(x))
-    pairs = np.column_stack([row, indices])[row <= indices]
 
     def order() -> Any:
         if multifrontal.__name__ == "solver.multifrontal":

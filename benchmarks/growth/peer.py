@@ -22,8 +22,9 @@ from benchmarks.figures import Sheet
 from solver import shell
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
-from solver.growth.settling.energy import StepEnergy, Tangent
+from solver.growth.settling.energy import StepEnergy
 from solver.growth.settling.minimise import lbfgs, quasi_newton
+from solver.growth.settling.tangent import Tangent
 
 _STEPS = (10, 50, 100, 200)
 _THICKNESS = 0.01

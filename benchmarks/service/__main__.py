@@ -186,6 +186,7 @@ def _turns(sides: dict[str, Any], seconds: float, rounds: int) -> list[dict[str,
             "p50_ms": statistics.median(one.quantile(0.5) for one in runs),
             "p99_ms": statistics.median(one.quantile(0.99) for one in runs),
             "processor_ms": min(busy[name]),
+            "rounds": [{"rate": one.rate, "p50_ms": one.quantile(0.5), "p99_ms": one.quantile(0.99)} for one in runs],
             "body": runs[0].body,
             "failed": sum(one.failed for one in runs),
         }
@@ -340,7 +341,13 @@ def main() -> None:
     for part, rows in found.items():
         runs = rows if isinstance(rows, list) else [rows]
         head, cells = _TABLES[part]
-        keep(f"service-{part}", runs, table={"head": head, "rows": [cells(run) for run in runs]})
+        peer = {"peer": _version(options.peer)} if part == "load" and options.peer else {}
+        keep(f"service-{part}", runs, table={"head": head, "rows": [cells(run) for run in runs]}, **peer)
+
+
+def _version(python: str) -> str:
+    words = "import importlib.metadata; print('xpublish', importlib.metadata.version('xpublish'))"
+    return subprocess.run([python, "-c", words], check=True, capture_output=True, text=True).stdout.strip()
 
 
 if __name__ == "__main__":

@@ -43,6 +43,7 @@ _EXTRAS = {
     "distributed": "runs on many machines: pip install '.[cluster]'",
     "trimesh": "meshes of one's own: pip install '.[formats]'",
     "pxr": "USD files: pip install '.[usd]'",
+    "pypardiso": "MKL's sparse factor (WIZEN_FACTOR): pip install '.[mkl]'",
 }
 
 State = Literal["good", "note", "bad"]

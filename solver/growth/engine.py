@@ -20,9 +20,10 @@ from .params import GrowthParams
 from .plastic import forgotten
 from .remeshing.remesh import remesh
 from .settling.active import Habit
-from .settling.energy import StepEnergy, Tangent
+from .settling.energy import StepEnergy
 from .settling.equilibrium import balanced, begun
 from .settling.stage import settled
+from .settling.tangent import Tangent
 from .shapes import start
 from .state import State
 from .tooling.placing import branched, started

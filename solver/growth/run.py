@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from .. import shell
 from ..arrays import Floats
 from ..contract import Context, InvalidInput, Need, SolverError
+from ..linalg import definite
 from ..meshes import Frame, changing
 from .engine import Engine
 from .params import GrowthParams
@@ -29,13 +30,14 @@ def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     """Return meshes and numbers of the wanted growth times; see `solver.quantities` for units.
 
     Raises:
-        InvalidInput: a region, which a mesh of its own has not.
+        InvalidInput: a region, which a mesh of its own has not, or a factor that is not installed.
         NotConverged, Unstable: with the stages before.
         Cancelled: the observer asked to stop.
 
     """
     if need.region is not None:
         raise InvalidInput("growth has no lattice to cut a region from.", advice="Ask without a region.")
+    definite.chosen()
     # sums in BLAS depend on the number of threads, and buckling makes much of little
     with threadpool_limits(1, user_api="blas"):
         return _run(params, need, context)
@@ -101,4 +103,4 @@ def _dataset(rows: list[dict[str, Any]], frames: list[Frame], need: Need, params
     if frames:
         data |= changing(frames[: len(rows)], need.dtype)
         coords["component"] = ["x", "y", "z"]
-    return xr.Dataset(data, coords, {"path": params.solver, "up": "z"})
+    return xr.Dataset(data, coords, {"path": params.solver, "factor": definite.chosen(), "up": "z"})

@@ -40,7 +40,8 @@ def dissect(parts: Ints, centres: Floats, vertices: int, leaf_size: int, thin: b
     """
     depth = max(0, int(np.ceil(np.log2(max(len(parts), 1) / leaf_size))))
     leaf = np.empty(len(parts), np.int64)
-    _halve(parts, centres, vertices, depth, thin, leaf)
+    ranks = np.stack([np.unique(along, return_inverse=True)[1] for along in centres.T])
+    _halve(parts, centres, ranks, vertices, depth, thin, leaf)
     leaves = np.repeat(leaf, parts.shape[1])
     low, high = np.full(vertices, 1 << depth), np.full(vertices, -1)
     np.minimum.at(low, parts.ravel(), leaves)
@@ -87,36 +88,53 @@ def _shared(parts: Ints, order: Ints, mark: Ints) -> int:
 
 
 @njit(cache=True)
-def _halve(parts: Ints, centres: Floats, vertices: int, depth: int, thin: bool, leaf: Ints) -> None:
-    """Write the leaf of each part."""
+def _sorted(order: Ints, part: Ints, bounds: Ints, ranks: Ints, axes: Ints) -> Ints:
+    """Return `order` sorted within each part by rank along the part's axis: stably, by counting, all parts at once."""
+    rank, cursor = np.empty_like(order), np.zeros(len(order) + 1, np.int64)
+    for p in range(len(order)):
+        rank[p] = ranks[axes[part[p]], p]
+        cursor[rank[p] + 1] += 1
+    cursor = np.cumsum(cursor)
+    ranked, found, at = np.empty_like(order), np.empty_like(order), bounds[:-1].copy()
+    for p in order:
+        ranked[cursor[rank[p]]] = p
+        cursor[rank[p]] += 1
+    for p in ranked:
+        found[at[part[p]]] = p
+        at[part[p]] += 1
+    return found
+
+
+@njit(cache=True)
+def _halve(parts: Ints, centres: Floats, ranks: Ints, vertices: int, depth: int, thin: bool, leaf: Ints) -> None:
+    """Write the leaf of each part; ranks (3, p): of the centres along each axis."""
     count, mark = len(centres), np.zeros(vertices if thin else 0, np.int64)
-    order = np.arange(count)
-    bounds = np.array([0, count])
+    order, bounds = np.arange(count), np.array([0, count])
+    leaf[:] = 0
     for _ in range(depth):
-        finer = np.empty(2 * len(bounds) - 1, np.int64)
-        for k in range(len(bounds) - 1):
+        halved = len(bounds) - 1
+        axes, least = np.zeros(halved, np.int64), np.full(halved, np.inf)
+        for axis in range(3):
+            way = _sorted(order, leaf, bounds, ranks, np.full(halved, axis)) if thin else order
+            for k in range(halved):
+                part = way[bounds[k] : bounds[k + 1]]
+                cost = float(_shared(parts, part, mark)) if thin else -_extent(centres, part, axis)
+                if cost < least[k]:
+                    axes[k], least[k] = axis, cost
+        order = _sorted(order, leaf, bounds, ranks, axes)
+        finer = np.empty(2 * halved + 1, np.int64)
+        for k in range(halved):
             first, last = bounds[k], bounds[k + 1]
-            part = order[first:last].copy()
-            best, widest, fewest = 0, -1.0, vertices + 1
-            for axis in range(3):
-                if thin:
-                    ranked = part[np.argsort(centres[part, axis], kind="mergesort")]
-                    shared = _shared(parts, ranked, mark)
-                    if shared < fewest:
-                        best, fewest = axis, shared
-                    continue
-                small, large = np.inf, -np.inf
-                for p in part:
-                    small, large = min(small, centres[p, axis]), max(large, centres[p, axis])
-                if large - small > widest:
-                    best, widest = axis, large - small
-            along = np.empty(len(part))
-            for i in range(len(part)):
-                along[i] = centres[part[i], best]
-            order[first:last] = part[np.argsort(along, kind="mergesort")]
-            finer[2 * k], finer[2 * k + 1] = first, (first + last + 1) // 2
+            middle = (first + last + 1) // 2
+            leaf[order[first:middle]], leaf[order[middle:last]] = 2 * k, 2 * k + 1
+            finer[2 * k], finer[2 * k + 1] = first, middle
         finer[-1] = count
         bounds = finer
-    for k in range(len(bounds) - 1):
-        for i in range(bounds[k], bounds[k + 1]):
-            leaf[order[i]] = k
+
+
+@njit(cache=True)
+def _extent(centres: Floats, part: Ints, axis: int) -> float:
+    small, large = np.inf, -np.inf
+    for p in part:
+        small, large = min(small, centres[p, axis]), max(large, centres[p, axis])
+    return large - small

@@ -2,7 +2,7 @@
 
 A fruit is thin in one direction of its graph: a few nodes along a column, many columns. Dissecting the columns and
 keeping each column whole gives fronts that are small and dense, so that LAPACK does all the work: 4 times faster than
-SuperLU, and with the inertia (Sylvester's law). MKL's Pardiso factors faster and solves slower (docs/dehydration.md).
+SuperLU, and with the inertia (Sylvester's law). MKL's Pardiso is measured in docs/dehydration.md.
 Duff and Reid 1983 (multifrontal), George 1973 (nested dissection).
 """
 
@@ -75,32 +75,42 @@ def analyse(
 
 
 @njit(cache=True)
-def _gather(panel: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, data: Floats, place: Ints) -> None:
-    """Add the matrix's blocks (row in front, column eliminated here), lower triangle, to panel (3 nf, 3 own)."""
+def _gather(
+    top: Floats, below: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, data: Floats, place: Ints
+) -> None:
+    """Add the matrix's blocks (row in front, column eliminated here), lower triangle, to top and below."""
     for local in range(own):
         node = nodes[local]
         for entry in range(indptr[node], indptr[node + 1]):
             row = place[indices[entry]]
             if row >= local:
+                into, row = (top, row) if row < own else (below, row - own)
                 for k in range(3):
                     for i in range(3):
-                        panel[3 * row + i, 3 * local + k] += data[entry, k, i]
+                        into[3 * row + i, 3 * local + k] += data[entry, k, i]
 
 
 @njit(cache=True)
-def _extend(panel: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, pivots: int) -> None:
-    """Add a child's Schur complement (lower triangle, on `nodes`) to a front."""
-    size = len(inner)
-    at = np.empty(size, np.int64)
-    for r in range(size):
-        at[r] = 3 * place[nodes[r // 3]] + r % 3
-    for c in range(size):
-        for r in range(c, size):
-            row, column = max(at[r], at[c]), min(at[r], at[c])
-            if column < pivots:
-                panel[row, column] += inner[r, c]
+def _extend(top: Floats, below: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, own: int) -> None:
+    """Add a child's Schur complement (lower triangle, on `nodes`) to a front that eliminates `own` nodes."""
+    for c in range(len(nodes)):
+        for r in range(c, len(nodes)):
+            row, column = place[nodes[r]], place[nodes[c]]
+            turned = row < column
+            if turned:
+                row, column = column, row
+            if row < own:
+                into = top
+            elif column < own:
+                into, row = below, row - own
             else:
-                rest[row - pivots, column - pivots] += inner[r, c]
+                into, row, column = rest, row - own, column - own
+            for k in range(3):
+                for i in range(k if r == c else 0, 3):
+                    if turned:
+                        into[3 * row + k, 3 * column + i] += inner[3 * r + i, 3 * c + k]
+                    else:
+                        into[3 * row + i, 3 * column + k] += inner[3 * r + i, 3 * c + k]
 
 
 class _Block(NamedTuple):
@@ -154,10 +164,8 @@ def _half(pivot: Floats, right: Floats, transposed: int) -> Floats:
     return blas.dtrsv(pivot, right, lower=1, trans=transposed)
 
 
-def _eliminate(panel: Floats, rest: Floats) -> tuple[_Block, int]:
+def _eliminate(top: Floats, below: Floats, rest: Floats) -> tuple[_Block, int]:
     """Eliminate the pivots of a front; `rest` becomes the Schur complement (lower triangle)."""
-    pivots = panel.shape[1]
-    top, below = np.asfortranarray(panel[:pivots]), np.asfortranarray(panel[pivots:])
     factor, failed = lapack.dpotrf(top, lower=1, clean=0)
     if not failed:
         if len(below):
@@ -190,14 +198,14 @@ def factorise(
             watch()
         size, pivots = 3 * len(front.nodes), 3 * front.own
         place[front.nodes] = np.arange(len(front.nodes))
-        panel = np.zeros((size, pivots), order="F")
+        top, below = np.zeros((pivots, pivots), order="F"), np.zeros((size - pivots, pivots), order="F")
         rest = np.zeros((size - pivots, size - pivots), order="F")
-        _gather(panel, front.nodes, front.own, analysis.indptr, analysis.indices, data, place)
+        _gather(top, below, front.nodes, front.own, analysis.indptr, analysis.indices, data, place)
         for child in front.children:
-            below = analysis.fronts[child]
-            _extend(panel, rest, open_.pop(child), below.nodes[below.own :], place, pivots)
+            inner = analysis.fronts[child]
+            _extend(top, below, rest, open_.pop(child), inner.nodes[inner.own :], place, front.own)
         place[front.nodes] = -1
-        block, below_zero = _eliminate(panel, rest) if pivots else (_Block(panel, None, panel), 0)
+        block, below_zero = _eliminate(top, below, rest) if pivots else (_Block(top, None, below), 0)
         if definite and block.signs is not None:
             raise np.linalg.LinAlgError("the matrix is not positive definite")
         blocks.append(block)

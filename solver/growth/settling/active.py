@@ -14,8 +14,9 @@ import numpy as np
 from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..state import State
-from .energy import StepEnergy, Tangent, ahead
+from .energy import StepEnergy, ahead
 from .minimise import Point
+from .tangent import Tangent
 
 __all__ = ["Habit", "Settled", "settle"]
 

@@ -7,73 +7,30 @@ the volume inside, -p V(x), so there it may follow every move (`following`): the
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse import bsr_array
 
 from ... import shell
 from ...arrays import Floats, Ints
-from ...linalg.dissection import Fronts
-from ...linalg.multifrontal import Analysis, analyse
-from ...shell.inverse import Inverse, fronts_of, inverse_of
+from ...linalg.multifrontal import Analysis
+from ...shell.inverse import fronts_of, inverse_of
 from ...shell.normals import normals
 from ..params import Bending, Plane, SolidBall
 from ..state import State
+from .loads import area_vectors, depth_in
+from .tangent import Tangent
 
-__all__ = ["StepEnergy", "Tangent", "ahead", "area_vectors", "elastic"]
-
+__all__ = ["StepEnergy", "ahead", "elastic"]
 
 #: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
 _SHIFT = 1e-5
-#: An inverse outlives so many remeshings, and so many times its vertices.
-_LAYERS, _MORE = 12, 1.3
 #: Stiffness of a membrane's vertex [mu]: about the diagonal of six equilateral triangles.
 _STIFFEST = 10.0
 #: How far vertices move before contact looks for its pairs again, over the distance.
 _SLACK = 0.5
 #: Penalty of solids per area and depth [mu / l^2].
 _HARDNESS = 30.0
-#: Pairs of vertices in the smallest front: below some twenty, calls take longer than their arithmetic.
-_LEAF = 24
-
-
-class Tangent:
-    """Pattern, order of elimination and last inverse of one topology; outlives the growth steps between remeshings."""
-
-    def __init__(self, mesh: shell.Topology, inverse: Inverse | None = None) -> None:
-        self.mesh = mesh
-        self.fronts: Fronts | None = None
-        self.inverse = inverse
-        self._analysis: Analysis | None = None
-
-    @cached_property
-    def pattern(self) -> shell.Pattern:
-        """Where blocks go."""
-        return shell.pattern(self.mesh)
-
-    def analysis(self, x: Floats) -> Analysis:
-        """Return the order in which the whole second derivative is eliminated; x (n, 3) of the first call decides."""
-        if self._analysis is None:
-            pairs = np.concatenate([self.mesh.edges, self.mesh.hinges[:, 2:]])
-            indptr, indices = self.pattern.indptr, self.pattern.indices
-            self._analysis = analyse(pairs, x[pairs].mean(axis=1), indptr, indices, leaf_size=_LEAF)
-        return self._analysis
-
-    def copy(self) -> Tangent:
-        """Return a tangent that starts from this one's inverse, and may take another."""
-        found = Tangent(self.mesh, self.inverse)
-        found.fronts = self.fronts
-        if "pattern" in self.__dict__:
-            found.__dict__["pattern"] = self.pattern
-        return found
-
-    def remeshed(self, mesh: shell.Topology, pairs: Ints) -> Tangent:
-        """Return the tangent of a mesh whose vertices lie in the middle of `pairs` (n', 2) of this one's."""
-        kept = self.inverse
-        if kept is not None and (len(kept.parents) >= _LAYERS or len(pairs) > _MORE * len(kept.normals)):
-            kept = None
-        return Tangent(mesh, kept.remeshed(pairs) if kept else None)
 
 
 def elastic(state: State, material: shell.Material, bending: Bending) -> float:
@@ -157,7 +114,7 @@ class StepEnergy:
             hard = _HARDNESS * self.areas / self._distance
             energy += shell.contact(x, state.mesh.triangles, self._pairs, self._distance, hard, gradient)
         for solid in self.solids:
-            depth, normal = _depth(solid, x)
+            depth, normal = depth_in(solid, x)
             energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
             gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
         gradient[state.held] = 0.0
@@ -254,7 +211,7 @@ class StepEnergy:
         """Add the stiffness of solids, and of contact, at each vertex to the diagonal `blocks` (nnz, 3, 3)."""
         diagonal = self.tangent.pattern.diagonal
         for solid in self.solids:
-            depth, normal = _depth(solid, x)
+            depth, normal = depth_in(solid, x)
             weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
             blocks[diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
         if self._distance:
@@ -286,20 +243,3 @@ class StepEnergy:
         found = self.tangent.inverse.apply(v)
         found[self.state.held] = 0.0
         return found
-
-
-def area_vectors(x: Floats, triangles: Ints) -> Floats:
-    """Return a third of the area vectors of each vertex's triangles (n, 3)."""
-    p = x[triangles]
-    third = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6
-    return np.stack([np.bincount(triangles.ravel(), np.repeat(third[:, c], 3), len(x)) for c in range(3)], -1)
-
-
-def _depth(solid: Plane | SolidBall, x: Floats) -> tuple[Floats, Floats]:
-    """Return how deep vertices are in a solid (n,), 0 outside, and the way out (n, 3)."""
-    if isinstance(solid, Plane):
-        normal = np.array(solid.normal) / np.linalg.norm(solid.normal)
-        return np.maximum((np.array(solid.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
-    way = x - np.array(solid.centre)
-    distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
-    return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from ...arrays import Floats, Ints
-from ...linalg.multifrontal import Analysis, factorise
+from ...linalg.definite import factorise
+from ...linalg.multifrontal import Analysis
 from .minimise import Energy, Point, descend
 
 __all__ = ["Curved", "newton"]
@@ -85,7 +86,7 @@ def _shifted(blocks: Floats, diagonal: Ints, shift: float) -> Floats:
 def _direction(order: Analysis, blocks: Floats, gradient: Floats) -> Floats | None:
     """Return -matrix^-1 gradient (n, 3), or None where the matrix is not positive definite."""
     try:
-        factor = factorise(order, blocks, definite=True)
+        factor = factorise(order, blocks)
     except np.linalg.LinAlgError:
         return None
     found: Floats = -factor.solve(gradient.ravel()).reshape(-1, 3)

@@ -15,9 +15,10 @@ from ... import shell
 from ...contract import Unstable
 from ..params import GrowthParams
 from ..state import State
-from .energy import StepEnergy, Tangent
+from .energy import StepEnergy
 from .minimise import Point, quasi_newton
 from .newton import newton
+from .tangent import Tangent
 
 __all__ = ["force_unit", "settled"]
 

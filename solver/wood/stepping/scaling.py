@@ -26,6 +26,8 @@ __all__ = ["push", "rigid", "saved"]
 _MIDDLE, _SPEED, _SPIN, _PULL, _TWIST = 0, 3, 6, 9, 12
 #: Of the trace of J, added to its diagonal: one straight rod does not turn about itself.
 _ROUND = 1e-6
+#: Inertia over that about the origin below which a fragment is one vertex, and its J round-off.
+_POINT = 1e-12
 
 
 @njit(cache=True, error_model="numpy")
@@ -37,8 +39,12 @@ def _cross(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _solve(j: np.ndarray, right: np.ndarray, out: np.ndarray) -> None:
-    """Write J^-1 right (3,) to out; j (6,): xx, yy, zz, xy, xz, yz."""
-    more = _ROUND * (j[0] + j[1] + j[2]) + 1e-300
+    """Write J^-1 right (3,) to out; j (6,): xx, yy, zz, xy, xz, yz. A single vertex, whose J is 0, does not turn."""
+    trace = j[0] + j[1] + j[2]
+    if trace == 0.0:
+        out[:] = 0.0
+        return
+    more = _ROUND * trace + 1e-300
     a = j[0] + more
     b = j[1] + more
     c = j[2] + more
@@ -131,6 +137,8 @@ def _sums(x: np.ndarray, v: np.ndarray, f: np.ndarray, mass: np.ndarray, parts: 
         xx = max(one[16] - m * a * a, 0.0)
         yy = max(one[17] - m * b * b, 0.0)
         zz = max(one[18] - m * c * c, 0.0)
+        if xx + yy + zz <= _POINT * (one[16] + one[17] + one[18]):
+            continue
         inertia[n, 0] = yy + zz
         inertia[n, 1] = xx + zz
         inertia[n, 2] = xx + yy

@@ -13,7 +13,8 @@ from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.remeshing.rest import edge_squares, flat_hinges
 from solver.growth.settling import active
-from solver.growth.settling.energy import StepEnergy, Tangent, elastic
+from solver.growth.settling.energy import StepEnergy, elastic
+from solver.growth.settling.tangent import Tangent
 from solver.growth.state import State
 from solver.growth.tooling import reach
 

@@ -8,8 +8,9 @@ import pytest
 from solver import shell
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
-from solver.growth.settling.energy import StepEnergy, Tangent
+from solver.growth.settling.energy import StepEnergy
 from solver.growth.settling.minimise import quasi_newton
+from solver.growth.settling.tangent import Tangent
 from tests.solver.shell._meshes import sheet
 
 DISTANCE = 0.1

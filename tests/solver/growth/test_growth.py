@@ -10,8 +10,9 @@ from solver.contract import InvalidInput, Need, NotConverged, SolverError
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.remeshing.cuts import cut
-from solver.growth.settling.energy import StepEnergy, Tangent
+from solver.growth.settling.energy import StepEnergy
 from solver.growth.settling.minimise import conjugate_gradients, lbfgs, quasi_newton
+from solver.growth.settling.tangent import Tangent
 from solver.growth.tooling.tools import HotSpot
 
 EVERYWHERE = {"kind": "everywhere"}

@@ -8,7 +8,8 @@ from solver.contract import Context
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.settling import newton
-from solver.growth.settling.energy import StepEnergy, Tangent
+from solver.growth.settling.energy import StepEnergy
+from solver.growth.settling.tangent import Tangent
 
 RIM = {"kind": "surface", "where": {"kind": "rim", "width": 0.3}, "stretch": (1.5, 1.0)}
 SPOT = {"kind": "spot", "at": (0.0, 0.0, 1.0), "radius": 0.6, "stretch": (2.5, 2.5)}

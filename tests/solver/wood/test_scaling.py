@@ -101,6 +101,26 @@ def test_accelerations_are_those_of_plain_sums():
     assert parts.field[0, 12:15] == pytest.approx(twist, rel=1e-3)
 
 
+def test_a_fragment_of_one_vertex_falls_and_does_not_turn():
+    """What is left where both edges of a vertex are cut, and no bond holds it: its inertia is 0, or round-off."""
+    wood = lay(SOLVER.parse({**FREE, "mass_scaling": 100.0}), 8)
+    m = wood.motion
+    wood.bonds.on[:] = 0
+    wood.rods.alive[:2] = 0
+    parts = fragments(wood.rods, wood.bonds, m.held, m.mass, 100.0, 0.0)
+    (lone,) = np.flatnonzero(np.bincount(parts.of)[parts.of] == 1)[:1]
+    generator = np.random.default_rng(3)
+    for place in (m.x[lone].copy(), np.array([0.3, -0.7, 0.11])):
+        m.x[lone] = place
+        m.v[lone], f = generator.normal(size=3), generator.normal(size=m.x.shape)
+        rigid(m.x, m.v, f, m.mass, parts, 1e-6)
+        _, speed, spin, pull, twist = np.split(parts.field[parts.of[lone]], 5)
+        np.testing.assert_allclose(speed, m.v[lone], rtol=1e-12)
+        np.testing.assert_allclose(pull, 100 * f[lone] / m.mass[lone], rtol=1e-12)
+        assert not spin.any()
+        assert not twist.any()
+
+
 def test_fragments_are_what_hangs_together():
     wood = lay(SOLVER.parse({**FREE, "mass_scaling": 4.0, "reach": 0.0}), 8)
     m = wood.motion

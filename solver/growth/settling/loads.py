@@ -1,0 +1,27 @@
+"""Where pressure pushes, and how deep vertices are in solids."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ..params import Plane, SolidBall
+
+__all__ = ["area_vectors", "depth_in"]
+
+
+def area_vectors(x: Floats, triangles: Ints) -> Floats:
+    """Return a third of the area vectors of each vertex's triangles (n, 3)."""
+    p = x[triangles]
+    third = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6
+    return np.stack([np.bincount(triangles.ravel(), np.repeat(third[:, c], 3), len(x)) for c in range(3)], -1)
+
+
+def depth_in(solid: Plane | SolidBall, x: Floats) -> tuple[Floats, Floats]:
+    """Return how deep vertices are in a solid (n,), 0 outside, and the way out (n, 3)."""
+    if isinstance(solid, Plane):
+        normal = np.array(solid.normal) / np.linalg.norm(solid.normal)
+        return np.maximum((np.array(solid.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
+    way = x - np.array(solid.centre)
+    distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
+    return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]
