@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -141,8 +141,12 @@ def check_suffix(path: Path, run: bool, stages: int) -> None:
         raise InvalidOption(f"--out {path}: there is no directory {path.parent}.", "Create it first.")
 
 
-def fields_for(path: Path | None, run: bool, solver: Solver | None = None) -> tuple[str, ...]:
+def fields_for(
+    path: Path | None, run: bool, solver: Solver | None = None, asked: Sequence[str] = ()
+) -> tuple[str, ...]:
     """Return the fields that writing `path` needs, of a table's shapes or of a solver; none if nothing is written.
+
+    Where the mesh that was solved is among the fields `asked` for, it is what is written.
 
     Raises:
         InvalidOption: the format holds the fruit's lattice only, and the solver has none.
@@ -152,7 +156,7 @@ def fields_for(path: Path | None, run: bool, solver: Solver | None = None) -> tu
     if encoder is None:
         return ()
     known = ("position",) if solver is None else solver.fields
-    if "position" in known or "position" not in encoder.fields:
+    if ("position" in known and "mesh_position" not in asked) or "position" not in encoder.fields:
         return encoder.fields
     if encoder.single and encoder.whole is None:
         raise InvalidOption(

@@ -137,7 +137,8 @@ class Sequence:
     @property
     def length(self) -> str:
         """The unit of length in words."""
-        base = "r1" if self.lattice else f"{self.unit * self.scale:g} m" if self.unit else "the solver's own"
+        named = str(self.run.attrs.get("unit_of_length", "the solver's own"))
+        base = "r1" if self.lattice else f"{self.unit * self.scale:g} m" if self.unit else named
         return base if self.scale == 1 else f"{base} / {self.scale:g}"
 
     @property

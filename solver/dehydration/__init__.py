@@ -63,7 +63,7 @@ SOLVER = Solver(
     version="8",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
-    fields=("position", "displacement", *_DESCRIPTORS, "strain_energy", "released_energy"),
+    fields=("position", "displacement", "mesh_position", *_DESCRIPTORS, "strain_energy", "released_energy"),
     default_fields=("displacement", *_DESCRIPTORS),
     stages=StageAxis(
         "s",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from .kernel import (
     stiffness_bounds,
     weigh,
 )
+from .kernel.fixed_point import QUANTUM
 from .kernel.march import SEARCH_EVERY
 from .params import DehydrationParams
 from .settings import Settings
@@ -40,6 +42,7 @@ from .settings import Settings
 __all__ = ["Motion"]
 
 Fixed = NDArray[np.int32]
+Masses: TypeAlias = tuple[Layout, Fixed]
 
 #: Factor on the scaled masses.
 _SAFETY = 2.0
@@ -47,8 +50,13 @@ _SAFETY = 2.0
 #: Element-steps between two looks at the observer: about a quarter of a second on one core.
 _SLICE = 8_000_000
 
-#: Element-steps between two looks whether the run is cancelled: half a second on one busy core, contact included.
-_WATCHED = 2_000_000
+#: Most steps between two looks at how far all has come, and whether the run is cancelled; no more element-steps than
+#: half a second on one busy core, contact included.
+_STRIDE, _WATCHED = 100, 2_000_000
+
+#: Way of a node, in edges of the skin, after which the masses are taken anew. Thick skins that fall from a late onset
+#: (te = 0.1, gamma = 30) need 1.6 times their masses after an edge and a half and blow up after three.
+_WAY = 0.5
 
 #: How fast rest volumes follow the pressure, as a share of what damping takes from a ringing volume.
 _FOLLOW = 0.125
@@ -107,8 +115,10 @@ class Motion:
             share=sector.share,
         )
         self.steps = 0
-        # whole searches for contact: cut there, a march takes the same steps as in one piece
-        self._watched = SEARCH_EVERY * max(1, _WATCHED // (SEARCH_EVERY * self.elements))
+        self._weighed = self.layout.fresh.copy()
+        self._way = _WAY * float(self._skin.contact.size)
+        # whole searches for contact
+        self._stride = SEARCH_EVERY * max(1, min(_STRIDE, _WATCHED // self.elements) // SEARCH_EVERY)
 
     @property
     def elements(self) -> int:
@@ -128,11 +138,28 @@ class Motion:
         """Return the smooth start at `shrinkage`, at rest."""
         return new_state(self.layout, self.drive.smooth(shrinkage))
 
-    def weighed(self, state: Fixed) -> Layout:
-        """Return the layout with masses for the stiffness in this state."""
-        return reweigh(
-            self.layout, state, self.sector.mesh.is_exocarp, *self._moduli, self._fresh_bound, safety=_SAFETY
-        )
+    @property
+    def masses(self) -> Masses:
+        """The masses, and the state that they were taken in; what follows depends on them as on state and velocity."""
+        return self.layout, self._weighed
+
+    @masses.setter
+    def masses(self, masses: Masses) -> None:
+        self.layout, self._weighed = masses
+
+    def _follow(self, state: Fixed, velocity: Singles) -> int:
+        """Take the masses anew if nodes have come far since the last time; return how many steps may be made now."""
+        if QUANTUM * float(np.abs(state - self._weighed).max()) > self._way:
+            self.layout = reweigh(
+                self.layout, state, self.sector.mesh.is_exocarp, *self._moduli, self._fresh_bound, safety=_SAFETY
+            )
+            self._weighed = state.copy()
+            weigh(self._skin, self.layout)
+        speed = float(np.abs(velocity).max())
+        if speed * self._stride <= self._way:
+            return self._stride
+        # what has blown up has no speed
+        return SEARCH_EVERY * max(1, int(self._way / speed) // SEARCH_EVERY) if np.isfinite(speed) else SEARCH_EVERY
 
     def advance(
         self,
@@ -149,7 +176,7 @@ class Motion:
         settings = self.settings
         if settings.kappa_ratio == settings.march_kappa_ratio:
             return rest
-        loaded = self._ready(self.layout, b, rest)
+        loaded = self._ready(b, rest)
         goal = rests(dilatations(loaded, state, 1 - b), settings.march_kappa_ratio, settings.kappa_ratio)
         # volumes ring for 2 / damping steps; following faster than that feeds what rings
         share = 1 - np.exp(-_FOLLOW * damping * count)
@@ -165,21 +192,21 @@ class Motion:
         a: float,
         b: float,
         damping: float,
-        layout: Layout | None = None,
     ) -> None:
-        """March from shrinkage a to b under rest volumes `rest`; state and velocity change in place."""
-        layout = layout or self.layout
-        forget(self._skin, layout)
+        """March from shrinkage a to b under rest volumes `rest`; state and velocity change in place.
+
+        Masses follow the deformation on the way.
+        """
+        forget(self._skin, self.layout)
         for begin, end, steps in self.drive.pieces(a, b, count):
             middle = (begin + end) / 2
             self.drive.lead(state, middle)
-            loaded = self._ready(layout, middle, rest)
-            for first in range(0, steps, self._watched):
+            per_step, last = (end - begin) / steps, 0
+            while last < steps:
                 self._context.check_cancelled()
-                last = min(first + self._watched, steps)
-                per_step = (end - begin) / steps
+                first, last = last, min(last + self._follow(state, velocity), steps)
                 skin = march(
-                    loaded,
+                    self._ready(middle, rest),
                     state,
                     velocity,
                     last - first,
@@ -197,26 +224,26 @@ class Motion:
                 advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             )
 
-    def _ready(self, layout: Layout, shrinkage: float, rest: Floats) -> Layout:
-        """Return `layout` with the targets at `shrinkage` and the rest volumes; the last one made is kept."""
+    def _ready(self, shrinkage: float, rest: Floats) -> Layout:
+        """Return the layout with the targets at `shrinkage` and the rest volumes; the last one made is kept."""
         if self._made is None or self._made[0] is not rest or not self.drive.loading.uniform:
             self._made = rest, rested(self.drive.loaded(self.layout, shrinkage), rest)
         planes = self._made[1]
-        return dataclasses.replace(planes, mass=layout.mass, inverse_mass=layout.inverse_mass)
+        return dataclasses.replace(planes, mass=self.layout.mass, inverse_mass=self.layout.inverse_mass)
 
     def report(self, state: Fixed, rest: Floats, shrinkage: float) -> ElementReport:
         """Return energies and volume ratios of the elements."""
-        layout = self._ready(self.layout, shrinkage, rest)
+        layout = self._ready(shrinkage, rest)
         return element_report(layout, state, 1 - shrinkage, one_point=True)
 
-    def residual(self, state: Fixed, rest: Floats, shrinkage: float, layout: Layout, damping: float) -> float:
+    def residual(self, state: Fixed, rest: Floats, shrinkage: float, damping: float) -> float:
         """Return the out-of-balance force, contact included: what one step from rest does to the momentum.
 
         Relative to the root of the sum of squares of all elements' nodal forces. A step moves the nodes before contact
         answers, and damping shortens that move: the balance is struck, and measured, with the damping it settles with.
         """
         theta = 1 - shrinkage
-        layout = self._ready(layout, shrinkage, rest)
+        layout = self._ready(shrinkage, rest)
         scale = internal_force(layout, state, theta, one_point=True).scale
         moved, kick = state.copy(), np.zeros((layout.nodes, 4), np.float32)
         weigh(self._skin, layout)  # pairs are still those of the steps before, or are looked for anew

@@ -25,8 +25,8 @@ __all__ = ["Path", "State"]
 
 Fixed = NDArray[np.int32]
 
-#: Shrinkage after which the scaled masses are taken anew.
-_REWEIGH = 0.01
+#: Shrinkage after which rest volumes are taken anew on the march, and the observer is told.
+_SLICE = 0.01
 
 #: Updates of the rest volumes before a state settles, steps between two, and their damping: what rings is gone by the
 #: next. A march's volumes lag by 0.03 of shrinkage; those of a smooth start know no pressure.
@@ -85,8 +85,10 @@ class Path:
         if self._settled is not None and abs(shrinkage - top * RUNG) < _ROUNDING:
             return self._settled
         self._march(shrinkage, last)
-        state, velocity = self._state.copy(), self._velocity.copy()
-        return self._settle(state, velocity, self._arrived(state, velocity, shrinkage), shrinkage)
+        state, velocity, masses = self._state.copy(), self._velocity.copy(), self.motion.masses
+        found = self._settle(state, velocity, self._arrived(state, velocity, shrinkage), shrinkage)
+        self.motion.masses = masses
+        return found
 
     def _climb(self, last: float) -> None:
         """March to the next rung and settle there."""
@@ -106,11 +108,8 @@ class Path:
         """March towards `shrinkage` in whole slices, whatever stages were asked for."""
         settings = self._settings
         target = int((shrinkage - self._foot) / settings.pace)
-        chunk = max(20, min(self.motion.slice, round(_REWEIGH / settings.pace)))
-        every = max(1, round(_REWEIGH / (chunk * settings.pace)))
+        chunk = max(20, min(self.motion.slice, round(_SLICE / settings.pace)))
         while self._place + chunk <= target:
-            if self._place // chunk % every == 0:
-                self.motion.layout = self.motion.weighed(self._state)
             a, b = self._at(self._place), self._at(self._place + chunk)
             self._rest = self.motion.advance(self._state, self._velocity, self._rest, chunk, a, b, settings.damping)
             self._place += chunk

@@ -10,6 +10,7 @@ import xarray as xr
 
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
+from ..geometry.crossings import split_quads
 from .fresh.loading import Loading
 from .measures.delivery import Delivery
 from .measures.descriptors import Descriptors, Surface
@@ -52,6 +53,8 @@ class _Record:
             "seconds": time.perf_counter() - self._start,
         }
         nodes = state.surface
+        if "mesh_position" in self._need.fields:
+            row["mesh_position"] = nodes.astype(self._need.dtype)
         if self._wants_fields or self._measures_delivered:
             given = self._delivered(nodes)
             for name, field in (("displacement", given.displacement), ("position", given.position)):
@@ -83,6 +86,13 @@ class _Record:
             values = np.array([row[name] for row in self.rows])
             if name in _FIELDS:
                 data[name] = (("stage", "colatitude", "azimuth", "component"), values)
+            elif name == "mesh_position":
+                data[name] = (("stage", "vertex", "component"), values)
+                quads = self._path.mesh.sphere.quads
+                # each triangle beside the other half of its quad
+                halves = split_quads(quads).reshape(2, -1, 3).transpose(1, 0, 2).reshape(-1, 3)
+                data["triangle"] = (("face", "corner"), halves.astype(np.int32))
+                data["quad"] = (("quad_face", "quad_corner"), quads.astype(np.int32))
             elif name == "converged":
                 data[name] = ("stage", values.astype(np.int8))
             else:
@@ -92,6 +102,7 @@ class _Record:
             rows, columns = self._inside
             coords["colatitude"] = colatitudes(need.resolution)[rows]
             coords["azimuth"] = azimuths(need.resolution)[columns]
+        if self._wants_fields or "mesh_position" in need.fields:
             coords["component"] = ["x", "y", "z"]
         return xr.Dataset(data, coords, attrs)
 
@@ -124,6 +135,7 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
         "residual_limit": settings.residual,
         "drift_limit": settings.drift,
         "kappa_over_mu": settings.kappa_ratio,
+        "unit_of_length": "r1",
     }
     try:
         for done, shrinkage in enumerate(need.stages, 1):

@@ -15,9 +15,8 @@ __all__ = ["State", "settle"]
 
 Fixed = NDArray[np.int32]
 
-#: Looks at the kinetic energy per swing, and those between two weighings: what moves that fast folds meanwhile, and
-#: on masses that are 800 steps old it can blow up.
-_LOOKS, _WEIGH_EVERY = 15, 6
+#: Looks at the kinetic energy per swing.
+_LOOKS = 15
 
 #: Steps over which the surface's drift is measured.
 _REST_STEPS = 200
@@ -70,14 +69,14 @@ def settle(
         if spent or shrinkage > settings.start:
             _swing(motion, state, velocity, rest, shrinkage)
             spent += settings.swing_steps
-        layout, rested = motion.weighed(state), 0
+        rested = 0
         while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
             surface = motion.surface(state)
             # rest volumes stay: under some that go on following, forces have no potential and hardly balance
             count = min(_REST_STEPS, max(20, motion.slice))
-            motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping, layout)
+            motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping)
             rested += count
-            residual = motion.residual(state, rest, shrinkage, layout, settings.calm_damping)
+            residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
             moved = np.square(motion.surface(state) - surface).sum(axis=1).mean()
             drift = float(np.sqrt(moved) / count * _REST_STEPS / motion.params.exocarp_thickness)
         spent += rested
@@ -99,11 +98,10 @@ def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrink
     """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy."""
     settings = motion.settings
     count = settings.swing_steps // _LOOKS
-    last, layout = 0.0, motion.layout
-    for look in range(_LOOKS):
-        if look % _WEIGH_EVERY == 0:
-            layout = motion.weighed(state)
-        motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping, layout)
+    last = 0.0
+    for _ in range(_LOOKS):
+        motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping)
+        layout = motion.layout
         energy = float((layout.mass * np.square(velocity[:, :3]).sum(axis=1, dtype=np.float64))[layout.free].sum())
         if energy < last:
             velocity[:] = energy = 0.0

@@ -69,7 +69,7 @@ def test_a_blow_up_is_a_typed_error_with_the_last_good_stage(monkeypatch):
     def reckless(params, quality, last):
         # ten thousand times the pace: the volume shrinks faster than any wave can tell
         settings = choose(params, quality, last)
-        return dataclasses.replace(settings, pace=0.05, damping=0.0)
+        return dataclasses.replace(settings, pace=0.05, damping=0.0, settle_steps=0, n=8)
 
     monkeypatch.setattr(run_module, "choose", reckless)
     params = SOLVER.parse({"te": 0.1, "gamma": 300.0, "imperfection": 0.01})
@@ -158,3 +158,37 @@ def test_elements_turned_inside_out_are_never_handed_over():
     with pytest.raises(Unstable, match="inside out") as caught:
         stage(True)
     assert caught.value.advice
+
+
+def test_the_mesh_as_solved_is_closed_and_is_what_the_numbers_are_of():
+    """`mesh_position`: every node once, faces from outside, and the volume that the descriptors say, by tetrahedra."""
+    need = Need(quality="preview", stages=(0.05,), fields=("mesh_position", "volume"), dtype="float64")
+    result = SOLVER.solve(SOLVER.parse(QUICK), need)
+    assert set(result.data_vars) >= {"mesh_position", "triangle", "quad"}
+    assert "colatitude" not in result.dims
+    points, faces = result.mesh_position.values[0], result.triangle.values
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    _, times = np.unique(edges, axis=0, return_counts=True)
+    assert set(times) == {2}
+    assert len(points) - len(times) + len(faces) == 2
+    a, b, c = points[faces].transpose(1, 0, 2)
+    inside = np.einsum("fi,fi->", a, np.cross(b, c)) / 6
+    assert inside == pytest.approx(float(result.volume[0]), rel=1e-3)
+    halves = faces.reshape(-1, 2, 3)
+    np.testing.assert_array_equal(halves[:, 0], result.quad.values[:, [0, 1, 2]])
+    np.testing.assert_array_equal(halves[:, 1], result.quad.values[:, [0, 2, 3]])
+
+
+def test_stages_do_not_depend_on_what_else_was_asked_for():
+    """On a rung and between two, alone and with others on both sides; past the onset, on one thread count."""
+    params = SOLVER.parse({"te": 0.15, "gamma": 30.0, "mirrors": "xyz"})
+
+    def solved(*stages: float) -> dict[float, np.ndarray]:
+        need = Need(quality="preview", stages=stages, fields=("mesh_position",), dtype="float64")
+        result = SOLVER.solve(params, need)
+        return dict(zip(stages, result.mesh_position.values, strict=True))
+
+    many = solved(0.05, 0.06, 0.1, 0.11)
+    for stages in ((0.1,), (0.06, 0.11)):
+        for stage, points in solved(*stages).items():
+            np.testing.assert_array_equal(points, many[stage])

@@ -124,6 +124,21 @@ def test_solve_writes_other_formats(shrinking: Solves, tmp_path: Path, suffix: s
     assert "mean_radius" in result.stdout
 
 
+def test_solve_says_all_of_a_need(shrinking: Solves, tmp_path: Path) -> None:
+    """All of it reaches the solver; that it keeps to it is the contract's test."""
+    out = tmp_path / "run.h5"
+    words = ["--fields", "position", "--resolution", 8, "--region", "0,90,0,180", "--dtype", "float64"]
+    result = wizen("solve", "shrinking", "--stages", "0.1", *words, "--out", out, "--json")
+    assert result.exit_code == 0, result.output
+    with xr.open_dataset(out, engine="h5netcdf") as opened:
+        assert opened["position"].dtype == "f8"
+        assert opened["position"].shape[1] == 8
+        assert "mean_radius" not in opened
+    need = document(result)["need"]
+    assert need["fields"] == ["position"]
+    assert need["region"] == {"colatitude": [0.0, 90.0], "azimuth": [0.0, 180.0]}
+
+
 def test_solve_without_a_file(shrinking: Solves) -> None:
     result = wizen("solve", "shrinking", "--stages", "0.1")
     assert result.exit_code == 0
@@ -172,6 +187,12 @@ def test_a_solve_that_fails_has_exit_code_1(shrinking: Solves) -> None:
         ("solve dehydration --stages 0.1,x", 2, "not a number"),
         ("solve dehydration --stages 0.9", 2, "lies outside"),
         ("solve dehydration --quality good", 2, "quality"),
+        ("solve dehydration --fields positon", 2, "did you mean 'position'"),
+        ("solve dehydration --region 0,90", 2, "four numbers"),
+        ("solve dehydration --region 90,0,0,180", 2, "smaller to a larger"),
+        ("solve dehydration --dtype float16", 2, "dtype"),
+        ("solve dehydration --resolution 3", 2, "resolution"),
+        ("solve dehydration --tolerance 0.0001", 2, "finer than"),
         ("solve dehydration --out run.docx", 2, ".docx"),
         ("solve dehydration --out run.obj --stages 0.1,0.2", 2, "one stage"),
         ("solve dehydration --out no/such/run.h5", 2, "no directory"),

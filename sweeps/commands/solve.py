@@ -1,0 +1,204 @@
+"""`wizen solve`: one run, here and now, with all that a need can say."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import InvalidOption
+from .terminal.console import emit
+from .terminal.options import (
+    As_json,
+    Out,
+    Params,
+    Preset,
+    Quality,
+    Seed,
+    Set,
+    Stages,
+    assignments,
+    numbers,
+    parameters,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from solver.contract import Need, Solver
+    from solver.contract import Params as Parameters
+
+__all__ = ["add_to"]
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(solve)
+
+
+def solve(
+    solver: Annotated[str, typer.Argument(help="Name of a solver (`wizen presets`).")],
+    preset: Preset = None,
+    params_file: Params = None,
+    set_: Set = None,
+    stages: Stages = None,
+    quality: Quality = None,
+    tolerance: Annotated[
+        float | None, typer.Option("--tolerance", metavar="E", help="Relative error in place of a quality, e.g. 0.1.")
+    ] = None,
+    fields: Annotated[
+        str | None, typer.Option("--fields", metavar="NAME,...", help="What to keep; nothing else is computed.")
+    ] = None,
+    resolution: Annotated[
+        int | None, typer.Option("--resolution", metavar="N", help="Colatitudes of surface fields; azimuths are 2 N.")
+    ] = None,
+    region: Annotated[
+        str | None,
+        typer.Option("--region", metavar="A,B,C,D", help="Colatitudes A to B and azimuths C to D alone (degree)."),
+    ] = None,
+    dtype: Annotated[str | None, typer.Option("--dtype", help="float32 or float64, of surface fields.")] = None,
+    seed: Seed = None,
+    out: Out = None,
+    cut: Annotated[
+        str | None, typer.Option("--cut", metavar="PLANE", help=".png: cut open along an azimuth (degree), or equator.")
+    ] = None,
+    as_json: As_json = False,
+) -> None:
+    """Run a solver once, here and now, without a store.
+
+    --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, shapes as .obj or .glb, and all stages as
+    a clip: .glb, .usda, .usdc.
+
+    [bold]Examples[/bold]
+
+    wizen solve dehydration --preset sphere --set te=0.04 --set gamma=30 --stages 0.1,0.2 --out run.h5
+
+    wizen solve dehydration --preset plum1 --quality preview --stages 0.3 --out plum.png --json
+
+    wizen solve decay --preset orange --stages 0,4,8 --out inside.png --cut 35
+
+    wizen solve dehydration --fields mesh_position --stages 0.2 --out as-solved.glb
+
+    wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
+    """
+    from solver import registry
+    from solver.contract import Need
+    from store import shards
+
+    from ..planning.plan import job
+    from .terminal.words import per_stage, show_run
+
+    if cut is not None:
+        _check_cut(cut, out)
+    chosen = registry.get(solver)
+    own = {} if seed is None else {"seed": seed}
+    params = chosen.parse(parameters(params_file) | assignments(set_) | own, preset)
+    asked = Need.parse(
+        {
+            "stages": numbers(stages),
+            "fields": [name.strip() for name in fields.split(",")] if fields else (),
+            "region": _region(region),
+        }
+        | {
+            name: value
+            for name, value in (
+                ("quality", quality),
+                ("tolerance", tolerance),
+                ("resolution", resolution),
+                ("dtype", dtype),
+            )
+            if value is not None
+        }
+    )
+    need = _for_file(out, chosen, chosen.settle(asked, preset))
+    spec = job(chosen, params, need)
+    result, seconds = _run(chosen, params, need)
+    document = {
+        **{name: getattr(spec, name) for name in ("key", "solver", "version", "params", "need")},
+        "digest": shards.digest(result),
+        "seconds": seconds,
+        "path": out and str(out),
+        "stages": [float(stage) for stage in result["stage"]],
+        "descriptors": per_stage(result),
+    }
+    if out is not None:
+        _save(out, preset or (params_file.stem if params_file else solver), chosen, params, result, document, cut)
+    emit(document, as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+def _run(solver: Solver, params: Parameters, need: Need) -> tuple[xr.Dataset, float]:
+    """Return the result and the seconds it took; progress is shown, and an interrupt ends it well."""
+    from solver.contract import Context
+
+    from .. import tabled
+    from .terminal import progress
+
+    begin = time.perf_counter()
+    with progress.one_run(solver.name) as observe, progress.stopping() as stop:
+        result = solver.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
+    return result, round(time.perf_counter() - begin, 3)
+
+
+def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:
+    """Return the need, settled, with the fields that a file wants; refuse what could not be written."""
+    if out is None:
+        return need
+    from .. import outputs
+
+    outputs.check_suffix(out, True, len(need.stages))
+    return solver.settle(
+        need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, solver, need.fields))})
+    )
+
+
+def _save(
+    out: Path,
+    of: str,
+    solver: Solver,
+    params: Parameters,
+    result: xr.Dataset,
+    document: dict[str, Any],
+    cut: str | None,
+) -> None:
+    """Write a run and the shapes in it."""
+    from .. import outputs
+    from ..formats import Made
+
+    axes = {name: params.axis(name) for name in params.axes}
+    count = result.sizes["stage"] if "position" in result else 0
+    made = Made(
+        [outputs.of_result(result, axes, i) for i in range(count)],
+        document,
+        f"{solver.title}: {of}",
+        solver.name,
+        stage_symbol=solver.stages.symbol,
+        units=solver.axis_units(),
+        run=result,
+        key=document["key"],
+        cut=cut,
+    )
+    outputs.save(out, made)
+
+
+def _check_cut(cut: str, out: Path | None) -> None:
+    """Refuse, before any work, a cut that nobody could draw."""
+    from ..pictures import section
+
+    section.plane(cut)
+    if out is None or out.suffix != ".png":
+        raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
+
+
+def _region(text: str | None) -> dict[str, Any] | None:
+    """Return the part of the surface that --region names."""
+    if text is None:
+        return None
+    found = numbers(text, "--region")
+    if len(found) != 4:
+        raise InvalidOption(
+            f"--region {text!r} is not four numbers.",
+            "Write colatitudes and azimuths in degrees, for example --region 0,90,0,180.",
+        )
+    return {"colatitude": found[:2], "azimuth": found[2:]}
