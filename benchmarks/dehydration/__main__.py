@@ -22,8 +22,8 @@ from .precision.record import Record
 
 #: te, gamma, mirrors, quality, seeds. Thin skins take long: of them an eighth is solved, and only with --thin.
 PLAN = (
+    *((0.04, gamma, "xyz", quality, 3) for gamma in (10.0, 30.0, 50.0) for quality in ("preview", "default", "fine")),
     *((0.04, 10.0, "", quality, seeds) for quality, seeds in (("preview", 3), ("default", 2), ("fine", 2))),
-    *((0.04, gamma, "xyz", quality, 3) for gamma in (10.0, 30.0) for quality in ("preview", "default", "fine")),
 )
 THIN = (
     (0.02, 10.0, "xyz", "preview", 2),

@@ -28,7 +28,7 @@ def measure(case: dict[str, Any], quality: str, full: bool) -> list[dict[str, An
     params = DehydrationParams.parse({"stone": (stone, stone), "te": te, "gamma": gamma})
     rows = []
     for kappa, key in ((None, "s_cr"), (1000.0, "s_cr_kappa_over_mu_1000")):
-        there = full and kappa is None and (stone, te, gamma) == _SPHERE
+        there = full and (stone, te, gamma) == _SPHERE
         for road in ("radial", "meridional", *["full"] * there):
             found = onset(params, kappa_ratio=kappa, road=road, quality=quality)  # type: ignore[arg-type]
             assert found.s_cr is not None

@@ -63,7 +63,8 @@ def submit(
     """
     settings: Settings = state.settings
     check_own(settings.store)
-    values, settled = solver.parse(params, preset), solver.settle(need, preset)
+    values = solver.parse(params, preset)
+    settled = solver.settle(need, preset, (values,))
     if not unlimited:
         _weigh(solver, values, settled, settings)
     store: Store = state.tables.store

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Cost", "Solver", "StageAxis", "finish"]
+
+_QUALITIES: tuple[Quality, ...] = ("preview", "default", "fine")
 
 
 class StageAxis(NamedTuple):
@@ -52,7 +55,9 @@ class Solver:
     The rest is what the floors above want to know of it: `surface`, where the fresh shape is parametric, so that
     tables of shapes can be built; `looks`, its colours and labels; `preset_stages`, the stages worth a look of those
     presets that the default ones do not suit; `onset(params, method=, kappa_ratio=, quality=, context=)`, where it
-    can say at which stage its shape begins to lose its symmetry.
+    can say at which stage its shape begins to lose its symmetry; `error(params, quality, last stage)`, the relative
+    error to expect of these parameters, which refuses what was never measured. `tolerances` are the worst of each
+    quality over all that was.
     """
 
     name: str
@@ -71,6 +76,7 @@ class Solver:
     looks: Looks = field(default_factory=Looks)
     preset_stages: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     onset: Callable[..., Any] | None = None
+    error: Callable[[Any, Quality, float], float] | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.
@@ -112,11 +118,13 @@ class Solver:
             return None
         return self.surface.of(params)
 
-    def settle(self, need: Need, preset: str | None = None) -> Need:
+    def settle(self, need: Need, preset: str | None = None, of: Iterable[Params] = ()) -> Need:
         """Fill in the defaults of `need`, those of a preset if one is named; refuse what this solver cannot give.
 
+        of: the parameters that it is asked for, all of which a tolerance must hold for.
+
         Raises:
-            InvalidInput: unknown field, stage off the axis, a tolerance finer than the measured table.
+            InvalidInput: unknown field, stage off the axis, a tolerance finer than what was measured.
 
         """
         unknown = [f for f in need.fields if f not in self.fields]
@@ -136,18 +144,7 @@ class Solver:
                 )
         quality: Quality = need.quality
         if need.tolerance is not None:
-            fit = [
-                q
-                for q in ("preview", "default", "fine")
-                if q in self.tolerances and self.tolerances[q] <= need.tolerance
-            ]
-            if not fit:
-                best = min(self.tolerances.values())
-                raise InvalidInput(
-                    f"a relative error of {need.tolerance:g} is finer than what {self.name} was measured to reach.",
-                    advice=f"The finest setting was measured at {best:g}.",
-                )
-            quality = fit[0]  # type: ignore[assignment]
+            quality = self._quality_for(need.tolerance, max(stages), tuple(of))
         return need.model_copy(
             update={
                 "fields": tuple(sorted(need.fields or self.default_fields)),
@@ -158,6 +155,22 @@ class Solver:
             }
         )
 
+    def _quality_for(self, tolerance: float, last: float, of: tuple[Params, ...]) -> Quality:
+        """Return the cheapest quality whose error is at most `tolerance`, for all parameters."""
+        best = math.inf
+        for quality in _QUALITIES:
+            if self.error is not None and of:
+                reached = max(self.error(params, quality, last) for params in of)
+            else:
+                reached = self.tolerances.get(quality, math.inf)
+            if reached <= tolerance:
+                return quality
+            best = min(best, reached)
+        raise InvalidInput(
+            f"a relative error of {tolerance:g} is finer than what {self.name} was measured to reach.",
+            advice=f"The finest setting was measured at {best:.2g}.",
+        )
+
     def solve(self, params: Params, need: Need | None = None, context: Context | None = None) -> xr.Dataset:
         """Settle the need, run, and check what leaves: named, finite, with units.
 
@@ -165,7 +178,7 @@ class Solver:
             SolverError: typed, with the converged stages attached where there are any.
 
         """
-        settled = self.settle(need or Need())
+        settled = self.settle(need or Need(), of=(params,))
         result = self.run(params, settled, context or Context())
         return finish(result, self, params, settled)
 

@@ -112,7 +112,7 @@ def solve(
             if value is not None
         }
     )
-    need = _for_file(out, chosen, chosen.settle(asked, preset))
+    need = _for_file(out, chosen, chosen.settle(asked, preset, (params,)))
     spec = job(chosen, params, need)
     result, seconds = _run(chosen, params, need)
     document = {

@@ -70,7 +70,7 @@ class Plan:
         written = planfile.parse(tables)
         try:
             solver = registry.get(written.solver)
-            need = solver.settle(Need.parse(written.need), written.preset)
+            need = solver.settle(Need.parse(written.need).model_copy(update={"tolerance": None}), written.preset)
         except InvalidInput as error:
             raise PlanError(error.message, error.advice) from None
         _check_names(written, solver)
@@ -100,6 +100,11 @@ class Plan:
             )
         if not samples:
             raise PlanError(f"none of the {skipped} combinations is possible.", "Change the ranges under [axes].")
+        try:
+            # a tolerance holds for every sample
+            need = solver.settle(Need.parse(written.need), written.preset, samples.values())
+        except InvalidInput as error:
+            raise PlanError(f"[need]: {error.message}", error.advice) from None
         name = written.name or name
         first = controls = None
         if written.pattern is not None:

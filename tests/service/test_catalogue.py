@@ -54,7 +54,7 @@ def test_solvers(client: httpx.Client) -> None:
     assert solver["stages"]["highest"] == 0.6
     assert solver["fields"]["position"]["units"] == "1"
     assert solver["qualities"]["default"] == {"relative_error": SOLVER.tolerances["default"], "resolution": 96}
-    assert solver["qualities"]["fine"] == {"relative_error": None, "resolution": 128}
+    assert solver["qualities"]["fine"] == {"relative_error": SOLVER.tolerances["fine"], "resolution": 128}
     for preset in solver["presets"].values():
         SOLVER.params.parse(preset)
     assert set(solver["params"]["properties"]) == set(SOLVER.params.model_fields)

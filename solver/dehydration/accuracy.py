@@ -1,0 +1,57 @@
+"""How far the roughness of a run is expected to be off, as measured on eighths of spheres against finer meshes.
+
+Wrinkled skins bend over lengths of te, so their error goes with the square of an element's edge h over te, and stiffer
+skins need finer meshes, although their waves are longer:
+
+    error = RATE (gamma / 10)^POWER (h / te)^2 + SCATTER
+
+SCATTER is what single seeds differ by from their mean. Past the onset it is a statement on descriptors alone: the
+pattern itself is chaotic.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..contract import InvalidInput, Need, Quality
+from .fresh.loading import Loading
+from .params import DehydrationParams
+from .settings import choose, expected_cost
+
+__all__ = ["RATE", "SCATTER", "expected_error"]
+
+RATE, POWER, SCATTER = 0.03, 0.7, 0.06
+
+#: Where it was measured: te, gamma, and the last stage.
+_THICKNESS, _RATIO, _LAST = (0.02, 0.04), (10.0, 50.0), 0.3
+
+
+def expected_error(params: DehydrationParams, quality: Quality, last: float) -> float:
+    """Return the expected relative error of the roughness of a run at `quality` up to stage `last`.
+
+    Raises:
+        InvalidInput: none was measured for such a fruit; says for which, and what a run takes.
+
+    """
+    te, gamma = params.exocarp_thickness, params.modulus_ratio
+    stone = min(params.stone), max(params.stone)
+    measured = (
+        params.is_sphere
+        and Loading(params).uniform
+        and _THICKNESS[0] <= te <= _THICKNESS[1]
+        and _RATIO[0] <= gamma <= _RATIO[1]
+        and 0 <= last <= _LAST
+        and stone[0] >= 0.3
+        and stone[1] <= 0.5
+    )
+    settings = choose(params, quality, last)
+    if not measured:
+        raise InvalidInput(
+            f"no error was measured for this fruit (te = {te:g}, gamma = {gamma:g}) to s = {last:g}: only for evenly "
+            f"drying spheres with te {_THICKNESS[0]:g} to {_THICKNESS[1]:g}, gamma {_RATIO[0]:g} to {_RATIO[1]:g} and "
+            f"stones of 0.3 to 0.5 r1, to s = {_LAST:g}.",
+            advice=f"Name a quality in place of the tolerance: {quality} takes {settings.elements:,} elements and "
+            f"about {expected_cost(params, Need(stages=(last,), quality=quality)).seconds:.0f} s.",
+        )
+    edge = math.pi / 2 / settings.n
+    return RATE * (gamma / 10) ** POWER * (edge / te) ** 2 + SCATTER
