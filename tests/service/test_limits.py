@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
-from starlette.types import Message, Receive, Scope, Send
+import pytest
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.limits.requests import Limits
 from service.settings import Settings
 
-SCOPE: dict[str, Any] = {"type": "http", "method": "GET", "path": "/v1", "query_string": b"", "headers": []}
+SCOPE: Scope = {"type": "http", "method": "GET", "path": "/v1", "query_string": b"", "headers": []}
 
 
-def said(app: Any, settings: Settings) -> list[Message]:
+def said(app: ASGIApp, settings: Settings, scope: Scope = SCOPE) -> list[Message]:
     """Return what is sent to somebody who asks an app within limits."""
     sent: list[Message] = []
 
@@ -23,7 +23,7 @@ def said(app: Any, settings: Settings) -> list[Message]:
     async def send(message: Message) -> None:
         sent.append(message)
 
-    asyncio.run(Limits(app, settings)(SCOPE, receive, send))
+    asyncio.run(Limits(app, settings)(scope, receive, send))
     return sent
 
 
@@ -42,3 +42,18 @@ def test_an_answer_that_has_begun_may_take_longer_than_one_may_wait_for_it() -> 
     assert begun["status"] == 200
     assert b"".join(part["body"] for part in parts) == b"0123"
     assert said(wait, settings)[0]["status"] == 503
+
+
+@pytest.mark.parametrize(("declared", "status"), [(b"100", 200), (b"101", 413), (b"9" * 30, 413)])
+def test_a_body_that_says_it_is_too_large_is_refused_unread(declared: bytes, status: int) -> None:
+    """Whoever answers is not even asked: it might read all of it, or do its work and read nothing."""
+    asked = []
+
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+        asked.append(scope)
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    found = said(answer, Settings(max_body=100), {**SCOPE, "headers": [(b"content-length", declared)]})
+    assert found[0]["status"] == status
+    assert bool(asked) == (status == 200)
