@@ -49,3 +49,11 @@ def test_swelling_is_the_inverse_of_shrinking():
     assert (swollen[1:] > fresh[1:]).all()
     back = sphere_radius(swollen, 1 / 1.3, 0.4, interface=float(swollen[-1]))
     assert back == pytest.approx(fresh, rel=1e-13)
+
+
+@pytest.mark.parametrize("stone", [0.0, 0.4, 0.7, 0.9])
+def test_at_the_estimated_onset_the_skin_is_strained_as_a_flat_film_is(stone):
+    """Of a skin so stiff that all strains are small: the interface of the smooth sphere has come in by that strain."""
+    gamma = 1e6
+    moved = sphere_radius(np.array([1.0]), 1 - onset_estimate(gamma, stone), stone)
+    assert 1 - moved[0] == pytest.approx(flat_film_strain(gamma), rel=1e-3)

@@ -11,6 +11,7 @@ from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.remeshing.collapses import collapse
 from solver.growth.remeshing.flips import flip
+from solver.growth.remeshing.remesh import remesh
 
 MATERIAL = shell.Material(0.05)
 
@@ -95,3 +96,35 @@ def test_a_sphere_stays_a_sphere_when_edges_collapse():
     # integral of mean curvature over a unit sphere: half the sum of lengths times angles
     assert lengths @ coarser.rest / 2 == pytest.approx(4 * np.pi, rel=0.03)
     assert shell.areas(coarser.g).sum() == pytest.approx(shell.areas(state.g).sum(), rel=0.01)
+
+
+def test_remeshing_takes_back_what_cuts_near_an_end_have_left():
+    """Edges of a lattice cut at an eighth of their length: the short parts go, and the lattice is as it was."""
+    state = flat()
+    mesh, triangles, points = state.mesh, state.mesh.triangles.tolist(), list(state.x)
+    taken = np.zeros(len(state.x), bool)
+    taken[mesh.edges[mesh.border]] = True
+    for j, k in mesh.edges.tolist():
+        sides = [t for t in triangles if j in t and k in t]
+        if np.max(sides) < len(state.x) and not taken[sides].any():
+            taken[sides] = True
+            for side in sides:
+                triangles.remove(side)
+                triangles += [[len(points) if v == old else v for v in side] for old in (j, k)]
+            points.append(state.x[j] + 0.125 * (state.x[k] - state.x[j]))
+    x, top = np.array(points), shell.topology(np.array(triangles), len(points))
+    assert len(x) > len(state.x) + 10
+    rest = np.zeros(len(top.hinges))
+    # of an edge's two ends the one that nothing holds goes
+    held = np.repeat(np.arange(len(x)) < len(state.x), 3).reshape(-1, 3)
+    work = remesh(replace(state, x=x, mesh=top, g=shell.metric(x, top.triangles), rest=rest, held=held), 0.15, 10**6)
+    assert 0.125 * state.length < 0.25 * 0.15 < 0.9 * state.length
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            found, _ = end.value
+            break
+    assert np.array_equal(found.x, state.x)
+    assert {frozenset(t) for t in found.mesh.triangles.tolist()} == {frozenset(t) for t in mesh.triangles.tolist()}
+    assert energy(found, stretched(found.x)) == pytest.approx(energy(state, stretched(state.x)), rel=1e-12)

@@ -69,6 +69,7 @@ def test_boxes_find_what_all_pairs_do():
     x = wood.motion.x + np.random.default_rng(0).normal(0, 5e-4, wood.motion.x.shape)
     r, reach = wood.rods, 1.5e-3
     found = {tuple(p) for p in pairs(x, r, wood.rod, reach)}
+    assert all(wood.rod[e] != wood.rod[w] for e, w in found)
     share = np.linspace(0, 1, 41)
     real = np.flatnonzero(r.k > 0)
     points = x[r.a[real], None] * (1 - share[:, None]) + x[r.b[real], None] * share[:, None]

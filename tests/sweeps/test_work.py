@@ -1,0 +1,36 @@
+"""What one worker makes of one job."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from conftest import Solves
+
+from solver import registry
+from solver.contract import Need
+from store.ledger.jobs import JobSpec
+from store.store import Store
+from sweeps.running.work import Task, work
+
+
+@pytest.mark.parametrize("other", ["0", "2", "1.0"])
+def test_a_worker_of_another_version_refuses(shrinking: Solves, store: Store, other: str) -> None:
+    """Before it computes anything: its numbers would stand under the key of others. Once more does not help."""
+    solver = registry.get("shrinking")
+    params, need = solver.parse({"te": 0.03}, "sphere"), solver.settle(Need(stages=(0.1,), quality="preview"))
+    specs = [JobSpec.of(replace(solver, version=version), params, need) for version in (other, solver.version)]
+    store.ledger.want(specs, "both")
+    found = {}
+    for spec in specs:
+        job = store.ledger.claim("somebody", 60.0, [spec.key])
+        assert job is not None
+        found[spec.version] = work(Task(store.root, job, 60.0))
+    refused, done = found[other], found[solver.version]
+    assert (refused.state, refused.retry) == ("failed", False)
+    assert refused.error is not None
+    assert refused.error["code"] == "other-version"
+    assert f"version {other}, this worker has 1" in refused.error["message"]
+    assert done.state == "done"
+    assert list(store.keys()) == [specs[1].key]
+    assert len(shrinking) == 1
