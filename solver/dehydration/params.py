@@ -83,7 +83,8 @@ class DehydrationParams(Fruit):
         # keys of runs that knew no mirrors stay what they were
         exclude_if=lambda value: value == "",
         description="Mirror planes through the centre, by the axis across them: a half, a quarter or an eighth of the "
-        "fruit is solved and stands for the whole. y, across the poles' axis, wants equal halves",
+        "fruit is solved and stands for the whole. y, across the poles' axis, wants equal halves, and shows as bands "
+        "alike on both sides of the equator of a long fruit",
         json_schema_extra={"units": "1"},
     )
 
