@@ -54,4 +54,4 @@ def expected_error(params: DehydrationParams, quality: Quality, last: float) -> 
             f"about {expected_cost(params, Need(stages=(last,), quality=quality)).seconds:.0f} s.",
         )
     edge = math.pi / 2 / settings.n
-    return RATE * (gamma / 10) ** POWER * (edge / te) ** 2 + SCATTER
+    return float(RATE * (gamma / 10) ** POWER * (edge / te) ** 2 + SCATTER)
