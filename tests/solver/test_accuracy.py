@@ -30,7 +30,7 @@ def test_every_measured_run_is_as_near_the_finest_as_expected() -> None:
             truth = statistics.mean(other["roughness"][stage] for other in finest)
             assert abs(value / truth - 1) <= expected, (fruit, row["quality"], row["seed"], stage)
             checked += 1
-    assert checked >= 60
+    assert checked >= 48
 
 
 def test_the_expected_error_falls_with_the_mesh_and_grows_with_the_stiffness() -> None:
