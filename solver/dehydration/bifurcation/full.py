@@ -1,7 +1,7 @@
 """The onset of any fruit, elliptic equators too: triquadratic elements between the symmetry planes, all parities.
 
 Cost: three-dimensional. The part of the fruit between its planes is solved twice per look (two smooth states), then
-each parity costs a factorisation and some forty solves; unknowns grow with 1 / thickness^2.
+each parity costs two factorisations and some eighty solves; unknowns grow with 1 / thickness^2.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from ...fem import HEX27
 from ..fresh.closed_form import flat_film_wavelength, onset_estimate
 from ..fresh.mesh import layer_fractions
 from ..implicit import Equilibrium, Model, build_model, build_quadratic_mesh, equilibrium, natural_symmetry
-from ..implicit.buckling import Crossing, first_crossing, parities, stress_stiffness, tangent_at
+from ..implicit.buckling import Crossing, first_crossing, fresh_metric, parities, stress_stiffness, tangent_at
 from ..implicit.location import fold, locate
 from ..params import DehydrationParams
 from .result import FieldMode, Method, Onset, Tie
 
-__all__ = ["onset_full"]
+__all__ = ["crossings", "onset_full"]
 
 
-#: Quadratic elements per wrinkle of the flat film on a unit sphere: s_cr of the sphere with te = 0.04 comes out 3.0,
-#: 1.7 and 0.9 % high with 1.5, 2 and 2.5 of them.
+#: Quadratic elements per wrinkle of the flat film on a unit sphere: s_cr of the sphere with te = 0.04 and gamma = 10
+#: comes out 3.4, 2.1 and 1.3 % high with 1.5, 2 and 2.5 of them, whatever the bulk modulus.
 PER_WAVELENGTH = {"preview": 1.5, "default": 2.5, "fine": 3.5}
 #: The linear method's first modes are shorter (degree 23 instead of 14 on that sphere): it needs this many times more.
 LINEAR_FINER = 2.0
@@ -38,7 +38,7 @@ FIRST_LAYER, LAYER_GROWTH = 0.17, 1.8
 PENALTY = 1e5
 #: Largest shrinkage that is looked at.
 SEARCHED = 0.6
-#: Fractions of the expected onset between which the tangent's slope is taken: a first look, then a close one.
+#: Fractions of the expected onset through whose lowest stiffnesses a line is drawn: a first look, then a close one.
 LOOKS = ((0.80, 0.86), (0.96, 0.985))
 #: Parities whose first look is this close to the best are looked at closely.
 RIVALS = 1.03
@@ -64,26 +64,38 @@ def onset_full(
         Cancelled: by the context.
 
     """
-    begin, context = time.perf_counter(), context or Context()
-    model = _model(params, kappa_ratio, PER_WAVELENGTH[quality] * (LINEAR_FINER if method == "linear" else 1.0))
-    crossings = _exact(params, model, context) if method == "exact" else _linear(model, context)
+    begin = time.perf_counter()
+    model, found = crossings(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
     settings = {"n": len(model.mesh.quad_of[0]), "layers": model.mesh.layers, "unknowns": int(model.free.sum())}
-    if not crossings:
+    if not found:
         return Onset(
             None, None, None, "full", method, kappa_ratio, None, seconds=time.perf_counter() - begin, settings=settings,
             searched=SEARCHED, reason=f"the smooth shape stays stable up to s = {SEARCHED:g}",
         )  # fmt: skip
-    found = []
-    for crossing in crossings:
+    modes = []
+    for crossing in found:
         heights = _heights(params, model, crossing)
         degree, wavenumber = _dominant(heights, 2 * len(model.mesh.quad_of[0]) * 2)
-        found.append((crossing.shrinkage, degree, wavenumber, heights))
-    s_cr, degree, wavenumber, heights = found[0]
+        modes.append((crossing.shrinkage, degree, wavenumber, heights))
+    s_cr, degree, wavenumber, heights = modes[0]
     return Onset(
         s_cr, degree, wavenumber, "full", method, kappa_ratio, FieldMode(heights),
-        ties=tuple(Tie(s, d, m) for s, d, m, _ in found[1:]), seconds=time.perf_counter() - begin,
+        ties=tuple(Tie(s, d, m) for s, d, m, _ in modes[1:]), seconds=time.perf_counter() - begin,
         searched=SEARCHED, settings=settings,
     )  # fmt: skip
+
+
+def crossings(
+    params: DehydrationParams, *, method: Method = "exact", kappa_ratio: float | None = None,
+    quality: str = "default", context: Context | None = None,
+) -> tuple[Model, list[Crossing]]:  # fmt: skip
+    """Return the mesh's model and each parity's first singular tangent up to `SEARCHED`, sorted; none where smooth.
+
+    The part of `onset_full` that costs no search for the modes' degrees. Raises what it raises.
+    """
+    context = context or Context()
+    model = _model(params, kappa_ratio, PER_WAVELENGTH[quality] * (LINEAR_FINER if method == "linear" else 1.0))
+    return model, _exact(params, model, context) if method == "exact" else _linear(model, context)
 
 
 def _model(params: DehydrationParams, kappa_ratio: float | None, per_wavelength: float) -> Model:
@@ -106,35 +118,27 @@ def _linear(model: Model, context: Context) -> list[Crossing]:
 def _exact(params: DehydrationParams, model: Model, context: Context) -> list[Crossing]:
     expected = min(onset_estimate(params.modulus_ratio, min(params.stone)), SEARCHED)
     at: Equilibrium | None = None
+    metric = fresh_metric(model)
     wanted: dict[tuple[int, ...], Floats | None] = {parity: None for parity, _ in parities(model)}
-    known: dict[tuple[int, ...], Crossing] = {}
-    lower = False
+    known: list[Crossing] = []
     for _ in range(8):
-        look = LOOKS[-1] if known else LOOKS[0]
-        low, high = (expected * fraction for fraction in look)
-        ahead = at is not None and not lower and at.shrinkage <= low
-        first = at = equilibrium(model, low, start=at if ahead else None, context=context)
-        second = equilibrium(model, high, start=first, context=context)
-        base = tangent_at(model, first)
-        slope = (tangent_at(model, second) - base) / (high - low)
+        low, high = (expected * fraction for fraction in (LOOKS[-1] if known else LOOKS[0]))
+        ahead = at is not None and at.shrinkage <= low
+        first = equilibrium(model, low, start=at if ahead else None, context=context)
+        at = equilibrium(model, high, start=first, context=context)
         try:
-            found = _all(model, base, slope, low, context, wanted)
+            found = _softened(model, first, at, metric, context, wanted)
         except _AlreadyUnstable:
-            expected, lower, known = 0.8 * low, True, {}
+            expected, at, known = 0.8 * low, None, []
             wanted = {parity: None for parity, _ in parities(model)}
             continue
-        fresh_look = not known
-        known = {crossing.parity: crossing for crossing in found}
-        if not known:
-            return []
-        best = min(crossing.shrinkage for crossing in found)
+        best = min((crossing.shrinkage for crossing in found), default=np.inf)
         if best > SEARCHED:
             return []
-        close = abs(best / expected - 1) < 0.03
-        expected, lower = best, False
-        wanted = {c.parity: c.mode for c in found if c.shrinkage < RIVALS * best}
-        if not fresh_look and close:
+        if known and abs(best / expected - 1) < 0.03:
             return _sorted(found)
+        expected, known = best, found
+        wanted = {c.parity: c.mode for c in found if c.shrinkage < RIVALS * best}
     raise NotConverged(
         "the onset was not bracketed.", advice="Ask for a finer quality.", last_stage=at.shrinkage if at else None
     )
@@ -142,6 +146,28 @@ def _exact(params: DehydrationParams, model: Model, context: Context) -> list[Cr
 
 class _AlreadyUnstable(Exception):
     """The smooth state below the expected onset has a falling direction."""
+
+
+def _softened(
+    model: Model, first: Equilibrium, second: Equilibrium, metric: Floats, context: Context,
+    wanted: dict[tuple[int, ...], Floats | None],
+) -> list[Crossing]:  # fmt: skip
+    """Where each wanted parity's lowest stiffness, known at two states, falls to zero.
+
+    A line through the two stiffnesses, not through the two tangents: those hold kappa B^T B with B linear in s, and a
+    line through that is too low by kappa (s - low) (s - high) |B' v|^2 beyond both, which ends in false crossings.
+    """
+    lows = _all(model, tangent_at(model, first), -metric, 0.0, context, wanted)
+    begun = {c.parity: c.mode for c in lows}
+    highs = {c.parity: c for c in _all(model, tangent_at(model, second), -metric, 0.0, context, begun)}
+    found = []
+    for low in lows:
+        high = highs.get(low.parity)
+        if high is None or high.shrinkage >= low.shrinkage:
+            continue
+        slope = (low.shrinkage - high.shrinkage) / (second.shrinkage - first.shrinkage)
+        found.append(Crossing(second.shrinkage + high.shrinkage / slope, high.mode, high.parity))
+    return found
 
 
 def _all(

@@ -6,6 +6,7 @@ an independent problem on the same part of the mesh with other supports on the p
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from ...linalg.multifrontal import Factor
 from .hexahedron import PRESSURE, SHAPE_GRADIENTS, WEIGHTS
 from .newton import Equilibrium, Model, masked
 
-__all__ = ["Crossing", "first_crossing", "parities", "stress_stiffness", "tangent_at"]
+__all__ = ["Crossing", "first_crossing", "fresh_metric", "parities", "stress_stiffness", "tangent_at"]
 
 
 LANCZOS_TOLERANCE = 1e-5
@@ -48,6 +49,15 @@ def parities(model: Model) -> Iterator[tuple[tuple[int, ...], Bools]]:
 def tangent_at(model: Model, state: Equilibrium) -> Floats:
     """Return the tangent at an equilibrium, (nnz, 3, 3), without supports on the planes."""
     return model.sweep(state.deformed, model.stretch(state.shrinkage), state.pressure).data
+
+
+def fresh_metric(model: Model) -> Floats:
+    """Return what stiffnesses are compared with: the fresh tangent with kappa = mu, (nnz, 3, 3)."""
+    soft, still = (
+        dataclasses.replace(model, kappa=model.mu),
+        np.zeros((len(model.mesh.connectivity), PRESSURE.shape[1])),
+    )
+    return soft.sweep(model.mesh.positions, model.stretch(0.0), still).data
 
 
 def stress_stiffness(model: Model, state: Equilibrium) -> Floats:
