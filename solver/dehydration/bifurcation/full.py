@@ -28,7 +28,7 @@ __all__ = ["crossings", "onset_full"]
 
 
 #: Quadratic elements per wrinkle of the flat film on a unit sphere: s_cr of the sphere with te = 0.04 and gamma = 10
-#: comes out 3.4, 2.1 and 1.3 % high with 1.5, 2 and 2.5 of them, whatever the bulk modulus.
+#: comes out 3.4, 2.1 and 1.3 % high with 1.5, 2 and 2.5 of them, incompressible.
 PER_WAVELENGTH = {"preview": 1.5, "default": 2.5, "fine": 3.5}
 #: The linear method's first modes are shorter (degree 23 instead of 14 on that sphere): it needs this many times more.
 LINEAR_FINER = 2.0
