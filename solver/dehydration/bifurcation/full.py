@@ -158,7 +158,7 @@ def _softened(
     line through that is too low by kappa (s - low) (s - high) |B' v|^2 beyond both, which ends in false crossings.
     """
     lows = _all(model, tangent_at(model, first), -metric, 0.0, context, wanted)
-    begun = {c.parity: c.mode for c in lows}
+    begun: dict[tuple[int, ...], Floats | None] = {c.parity: c.mode for c in lows}
     highs = {c.parity: c for c in _all(model, tangent_at(model, second), -metric, 0.0, context, begun)}
     found = []
     for low in lows:
