@@ -73,9 +73,12 @@ class Path:
         """
         settings = self._settings
         if shrinkage <= settings.start:
+            masses = self.motion.masses
             state, velocity = self.motion.smooth(shrinkage)
             rest = self._pressed(state, velocity, self._rest, shrinkage, _PRESSINGS_AT_START)
-            return self._settle(state, velocity, rest, shrinkage)
+            found = self._settle(state, velocity, rest, shrinkage)
+            self.motion.masses = masses
+            return found
         if not self._begun:
             self._state, self._velocity = self.motion.smooth(settings.start)
             self._begun = True
