@@ -22,8 +22,8 @@ __all__ = ["RATE", "SCATTER", "expected_error"]
 
 RATE, POWER, SCATTER = 0.03, 0.7, 0.06
 
-#: Where it was measured: te, gamma, and the last stage.
-_THICKNESS, _RATIO, _LAST = (0.02, 0.04), (10.0, 50.0), 0.3
+#: Where it was measured: te (0.02 at gamma = 10 alone, by version 5), gamma, the last stage, and the stone.
+_THICKNESS, _RATIO, _LAST, _STONE = (0.02, 0.04), (10.0, 50.0), 0.3, 0.4
 
 
 def expected_error(params: DehydrationParams, quality: Quality, last: float) -> float:
@@ -34,22 +34,20 @@ def expected_error(params: DehydrationParams, quality: Quality, last: float) -> 
 
     """
     te, gamma = params.exocarp_thickness, params.modulus_ratio
-    stone = min(params.stone), max(params.stone)
     measured = (
         params.is_sphere
         and Loading(params).uniform
         and _THICKNESS[0] <= te <= _THICKNESS[1]
         and _RATIO[0] <= gamma <= _RATIO[1]
         and 0 <= last <= _LAST
-        and stone[0] >= 0.3
-        and stone[1] <= 0.5
+        and params.stone == (_STONE, _STONE)
     )
     settings = choose(params, quality, last)
     if not measured:
         raise InvalidInput(
             f"no error was measured for this fruit (te = {te:g}, gamma = {gamma:g}) to s = {last:g}: only for evenly "
             f"drying spheres with te {_THICKNESS[0]:g} to {_THICKNESS[1]:g}, gamma {_RATIO[0]:g} to {_RATIO[1]:g} and "
-            f"stones of 0.3 to 0.5 r1, to s = {_LAST:g}.",
+            f"stones of {_STONE:g} r1, to s = {_LAST:g}.",
             advice=f"Name a quality in place of the tolerance: {quality} takes {settings.elements:,} elements and "
             f"about {expected_cost(params, Need(stages=(last,), quality=quality)).seconds:.0f} s.",
         )

@@ -54,7 +54,7 @@ def test_a_tolerance_takes_the_quality_that_the_fruit_needs() -> None:
 
 
 @pytest.mark.parametrize(
-    "values", [{"te": 0.005}, {"te": 0.1}, {"gamma": 100.0}, {"r4": 0.8}, {"wy": 0.3}, {"rs1": 0.9, "rs2": 0.9}]
+    "values", [{"te": 0.005}, {"te": 0.1}, {"gamma": 100.0}, {"r4": 0.8}, {"wy": 0.3}, {"rs1": 0.5, "rs2": 0.5}]
 )
 def test_what_was_never_measured_is_refused_with_what_it_takes(values: dict[str, float]) -> None:
     with pytest.raises(InvalidInput, match="no error was measured") as caught:
