@@ -92,6 +92,7 @@ def _write(
         places=samples.axes,
         keys=samples.keys,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
+        tied=samples.tied,
     )
     write_manifest(store.tables_dir, table)
     return table
