@@ -196,7 +196,7 @@ class ShapeTable:
             displacement=found[1],
             poles=found[2],
             stage=s,
-            parameters=values,
+            parameters=self.info.complete(values),
             descriptors=self._describe(near, stages),
             weights={self._keys[i]: float(w) for i, w in zip(near.samples, near.weights, strict=True)},
             nearest=near.nearest,

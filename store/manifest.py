@@ -27,7 +27,7 @@ class TableInfo:
     `axes` are the parameters that vary, with their bounds; `fixed` those that do not. `places` says where each scalar
     sits in the solver's parameters, of which `template` is one complete set. `resolution` is the band limit and the
     lattice that holds it exactly. `digest` is that of the content; `created` (UTC) is not part of it. `tied` are
-    parameters that vary along with an axis.
+    parameters that vary along with an axis, `plan` is the text of the plan whose runs it holds.
     """
 
     name: str
@@ -48,6 +48,7 @@ class TableInfo:
     keys: tuple[str, ...]
     created: str
     tied: dict[str, Tie] = field(default_factory=dict)
+    plan: str = ""
 
     def complete(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return values on the axes, and with them those of the parameters that follow."""
