@@ -10,6 +10,7 @@ import numpy as np
 
 from solver import registry
 from solver.contract import Solver
+from store.errors import UnknownTable
 from store.families import stored
 from store.families.choose import Families
 from store.generations import generation
@@ -17,7 +18,9 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, path_of
 
-__all__ = ["covered", "portrait", "thumbnail"]
+from .pictures.sheet import Panel, sheet
+
+__all__ = ["covered", "gallery", "portrait", "thumbnail"]
 
 #: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
 _DRY = 0.67
@@ -101,6 +104,30 @@ def thumbnail(table: ShapeTable, point: Mapping[str, float], stage: float, pixel
     out = io.BytesIO()
     Image.fromarray(render(shape.position, shape.poles, pixels, colour=colour)).save(out, "PNG", optimize=True)
     return out.getvalue()
+
+
+def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
+    """Return a PNG with the portraits of all tables of shapes in a store.
+
+    Raises:
+        UnknownTable: there is none.
+
+    """
+    panels = []
+    for name in store.table_names():
+        table = ShapeTable.open(store, name, surfaces=registry.surface)
+        solver = registry.get(table.info.solver)
+        point, stage = portrait(store, stored.families(store, solver), table.info)
+        shape = table.at(point, stage, resolution=128)
+        assert shape.position is not None  # asked for by default
+        said = ", ".join(f"{axis} {value:g}" for axis, value in point.items())
+        colour = _tint(table.info)
+        skin = None if colour is None else np.broadcast_to(colour, shape.position.shape)
+        note = f"{name}: {said}, {solver.stages.symbol} {stage:g}"
+        panels.append(Panel(shape.position, shape.poles, note, skin))
+    if not panels:
+        raise UnknownTable("the store has no table of shapes.", "Build one: `wizen table build`.")
+    return sheet([panels[i : i + columns] for i in range(0, len(panels), columns)], pixels=pixels)
 
 
 def _tint(info: TableInfo) -> np.ndarray[Any, np.dtype[np.float64]] | None:

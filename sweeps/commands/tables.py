@@ -87,27 +87,40 @@ def build(
 
 
 @table_app.command("list")
-def list_(store: StoreToRead = None, as_json: As_json = False) -> None:
+def list_(
+    store: StoreToRead = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="A picture of each, side by side.")
+    ] = None,
+    as_json: As_json = False,
+) -> None:
     """List the tables of shapes: what each covers, how good it is, which presets it holds.
 
     [bold]Examples[/bold]
 
     wizen table list
 
+    wizen table list --picture fruits.png
+
     wizen table list --store demo --json
     """
     from solver import registry
-    from store import tables
+    from store import seal, tables
     from store.families import stored
 
-    from ..families import covered
+    from ..families import covered, gallery
 
     opened = open_store(store)
+    if picture is not None and picture.suffix != ".png":
+        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
     found = []
     for name in opened.table_names():
         table = tables.info(opened, name)
         solver = registry.get(table.solver)
         found.append(covered(opened, stored.families(opened, solver), table, solver))
+
+    if picture is not None:
+        seal.publish(picture, gallery(opened))
 
     def show(console: Any) -> None:
         rows = []
