@@ -42,14 +42,20 @@ class Tie:
         return low + t * (a + t * ((3 * rise - 2 * a - b) + t * (a + b - 2 * rise)))
 
     def _slope(self, j: int) -> float:
-        """Return the slope at a node: of its two intervals the weighted harmonic mean, at an end the interval's."""
-        at, values = self.at, self.values
-        slopes = [(values[i + 1] - values[i]) / (at[i + 1] - at[i]) for i in (j - 1, j) if i >= 0 and i + 1 < len(at)]
+        """Return the slope at a node: the weighted harmonic mean of its two intervals', at an end a parabola's."""
+        steps = [b - a for a, b in pairwise(self.at)]
+        slopes = [(b - a) / step for (a, b), step in zip(pairwise(self.values), steps, strict=True)]
         if len(slopes) == 1:
             return slopes[0]
-        before, after = at[j] - at[j - 1], at[j + 1] - at[j]
+        if j in (0, len(steps)):
+            near, next_ = (0, 1) if j == 0 else (-1, -2)
+            h, g = steps[near], steps[next_]
+            found = ((2 * h + g) * slopes[near] - h * slopes[next_]) / (h + g)
+            # neither back nor steeper than keeps it monotone
+            return min(max(found / slopes[near], 0.0), 3.0) * slopes[near]
+        before, after = steps[j - 1], steps[j]
         one, two = 2 * after + before, after + 2 * before
-        return (one + two) / (one / slopes[0] + two / slopes[1])
+        return (one + two) / (one / slopes[j - 1] + two / slopes[j])
 
 
 def find(columns: Mapping[str, Sequence[float]]) -> dict[str, Tie]:
