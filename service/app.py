@@ -19,6 +19,7 @@ from store.tokens import Tokens
 from . import catalogue, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
+from .jobs import fields as jobs_fields
 from .jobs import results as jobs_results
 from .jobs import routes as jobs
 from .jobs.runner import JobRunner
@@ -94,6 +95,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         batch.router,
         jobs.reading,
         jobs_events.router,
+        jobs_fields.router,
         jobs_results.router,
         results.router,
     )

@@ -17,6 +17,7 @@ from . import page, problems, vocabulary
 from .formats import FORMATS
 from .sequences import EXPORTS
 from .shapes.live import LiveTables
+from .views.catalogue import Health, Index, SolverList, SolverPage, TableList, TablePage
 
 __all__ = ["open_router", "router"]
 
@@ -30,7 +31,7 @@ Json = dict[str, Any]
     "/",
     summary="Where to go from here",
     response_class=Response,
-    responses={200: {"content": {"application/json": {"schema": {"type": "object"}}, "text/html": {}}}},
+    responses={200: {"model": Index, "content": {"text/html": {"schema": {"type": "string"}}}}},
 )
 def index(request: Request) -> Response:
     """List the service's pages; a browser is shown the viewer."""
@@ -52,7 +53,13 @@ def index(request: Request) -> Response:
     return JSONResponse(body, headers={"Vary": "Accept"})
 
 
-@open_router.get("/healthz", summary="Whether shapes can be served", responses=problems.responses(503))
+@open_router.get(
+    "/healthz",
+    summary="Whether shapes can be served",
+    response_model=Health,
+    response_model_exclude_unset=True,
+    responses=problems.responses(503),
+)
 def health(request: Request) -> Json:
     """Open every table; 200 only if the store and all its tables can be read.
 
@@ -67,7 +74,13 @@ def health(request: Request) -> Json:
     return {"status": "ok", "version": __version__, "tables": found}
 
 
-@router.get("/v1/tables", summary="All tables", responses=problems.responses(503))
+@router.get(
+    "/v1/tables",
+    summary="All tables",
+    response_model=TableList,
+    response_model_exclude_unset=True,
+    responses=problems.responses(503),
+)
 def tables(request: Request) -> Json:
     """List the tables that shapes can be asked of; a damaged one has a `complaint` in place of its axes."""
     live: LiveTables = request.app.state.tables
@@ -80,14 +93,20 @@ def tables(request: Request) -> Json:
     return {"tables": found}
 
 
-@router.get("/v1/tables/{name}", summary="One table", responses=problems.responses(404, 503))
+@router.get(
+    "/v1/tables/{name}",
+    summary="One table",
+    response_model=TablePage,
+    response_model_exclude_unset=True,
+    responses=problems.responses(404, 503),
+)
 def table(request: Request, name: str = Path(description="Name of a table; GET /v1/tables lists them")) -> Json:
     """Describe a table: its axes with ranges and units, its stages and its generation."""
     live: LiveTables = request.app.state.tables
     return _table(request, live.info(name))
 
 
-@router.get("/v1/solvers", summary="All solvers")
+@router.get("/v1/solvers", summary="All solvers", response_model=SolverList)
 def solvers() -> Json:
     """List the solvers."""
     return {
@@ -95,7 +114,13 @@ def solvers() -> Json:
     }
 
 
-@router.get("/v1/solvers/{name}", summary="One solver", responses=problems.responses(404))
+@router.get(
+    "/v1/solvers/{name}",
+    summary="One solver",
+    response_model=SolverPage,
+    response_model_exclude_unset=True,
+    responses=problems.responses(404),
+)
 def solver(name: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Json:
     """Describe a solver: parameter schema, query axes and stage axis with units, fields, presets, looks, qualities."""
     return _solver(vocabulary.solver_named(name))

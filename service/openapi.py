@@ -47,7 +47,10 @@ class Documented(FastAPI):
             problem = problems.Problem.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas.update(problem.pop("$defs", {}), Problem=problem)
             get = document["paths"]["/v1/shapes/{solver}"]["get"]
-            get["parameters"] = [*get["parameters"], *_parameters(self.state.settings, examples)]
+            parameters = _parameters(self.state.settings, examples)
+            get["parameters"] = [*get["parameters"], *parameters]
+            info = document["paths"]["/v1/shapes/{solver}/info"]["get"]
+            info["parameters"] += [each for each in parameters if each["name"] not in ("format", "exact")]
             schemas["JobRequest"] = _job_request(schemas)
             _replace_validation(document)
             _complete(document)

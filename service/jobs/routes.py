@@ -18,12 +18,12 @@ from store.store import Store
 from store.tokens import Token
 
 from .. import problems, vocabulary
-from ..errors import Forbidden, JobEnded
+from ..errors import Forbidden, JobEnded, JobFailed, NotDone
 from ..security import requires
 from .submit import submit
 from .views import JobList, JobRequest, JobView, view
 
-__all__ = ["JobId", "ledger_of", "reading", "stored_job", "writing"]
+__all__ = ["JobId", "check_done", "ledger_of", "reading", "stored_job", "writing"]
 
 #: Routes that need the scope read, and those that need run.
 reading, writing = APIRouter(tags=["jobs"]), APIRouter(tags=["jobs"])
@@ -137,3 +137,25 @@ def stored_job(request: Request, key: str) -> Job:
     if ledger is None:
         raise UnknownJob(f"there is no job {key[:80]!r}.", "GET /v1/jobs lists all.")
     return ledger.get(key)
+
+
+def check_done(job: Job) -> None:
+    """Refuse a job that has no result.
+
+    Raises:
+        JobFailed: it was given up.
+        NotDone: it waits, runs or was cancelled.
+
+    """
+    if job.state == "failed":
+        error = job.error or {}
+        raise JobFailed(
+            f"this job failed: {error.get('message', 'nobody knows why.')}", advice=str(error.get("advice", ""))
+        )
+    if job.state == "cancelled":
+        raise NotDone("this job was cancelled.", advice="Ask for it again with POST /v1/jobs.")
+    if job.state != "done":
+        raise NotDone(
+            f"this job is {job.state} ({job.progress:.0%}).",
+            advice=f"Follow /v1/jobs/{job.key}/events until it is done.",
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import urlencode
 from weakref import WeakKeyDictionary
 
@@ -20,9 +20,10 @@ from store.errors import StoreError, TooUncertain
 from store.lookup import ShapeTable
 
 from .. import problems, vocabulary
-from ..errors import OutsideRanges, ServiceError
+from ..errors import OutsideRanges, ServiceError, Wrong
 from ..formats import FORMATS, About, Format, negotiate
 from ..settings import Settings
+from ..views.shape import ShapePage
 from . import detail as level
 from . import exact
 from .answers import Answer, Answers, matches
@@ -44,8 +45,7 @@ _QUESTION = "wizen.question"
 #: The words of the tables in use, which one application serves with one limit.
 _kept_words: WeakKeyDictionary[ShapeTable, Words] = WeakKeyDictionary()
 
-_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
-_CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()}
+_CONTENT = problems.files(f.media_type for f in FORMATS.values() if f.name != "json")
 
 
 @router.get(
@@ -53,7 +53,7 @@ _CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" els
     summary="One shape, interpolated from a table",
     response_class=Response,
     responses={
-        200: {"description": "The shape", "content": _CONTENT},
+        200: {"model": ShapePage, "description": "The shape, in the format asked for", "content": _CONTENT},
         303: exact.RESPONSE,
         304: {"description": "The shape that the asker has is the current one"},
         **problems.responses(401, 403, 404, 406, 409, 413, 414, 422, 429, 500, 503, 507),
@@ -70,6 +70,20 @@ async def shape(
     """
     found = await at_once(request, solver)
     return await run_in_threadpool(_shape, request, solver) if found is None else found
+
+
+@router.get(
+    "/v1/shapes/{solver}/info",
+    summary="The numbers about one shape",
+    response_model=ShapePage,
+    responses={
+        304: {"description": "What the asker has is current"},
+        **problems.responses(404, 413, 414, 422, 500, 503),
+    },
+)
+def info(request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Response:
+    """Say what is known of a shape, as `format=json` does of the same question: always JSON, whatever is accepted."""
+    return _settle(request, _ask(request, solver, FORMATS["json"], ("format", "exact")))
 
 
 async def at_once(request: Request, solver: str) -> Response | None:
@@ -129,8 +143,8 @@ def _asked(request: Request, solver: str) -> _Asked:
     return found
 
 
-def _ask(request: Request, solver: str) -> _Asked:
-    """Return the question of a request.
+def _ask(request: Request, solver: str, only: Format | None = None, without: tuple[str, ...] = ()) -> _Asked:
+    """Return the question of a request, in the format asked for or in the `only` one, `without` some parameters.
 
     Raises:
         ServiceError, StoreError: it cannot be understood, or there is no table for it.
@@ -140,14 +154,15 @@ def _ask(request: Request, solver: str) -> _Asked:
     tables: LiveTables = request.app.state.tables
     given = request.query_params
     known = vocabulary.solver_named(solver)
-    chosen = negotiate(request.headers.get("accept"), given.get("format"))
+    chosen = only or negotiate(request.headers.get("accept"), given.get("format"))
     name = tables.choose(solver, given.get("table"))
     table = tables.get(name)
     words = _kept_words.get(table)
     if words is None:
         words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
     detail = level.read(given)
-    query = parse(given.multi_items(), words, detail.refused(chosen))
+    unknown = [Wrong(name, "means nothing here", f"Ask /v1/shapes/{solver}.") for name in without if name in given]
+    query = parse(given.multi_items(), words, [*unknown, *detail.refused(chosen)])
     resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
     return _Asked(known, name, table, words, query, detail, chosen, resolution)
 
@@ -258,7 +273,8 @@ def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str,
     kept = [(k, v) for k, v in request.query_params.multi_items() if k not in settled]
     others = [name for name, chosen in FORMATS.items() if name != "json" and not detail.refused(chosen)]
     pairs = [*kept, ("resolution", str(resolution))]
-    return {name: f"{request.url.path}?{urlencode([*pairs, ('format', name)])}" for name in others}
+    path = request.url.path.removesuffix("/info")
+    return {name: f"{path}?{urlencode([*pairs, ('format', name)])}" for name in others}
 
 
 def _filename(solver: str, query: ShapeQuery, symbol: str, chosen: Format) -> str:
