@@ -47,6 +47,7 @@ STATUS: Mapping[type[Exception], int] = {
     stored.TooUncertain: 422,
     stored.MixedSamples: 503,
     stored.StorageFull: 507,
+    stored.StorageFailed: 503,
     stored.UnknownJob: 404,
     stored.QueueFull: 429,
     stored.ReadOnlyStore: 409,

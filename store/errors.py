@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import ClassVar
@@ -22,6 +22,7 @@ __all__ = [
     "OutsideTable",
     "QueueFull",
     "ReadOnlyStore",
+    "StorageFailed",
     "StorageFull",
     "StoreError",
     "TooUncertain",
@@ -31,6 +32,7 @@ __all__ = [
     "full_disk",
 ]
 
+_BROKEN = {errno.EIO, errno.EREMOTEIO, errno.ENXIO}
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
@@ -132,6 +134,12 @@ class StorageFull(StoreError):
     code = "storage-full"
 
 
+class StorageFailed(StoreError):
+    """The disk could not read or write. Nothing half-written stays."""
+
+    code = "storage-failed"
+
+
 class UnknownJob(StoreError):
     """No job or result has that key."""
 
@@ -158,17 +166,27 @@ class UnknownToken(StoreError):
 
 @contextmanager
 def full_disk(path: Path) -> Iterator[None]:
-    """Turn the system's ways of saying 'no space' while writing `path` into `StorageFull`.
+    """Turn the system's ways of saying 'no space' while writing `path` into `StorageFull`, and others into sentences.
 
     Raises:
         StorageFull: no space, over quota, or over the file size limit.
+        StorageFailed: the disk does not work.
+        ReadOnlyStore: the path may not be written.
 
     """
     try:
         yield
     except OSError as error:
         # HDF5 reports the system's error number only inside its message
-        if error.errno not in _FULL and not any(f"errno = {number}," in str(error) for number in _FULL):
+        def met(numbers: Iterable[int]) -> bool:
+            return error.errno in numbers or any(f"errno = {number}," in str(error) for number in numbers)
+
+        if met(_BROKEN):
+            advice = "Look at the disk (dmesg, smartctl); then run the same command again, here or on a copy."
+            raise StorageFailed(f"the disk could not write {path} ({error}).", advice) from error
+        if met((errno.EACCES, errno.EPERM, errno.EROFS)):
+            raise ReadOnlyStore(f"{path} cannot be written.", "Name a store of your own.") from error
+        if not met(_FULL):
             raise
         raise StorageFull(
             f"there is no space left to write {path}.",

@@ -46,7 +46,7 @@ class Store:
                 f"there is no store in {store.root.absolute()}.",
                 "Run a sweep with that directory to create it, or name another one.",
             )
-        for directory in (store._shards, store.tables_dir):
+        for directory in (store.root, store._shards, store.tables_dir):
             seal.clean(directory)
         return store
 

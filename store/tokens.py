@@ -149,9 +149,7 @@ class Tokens:
             found = dict(self._read())
             yield found
             data = json.dumps([asdict(token) for token in found.values()], indent=1).encode()
-            with seal.scratch(self.path) as temporary:
-                # nobody else may read it at any moment
-                temporary.touch(0o600, exist_ok=False)
+            with seal.scratch(self.path, private=True) as temporary:
                 temporary.write_bytes(data)
                 seal.adopt(temporary, self.path)
         finally:

@@ -7,14 +7,14 @@ import time
 from generated import AuthenticatedClient
 from generated.api.jobs import ask, fields, job
 from generated.api.shapes import batch, info, shape
-from generated.models import BatchRequest, JobRequestDehydration, Problem
+from generated.models import BatchRequest, JobRequestDehydration, Problem, ShapeFormat
 
 address, token = sys.argv[1:]
 client = AuthenticatedClient(base_url=address, token=token, raise_on_unexpected_status=True, timeout=120)
 query = {"te": 0.03, "gamma": 7.0, "s": 0.25, "resolution": "16"}
 
 said = info.sync("dehydration", client=client, **query)
-file = shape.sync("dehydration", client=client, format_="glb", **query)
+file = shape.sync("dehydration", client=client, format_=ShapeFormat.GLB, **query)
 points = [{"te": 0.03, "gamma": 7, "s": 0.1}]
 wanted = BatchRequest.from_dict({"solver": "dehydration", "points": points, "format": "npz", "resolution": 16})
 archive = batch.sync(client=client, body=wanted)
