@@ -37,6 +37,7 @@ from .shapes.shortcut import Shortcut
 from .shapes.turns import Turns
 from .stopping import at_signals
 from .telemetry import Metrics, Telemetry
+from .views.addresses import Rooted
 
 __all__ = ["create_app"]
 
@@ -126,6 +127,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             expose_headers=["ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID"],
         )
     app.add_middleware(Telemetry, metrics=metrics)
+    if settings.root_path:
+        app.add_middleware(Rooted, root=settings.root_path)
     return app
 
 

@@ -17,6 +17,7 @@ from . import page, problems, vocabulary
 from .formats import FORMATS
 from .sequences import EXPORTS
 from .shapes.live import LiveTables
+from .views.addresses import link
 from .views.catalogue import Health, Index, SolverList, SolverPage, TableList, TablePage
 
 __all__ = ["open_router", "router"]
@@ -50,6 +51,7 @@ def index(request: Request) -> Response:
     formats = {f.name: {"media_type": f.media_type, "title": f.title} for f in FORMATS.values()}
     exports = {e.name: {"media_type": e.media_type, "title": e.title} for e in EXPORTS.values()}
     body = {"name": "wizen", "version": __version__, "links": links, "formats": formats, "result_formats": exports}
+    body["links"] = {name: link(path) for name, path in links.items()}
     return JSONResponse(body, headers={"Vary": "Accept"})
 
 
@@ -109,9 +111,8 @@ def table(request: Request, name: str = Path(description="Name of a table; GET /
 @router.get("/v1/solvers", summary="All solvers", response_model=SolverList)
 def solvers() -> Json:
     """List the solvers."""
-    return {
-        "solvers": [{"name": n, "title": registry.get(n).title, "href": f"/v1/solvers/{n}"} for n in registry.names()]
-    }
+    found = {name: registry.get(name).title for name in registry.names()}
+    return {"solvers": [{"name": n, "title": title, "href": link(f"/v1/solvers/{n}")} for n, title in found.items()]}
 
 
 @router.get(
@@ -144,7 +145,7 @@ def _solver(solver: Solver) -> Json:
             name: {"relative_error": solver.tolerances.get(name), "resolution": resolution}
             for name, resolution in solver.default_resolution.items()
         },
-        "links": {"shapes": f"/v1/shapes/{solver.name}"},
+        "links": {"shapes": link(f"/v1/shapes/{solver.name}")},
     }
 
 
@@ -196,5 +197,8 @@ def _table(request: Request, info: TableInfo) -> Json:
         },
         "methods": {"default": methods.DEFAULT, "known": methods.NAMED, "judged": judged.method},
         "descriptors": {name: quantities.attrs(name) for name in info.descriptors if name in quantities.QUANTITIES},
-        "links": {"self": f"/v1/tables/{info.name}", "shapes": f"/v1/shapes/{info.solver}?table={info.name}"},
+        "links": {
+            "self": link(f"/v1/tables/{info.name}"),
+            "shapes": link(f"/v1/shapes/{info.solver}?table={info.name}"),
+        },
     }

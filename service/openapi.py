@@ -53,7 +53,7 @@ class Documented(FastAPI):
             info["parameters"] += [each for each in parameters if each["name"] not in ("format", "exact")]
             schemas["JobRequest"] = _job_request(schemas)
             _replace_validation(document)
-            _complete(document)
+            _complete(document, self.state.settings.root_path)
             document["x-examples"] = examples
         return self.openapi_schema  # type: ignore[return-value]
 
@@ -63,11 +63,11 @@ def operation_id(route: APIRoute) -> str:
     return route.name
 
 
-def _complete(document: Json) -> None:
+def _complete(document: Json, root: str) -> None:
     """Add what generators of clients and linters ask for: a server, whether each operation needs a token, and no
     keyword that JSON Schema does not know.
     """
-    document["servers"] = [{"url": "/", "description": "The service that sent this page"}]
+    document["servers"] = [{"url": root or "/", "description": "The service that sent this page"}]
     document["info"]["license"] = {"name": "Apache 2.0", "identifier": "Apache-2.0"}
     for operations in document["paths"].values():
         for operation in operations.values():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import ClassVar
 
 __all__ = [
     "Advised",
+    "CorruptBackup",
     "CorruptLedger",
     "CorruptShard",
     "CorruptTable",
@@ -21,6 +22,7 @@ __all__ = [
     "NetworkFileSystem",
     "OutsideTable",
     "QueueFull",
+    "QuotaSpent",
     "ReadOnlyStore",
     "StorageFailed",
     "StorageFull",
@@ -33,6 +35,7 @@ __all__ = [
 ]
 
 _BROKEN = {errno.EIO, errno.EREMOTEIO, errno.ENXIO}
+_REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS}
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
@@ -116,6 +119,12 @@ class QueueFull(StoreError):
     code = "queue-full"
 
 
+class QuotaSpent(StoreError):
+    """Somebody has asked for as much solver time as he may."""
+
+    code = "quota-spent"
+
+
 class NetworkFileSystem(StoreError):
     """The ledger would lie where the locks of two machines do not see each other."""
 
@@ -132,6 +141,12 @@ class StorageFull(StoreError):
     """The disk or a quota is full. Nothing half-written stays."""
 
     code = "storage-full"
+
+
+class CorruptBackup(StoreError):
+    """A backup is not what was copied."""
+
+    code = "corrupt-backup"
 
 
 class StorageFailed(StoreError):
@@ -177,18 +192,19 @@ def full_disk(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        # HDF5 reports the system's error number only inside its message
-        def met(numbers: Iterable[int]) -> bool:
-            return error.errno in numbers or any(f"errno = {number}," in str(error) for number in numbers)
-
-        if met(_BROKEN):
+        if _met(error, _BROKEN):
             advice = "Look at the disk (dmesg, smartctl); then run the same command again, here or on a copy."
             raise StorageFailed(f"the disk could not write {path} ({error}).", advice) from error
-        if met((errno.EACCES, errno.EPERM, errno.EROFS)):
+        if _met(error, _REFUSED):
             raise ReadOnlyStore(f"{path} cannot be written.", "Name a store of your own.") from error
-        if not met(_FULL):
+        if not _met(error, _FULL):
             raise
         raise StorageFull(
             f"there is no space left to write {path}.",
             "Free space (`prune` removes old table generations) or move the store; then run the same command again.",
         ) from error
+
+
+def _met(error: OSError, numbers: set[int]) -> bool:
+    """Return whether the system gave one of these numbers; HDF5 reports them only inside its message."""
+    return error.errno in numbers or any(f"errno = {number}," in str(error) for number in numbers)

@@ -18,7 +18,7 @@ from pathlib import Path
 from . import holding
 from .errors import full_disk
 
-__all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "make_directory", "publish", "scratch", "seal"]
+__all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "make_directory", "publish", "scratch", "seal", "sync"]
 
 _MARK = b"wizen\x00\x01\n"
 #: Bytes of the seal at the end of a file.
@@ -35,7 +35,7 @@ def make_directory(path: Path) -> None:
         return
     make_directory(path.parent)
     path.mkdir(exist_ok=True)
-    _sync(path.parent)
+    sync(path.parent)
 
 
 @contextmanager
@@ -71,9 +71,9 @@ def _begin(path: Path, mode: int) -> tuple[Path, int]:
 
 def adopt(temporary: Path, path: Path) -> None:
     """Make a file written under a temporary name visible as `path`, whole and on the disk when this returns."""
-    _sync(temporary)
+    sync(temporary)
     temporary.replace(path)
-    _sync(path.parent)
+    sync(path.parent)
 
 
 def publish(path: Path, data: bytes | memoryview) -> None:
@@ -136,7 +136,8 @@ def clean(directory: Path) -> int:
     return removed
 
 
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
+    """Return once a file, or the names in a directory, are on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -20,7 +20,8 @@ from store.tokens import Token
 from .. import problems, vocabulary
 from ..errors import Forbidden, JobEnded, JobFailed, NotDone
 from ..security import requires
-from .submit import submit
+from ..views.addresses import link
+from .submit import asker_of, submit
 from .views import JobList, JobRequest, JobView, view
 
 __all__ = ["JobId", "check_done", "ledger_of", "reading", "stored_job", "writing"]
@@ -56,7 +57,7 @@ def ask(request: Request, response: Response, body: JobRequest, token: Runner) -
         vocabulary.solver_named(body.solver),
         body.params,
         body.need,
-        token.id,
+        asker_of(request, token),
         preset=body.preset,
         again=body.again,
         unlimited=token.allows("admin"),
@@ -84,7 +85,7 @@ def jobs(
     following = None
     if more is not None:
         pairs = {"state": state, "limit": limit, "after": more}
-        following = f"/v1/jobs?{urlencode({k: v for k, v in pairs.items() if v is not None})}"
+        following = link(f"/v1/jobs?{urlencode({k: v for k, v in pairs.items() if v is not None})}")
     return JobList(jobs=[view(job) for job in found], next=following)
 
 

@@ -14,7 +14,7 @@ from store.lookup import ShapeTable
 
 from ..errors import OutsideRanges
 from ..formats import Format
-from ..jobs.submit import submit
+from ..jobs.submit import asker_of, submit
 from ..security import authorize, bearer
 from .query import ShapeQuery
 
@@ -51,7 +51,7 @@ def redirect(request: Request, solver: Solver, table: ShapeTable, query: ShapeQu
     token = authorize(request.app.state, bearer(request), "run")
     params = {**table.info.template, **query.named, **query.point}
     need = Need(stages=(query.stage,), quality="default")
-    found = submit(request.app.state, solver, params, need, token.id, unlimited=token.allows("admin"))
+    found = submit(request.app.state, solver, params, need, asker_of(request, token), unlimited=token.allows("admin"))
     location = found.location
     if found.job.state == "done":
         location += f"/result?{urlencode({'format': chosen.name})}"

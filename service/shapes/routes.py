@@ -23,6 +23,7 @@ from .. import problems, vocabulary
 from ..errors import OutsideRanges, ServiceError, Wrong
 from ..formats import FORMATS, About, Format, negotiate
 from ..settings import Settings
+from ..views.addresses import link
 from ..views.shape import ShapePage
 from . import detail as level
 from . import exact
@@ -273,7 +274,7 @@ def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str,
     kept = [(k, v) for k, v in request.query_params.multi_items() if k not in settled]
     others = [name for name, chosen in FORMATS.items() if name != "json" and not detail.refused(chosen)]
     pairs = [*kept, ("resolution", str(resolution))]
-    path = request.url.path.removesuffix("/info")
+    path = link(request.scope["path"].removesuffix("/info"))
     return {name: f"{path}?{urlencode([*pairs, ('format', name)])}" for name in others}
 
 
