@@ -15,7 +15,7 @@ CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
 CREATE TABLE IF NOT EXISTS plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) WITHOUT ROWID;
 -- what a running job says of itself
 CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) WITHOUT ROWID;
--- who asked for it over HTTP, and how long it was expected to take; no secrets
+-- who asked for it over HTTP, and how long it was expected to take, without secrets
 CREATE TABLE IF NOT EXISTS asks (
     key TEXT NOT NULL, token TEXT NOT NULL, name TEXT NOT NULL, client TEXT NOT NULL, at REAL NOT NULL,
     expected REAL NOT NULL
