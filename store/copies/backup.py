@@ -189,11 +189,11 @@ def _copy(
 def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
     """Copy the ledger as it is at one moment, with no job claimed."""
     source = sqlite3.connect(f"file:{store.ledger.path}?mode=ro", uri=True)
-    with seal.scratch(root / at) as temporary, closing(source), closing(sqlite3.connect(temporary)) as target:
-        source.backup(target)
-        target.execute("PRAGMA journal_mode = DELETE")  # one file, without a log beside it
-        target.execute(_FREE)
-        target.commit()
-        data = temporary.read_bytes()
-        seal.adopt(temporary, root / at)
+    # in memory first: SQLite's locks would wait for ours on the file
+    with closing(source), closing(sqlite3.connect(":memory:")) as copy:
+        source.backup(copy)
+        copy.execute(_FREE)
+        copy.commit()
+        data = copy.serialize()
+    seal.publish(root / at, data)
     return {"at": at, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
