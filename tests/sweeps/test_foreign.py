@@ -76,6 +76,14 @@ def lines(n: int) -> Any:
     return lambda page: page.update(nodes=[*({"children": [i + 1, i + 1]} for i in range(n)), {"mesh": 0}])
 
 
+def ring(page: Any) -> None:
+    page.update(nodes=[{"mesh": 0, "children": [1]}, {"children": [0]}])
+
+
+def deep(n: int) -> bytes:
+    return struct.pack("<4sII", b"glTF", 2, 20 + n) + struct.pack("<I4s", n, b"JSON") + b"[" * n
+
+
 HOSTILE: dict[str, tuple[str, bytes]] = {
     "a gzip bomb": ("a.obj", gzip.compress(b"v 0 0 0\n" * 10**6)),
     "a zip bomb": ("a.obj", zipped(b"v 0 0 0\n" * 10**6)),
@@ -112,10 +120,10 @@ HOSTILE: dict[str, tuple[str, bytes]] = {
     "a view outside": ("a.glb", glb(update("bufferViews", 0, byteOffset=-36))),
     "a view beyond the end": ("a.glb", glb(update("bufferViews", 0, byteLength=BILLION))),
     "an index from the end": ("a.glb", glb(update("accessors", 0, bufferView=-1))),
-    "nodes in a ring": ("a.glb", glb(lambda page: page.update(nodes=[{"mesh": 0, "children": [1]}, {"children": [0]}]))),
+    "nodes in a ring": ("a.glb", glb(ring)),
     "a billion copies": ("a.glb", glb(lines(30))),
     "a length that is not its own": ("a.glb", glb(cut=3)),
-    "JSON without end": ("a.glb", struct.pack("<4sII", b"glTF", 2, 20 + 10**5) + struct.pack("<I4s", 10**5, b"JSON") + b"[" * 10**5),
+    "JSON without end": ("a.glb", deep(10**5)),
     "not a mesh at all": ("a.exe", b"MZ"),
 }  # fmt: skip
 
