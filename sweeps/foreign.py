@@ -57,7 +57,7 @@ def checked(path: Path) -> bytes:
 
     """
     if path.suffix.lower() not in KINDS:
-        raise ForeignMesh(path, "that is no kind of mesh", f"Known: {', '.join(KINDS)}.")
+        raise ForeignMesh(path, "it is no mesh", f"Known: {', '.join(KINDS)}.")
     try:
         if not path.is_file():
             raise ForeignMesh(path, "there is no such file", "Name a mesh file.")

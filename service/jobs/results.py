@@ -43,9 +43,8 @@ def _said(name: str) -> str:
     return str(Options.model_fields[name].description)
 
 
-_CONTENT = problems.files(
-    [NETCDF, *(e.media_type.partition(";")[0] for e in (*FORMATS.values(), *EXPORTS.values()) if e.name != "json")]
-)
+_KNOWN: list[Format | Export] = [*FORMATS.values(), *EXPORTS.values()]
+_CONTENT = problems.files([NETCDF, *(e.media_type.partition(";")[0] for e in _KNOWN if e.name != "json")])
 
 
 def _options(

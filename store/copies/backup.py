@@ -76,7 +76,7 @@ def backup(store: Store, to: Path) -> Copied:
                 files[name], copied = _copy(store.root / name, to, at, known.get(name), private=name in _PRIVATE)
                 new += copied
         _check_tables(to / changing, files)
-        page = {"wizen": __version__, "created": now.isoformat(timespec="seconds"), "files": files}
+        page: dict[str, Any] = {"wizen": __version__, "created": now.isoformat(timespec="seconds"), "files": files}
         seal.publish(to / _LIST, json.dumps(page, indent=1).encode())
         for old in (to / _CHANGING).iterdir():
             if old.name != Path(changing).name:

@@ -23,9 +23,9 @@ def read(path: Path) -> dict[str, Any]:
     """
     try:
         mesh = foreign.read(path)
+        foreign.sound(path, np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64))
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
         points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
-        foreign.sound(path, points, faces)
     except SweepError as error:
         raise InvalidOption(error.message, error.advice) from None
     used, faces = np.unique(faces, return_inverse=True)
