@@ -7,6 +7,7 @@ a sealed file still opens everywhere, and it is checked before HDF5 sees it.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import secrets
@@ -131,8 +132,10 @@ def clean(directory: Path) -> int:
                 removed += holding.remove_free(path, time.time() - path.stat().st_mtime > _ABANDONED)
             except FileNotFoundError:
                 continue  # its writer, or another cleaner, was faster
-            except PermissionError:
-                continue  # another user's, who cleans up after himself
+            except OSError as error:
+                if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
+                    raise
+                # another user's, who cleans up after himself
     return removed
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from . import seal, shards
-from .errors import CorruptShard, MissingStore, UnknownJob
+from .errors import CorruptShard, MissingStore, UnknownJob, full_disk
 from .keys import is_key
 from .ledger.ledger import Ledger
 
@@ -35,12 +35,14 @@ class Store:
 
         Raises:
             MissingStore: there is none, and `create` is false.
+            ReadOnlyStore: it cannot be made there.
 
         """
         store = cls(root)
         if create:
-            seal.make_directory(store._shards)
-            seal.make_directory(store.tables_dir)
+            with full_disk(store.root):
+                seal.make_directory(store._shards)
+                seal.make_directory(store.tables_dir)
         elif not store._shards.is_dir():
             raise MissingStore(
                 f"there is no store in {store.root.absolute()}.",
