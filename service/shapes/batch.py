@@ -13,7 +13,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from starlette.responses import Response, StreamingResponse
 
-from solver.contract import SolverError
+from solver.contract import Solver, SolverError
 from store.errors import StoreError, TooUncertain
 from store.lookup import ShapeTable
 from store.shape import Shape
@@ -24,12 +24,12 @@ from ..formats import About
 from ..settings import Settings
 from . import batch_detail, batch_formats
 from . import detail as level
+from .asking import Found, beyond, choose, preset_of, words_of
 from .batch_detail import Asked
 from .batch_formats import Batch
 from .batch_request import BatchRequest, expand
 from .live import LiveTables
 from .query import RESERVED, ShapeQuery, Words, parse
-from .routes import words_of
 
 __all__ = ["router"]
 
@@ -60,18 +60,18 @@ def batch(request: Request, body: BatchRequest) -> Response:
     tables: LiveTables = request.app.state.tables
     solver = vocabulary.solver_named(body.solver)
     chosen = batch_formats.negotiate(request.headers.get("accept"), body.format)
-    name = tables.choose(body.solver, body.table)
-    table = tables.get(name)
+    entries = expand(body.points)
+    found = _table(tables, solver, body, entries)
+    name, table = found.name, tables.get(found.name)
     words = words_of(solver, table, settings.max_resolution)
     detail = level.read(body.detail)
     # what is wrong with all of them is said first, and alone: it would hide what is wrong with some
-    entries = expand(body.points)
     _check_count(len(entries), settings)
     wrong = [*detail.refused(chosen), *_off(body, settings)]
     if wrong:
         raise InvalidQuery.of(wrong)
     levels, off = batch_detail.levels(entries, body, table.resolution, settings.max_resolution)
-    asked = [Asked(q, *at) for q, at in zip(_queries(entries, words, off), levels, strict=True)]
+    asked = [Asked(q, *at) for q, at in zip(_queries(entries, words, found, off), levels, strict=True)]
     if chosen.name == "npz" and len({one.resolution for one in asked}) > 1:
         advice = "Ask for glb, obj, points or json, or for one batch for each lattice."
         raise InvalidQuery.of([Wrong("points", "are of several lattices, which one npz cannot hold", advice)])
@@ -93,11 +93,41 @@ def batch(request: Request, body: BatchRequest) -> Response:
     def look_up() -> Iterator[tuple[Shape, About]]:
         yield from batch_detail.each_once(distinct, sent, at, lambda one: replace(about, detail=one.said))
 
-    about = About(solver=body.solver, table=name, fixed=words.fixed, stage_symbol=words.stage, units=words.units)
-    found = Batch(
-        table, replace(about, detail=sent[0].said), sent, rows if body.once else None, detail.window, fields, look_up
+    about = About(
+        solver=body.solver,
+        table=name,
+        fixed=words.fixed,
+        stage_symbol=words.stage,
+        units=words.units,
+        made=words.made,
     )
-    return _answer(batch_formats.encode(chosen, found), batch_formats.media_type(chosen, found))
+    rest = (rows if body.once else None, detail.window, fields, look_up)
+    made = Batch(table, replace(about, detail=sent[0].said), sent, *rest)
+    return _answer(batch_formats.encode(chosen, made), batch_formats.media_type(chosen, made))
+
+
+def _table(tables: LiveTables, solver: Solver, body: BatchRequest, entries: list[Mapping[str, float]]) -> Found:
+    """Return the table that holds all entries, or else the one nearest to the first that is held by another.
+
+    Raises:
+        UnknownTable: there is none of that name, or none at all.
+        InvalidQuery: there is no such preset.
+
+    """
+    preset = preset_of(solver, body.preset)
+    if body.table is not None:
+        tables.belongs(body.table, solver.name)
+        filled = {} if preset is None else tables.families(solver).values({}, preset)
+        return Found(body.table, preset, filled)
+    families = tables.families(solver)
+    found = [choose(families, entry, solver.stages.symbol, preset) for entry in entries]
+    best = found[0]
+    for one in {one.name: one for one in found}.values():
+        # of those that answer some entry, one that answers all
+        only = families.only(one.name)
+        if all(not choose(only, entry, solver.stages.symbol, preset).fits for entry in entries):
+            best = one
+    return best
 
 
 def _answer(parts: Iterator[bytes], media_type: str) -> Response:
@@ -162,7 +192,7 @@ def _off(body: BatchRequest, settings: Settings) -> list[Wrong]:
     return [Wrong("resolution", detail, "An operator raises the limit with WIZEN_MAX_RESOLUTION.")]
 
 
-def _queries(entries: list[Mapping[str, float]], words: Words, off: list[Wrong]) -> list[ShapeQuery]:
+def _queries(entries: list[Mapping[str, float]], words: Words, found: Found, off: list[Wrong]) -> list[ShapeQuery]:
     """Return the questions of all entries; `off` is what is wrong with their levels of detail.
 
     Raises:
@@ -176,7 +206,8 @@ def _queries(entries: list[Mapping[str, float]], words: Words, off: list[Wrong])
         own = {name: value for name, value in entry.items() if name not in batch_detail.NAMES}
         common = [Wrong(n, "is not a parameter of one shape", "Give it for all.") for n in RESERVED if n in own]
         try:
-            query = parse([(name, repr(value)) for name, value in own.items()], words, common)
+            items = [(name, repr(value)) for name, value in own.items()]
+            query = parse(items, words, common, found.filled, beyond(found, words))
         except InvalidQuery as error:
             only_outside = False
             wrong += batch_detail.entry(i, error.wrong)

@@ -39,6 +39,7 @@ class ShapePage(BaseModel):
     table: str
     digest: str = Field(description="Names the table's generation")
     params: dict[str, Any] = Field(description="All parameters: those asked for, and what the table holds fixed")
+    made: dict[str, Any] | None = Field(None, description="How its runs were done where that is not the usual")
     stage: ShapeStage
     exact: bool = Field(description="A stored run at a stored stage, or the fresh shape")
     converged: bool = Field(description="All runs that took part did converge")
