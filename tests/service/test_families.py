@@ -91,6 +91,8 @@ def test_a_fruit_that_no_table_has_is_run_whole(client: httpx.Client, house: Pat
     problem = client.get(SHAPE, params={"preset": "plum2", "s": 0.2}).json()
     assert problem["nearest"]["table"] == "sphere"
     assert {"r8", "rs1"} <= set(problem["nearest"]["parameters"])
+    assert problem["detail"].startswith("no table holds this; the nearest is 'sphere'")
+    assert "Leave r8 out" not in problem["advice"]
     store = Store.open(house)
     run = client.get(problem["links"]["exact"], headers=allowed, follow_redirects=False)
     job = next(job for job in store.ledger.jobs() if run.headers["location"].endswith(job.key))
