@@ -137,6 +137,7 @@ def _show(console: Any, shapes: list[Shape], symbol: str, out: Path | None) -> N
     if len(errors) == len(shapes):
         rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
     rows += [["exact", *(str(shape.exact) for shape in shapes)]]
+    rows += [["crossings", *("unknown" if one.crossings is None else str(one.crossings) for one in shapes)]]
     grid(console, ["", *(f"{symbol} = {shape.stage:g}" for shape in shapes)], rows)
     if out is not None:
         console.print(f"written to {out}", markup=False)
@@ -163,6 +164,7 @@ def _document(shape: Any) -> dict[str, Any]:
         "stage": shape.stage,
         "exact": shape.exact,
         "converged": shape.converged,
+        "crossings": shape.crossings,
         "nearest": shape.nearest,
         "inside": shape.inside,
         "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
