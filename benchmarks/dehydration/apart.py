@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ def main() -> None:
     stages = rng.uniform(0, table.reach[1], asked.shapes)
     sheet = Sheet("dehydration-apart", _HEAD, table.info.solver)
     _ask(table, {"te": te[0], "gamma": float(np.exp(gamma[0] + 0.1))}, 0.29, asked.resolution, True)  # compiles
-    for low, high in zip(_EDGES, _EDGES[1:], strict=False):
+    for low, high in pairwise(_EDGES):
         rows = []
         for i, stage in enumerate(stages[(stages > low) & (stages <= high)]):
             point = {"te": float(rng.uniform(*te)), "gamma": float(np.exp(rng.uniform(*gamma)))}
@@ -76,9 +77,9 @@ def _add(sheet: Sheet, span: str, rows: list[dict[str, Any]]) -> None:
     rms = float(np.sqrt(np.mean([row["rms"] ** 2 for row in rows])))
     most = max(row["most"] for row in rows)
     ms, without = (1e3 * float(np.median([row[name] for row in rows])) for name in ("seconds", "without"))
+    said = f"{rms:.4f}", f"{most:.3f}", f"{ms:.1f}", f"{without:.1f}"
     sheet.add(
-        (span, len(rows), moved, f"{sum(before)} of {len(before)}", crossing, f"{rms:.4f}", f"{most:.3f}")
-        + (f"{ms:.1f}", f"{without:.1f}"),
+        (span, len(rows), moved, f"{sum(before)} of {len(before)}", crossing, *said),
         s=span, asked=len(rows), moved=moved, before=sum(before), of=len(before), crossing=crossing,
         pairs=sum(row["pairs"] for row in rows), rms=rms, most=most, ms=ms, without=without,
     )  # fmt: skip

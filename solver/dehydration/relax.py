@@ -1,8 +1,8 @@
 """A surface from elsewhere, relaxed: put on the mesh of a fruit and let go until forces balance, pattern and all.
 
-A looked-up shape is near many equilibria and on none. Its surface is pushed on in small increments, the inside following
-with the cube of its depth and settling after each; then all is free. The pattern stays, the residual falls a hundredfold
-in some hundred steps: what a run needs many thousands for.
+A looked-up shape is near many equilibria and on none. Its surface is pushed on in small increments, the inside
+following with the cube of its depth and settling after each; then all is free. The pattern stays, the residual falls a
+hundredfold in some hundred steps: what a run needs many thousands for.
 """
 
 from __future__ import annotations

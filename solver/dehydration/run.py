@@ -45,6 +45,7 @@ class Record:
         self.rows: list[dict[str, Any]] = []
 
     def add(self, state: State, converged: bool) -> None:
+        """Keep what is asked for of a stage."""
         row: dict[str, Any] = {
             "stage": state.shrinkage,
             "residual": state.residual,
@@ -78,6 +79,7 @@ class Record:
         self.rows.append(row)
 
     def dataset(self, attrs: dict[str, Any]) -> xr.Dataset:
+        """Return all stages kept so far."""
         need = self._need
         assert need.resolution is not None
         data: dict[str, Any] = {}
