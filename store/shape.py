@@ -26,7 +26,7 @@ class Shape:
     `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape
     may be off the true one; None where the table does not know, as for any method but the one it was built for.
     `crossings` counts the pairs of triangles of the closed lattice that cross, on these positions; None where no
-    positions were computed, or those of a part.
+    positions were computed, or those of a part. `tier`: whether it is from the `table` or `relaxed` by its solver.
     """
 
     colatitude: Array = field(repr=False)
@@ -47,6 +47,7 @@ class Shape:
     expected_error: Mapping[str, float] | None = None
     method: str = ""
     crossings: int | None = None
+    tier: str = "table"
 
     @cached_property
     def normals(self) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -77,6 +78,9 @@ def query(
         str | None,
         typer.Option("--max-error", metavar="X|M:X,...", help="Refuse worse: 0.05 (roughness), rgh:0.05,dB:1.5."),
     ] = None,
+    relax: Annotated[
+        bool, typer.Option("--relax", help="Let the solver relax what was looked up: an equilibrium, in seconds.")
+    ] = False,
     out: Out = None,
     as_json: As_json = False,
 ) -> None:
@@ -91,6 +95,8 @@ def query(
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --method idw --out paper.glb
 
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --max-error rgh:0.1,dB:3
+
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --relax --out balanced.glb
 
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
@@ -109,19 +115,24 @@ def query(
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
-    fields = outputs.fields_for(out, False)
+    fields = tuple(sorted({*outputs.fields_for(out, False), "position"})) if relax else outputs.fields_for(out, False)
     values, how, limits = assignments(set_), method or methods.DEFAULT, _limits(max_error)
     told: dict[str, Any] = {"resolution": resolution, "fields": fields, "method": how, "max_error": limits}
     shapes = [table.at(values, stage, **told) for stage in wanted]
+    solver = registry.get(table.info.solver)
+    notes: list[Mapping[str, Any]] = [{} for _ in shapes]
+    if relax:
+        from ..relaxing import relaxed
+
+        shapes, notes = map(list, zip(*(relaxed(solver, table, shape) for shape in shapes), strict=True))
     document = {
         "table": name,
         "digest": table.digest,
         "method": shapes[0].method,
         "parameters": {**table.fixed, **shapes[0].parameters},
         "path": None if out is None else str(out),
-        "stages": [_document(shape) for shape in shapes],
+        "stages": [{**_document(shape), **note} for shape, note in zip(shapes, notes, strict=True)],
     }
-    solver = registry.get(table.info.solver)
     if out is not None:
         title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
         outputs.save(out, Made(shapes, document, title, solver.name, name, table.fixed, units=solver.axis_units()))
@@ -165,6 +176,7 @@ def _document(shape: Any) -> dict[str, Any]:
         "exact": shape.exact,
         "converged": shape.converged,
         "crossings": shape.crossings,
+        "tier": shape.tier,
         "nearest": shape.nearest,
         "inside": shape.inside,
         "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
