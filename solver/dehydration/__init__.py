@@ -98,4 +98,5 @@ SOLVER = Solver(
     looks=LOOKS,
     onset=onset,
     relax=_relax,
+    incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )
