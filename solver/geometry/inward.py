@@ -40,7 +40,8 @@ def _look(x: Doubles, faces: Words, t: int, size: Doubles) -> bool:
     if volume <= 0:
         return True
     square *= x[a, 0] ** 2 + x[a, 1] ** 2 + x[a, 2] ** 2
-    return volume * volume <= _STEEP**2 * square
+    is_steep: bool = volume * volume <= _STEEP**2 * square
+    return is_steep
 
 
 @njit(cache=True, error_model="numpy")
