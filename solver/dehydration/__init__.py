@@ -66,7 +66,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="9",
+    version="10",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", "mesh_position", *_DESCRIPTORS, "strain_energy", "released_energy"),
@@ -89,4 +89,5 @@ SOLVER = Solver(
     surface=SURFACE,
     looks=LOOKS,
     onset=onset,
+    incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )

@@ -1,6 +1,7 @@
 """Where jobs run: here, in local processes, or on Dask. All are `concurrent.futures.Executor`s to the runner.
 
-Workers of one machine share its cores: each gets `cores // workers` threads, set before numerical libraries load.
+Workers of one machine share its cores: each gets `cores // workers` threads, set before numerical libraries load,
+unless the user has set `NUMBA_NUM_THREADS` and the like.
 """
 
 from __future__ import annotations
@@ -172,7 +173,8 @@ def dask_local(count: int) -> Iterator[Workers]:
 
 @contextmanager
 def dask_cluster(address: str) -> Iterator[Workers]:
-    """The workers of a running Dask scheduler; they must see the store under the same path.
+    """The workers of a running Dask scheduler. Those that see the store under the same path write results there; others
+    hand them back. Jobs that start from other results need the former.
 
     The workers' threads are set where they are started (`dask worker --nthreads 1`, `OMP_NUM_THREADS`).
 
@@ -217,7 +219,9 @@ def _positive(count: int) -> None:
 
 
 def _threads(workers: int) -> dict[str, str]:
-    return dict.fromkeys(_THREADS, str(max(1, cores() // workers)))
+    """Return each worker's share of the cores; what the user has set stays as it is."""
+    share = str(max(1, cores() // workers))
+    return {name: os.environ.get(name, share) for name in _THREADS}
 
 
 @contextmanager
