@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from solver.arrays import Array, Ints
+from solver.geometry.nearest import nearest
 from sweeps.errors import installing
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
-from .nearest import nearest
 
 if TYPE_CHECKING:
     from .view import Sequence, Surface

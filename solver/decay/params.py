@@ -231,8 +231,8 @@ class DecayParams(Fruit):
                     else "only an imported mesh has numbered vertices"
                 )
                 raise ValueError(f"a wound names vertex {wound.vertex}: {where}")
-        if self.mesh is not None and self.body != "none":
-            raise ValueError(f"an imported mesh has no flesh under it: take body=none, not {self.body}")
+        if self.mesh is not None and self.body == "table":
+            raise ValueError("the table of dried fruits knows no imported mesh: take body=quasi-static, not table")
         if self.mesh is not None and self.seeds == "contacts":
             raise ValueError("an imported mesh has neither stem nor floor: take seeds=wounds")
         return self

@@ -137,13 +137,12 @@ class Shape:
                 points = points + dried.at_rays(self._dried(water, dried.ROWS, context), self._rays)
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
-            # an imported mesh may be wound either way, and an open one has none
-            own = self._extent if self._params.mesh is not None else None
             if "volume" in wanted:
-                row["volume"] = own.volume if own else _volume(points, self.surface)
+                row["volume"] = _volume(points, self.surface)
             if "density" in wanted:
-                fresh_volume = _volume(self.surface.points, self.surface)
-                row["density"] = booked.mass * (1.0 if own else fresh_volume / _volume(points, self.surface))
+                # an open mesh closes nothing whose volume could change
+                swells = _volume(points, self.surface) / _volume(self.surface.points, self.surface)
+                row["density"] = booked.mass / (swells if self._closed else 1.0)
         return row
 
     def follow(self, water: float, rot: Floats | None, context: Context) -> None:
@@ -177,5 +176,6 @@ class Shape:
 
 
 def _volume(points: Floats, surface: Surface) -> float:
+    # an imported mesh may be wound either way
     a, b, c = (points[surface.faces[:, k]] for k in range(3))
-    return float(np.sum(a * np.cross(b, c))) / 6
+    return abs(float(np.sum(a * np.cross(b, c)))) / 6
