@@ -54,6 +54,7 @@ def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
     mesh.GetPrim().SetCustomDataByKey("stages", _doubles(about["stages"]["values"]))
     if sequence.seam is not None:
         _texture(mesh, sequence.seam)
+    _materials(stage, mesh, sequence)
     for number, surface in enumerate(sequence):
         at = 1 + number * options.step
         if number == 0 or not sequence.kept:
@@ -97,7 +98,8 @@ def _sample(mesh: Any, surface: Surface, at: float) -> None:
         colour = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
         colour.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(surface.colour)), at)
     primvars = UsdGeom.PrimvarsAPI(mesh)
-    for name, values in surface.fields.items():
+    more = {} if surface.roughness is None else {"roughness": surface.roughness}
+    for name, values in {**surface.fields, **more}.items():
         own = primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
         own.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(values)), at)
 
@@ -109,3 +111,38 @@ def _texture(mesh: Any, seam: Seam) -> None:
     st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
     st.Set(Vt.Vec2fArray.FromNumpy(np.column_stack([seam.uv[:, 0], 1 - seam.uv[:, 1]]).astype("f4")))
     st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(seam.triangles.ravel(), np.int32)))
+
+
+def _materials(stage: Any, mesh: Any, sequence: Sequence) -> None:
+    """Bind materials under the mesh's own names, which take colour and roughness from the vertices."""
+    from pxr import Gf, Sdf, UsdGeom, UsdShade, Vt
+
+    if not sequence.coloured:
+        return
+    parts = sequence.materials
+    api = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
+    for number, (name, faces) in enumerate(parts):
+        path = mesh.GetPath().AppendChild(f"material{number}")
+        material = UsdShade.Material.Define(stage, path)
+        material.GetPrim().SetDisplayName(name or "skin")
+        shader = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
+        shader.CreateIdAttr("UsdPreviewSurface")
+        for what, kind, output in (
+            ("diffuseColor", Sdf.ValueTypeNames.Color3f, "UsdPrimvarReader_float3"),
+            ("roughness", Sdf.ValueTypeNames.Float, "UsdPrimvarReader_float"),
+        ):
+            reader = UsdShade.Shader.Define(stage, path.AppendChild(what))
+            reader.CreateIdAttr(output)
+            varname = "displayColor" if what == "diffuseColor" else what
+            reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(varname)
+            fallback = Gf.Vec3f(0.5) if what == "diffuseColor" else 0.5
+            reader.CreateInput("fallback", kind if what == "roughness" else Sdf.ValueTypeNames.Float3).Set(fallback)
+            result = reader.CreateOutput("result", kind if what == "roughness" else Sdf.ValueTypeNames.Float3)
+            shader.CreateInput(what, kind).ConnectToSource(result)
+        material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+        if len(parts) == 1:
+            api.Bind(material)
+            continue
+        indices = Vt.IntArray.FromNumpy(faces.astype(np.int32))
+        subset = api.CreateMaterialBindSubset(f"part{number}", indices, UsdGeom.Tokens.face)
+        UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)

@@ -1,4 +1,4 @@
-"""Which nodes of a regular lattice lie inside of a closed triangle mesh: crossings along lines, counted with their sense.
+"""Which nodes of a regular lattice lie inside of a closed triangle mesh: crossings along lines, counted by sense.
 
 A line along x that enters the mesh n times more often than it has left it is inside where n > 0, so that parts which
 overlap are one body, and triangles may be wound outwards or, all of them, inwards. Edges decide by their two ends in a

@@ -45,7 +45,7 @@ class Embedded:
                 "the mesh is open: nothing says what is inside of it.", advice="Close its borders, or take body=none."
             )
         self._surface, self.extent = surface, closed
-        filled, edge = _filled(surface, closed.volume, layers)
+        filled = _filled(surface, closed.volume, layers)
         skin_faces = boundary(filled.tets)
         skin, faces = np.unique(skin_faces, return_inverse=True)
         below = nearest(filled.points, surface.points, surface.faces)
@@ -91,15 +91,15 @@ class Embedded:
         return float(far.min()) - other.radius
 
 
-def _filled(surface: Surface, volume: float, layers: int) -> tuple[Stuffed, float]:
-    """Return flesh that hangs together and comes near every vertex, and its lattice's edge."""
+def _filled(surface: Surface, volume: float, layers: int) -> Stuffed:
+    """Return flesh that hangs together and comes near every vertex."""
     edge = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
     why = ""
     for _ in range(_TRIES):
         found = stuffed(surface.points, surface.faces, edge)
         why = _lacking(found, surface, edge)
         if not why:
-            return found, edge
+            return found
         edge /= _FINER
         if len(found.tets) * _FINER**3 > _MOST:
             break

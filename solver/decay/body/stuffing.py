@@ -25,6 +25,10 @@ _LONG, _SHORT = 0.24999, 0.41189
 _OFF = np.array([0.137_041, 0.241_733, 0.189_337])
 
 
+#: Corners of the three tetrahedra of a prism whose side away from its least corner is cut from 1 to 5, or from 2 to 4.
+_WAYS = ([[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]], [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]])
+
+
 class Stuffed(NamedTuple):
     """Points (p, 3), tetrahedra (t, 4) of positive volume."""
 
@@ -159,7 +163,7 @@ def _prisms(corners: Ints) -> Ints:
     turn = (np.argmin(corners[:, :3], axis=1)[:, None] + np.arange(3)) % 3
     v = np.take_along_axis(corners, np.concatenate([turn, turn + 3], axis=1), axis=1)
     up = np.minimum(v[:, 1], v[:, 5]) < np.minimum(v[:, 2], v[:, 4])
-    ways = np.where(up[:, None, None], [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]], [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]])
+    ways = np.where(up[:, None, None], *_WAYS)
     tets = np.take_along_axis(v, ways.reshape(len(v), 12), axis=1).reshape(-1, 4)
     ranked = np.sort(tets, axis=1)
     return np.asarray(tets[(ranked[:, 1:] > ranked[:, :-1]).all(axis=1)])

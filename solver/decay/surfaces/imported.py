@@ -35,9 +35,7 @@ class Mesh(BaseModel):
         (), max_length=800_000, description="The triangles' corners, as numbers of texture coordinates from 0"
     )
     materials: tuple[str, ...] = Field((), max_length=256, description="Names of materials, for files made of it")
-    face_materials: tuple[int, ...] = Field(
-        (), max_length=800_000, description="The material of each triangle, from 0"
-    )
+    face_materials: tuple[int, ...] = Field((), max_length=800_000, description="The material of each triangle, from 0")
 
     @model_validator(mode="before")
     @classmethod
@@ -58,7 +56,8 @@ class Mesh(BaseModel):
             ("face_materials", self.face_materials, len(self.materials)),
         ):
             if given and (len(given) != len(self.faces) or np.min(given) < 0 or np.max(given) >= known):
-                raise ValueError(f"{name} has a row for each of the {len(self.faces)} triangles, of numbers below {known}")
+                count = len(self.faces)
+                raise ValueError(f"{name} has a row for each of the {count} triangles, of numbers below {known}")
         if self.uv and not self.uv_faces:
             raise ValueError("uv without uv_faces belongs to no triangle")
         return self

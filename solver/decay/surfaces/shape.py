@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -81,6 +82,23 @@ class Shape:
         if self._dries:
             dried.check(self._params, self._need)
             dried.displaced(self._params, self.lost(self._need.stages[-1]), 4, context)
+
+    @property
+    def textured(self) -> dict[str, Any]:
+        """Texture coordinates and materials of an imported mesh, as variables; none of one that has none."""
+        mesh, found = self._params.mesh, {}
+        if mesh is not None and mesh.uv:
+            found["texture_coordinate"] = (("texture_vertex", "uv"), np.array(mesh.uv, float))
+            found["texture_triangle"] = (("face", "corner"), np.array(mesh.uv_faces, np.int32))
+        if mesh is not None and mesh.face_materials:
+            found["face_material"] = (("face",), np.array(mesh.face_materials, np.int32))
+        return found
+
+    @property
+    def materials(self) -> dict[str, str]:
+        """Names of an imported mesh's materials, as an attribute."""
+        mesh = self._params.mesh
+        return {"materials": json.dumps(mesh.materials)} if mesh is not None and mesh.materials else {}
 
     @property
     def triangles(self) -> Ints32:

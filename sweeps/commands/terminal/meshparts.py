@@ -101,25 +101,43 @@ def glb(path: Path) -> Parts:
     document, binary = json.loads(data[20 : 20 + size]), data[28 + size :]
     if set(document.get("extensionsRequired", [])) - {"KHR_mesh_quantization", "KHR_texture_transform"}:
         raise ValueError("it needs extensions")
-    found: list[tuple[Array, Array, Array | None, str]] = []
+    found: list[_Primitive] = []
     scene = document["scenes"][document.get("scene", 0)]
     for node in scene["nodes"]:
         _walk(document, binary, node, np.eye(4), found)
     if not found:
         raise ValueError("no triangles")
-    names = list(dict.fromkeys(name for *_, name in found))
-    starts = np.cumsum([0, *(len(points) for points, *_ in found)])
-    faces = np.concatenate([part + start for (_, part, _, _), start in zip(found, starts, strict=False)])
-    textured = all(uv is not None for _, _, uv, _ in found)
-    uvs = [np.asarray(uv, float) for _, _, uv, _ in found if uv is not None]
+    # primitives of several materials may share their vertices
+    starts: dict[tuple[int, ...], int] = {}
+    owners, total = [], 0
+    for part in found:
+        if part.key not in starts:
+            starts[part.key] = total
+            total += len(part.points)
+            owners.append(part)
+    faces = np.concatenate([part.faces + starts[part.key] for part in found])
+    uvs = [np.asarray(part.uv, float) for part in owners if part.uv is not None]
     # glTF's v runs down; of doubles the difference is exact
-    uv = np.concatenate(uvs) * [1, -1] + [0, 1] if textured else None
-    owned = np.concatenate([np.full(len(part), names.index(name)) for _, part, _, name in found])
-    points = np.concatenate([points for points, *_ in found])
-    return Parts(points, faces, uv, faces if textured else None, tuple(n for n in names if n), owned)
+    uv = np.concatenate(uvs) * [1, -1] + [0, 1] if len(uvs) == len(owners) else None
+    names = list(dict.fromkeys(part.material for part in found))
+    owned = np.concatenate([np.full(len(part.faces), names.index(part.material)) for part in found])
+    points = np.concatenate([part.points for part in owners])
+    if names == [""]:
+        names = []
+    return Parts(points, faces, uv, None if uv is None else faces, tuple(name or "skin" for name in names), owned)
 
 
-def _walk(document: dict[str, Any], binary: bytes, number: int, above: Floats, found: list[Any]) -> None:
+class _Primitive(NamedTuple):
+    """Points (p, 3), faces (f, 3) and uv (p, 2), v downwards; key: which node and accessors the points are of."""
+
+    points: Floats
+    faces: Ints
+    uv: Array | None
+    material: str
+    key: tuple[int, ...]
+
+
+def _walk(document: dict[str, Any], binary: bytes, number: int, above: Floats, found: list[_Primitive]) -> None:
     node = document["nodes"][number]
     here = above @ _transform(node)
     if "mesh" in node:
@@ -138,7 +156,8 @@ def _walk(document: dict[str, Any], binary: bytes, number: int, above: Floats, f
             name = ""
             if "material" in part:
                 name = document["materials"][part["material"]].get("name") or f"material {part['material']}"
-            found.append((points, faces, uv, name))
+            key = (number, part["attributes"]["POSITION"], -1 if at is None else at)
+            found.append(_Primitive(points, faces, uv, name, key))
     for child in node.get("children", []):
         _walk(document, binary, child, here, found)
 

@@ -73,7 +73,7 @@ def test_what_is_inside_does_not_hang_on_winding_or_overlaps() -> None:
         found = inside(low, step, (17, 17, 17), points, np.ascontiguousarray(wound))
         assert found[far < 0.97].all()
         assert not found[far > 1.001].any()
-    two = np.concatenate([points, points + [0.5, 0, 0]])
+    two = np.concatenate([points, points + np.array([0.5, 0, 0])])
     found = inside(low, step, (17, 17, 17), two, np.concatenate([faces, faces + len(points)]))
     assert found[(far < 0.97) | (np.linalg.norm(nodes - [0.5, 0, 0], axis=-1) < 0.97)].all()
 
