@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, Ints32
 
 __all__ = ["inside"]
 
@@ -39,7 +39,7 @@ def _side(points: Floats, i: int, j: int, y: float, z: float) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def _cross(origin: Floats, step: float, points: Floats, faces: Ints, sense: int, change: Ints) -> None:
+def _cross(origin: Floats, step: float, points: Floats, faces: Ints, sense: int, change: Ints32) -> None:
     """Add to change (i, j, k) what crossings between nodes i - 1 and i of a line do to how often it is inside."""
     nx, ny, nz = change.shape[0] - 1, change.shape[1], change.shape[2]
     for t in range(len(faces)):
