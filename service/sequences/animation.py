@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweeps.pictures import colours
+from sweeps.pictures.fur import ribbons
 
 from ..errors import UnfitFormat
 from ..formats.about import GENERATOR
@@ -68,6 +69,7 @@ class _File:
         plain = white if sequence.coloured else _PLAIN
         names = [name or "skin" for name, _ in sequence.materials]
         self.materials: list[Json] = [] if textured else [{"name": n, "pbrMetallicRoughness": plain} for n in names]
+        self.felt: int | None = None
         seam = sequence.seam
         self.copies = slice(None) if seam is None else seam.copies
         self.uv = None if seam is None else self.buffer.add(seam.uv.astype("f4"), FLOAT, "VEC2", VERTICES)
@@ -118,7 +120,27 @@ class _File:
             indices = self.shared
         first = self._textured(surface) if self.options.textures else 0
         attributes = self._attributes(surface)
-        return [{"attributes": attributes, "indices": at, "material": first + i} for i, at in enumerate(indices)]
+        found = [{"attributes": attributes, "indices": at, "material": first + i} for i, at in enumerate(indices)]
+        return found + self._cards(surface)
+
+    def _cards(self, surface: Surface) -> list[Json]:
+        """Return the threads on a surface as ribbons of a material of their own, seen from both sides."""
+        threads = self.sequence.threads(surface, self.options.threads)
+        if threads is None or not len(threads.points):
+            return []
+        points, faces, colour, normals = ribbons(threads)
+        points, colour, normals = (part.astype("f4") for part in (points, colour, normals))
+        if self.felt is None:
+            self.felt = len(self.materials)
+            rough = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
+            self.materials.append({"name": "hyphae", "doubleSided": True, "pbrMetallicRoughness": rough})
+        attributes = {
+            "POSITION": self.buffer.add(points, FLOAT, "VEC3", VERTICES, bounds(points)),
+            "NORMAL": self.buffer.add(normals, FLOAT, "VEC3", VERTICES),
+            "COLOR_0": self.buffer.add(np.clip(colour, 0, 1), FLOAT, "VEC3", VERTICES),
+        }
+        indices = self._indices(faces.astype("u4"), len(points))
+        return [{"attributes": attributes, "indices": indices, "material": self.felt}]
 
     def morph(self) -> None:
         """Add one mesh with a target per further stage, and weights that fade from each to the next."""

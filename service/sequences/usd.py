@@ -19,7 +19,10 @@ from ..errors import Unavailable
 from .options import Options
 
 if TYPE_CHECKING:
-    from .view import Seam, Sequence, Surface
+    from sweeps.pictures.fur import Threads
+
+    from .seam import Seam
+    from .view import Sequence, Surface
 
 __all__ = ["usda", "usdc"]
 
@@ -61,6 +64,7 @@ def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
             # triangles that stay have no time of their own
             _triangles(mesh, surface, None if sequence.kept else at)
         _sample(mesh, surface, at)
+        _threads(stage, mesh, sequence.threads(surface, options.threads), at)
     with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
         path = Path(folder) / f"result.{suffix}"
         stage.GetRootLayer().Export(str(path))
@@ -102,6 +106,33 @@ def _sample(mesh: Any, surface: Surface, at: float) -> None:
     for name, values in {**surface.fields, **more}.items():
         own = primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
         own.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(values)), at)
+
+
+def _threads(stage: Any, mesh: Any, threads: Threads | None, at: float) -> None:
+    """Write the threads of a stage as curves below the mesh, and their heads as points."""
+    from pxr import Gf, UsdGeom, Vt
+
+    if threads is None:
+        return
+    curves = UsdGeom.BasisCurves.Define(stage, mesh.GetPath().AppendChild("hyphae"))
+    curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+    count, steps = threads.points.shape[:2]
+    points = np.ascontiguousarray(threads.points.reshape(-1, 3), np.float32)
+    curves.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, steps, np.int32)), at)
+    curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), at)
+    narrow = np.tile(np.linspace(1, 0.35, steps) * threads.width, count).astype(np.float32)
+    curves.CreateWidthsAttr().Set(Vt.FloatArray.FromNumpy(narrow), at)
+    curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+    share = np.linspace(0, 1, steps)[None, :, None]
+    colour = (threads.low[:, None] * (1 - share) + threads.high[:, None] * share).reshape(-1, 3)
+    paint = curves.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    paint.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(colour, np.float32)), at)
+    headed = threads.heads > 0
+    heads = UsdGeom.Points.Define(stage, mesh.GetPath().AppendChild("heads"))
+    tips = np.ascontiguousarray(threads.points[headed, -1], np.float32)
+    heads.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(tips), at)
+    heads.CreateWidthsAttr().Set(Vt.FloatArray.FromNumpy((2 * threads.heads[headed]).astype(np.float32)), at)
+    heads.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(0.03, 0.03, 0.03)])
 
 
 def _texture(mesh: Any, seam: Seam) -> None:

@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Singles, Words32
+from solver.contract import Fur
 from solver.lattice import lattice as angles
 from store.surfaces import spectra
 from sweeps.pictures import colours
+from sweeps.pictures.fur import Feet, Threads, feet, grown
 
 from ..errors import InvalidQuery, UnfitFormat, Wrong
 from ..formats import mesh
@@ -38,7 +40,8 @@ __all__ = ["Seam", "Sequence", "Surface", "of_run"]
 class Surface(NamedTuple):
     """One stage: vertices (v, 3), triangles (f, 3) counter-clockwise from outside, fields of the vertices (v).
 
-    colour: (v, 3), linear light. roughness: (v). Both None where nothing says what the surface looks like.
+    colour: (v, 3), linear light. roughness: (v). Both None where nothing says what the surface looks like. fur: what
+    stands on it, None where nothing does.
     """
 
     stage: float
@@ -47,6 +50,7 @@ class Surface(NamedTuple):
     fields: Mapping[str, Singles]
     colour: Singles | None = None
     roughness: Singles | None = None
+    fur: Fur | None = None
 
     def normals(self) -> Singles:
         """Return outward unit normals (v, 3), weighted by area; (0, 1, 0) where no triangle has any."""
@@ -111,6 +115,27 @@ class Sequence:
             return (("", np.arange(self.run.sizes.get("face", 0))),) if not self.lattice else (("", np.empty(0, int)),)
         names, owned = json.loads(self.run.attrs["materials"]), self.run["face_material"].values
         return tuple((name, np.flatnonzero(owned == i)) for i, name in enumerate(names) if (owned == i).any())
+
+    def threads(self, surface: Surface, most: int) -> Threads | None:
+        """Return the threads, at most so many, of a stage's surface; None where none grow, or triangles change."""
+        if surface.fur is None or not self.kept or not most:
+            return None
+        fur = surface.fur._replace(
+            length=surface.fur.length * self.scale,
+            width=surface.fur.width * self.scale,
+            head=surface.fur.head * self.scale,
+        )
+        return grown(self._feet(fur, most), surface.vertices.astype(float), surface.normals().astype(float), fur)
+
+    def _feet(self, fur: Fur, most: int) -> Feet:
+        if most not in self._stood:
+            first = self._bare(0)
+            self._stood[most] = feet(first.vertices, first.triangles, fur.peak, most)
+        return self._stood[most]
+
+    @cached_property
+    def _stood(self) -> dict[int, Feet]:
+        return {}
 
     def unwrapped(self) -> Sequence:
         """Return the sequence with texture coordinates: its own, or else such as xatlas lays out.
@@ -201,10 +226,11 @@ class Sequence:
         if self.colour == "none":
             return bare
         if self.colour == "auto":
-            skin = colours.painted(self.run, bare.fields)
+            skin = colours.painted(self.run, index, bare.fields)
             if skin is None:
                 return bare
-            return bare._replace(colour=skin.colour.astype("f4"), roughness=skin.roughness.astype("f4"))
+            fur = colours.furred(self.run, bare.fields)
+            return bare._replace(colour=skin.colour.astype("f4"), roughness=skin.roughness.astype("f4"), fur=fur)
         if self.colour not in bare.fields:
             known = ", ".join(bare.fields) or "none in this result"
             raise InvalidQuery.of([Wrong("colour", f"there is no field {self.colour[:40]!r}", f"Fields: {known}.")])

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from ..fruit import Fruit
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
+from .hyphae import FURS, Hyphae
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Painted, Pressure, PressureMap, Wound
 
@@ -142,6 +143,11 @@ class DecayParams(Fruit):
     rot: Colony = Field(
         ROTS["penicillium-expansum"],
         description="Kinetics of the rot in the flesh: a mould's own lesion, or bacteria",
+        json_schema_extra={"units": "1"},
+    )
+    hyphae: Hyphae = Field(
+        FURS["penicillium-expansum"],
+        description="Threads and spore heads of the mould in files and pictures; no field depends on them",
         json_schema_extra={"units": "1"},
     )
     wounds: tuple[Wound, ...] = Field(

@@ -88,7 +88,14 @@ def test_what_frames_learnt_saves_the_next_ones_steps_and_changes_no_balance(sph
 
 
 def test_a_march_settles_each_stage_alike_whatever_else_is_asked_for():
-    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "skin": {"shrinkage": 0.0}, "march": 1.0, "transpiration": 8.48}
+    values = {
+        "body": "quasi-static",
+        "wounds": (),
+        "te": 0.04,
+        "skin": {"shrinkage": 0.0},
+        "march": 1.0,
+        "transpiration": 8.48,
+    }
 
     def at(*days):
         need = Need(fields=("displacement",), stages=days, quality="preview", resolution=64)
@@ -160,7 +167,12 @@ def test_skin_over_collapsed_rot_shrinks_with_it():
     """Rot that takes a quarter of its lengths: a skin that joins has no more area than the flesh below by a little."""
 
     def excess(joining):
-        values = {"body": "quasi-static", "skin": {"joining": joining, "shrinkage": 0.0}, "te": 0.03, "flesh": {"gravity": 0}}
+        values = {
+            "body": "quasi-static",
+            "skin": {"joining": joining, "shrinkage": 0.0},
+            "te": 0.03,
+            "flesh": {"gravity": 0},
+        }
         params = SOLVER.parse({**values, "temperature": 24.0, "stone": (0, 0)}, "tomato")
         need = Need(fields=("mesh_position", "triangle"), stages=(4.0,), quality="preview")
         run = SOLVER.solve(params, need)
