@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ..arrays import Floats, Ints
+from ..arrays import Array, Floats, Ints
 from .boxes import LEAF, sort_boxes
 from .closest import on_triangle
 
@@ -22,7 +22,7 @@ class Nearest(NamedTuple):
     distance: Floats
 
 
-def nearest(points: Floats, vertices: Floats, faces: Ints) -> Nearest:
+def nearest(points: Array, vertices: Array, faces: Array) -> Nearest:
     """Return the nearest point of a mesh (v, 3), (f, 3) for every point (p, 3)."""
     corners = np.ascontiguousarray(vertices[faces], dtype=np.float64)
     tree = sort_boxes(corners.min(axis=1), corners.max(axis=1))

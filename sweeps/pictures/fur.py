@@ -63,10 +63,12 @@ def grown(where: Feet, vertices: Array, normals: Array, fur: Fur) -> Threads:
     """Return the threads of a stage, whose vertices (v, 3) have normals (v, 3)."""
 
     def there(values: Array) -> Array:
-        return np.einsum("kc,kc...->k...", where.shares, np.asarray(values, float)[where.corners])
+        found: Array = np.einsum("kc,kc...->k...", where.shares, np.asarray(values, float)[where.corners])
+        return found
 
     stands = np.flatnonzero((where.rank * fur.peak < there(fur.density)) & (there(fur.length) > 0))
-    where = Feet(*(part[stands] for part in where))
+    corners, *numbers = where
+    where = Feet(corners[stands], *(part[stands] for part in numbers))
     root, out = there(vertices), there(normals)
     out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
     other = np.where(np.abs(out[:, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])

@@ -8,7 +8,7 @@ that neighbours cut it alike.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -183,6 +183,6 @@ def pieces(tets: Ints, count: int) -> tuple[int, Ints]:
     from scipy.sparse.csgraph import connected_components
 
     edges = _edges(tets)
-    graph = sparse.csr_array((np.ones(len(edges)), edges.T), shape=(count, count))
+    graph: Any = sparse.csr_array((np.ones(len(edges)), edges.T), shape=(count, count))
     found, of = connected_components(graph, directed=False)
     return int(found), of.astype(np.int64)

@@ -86,7 +86,8 @@ class Shape:
     @property
     def textured(self) -> dict[str, Any]:
         """Texture coordinates and materials of an imported mesh, as variables; none of one that has none."""
-        mesh, found = self._params.mesh, {}
+        mesh = self._params.mesh
+        found: dict[str, Any] = {}
         if mesh is not None and mesh.uv:
             found["texture_coordinate"] = (("texture_vertex", "uv"), np.array(mesh.uv, float))
             found["texture_triangle"] = (("face", "corner"), np.array(mesh.uv_faces, np.int32))
