@@ -20,6 +20,7 @@ from sweeps.errors import installing
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
 from .options import Options
+from .view import lattice_fields
 
 if TYPE_CHECKING:
     from .view import Sequence
@@ -34,7 +35,9 @@ def _fields(sequence: Sequence) -> dict[str, np.ndarray]:
         UnfitFormat: there are none.
 
     """
-    found = dict(next(iter(sequence)).fields)
+    # on the lattice a map needs no shape
+    on_lattice = lattice_fields(sequence.run, sequence.indices[0]) if sequence.lattice else {}
+    found = {name: values.ravel() for name, values in on_lattice.items()} or dict(next(iter(sequence)).fields)
     if not found:
         raise UnfitFormat("this result holds no field on its surface.", advice="Solve again with the field you want.")
     return found
