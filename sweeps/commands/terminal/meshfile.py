@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InvalidOption, installing
+from ... import foreign
+from ...errors import InvalidOption, SweepError
+from ...foreign import KINDS
 from .meshparts import Parts, glb, obj
 
 __all__ = ["KINDS", "read"]
-
-KINDS = (".obj", ".ply", ".glb", ".stl")
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -25,49 +25,32 @@ def read(path: Path) -> dict[str, Any]:
         InvalidOption: no such kind of file, nothing that can be read in it, or trimesh is not installed.
 
     """
-    if path.suffix.lower() not in KINDS:
-        raise InvalidOption(f"{path.name!r} is no mesh.", f"Known: {', '.join(KINDS)}.")
-    if not path.is_file():
-        raise InvalidOption(f"there is no file {path}.", "Name a mesh file.")
     try:
         parts = _parts(path)
-    except OSError as error:
-        raise InvalidOption(f"{path}: {error.strerror or error}.", "Name a mesh file.") from None
-    except InvalidOption:
-        raise
-    except Exception as error:  # readers of foreign files stumble in as many ways as there are files
-        raise InvalidOption(
-            f"{path} cannot be read: {error}.", f"Write it anew as one of {', '.join(KINDS)}."
-        ) from None
-    if not len(parts.faces):
-        raise InvalidOption(f"{path} holds no triangles.", "Name a mesh of triangles.")
-    return _merged(path, parts)
+        foreign.sound(path, parts.points, parts.faces)
+    except SweepError as error:
+        raise InvalidOption(error.message, error.advice) from None
+    return _merged(parts)
 
 
 def _parts(path: Path) -> Parts:
-    if path.suffix.lower() == ".obj":
-        return obj(path)
-    if path.suffix.lower() == ".glb":
+    kind = path.suffix.lower()
+    if kind in (".obj", ".glb"):
+        data = foreign.checked(path)
         try:
-            return glb(path)
-        except (ValueError, KeyError, IndexError, TypeError):
-            pass  # what is packed is for the library to unpack, without texture coordinates
-    try:
-        import trimesh
-    except ImportError:
-        raise InvalidOption("meshes need the package trimesh.", installing("formats")) from None
-    mesh: Any = trimesh.load(path, force="mesh", process=False)
+            return obj(data.decode(errors="replace")) if kind == ".obj" else glb(data)
+        except (ValueError, KeyError, IndexError, TypeError, RecursionError) as error:
+            if kind == ".obj":
+                raise foreign.ForeignMesh(path, str(error)[:200]) from None
+            # what is packed is for the library to unpack, without texture coordinates
+    mesh = foreign.read(path)
     faces = np.asarray(mesh.faces, np.int64)
     return Parts(np.asarray(mesh.vertices, float), faces, None, None, (), np.zeros(len(faces), np.int64))
 
 
-def _merged(path: Path, parts: Parts) -> dict[str, Any]:
+def _merged(parts: Parts) -> dict[str, Any]:
     """Return a mesh whose triangles share points, in the order in which the file first names each place."""
     faces = parts.faces
-    if faces.min() < 0 or faces.max() >= len(parts.points) or not np.isfinite(parts.points).all():
-        raise InvalidOption(
-            f"{path} holds numbers that are not finite, or corners that are no vertices.", "Write it anew."
-        )
     used = np.zeros(len(parts.points), np.bool_)
     used[faces] = True
     kept = np.flatnonzero(used)

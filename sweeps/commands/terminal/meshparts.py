@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,8 +31,8 @@ class Parts(NamedTuple):
     material: Ints
 
 
-def obj(path: Path) -> Parts:
-    """Return what an OBJ file holds; polygons are cut into fans.
+def obj(text: str) -> Parts:
+    """Return what an OBJ file's text holds; polygons are cut into fans.
 
     Raises:
         ValueError: it cannot be read.
@@ -46,7 +45,7 @@ def obj(path: Path) -> Parts:
     names: dict[str, int] = {}
     material: list[int] = []
     current = -1
-    for line in path.read_text(errors="replace").splitlines():
+    for line in text.splitlines():
         words = line.split()
         if words[:1] == ["v"]:
             points.append([float(word) for word in words[1:4]])
@@ -87,14 +86,13 @@ _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
-def glb(path: Path) -> Parts:
+def glb(data: bytes) -> Parts:
     """Return what a binary glTF's default scene holds: triangles of all its meshes, moved as its nodes say.
 
     Raises:
         ValueError: it is none, or holds what only libraries unpack (compressed or sparse accessors).
 
     """
-    data = path.read_bytes()
     if data[:4] != b"glTF" or len(data) < 20:
         raise ValueError("not a binary glTF")
     size = int.from_bytes(data[12:16], "little")
