@@ -110,14 +110,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
-    _surround(app, settings)
-    app.add_middleware(Telemetry, metrics=metrics)
-    if settings.root_path:
-        app.add_middleware(Rooted, root=settings.root_path)
+    _surround(app, settings, metrics)
     return app
 
 
-def _surround(app: FastAPI, settings: Settings) -> None:
+def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
     """Put around the routes what a request passes on its way to them; the last one added is the outermost."""
     if settings.public_read:
         app.add_middleware(Shortcut, state=app.state)
@@ -135,6 +132,9 @@ def _surround(app: FastAPI, settings: Settings) -> None:
             allow_headers=["Authorization", "Content-Type", "If-None-Match"],
             expose_headers=["ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID"],
         )
+    app.add_middleware(Telemetry, metrics=metrics)
+    if settings.root_path:
+        app.add_middleware(Rooted, root=settings.root_path)
 
 
 def __getattr__(name: str) -> Any:
