@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from .. import shell
-from ..contract import Context
+from ..contract import Context, InvalidGeometry
+from ..geometry.crossings import crossings
 from .fresh import fresh
 from .params import GrowthParams
 from .plastic import forgotten
@@ -24,6 +25,7 @@ from .settling.energy import StepEnergy
 from .settling.equilibrium import balanced, begun
 from .settling.stage import settled
 from .settling.tangent import Tangent
+from .settling.touching import felt
 from .shapes import start
 from .state import State
 from .tooling.placing import branched, started
@@ -50,6 +52,7 @@ class Engine:
 
         Raises:
             InvalidInput: a tool or an attachment that the shape cannot have.
+            InvalidGeometry: a shape that passes through itself, unless it may.
 
         """
         self.params, self.tolerance, self._most = params, tolerance, most
@@ -59,6 +62,12 @@ class Engine:
         self._history: list[tuple[State, int, Tangent, Habit]] = []
         self._work: Generator[None, None, None] | None = None
         self.state = fresh(params, start(params.shape, vertices, params.aspect))
+        through = 0 if params.contact == 0 else crossings(self.state.x, self.state.mesh.triangles).count
+        if through:
+            raise InvalidGeometry(
+                f"the start shape passes through itself in {through} pairs of triangles.",
+                advice="Mend the shape, or grow it with contact = 0.",
+            )
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
         self._tangent, self._habit = Tangent(self.state.mesh), Habit()
@@ -162,7 +171,9 @@ class Engine:
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         p = self.params
         tangent = self._tangent
-        energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
+        energy = StepEnergy(
+            state, self._material, p.pressure, p.solids, tangent, p.gravity, self._distance(state), p.bending
+        )
         goal = self.tolerance * state.length
         yield
         first = yield from begun(energy, meshed, dt, goal, p, self._habit)
@@ -178,6 +189,9 @@ class Engine:
         self.state = state
         self._steps += 1
 
+    def _distance(self, state: State) -> float:
+        return felt(self.params.contact, self.params.thickness, state.length)
+
     def _readied(self, state: State) -> Generator[None, None, State]:
         """Find the state from which a step grows: what is plastic forgotten, on a mesh that fits; yields in between.
 
@@ -188,7 +202,7 @@ class Engine:
             state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
         if not self.params.remesh:
             return state
-        finer, changes = yield from remesh(state, self._longest, self._largest)
+        finer, changes = yield from remesh(state, self._longest, self._largest, apart=self.params.contact != 0)
         tangent = self._tangent
         for pairs in changes:
             tangent = tangent.remeshed(finer.mesh, pairs)

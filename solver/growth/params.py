@@ -125,11 +125,11 @@ class GrowthParams(Params):
         (), max_length=20, description="What is held", json_schema_extra=_units("1")
     )
     solids: tuple[Solid, ...] = Field((), max_length=20, description="Static solids", json_schema_extra=_units("1"))
-    contact: float = Field(
-        0.0,
+    contact: float | None = Field(
+        None,
         ge=0,
         le=1,
-        description="Distance that parts keep from each other, about an edge of the mesh; 0: they pass through",
+        description="Distance that parts keep from each other; unless given the thickness; 0: they pass through",
         json_schema_extra=_units("start shape's unit"),
     )
     step: float = Field(
@@ -147,6 +147,6 @@ class GrowthParams(Params):
     )
     active: bool = Field(
         False,
-        description="Whether a part that grows settles alone where the rest stays in balance; not with contact",
+        description="Whether a part that grows settles alone where the rest stays in balance; only with contact = 0",
         json_schema_extra=_units("1"),
     )

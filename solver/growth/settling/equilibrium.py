@@ -31,7 +31,7 @@ def begun(
 ) -> Generator[None, None, Settled]:
     """Find where the search for the whole begins, from the state before the step; yields after pieces of work."""
     state = energy.state
-    if not (params.active and params.imperfection and not params.contact):
+    if not (params.active and params.imperfection and params.contact == 0):
         return Settled(ahead(energy, state, dt), 0, habit)
     now, last = state.g.T, before.g.T
     changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])
@@ -108,7 +108,8 @@ def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
     for waves in _WAVES:
         ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(x, axis=0).max()))
         height = np.cos(x @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
-        trial = x + (_NUDGE * energy.material.thickness * height)[:, None] * normal
+        way = (_NUDGE * energy.material.thickness * height)[:, None] * normal
+        trial = x + energy.allowed(x, way, 1.0) * way
         value = energy(trial)[0]
         if value < least:
             found, least = trial, value

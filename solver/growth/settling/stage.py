@@ -19,6 +19,7 @@ from .energy import StepEnergy
 from .minimise import Point, quasi_newton
 from .newton import newton
 from .tangent import Tangent
+from .touching import felt
 
 __all__ = ["force_unit", "settled"]
 
@@ -52,7 +53,7 @@ def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[St
         params.solids,
         Tangent(state.mesh),
         params.gravity,
-        params.contact,
+        felt(params.contact, params.thickness, state.length),
         params.bending,
         following=params.bending == "hinges",
     )
