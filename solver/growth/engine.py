@@ -25,7 +25,6 @@ from .settling.energy import StepEnergy
 from .settling.equilibrium import balanced, begun
 from .settling.stage import settled
 from .settling.tangent import Tangent
-from .settling.touching import felt
 from .shapes import start
 from .state import State
 from .tooling.placing import branched, started
@@ -46,7 +45,9 @@ class Engine:
     def __init__(
         self, params: GrowthParams, vertices: int, tolerance: float = 1e-3, most: int = 4000, history: bool = True
     ) -> None:
-        """Start from the parameters' shape with about `vertices`; tolerance: residual; most: steps to an equilibrium.
+        """Start from the parameters' shape with about `vertices`, or from their mesh.
+
+        tolerance: residual; most: steps to an equilibrium.
 
         history: whether states are kept for `undo`.
 
@@ -61,8 +62,9 @@ class Engine:
         self._keeps = history
         self._history: list[tuple[State, int, Tangent, Habit]] = []
         self._work: Generator[None, None, None] | None = None
-        self.state = fresh(params, start(params.shape, vertices, params.aspect))
-        through = 0 if params.contact == 0 else crossings(self.state.x, self.state.mesh.triangles).count
+        begun = params.mesh.shape() if params.mesh else start(params.shape, vertices, params.aspect)
+        self.state = fresh(params, begun)
+        through = crossings(self.state.x, self.state.mesh.triangles).count if params.contact else 0
         if through:
             raise InvalidGeometry(
                 f"the start shape passes through itself in {through} pairs of triangles.",
@@ -171,9 +173,7 @@ class Engine:
         state = replace(state, g=g, rest=rest, time=state.time + dt)
         p = self.params
         tangent = self._tangent
-        energy = StepEnergy(
-            state, self._material, p.pressure, p.solids, tangent, p.gravity, self._distance(state), p.bending
-        )
+        energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         yield
         first = yield from begun(energy, meshed, dt, goal, p, self._habit)
@@ -189,9 +189,6 @@ class Engine:
         self.state = state
         self._steps += 1
 
-    def _distance(self, state: State) -> float:
-        return felt(self.params.contact, self.params.thickness, state.length)
-
     def _readied(self, state: State) -> Generator[None, None, State]:
         """Find the state from which a step grows: what is plastic forgotten, on a mesh that fits; yields in between.
 
@@ -202,7 +199,7 @@ class Engine:
             state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
         if not self.params.remesh:
             return state
-        finer, changes = yield from remesh(state, self._longest, self._largest, apart=self.params.contact != 0)
+        finer, changes = yield from remesh(state, self._longest, self._largest, apart=self.params.contact > 0)
         tangent = self._tangent
         for pairs in changes:
             tangent = tangent.remeshed(finer.mesh, pairs)

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from ..contract import Params
+from .imported import OwnMesh
 from .shapes import Shape
 from .tooling.places import Place
 from .tooling.tools import HotSurface, Tool
@@ -61,11 +62,14 @@ class GrowthParams(Params):
     }
 
     shape: Shape = Field("sphere", description="Start shape", json_schema_extra=_units("1"))
+    mesh: OwnMesh | None = Field(
+        None, description="A triangle mesh to start from in place of `shape`", json_schema_extra=_units("1")
+    )
     aspect: float = Field(
         4.0,
         ge=0.2,
         le=50,
-        description="Length over width of a strip, height over radius of a tube",
+        description="Length over width of a strip or triangle, height over radius of what is round, radii of a torus",
         json_schema_extra=_units("1"),
     )
     tools: tuple[Tool, ...] = Field(
@@ -125,11 +129,11 @@ class GrowthParams(Params):
         (), max_length=20, description="What is held", json_schema_extra=_units("1")
     )
     solids: tuple[Solid, ...] = Field((), max_length=20, description="Static solids", json_schema_extra=_units("1"))
-    contact: float | None = Field(
-        None,
+    contact: float = Field(
+        0.0,
         ge=0,
         le=1,
-        description="Distance that parts keep from each other; unless given the thickness; 0: they pass through",
+        description="Distance that parts keep from each other, the thickness, say; 0: they pass through",
         json_schema_extra=_units("start shape's unit"),
     )
     step: float = Field(
@@ -147,6 +151,6 @@ class GrowthParams(Params):
     )
     active: bool = Field(
         False,
-        description="Whether a part that grows settles alone where the rest stays in balance; only with contact = 0",
+        description="Whether a part that grows settles alone where the rest stays in balance; not with contact",
         json_schema_extra=_units("1"),
     )

@@ -19,7 +19,6 @@ from .energy import StepEnergy
 from .minimise import Point, quasi_newton
 from .newton import newton
 from .tangent import Tangent
-from .touching import felt
 
 __all__ = ["force_unit", "settled"]
 
@@ -53,7 +52,7 @@ def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[St
         params.solids,
         Tangent(state.mesh),
         params.gravity,
-        felt(params.contact, params.thickness, state.length),
+        params.contact,
         params.bending,
         following=params.bending == "hinges",
     )

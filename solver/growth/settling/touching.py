@@ -13,10 +13,8 @@ from ...linalg.multifrontal import Analysis, analyse
 from ...shell.contact.steps import largest
 from ..state import State
 
-__all__ = ["Touching", "felt"]
+__all__ = ["Touching"]
 
-#: Least and largest distance that is kept unless asked for, over the mean rest edge.
-_LEAST, _MOST = 0.3, 3.0
 #: Room for moves, at first and at most, and for the change of an edge, over the mean rest edge.
 _FAR, _FURTHEST, _CHANGE = 0.4, 2.0, 0.12
 #: Share of a step up to a touch that is taken.
@@ -25,20 +23,16 @@ _SHORT = 0.9
 _AHEAD = 1.3
 
 
-def felt(asked: float | None, thickness: float, length: float) -> float:
-    """Return the distance that parts keep: what is asked for, else the thickness within what the mesh can carry."""
-    if asked is not None:
-        return asked
-    return min(max(thickness, _LEAST * length), _MOST * length)
-
-
 class Touching:
     """Contact of a state's sheet with itself, as its energy sees it."""
 
     def __init__(self, state: State, distance: float, unit: float, areas: Floats) -> None:
         """distance: that parts keep. unit: force that bends an edge [mu l]. areas (n,): of the vertices at rest."""
-        self._mesh, self._length, self._distance = state.mesh, state.length, distance
-        self._near = shell.near_of(state.g, state.mesh, _lengths(state), areas, distance)
+        self._mesh, self._length, self._distance = state.mesh, _edge(state), distance
+        # where a step grows threefold what is near is near as it is, too: else it would push before it has room
+        rest, now = state.g, shell.metric(state.x, state.mesh.triangles)
+        lengths = np.minimum(_lengths(rest, state.mesh), _lengths(now, state.mesh))
+        self._near = shell.near_of((rest, now), state.mesh, lengths, areas, distance)
         # pressure that bends a sheet as sharply as its mesh can show
         self._hardness = unit / state.length**2
         self._coupled: tuple[Ints, shell.Pattern, Analysis] | None = None
@@ -121,12 +115,18 @@ class Touching:
         return self.pairs.stencils[shell.within(x, self.pairs, _AHEAD)]
 
 
-def _lengths(state: State) -> Floats:
-    """Return the rest lengths of edges (e,), the longest where triangles differ."""
-    g, found = state.g, np.zeros(len(state.mesh.edges))
+def _lengths(g: Floats, mesh: shell.Topology) -> Floats:
+    """Return the lengths of edges (e,) by metrics (f, 3), the longest where triangles differ."""
+    found = np.zeros(len(mesh.edges))
     squares = np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
-    np.maximum.at(found, state.mesh.face_edges.ravel(), squares.ravel())
+    np.maximum.at(found, mesh.face_edges.ravel(), squares.ravel())
     return np.sqrt(found)
+
+
+def _edge(state: State) -> float:
+    """Return the mean edge at rest or as it is, the lesser."""
+    i, j = state.mesh.edges.T
+    return min(state.length, float(np.linalg.norm(state.x[i] - state.x[j], axis=1).mean()))
 
 
 def _couples(stencils: Ints, n: int) -> Ints:

@@ -37,8 +37,8 @@ class Near:
     areas: Floats
 
 
-def near_of(g: Floats, mesh: Topology, lengths: Floats, areas: Floats, distance: float) -> Near:
-    """Return what is near on a rest state: g (f, 3), rest lengths of edges (e,), areas of vertices (n,).
+def near_of(metrics: tuple[Floats, ...], mesh: Topology, lengths: Floats, areas: Floats, distance: float) -> Near:
+    """Return what is near: by metrics (f, 3), the least altitude of which counts, lengths of edges (e,), areas (n,).
 
     What is not near is at least `distance` away at rest.
     """
@@ -48,11 +48,12 @@ def near_of(g: Floats, mesh: Topology, lengths: Floats, areas: Floats, distance:
     order = np.argsort(ends[:, 0], kind="stable")
     indptr = np.searchsorted(ends[order, 0], np.arange(n + 1))
     start, other, way = _ways(indptr, ends[order, 1], np.concatenate([lengths, lengths])[order], limit)
-    squares = np.maximum(np.maximum(g[:, 0], g[:, 2]), g[:, 0] + g[:, 2] - 2 * g[:, 1])
-    heights = np.sqrt((g[:, 0] * g[:, 2] - g[:, 1] ** 2) / squares)
     altitudes = np.full(n, np.inf)
-    for corner in range(3):
-        np.minimum.at(altitudes, mesh.triangles[:, corner], heights)
+    for g in metrics:
+        squares = np.maximum(np.maximum(g[:, 0], g[:, 2]), g[:, 0] + g[:, 2] - 2 * g[:, 1])
+        heights = np.sqrt((g[:, 0] * g[:, 2] - g[:, 1] ** 2) / squares)
+        for corner in range(3):
+            np.minimum.at(altitudes, mesh.triangles[:, corner], heights)
     owners = mesh.triangles.min(axis=1)
     faces = np.argsort(owners, kind="stable")
     return Near(

@@ -61,10 +61,12 @@ def search(x: Floats, mesh: Topology, near: Near, distance: float, room: float, 
     places = _near_places(x, near.start, near.other, even, spans, near.way, distance, change / length)
     places = np.concatenate([places, _far_places(x, order, begin, keys, wide, near.start, near.other, spans, reach)])
     own = near.start, near.other, near.way, near.altitudes, near.areas, near.face_start, near.faces
-    *found, close = _stencils(x, places, *own, near.edge_start, near.edges, spans, distance, reach, change / length)
-    found[-1][close] *= length
-    order = np.lexsort((found[-1], ~close))
-    return Pairs(*(part[order] for part in found), int(close.sum()))
+    stencils, kinds, felt, areas, beyond, close = _stencils(
+        x, places, *own, near.edge_start, near.edges, spans, distance, reach, change / length
+    )
+    beyond = np.where(close, length * beyond, beyond)
+    order = np.lexsort((beyond, ~close))
+    return Pairs(stencils[order], kinds[order], felt[order], areas[order], beyond[order], int(close.sum()))
 
 
 def within(x: Floats, pairs: Pairs, factor: float = 1.0) -> Ints:
@@ -211,4 +213,5 @@ def _rest(q: Ints, kind: int, v: int, mark: Ints, ways: Floats, altitudes: Float
     if kind == 2:
         least -= spans[v]
     height = min(min(altitudes[q[0]], altitudes[q[1]]), min(altitudes[q[2]], altitudes[q[3]]))
-    return max(least, height)
+    found: float = max(least, height)
+    return found

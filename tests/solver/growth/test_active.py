@@ -19,7 +19,7 @@ from solver.growth.state import State
 from solver.growth.tooling import reach
 
 SPOT = {"kind": "spot", "at": (0.3, 0.2, 1.0), "radius": 0.4, "stretch": (1.01, 1.01), "duration": 100}
-BALL = {"shape": "sphere", "contact": 0.0, "thickness": 0.02, "step": 1.0, "tools": [SPOT]}
+BALL = {"shape": "sphere", "thickness": 0.02, "step": 1.0, "tools": [SPOT]}
 
 
 def engine(vertices: int, steps: int, tolerance: float = 1e-3, **values: Any) -> Engine:

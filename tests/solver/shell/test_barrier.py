@@ -100,7 +100,7 @@ def crumpled():
 def near_in(x, mesh, distance):
     g = shell.metric(x, mesh.triangles)
     lengths = np.linalg.norm(x[mesh.edges[:, 0]] - x[mesh.edges[:, 1]], axis=1)
-    return shell.near_of(g, mesh, lengths, np.ones(mesh.vertices), distance)
+    return shell.near_of((g,), mesh, lengths, np.ones(mesh.vertices), distance)
 
 
 def test_search_finds_all_that_is_within_reach():
