@@ -24,7 +24,7 @@ from store import errors as stored
 
 from . import errors
 
-__all__ = ["MEDIA_TYPE", "STATUS", "URN", "Culprit", "Problem", "install", "of", "responses", "unforeseen"]
+__all__ = ["MEDIA_TYPE", "STATUS", "URN", "Culprit", "Problem", "files", "install", "of", "responses", "unforeseen"]
 
 MEDIA_TYPE = "application/problem+json"
 URN = "urn:wizen:problem:"
@@ -47,8 +47,11 @@ STATUS: Mapping[type[Exception], int] = {
     stored.TooUncertain: 422,
     stored.MixedSamples: 503,
     stored.StorageFull: 507,
+    stored.StorageFailed: 503,
+    stored.CorruptBackup: 503,
     stored.UnknownJob: 404,
     stored.QueueFull: 429,
+    stored.QuotaSpent: 429,
     stored.ReadOnlyStore: 409,
     stored.NetworkFileSystem: 503,
     stored.CorruptTokens: 503,
@@ -85,6 +88,14 @@ class Culprit(BaseModel):
     advice: str = Field("", description="What to change")
 
 
+class Nearest(BaseModel):
+    """The table that comes nearest to what was asked for."""
+
+    table: str = Field(description="Its name")
+    distance: float = Field(description="Over all parameters: logarithms of ratios, or differences")
+    parameters: dict[str, dict[str, Any]] = Field(description="What was asked, the nearest in the table, how far")
+
+
 class Problem(BaseModel):
     """An error as RFC 9457 describes it, with advice."""
 
@@ -98,6 +109,8 @@ class Problem(BaseModel):
     instance: str = Field(description="The request that met the problem")
     request_id: str = Field("", description="Names the request in the service's log")
     errors: list[Culprit] = Field(default_factory=list, description="Every wrong parameter")
+    nearest: Nearest | None = Field(None, description="The table that comes nearest")
+    links: dict[str, str] = Field(default_factory=dict, description="The run that answers: its address and its command")
 
 
 def of(error: Exception, scope: Scope) -> Response:
@@ -111,6 +124,7 @@ def of(error: Exception, scope: Scope) -> Response:
         str(getattr(error, "advice", "")),
         [Culprit(**wrong._asdict()) for wrong in getattr(error, "wrong", ())],
         getattr(error, "headers", None),
+        getattr(error, "more", {}),
     )
 
 
@@ -129,6 +143,15 @@ def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Return the OpenAPI entries that declare these statuses as problems."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
+
+
+def files(media_types: Iterable[str]) -> dict[str, Any]:
+    """Return the OpenAPI content of an answer that is a file of one of these types.
+
+    Generators of clients look for a type that they know to be bytes: it comes first, and stands for all of them.
+    """
+    binary = {"schema": {"type": "string", "format": "binary"}}
+    return dict.fromkeys(("application/octet-stream", *media_types), binary)
 
 
 def install(app: FastAPI) -> None:
@@ -185,6 +208,7 @@ def _response(
     advice: str = "",
     wrong: Iterable[Culprit] = (),
     headers: Mapping[str, str] | None = None,
+    more: Mapping[str, Any] | None = None,
 ) -> Response:
     query = scope.get("query_string", b"").decode("latin-1")
     problem = Problem(
@@ -196,6 +220,7 @@ def _response(
         instance=quote(scope["path"]) + (f"?{query[:512]}" if query else ""),
         request_id=scope.get("state", {}).get("request_id", ""),
         errors=list(wrong),
+        **(more or {}),
     )
     body = problem.model_dump(exclude_defaults=True)
     extra = {"Cache-Control": "no-store", **(headers or {})}

@@ -12,6 +12,7 @@ import typer
 
 from solver import __version__
 
+from . import copies as cli_copies
 from . import onset as cli_onset
 from . import queue as cli_queue
 from . import refine as cli_refine
@@ -129,6 +130,7 @@ def sweep(
     read = Plan.load(plan)
     with executors.choose(workers, dask, scheduler) as pool:
         opened = Store.open(store, create=True)
+        opened.keep_plan(read.name, plan.read_text(encoding="utf-8"))
         left_out = f", {read.skipped} impossible ones left out" if read.skipped else ""
         note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
         reports = []
@@ -193,6 +195,7 @@ def status(store: StorePath, as_json: As_json = False) -> None:
 cli_refine.add_to(app)
 cli_onset.add_to(app)
 cli_queue.add_to(app)
+cli_copies.add_to(app)
 cli_results.add_to(app)
 cli_tables.add_to(app)
 cli_shapes.add_to(app)
