@@ -73,6 +73,7 @@ register(
     residual=Quantity(
         "1", "out-of-balance force over internal force, or the largest error of a step, relative L2", "|r|/|f|"
     ),
+    moved=Quantity("1", "how far relaxing moved a surface: rms of the radial motion over its roughness", "d/r"),
     drift=Quantity("1", "rms motion of the surface in its last 200 steps, in exocarp thicknesses", "d"),
     iterations=Quantity("1", "steps or iterations spent up to and including this stage", "n"),
     seconds=Quantity("s", "wall time spent up to and including this stage", "t", volatile=True),

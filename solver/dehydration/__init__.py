@@ -14,6 +14,7 @@ from .params import DehydrationParams
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..arrays import Floats
     from .bifurcation import Onset
 
 __all__ = ["SOLVER", "DehydrationParams", "onset"]
@@ -49,6 +50,13 @@ def _run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     from .run import run
 
     return run(params, need, context)
+
+
+def _relax(params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context) -> xr.Dataset:
+    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+    from .relax import relax
+
+    return relax(params, position, stage, need, context)
 
 
 def _cost(params: DehydrationParams, need: Need) -> Cost:
@@ -89,5 +97,6 @@ SOLVER = Solver(
     surface=SURFACE,
     looks=LOOKS,
     onset=onset,
+    relax=_relax,
     incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )
