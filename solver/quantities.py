@@ -132,6 +132,9 @@ register(
 register(
     mesh_position=Quantity("1", "position of a vertex, in the solver's unit of length", "x"),
     triangle=Quantity("1", "the three vertices of a triangle, from 0, counter-clockwise from outside", "-"),
+    texture_coordinate=Quantity("1", "texture coordinates of a corner, v upwards", "uv"),
+    texture_triangle=Quantity("1", "the texture coordinates of a triangle's three corners, from 0", "-"),
+    face_material=Quantity("1", "the material of a triangle, from 0, as named in the attribute materials", "-"),
     quad=Quantity("1", "the four vertices of a face as solved, whose triangles are (0, 1, 2) and (0, 2, 3)", "-"),
     vertex_count=Quantity("1", "number of vertices of this stage's mesh", "n_v"),
     face_count=Quantity("1", "number of triangles of this stage's mesh", "n_f"),
@@ -159,6 +162,7 @@ register(
     tip_position=Quantity("m", "mean position of the rods' far ends, weighted with their sections", "x_tip"),
     rod_position=Quantity("m", "positions of both ends of every edge of the rods", "x"),
     rod_cut=Quantity("1", "where an edge is cut, 0 to 1 from its first end; -1 where it is not", "c"),
+    body=Quantity("1", "1 on the rigid bodies, 0 on the wood", "b"),
     inside=Quantity("1", "0 on the bark, 1 on ends, cracks and broken faces", "i"),
     rod=Quantity("1", "number of the rod that an edge belongs to", "-"),
 )
