@@ -16,7 +16,7 @@ from starlette.routing import Route
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, page, problems, results
+from . import catalogue, hours, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
@@ -90,6 +90,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     declared = problems.responses(414, *(() if settings.public_read else (401, 403)))
     guarded = (
         catalogue.router,
+        hours.router,
         shapes.router,
         batch.router,
         jobs.reading,

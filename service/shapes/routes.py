@@ -22,6 +22,7 @@ from store.lookup import ShapeTable
 from .. import problems, vocabulary
 from ..errors import OutsideRanges, ServiceError
 from ..formats import FORMATS, About, Format, negotiate
+from ..hours import timed
 from ..settings import Settings
 from . import detail as level
 from . import exact
@@ -147,7 +148,7 @@ def _ask(request: Request, solver: str) -> _Asked:
     if words is None:
         words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
     detail = level.read(given)
-    query = parse(given.multi_items(), words, detail.refused(chosen))
+    query = parse(timed(given.multi_items(), known), words, detail.refused(chosen))
     resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
     return _Asked(known, name, table, words, query, detail, chosen, resolution)
 

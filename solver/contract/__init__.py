@@ -4,6 +4,7 @@
 progress, cancellation and randomness, and every failure is a `SolverError` that says what to change.
 """
 
+from .clock import Clock
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, SolverError, Unstable
 from .looks import Label, Looks, Place, Shade, Skin
@@ -14,6 +15,7 @@ from .surface import Fresh, Surface
 
 __all__ = [
     "Cancelled",
+    "Clock",
     "Context",
     "Cost",
     "Fresh",

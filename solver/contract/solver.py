@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .. import __version__, quantities
+from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
 from .looks import Looks
@@ -57,7 +58,8 @@ class Solver:
     presets that the default ones do not suit; `onset(params, method=, kappa_ratio=, quality=, context=)`, where it
     can say at which stage its shape begins to lose its symmetry; `error(params, quality, last stage)`, the relative
     error to expect of these parameters, which refuses what was never measured. `tolerances` are the worst of each
-    quality over all that was.
+    quality over all that was. `clock` turns hours under given conditions into
+    stages.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Solver:
     preset_stages: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     onset: Callable[..., Any] | None = None
     error: Callable[[Any, Quality, float], float] | None = None
+    clock: Clock | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.
@@ -97,6 +100,22 @@ class Solver:
             base = self.presets[preset]
         # a whole field given by hand replaces the preset's; a scalar axis replaces one entry of it
         return self.params.parse({**base, **named(values)})
+
+    def stages_after(
+        self, hours: Iterable[float], under: Mapping[str, Any], preset: str | None = None
+    ) -> tuple[float, ...]:
+        """Return the stages after hours under conditions, those of a preset if one is named.
+
+        Raises:
+            InvalidInput: this solver knows no hours, or not under these conditions.
+
+        """
+        if self.clock is None:
+            raise InvalidInput(
+                f"{self.name} does not turn hours into stages.",
+                advice=f"Name stages: {self.stages.long_name} [{self.stages.units}].",
+            )
+        return self.clock.stages(hours, under, preset)
 
     def axis_units(self) -> dict[str, str]:
         """Return the units of the scalar axes, from the parameters' schema."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..contract import Context, Cost, Need, Quality, Solver, StageAxis
 from ..fresh import SURFACE
 from ..fruit import PRESETS
+from .drying import CLOCK
 from .looks import LOOKS
 from .params import DehydrationParams
 
@@ -89,4 +90,5 @@ SOLVER = Solver(
     surface=SURFACE,
     looks=LOOKS,
     onset=onset,
+    clock=CLOCK,
 )

@@ -9,7 +9,19 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid
-from .terminal.options import As_json, Out, Set, Stages, StoreToRead, TableName, assignments, numbers
+from .terminal.options import (
+    As_json,
+    Hours,
+    Out,
+    Set,
+    Stages,
+    StoreToRead,
+    TableName,
+    Under,
+    assignments,
+    numbers,
+    stages_asked,
+)
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -70,6 +82,8 @@ def query(
     store: StoreToRead = None,
     set_: Set = None,
     stages: Stages = None,
+    hours: Hours = None,
+    under: Under = None,
     name: TableName = "default",
     resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None,
     method: Annotated[str | None, typer.Option("--method", help="How to look up, as `table score` names it.")] = None,
@@ -90,6 +104,8 @@ def query(
 
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --method idw --out paper.glb
 
+    wizen query --set te=0.034 --set gamma=22 --hours 48 --under kinetics=grape --out sunny.glb
+
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --max-error rgh:0.1,dB:3
 
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
@@ -102,8 +118,8 @@ def query(
     from .. import outputs
     from ..formats import Made
 
-    wanted = numbers(stages)
     table = ShapeTable.open(store or starter.ROOT, name, surfaces=registry.surface)
+    wanted = stages_asked(registry.get(table.info.solver), stages, hours, under, None)
     if not wanted:
         low, high = table.reach
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")

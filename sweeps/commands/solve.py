@@ -12,6 +12,7 @@ from ..errors import InvalidOption
 from .terminal.console import emit
 from .terminal.options import (
     As_json,
+    Hours,
     Out,
     Params,
     Preset,
@@ -19,9 +20,11 @@ from .terminal.options import (
     Seed,
     Set,
     Stages,
+    Under,
     assignments,
     numbers,
     parameters,
+    stages_asked,
 )
 
 if TYPE_CHECKING:
@@ -44,6 +47,8 @@ def solve(
     params_file: Params = None,
     set_: Set = None,
     stages: Stages = None,
+    hours: Hours = None,
+    under: Under = None,
     quality: Quality = None,
     tolerance: Annotated[
         float | None, typer.Option("--tolerance", metavar="E", help="Relative error in place of a quality, e.g. 0.1.")
@@ -81,6 +86,8 @@ def solve(
 
     wizen solve dehydration --fields mesh_position --stages 0.2 --out as-solved.glb
 
+    wizen solve dehydration --preset raisin --quality preview --hours 24,48,96 --out sunny.glb
+
     wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
     """
     from solver import registry
@@ -97,7 +104,7 @@ def solve(
     params = chosen.parse(parameters(params_file) | assignments(set_) | own, preset)
     asked = Need.parse(
         {
-            "stages": numbers(stages),
+            "stages": stages_asked(chosen, stages, hours, under, preset),
             "fields": [name.strip() for name in fields.split(",")] if fields else (),
             "region": _region(region),
         }

@@ -308,3 +308,19 @@ def test_a_reader_that_leaves_early() -> None:
         )
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
+
+
+def test_hours_stand_in_for_stages(shrinking: Solves) -> None:
+    """As the solver's clock has it: `shrinking` is one of its own, which has none, and dehydration has."""
+    refused = wizen("solve", "shrinking", "--hours", "24")
+    assert refused.exit_code == 2
+    assert "does not turn hours into stages" in refused.stderr
+    both = wizen("solve", "dehydration", "--hours", "24", "--stages", "0.1")
+    assert both.exit_code == 2
+    assert "exclude each other" in both.stderr
+    alone = wizen("solve", "dehydration", "--under", "temperature=60")
+    assert alone.exit_code == 2
+    assert "there are none" in alone.stderr
+    unmeasured = wizen("solve", "dehydration", "--preset", "raisin", "--hours", "30", "--under", "temperature=60")
+    assert unmeasured.exit_code == 2
+    assert "open sun" in unmeasured.stderr
