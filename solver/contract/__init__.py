@@ -6,7 +6,7 @@ progress, cancellation and randomness, and every failure is a `SolverError` that
 
 from .clock import Clock
 from .context import Context
-from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, SolverError, Unstable
+from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
 from .looks import Label, Looks, Place, Shade, Skin
 from .need import Need, Quality, Region
 from .params import Params
@@ -25,6 +25,7 @@ __all__ = [
     "Looks",
     "Need",
     "NotConverged",
+    "OverBudget",
     "Params",
     "Place",
     "Quality",

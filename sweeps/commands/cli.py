@@ -22,6 +22,7 @@ from . import tables as cli_tables
 from .terminal.console import Root, emit, grid, note
 from .terminal.options import (
     As_json,
+    Most_seconds,
     StorePath,
 )
 
@@ -106,6 +107,7 @@ def sweep(
         str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler.")
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try again what was given up.")] = False,
+    max_seconds: Most_seconds = None,
     as_json: As_json = False,
 ) -> None:
     """Run all jobs of a plan. Stop it at any time: the same command goes on where it stopped.
@@ -120,6 +122,7 @@ def sweep(
     """
     from store.store import Store
 
+    from ..planning.afford import afford
     from ..planning.plan import Plan
     from ..running import executors
     from ..running.runner import run_plan
@@ -127,6 +130,8 @@ def sweep(
     from .terminal.words import readers, report_document, show_report
 
     read = Plan.load(plan)
+    if max_seconds is not None:
+        afford(read, store, max_seconds, scheduler)
     with executors.choose(workers, dask, scheduler) as pool:
         opened = Store.open(store, create=True)
         left_out = f", {read.skipped} impossible ones left out" if read.skipped else ""

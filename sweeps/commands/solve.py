@@ -13,6 +13,7 @@ from .terminal.console import emit
 from .terminal.options import (
     As_json,
     Hours,
+    Most_seconds,
     Out,
     Params,
     Preset,
@@ -65,6 +66,7 @@ def solve(
     ] = None,
     dtype: Annotated[str | None, typer.Option("--dtype", help="float32 or float64, of surface fields.")] = None,
     seed: Seed = None,
+    max_seconds: Most_seconds = None,
     out: Out = None,
     cut: Annotated[
         str | None, typer.Option("--cut", metavar="PLANE", help=".png: cut open along an azimuth (degree), or equator.")
@@ -91,7 +93,7 @@ def solve(
     wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
     """
     from solver import registry
-    from solver.contract import Need
+    from solver.contract import Need, budget
     from store import shards
 
     from ..planning.plan import job
@@ -120,6 +122,8 @@ def solve(
         }
     )
     need = _for_file(out, chosen, chosen.settle(asked, preset, (params,)))
+    if max_seconds is not None:
+        budget.within(chosen, (params,), need, max_seconds)
     spec = job(chosen, params, need)
     result, seconds = _run(chosen, params, need)
     document = {

@@ -4,9 +4,9 @@ What was measured, each figure from the paper's abstract:
 
 - Grapes in the open sun: I. Doymaz, J. Food Sci. Technol. 49 (2012) 214, doi 10.1007/s13197-011-0272-9. Seedless
   berries of 1.72 cm from 78.2 % water to about 22 % in 176 h, seeded ones of 2.20 cm from 79.5 % in 228 h. Between the
-  two the rate goes with a power of the diameter. Berries lose their water as exp(-k t) (Martin and Stott, Aust. J. Agric.
-  Res. 8 (1957) 444: log(c / (c - w)) linear in time in each of three stages, the last from 95 % of the loss on). The
-  diffusivities of Doymaz's abstract are not used: they leave 15 and 31 % of the water at the end; 8 and 7 % were left.
+  two the rate goes with a power of the diameter. Berries lose their water as exp(-k t) (Martin and Stott, Aust. J.
+  Agric. Res. 8 (1957) 444: log(c / (c - w)) linear in time in each of three stages, the last from 95 % of the loss).
+  The diffusivities of Doymaz's abstract are not used: they leave 15 and 31 % of the water; 8 and 7 % were left.
 - Whole jujubes in hot air: Motevali et al., J. Agric. Sci. Technol. 14 (2012) 523: effective diffusivity 1.1532e-10 to
   5.1895e-10 m2/s in the first of two periods, at 50 to 70 C and 0.5 to 1.5 m/s, activation energy 34.97 to 74.20
   kJ/mol. Its ends are taken for the coldest and slowest, and the hottest and fastest air; the middle of the energies

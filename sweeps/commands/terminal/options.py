@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "As_json",
     "Hours",
+    "Most_seconds",
     "Out",
     "Params",
     "Preset",
@@ -56,6 +57,12 @@ Under = Annotated[
     typer.Option("--under", metavar="NAME=VALUE", help="A condition of --hours, e.g. temperature=60. Repeatable."),
 ]
 Quality = Annotated[str | None, typer.Option("--quality", help="preview, default or fine.")]
+Most_seconds = Annotated[
+    float | None,
+    typer.Option(
+        "--max-seconds", min=0, help="Refuse, before any work, what is expected to take longer on this machine."
+    ),
+]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of everything random in the run.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Where the result goes; the suffix says how.")]
 As_json = Annotated[bool, typer.Option("--json", help="Print one JSON document; everything else goes to stderr.")]
