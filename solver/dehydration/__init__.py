@@ -82,7 +82,7 @@ SOLVER = Solver(
     ),
     default_resolution={"preview": 64, "default": 96, "fine": 128},
     # the worst of what was measured: te = 0.04, gamma = 50
-    tolerances={"preview": 0.5, "default": 0.31, "fine": 0.17},
+    tolerances={"preview": 0.45, "default": 0.36, "fine": 0.3},
     error=_error,
     presets=PRESETS,
     run=_run,
