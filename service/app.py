@@ -16,7 +16,7 @@ from starlette.routing import Route
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, hours, page, problems, results
+from . import catalogue, hours, maps, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
@@ -90,13 +90,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     declared = problems.responses(414, *(() if settings.public_read else (401, 403)))
     guarded = (
         catalogue.router,
-        hours.router,
         shapes.router,
         batch.router,
         jobs.reading,
         jobs_events.router,
         jobs_results.router,
         results.router,
+        maps.router,
+        hours.router,
     )
     app.include_router(catalogue.open_router, responses=problems.responses(414))
     for router in guarded:

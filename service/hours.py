@@ -63,7 +63,7 @@ def stages(
     )
 
 
-def timed(items: Sequence[tuple[str, str]], solver: Solver) -> list[tuple[str, str]]:
+def timed(items: Sequence[tuple[str, str]], solver: Solver, preset: str | None = None) -> list[tuple[str, str]]:
     """Return the items of a query with the stage in place of hours and conditions.
 
     Raises:
@@ -82,7 +82,7 @@ def timed(items: Sequence[tuple[str, str]], solver: Solver) -> list[tuple[str, s
     except ValueError:
         raise InvalidQuery.of([Wrong("hours", "is not a number of hours", "Write it like hours=48.")]) from None
     try:
-        (stage,) = solver.stages_after([hours], _conditions(given.get("under", "")))
+        (stage,) = solver.stages_after([hours], _conditions(given.get("under", "")), preset)
     except InvalidInput as error:
         raise InvalidQuery.of([Wrong("under", error.message, error.advice or "")]) from None
     return [*kept, (symbol, repr(stage))]

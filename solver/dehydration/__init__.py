@@ -91,4 +91,5 @@ SOLVER = Solver(
     looks=LOOKS,
     onset=onset,
     clock=CLOCK,
+    incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )
