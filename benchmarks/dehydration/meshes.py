@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from benchmarks import figures
 from benchmarks.figures import Row
 from solver.contract import Context, Need, SolverError
-from solver.dehydration import SOLVER, settings
+from solver.dehydration import SOLVER, DehydrationParams, settings
 
 NAME = "dehydration-meshes"
 STAGES = (0.1, 0.15, 0.2, 0.25, 0.3)
@@ -27,15 +27,10 @@ _FIELDS = ("roughness", "buckle_count", "wavelength", "crossings")
 def main() -> None:
     """Run what is missing, one after the other."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, kind, default in (
-        ("te", float, "0.04"),
-        ("gamma", float, "10,30,50"),
-        ("n", int, "18,26,36,48"),
-        ("seeds", int, "0,1,2"),
-    ):
-        parser.add_argument(
-            f"--{name}", type=lambda text, kind=kind: [kind(x) for x in text.split(",")], default=default
-        )
+    parser.add_argument("--te", type=_numbers, default="0.04")
+    parser.add_argument("--gamma", type=_numbers, default="10,30,50")
+    parser.add_argument("--n", type=_counts, default="18,26,36,48", help="elements along an edge of the cubed sphere")
+    parser.add_argument("--seeds", type=_counts, default="0,1,2")
     asked = parser.parse_args()
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
     runs = [row for row in kept if row["version"] == SOLVER.version]
@@ -53,7 +48,7 @@ def main() -> None:
 
 def measured(te: float, gamma: float, n: int, seed: int) -> Row:
     """Return the descriptors of an eighth with n elements an edge of the cubed sphere, at default's steps for them."""
-    params = SOLVER.parse({"te": te, "gamma": gamma, "mirrors": "xyz", "seed": seed})
+    params = DehydrationParams.parse({"te": te, "gamma": gamma, "mirrors": "xyz", "seed": seed})
     need = SOLVER.settle(Need(stages=STAGES, quality="default", fields=_FIELDS))
     begin = time.process_time()
     try:
@@ -65,6 +60,14 @@ def measured(te: float, gamma: float, n: int, seed: int) -> Row:
     row: Row = {name: result[name].values.tolist() for name in (*_FIELDS, "converged", "residual")}
     steps = int(result["iterations"].values[-1])
     return {"elements": elements, "steps": steps, **row, "cpu": time.process_time() - begin}
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(part) for part in text.split(",")]
+
+
+def _counts(text: str) -> list[int]:
+    return [int(part) for part in text.split(",")]
 
 
 @contextmanager
