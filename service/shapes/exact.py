@@ -51,8 +51,8 @@ def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain)
         more["nearest"] = document(near)
         if len(near.misses) + len(near.unusual) > _MANY:
             # refusals one by one would lead, together, to another fruit
-            said = refusal(asked.found.fits)
-            message, advice = said.message, f"{said.advice} {_OFFER}"
+            whole = refusal(asked.found.fits)
+            message, advice = whole.message, f"{whole.advice} {_OFFER}"
         else:
             advice = f"The nearest table is {near.info.name!r}, {near.distance:.3g} away. {advice}"
     if isinstance(error, OutsideRanges):

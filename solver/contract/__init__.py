@@ -7,7 +7,7 @@ progress, cancellation and randomness, and every failure is a `SolverError` that
 from .clock import Clock
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
-from .looks import Label, Looks, Place, Shade, Skin
+from .looks import Fur, Label, Looks, Place, Shade, Skin
 from .need import Need, Quality, Region
 from .params import Params
 from .solver import Cost, Solver, StageAxis, finish
@@ -19,6 +19,7 @@ __all__ = [
     "Context",
     "Cost",
     "Fresh",
+    "Fur",
     "InvalidGeometry",
     "InvalidInput",
     "Label",

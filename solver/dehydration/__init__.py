@@ -15,6 +15,7 @@ from .params import DehydrationParams
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..arrays import Floats
     from .bifurcation import Onset
 
 __all__ = ["SOLVER", "DehydrationParams", "onset"]
@@ -50,6 +51,13 @@ def _run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     from .run import run
 
     return run(params, need, context)
+
+
+def _relax(params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context) -> xr.Dataset:
+    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+    from .relax import relax
+
+    return relax(params, position, stage, need, context)
 
 
 def _cost(params: DehydrationParams, need: Need) -> Cost:
@@ -91,5 +99,6 @@ SOLVER = Solver(
     looks=LOOKS,
     onset=onset,
     clock=CLOCK,
+    relax=_relax,
     incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )

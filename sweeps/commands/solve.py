@@ -104,23 +104,11 @@ def solve(
     chosen = registry.get(solver)
     own = {} if seed is None else {"seed": seed}
     params = chosen.parse(parameters(params_file) | assignments(set_) | own, preset)
-    asked = Need.parse(
-        {
-            "stages": stages_asked(chosen, stages, hours, under, preset),
-            "fields": [name.strip() for name in fields.split(",")] if fields else (),
-            "region": _region(region),
-        }
-        | {
-            name: value
-            for name, value in (
-                ("quality", quality),
-                ("tolerance", tolerance),
-                ("resolution", resolution),
-                ("dtype", dtype),
-            )
-            if value is not None
-        }
-    )
+    said: dict[str, Any] = {"quality": quality, "tolerance": tolerance, "resolution": resolution, "dtype": dtype}
+    said["region"] = _region(region)
+    wanted = stages_asked(chosen, stages, hours, under, preset)
+    kept = {"stages": wanted, "fields": [name.strip() for name in fields.split(",")] if fields else ()}
+    asked = Need.parse(kept | {name: value for name, value in said.items() if value is not None})
     need = _for_file(out, chosen, chosen.settle(asked, preset, (params,)))
     if max_seconds is not None:
         budget.within(chosen, (params,), need, max_seconds)

@@ -175,7 +175,7 @@ def sag(n, weight):
     three = on.sum(axis=1) == 3
     contact = np.bincount(tets[three][on[three]], minlength=count) * 100 / (6 * n * n)  # by area: an even pressure
     tether = np.full(count, 1e-3)
-    balance = settle(points, rest, Loads(load, 0.0, contact, tether, points), blocks(tets, count), 1e-8)
+    balance = settle(points, rest, Loads(load, np.zeros(len(load)), contact, tether, points), blocks(tets, count), 1e-8)
     assert balance.reaction == pytest.approx(2 * weight, rel=1e-9)
     return balance.points[points[:, 1] == 2, 1].mean() - balance.points[points[:, 1] == 0, 1].mean()
 
