@@ -162,6 +162,7 @@ register(
     tip_position=Quantity("m", "mean position of the rods' far ends, weighted with their sections", "x_tip"),
     rod_position=Quantity("m", "positions of both ends of every edge of the rods", "x"),
     rod_cut=Quantity("1", "where an edge is cut, 0 to 1 from its first end; -1 where it is not", "c"),
+    body=Quantity("1", "1 on the rigid bodies, 0 on the wood", "b"),
     inside=Quantity("1", "0 on the bark, 1 on ends, cracks and broken faces", "i"),
     rod=Quantity("1", "number of the rod that an edge belongs to", "-"),
 )

@@ -21,12 +21,13 @@ from .stepping.marching import explicit
 from .stepping.moment import Reached
 from .stepping.stability import longest_step, touchable
 from .surface.skin import Skin
+from .surface.solids import among
 
 __all__ = ["run"]
 
 #: Energy that may be missing from the balance of a sound stage, over the largest energy of the run.
 _BALANCE = {"preview": 0.05, "default": 0.01, "fine": 0.003}
-_MESH = frozenset({"mesh_position", "inside"})
+_MESH = frozenset({"mesh_position", "inside", "body"})
 
 
 def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
@@ -76,7 +77,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         with threadpool_limits(1, user_api="blas"):
             for reached in marching:
                 if skin is not None:
-                    frames.append(skin.frame(reached.state.wood))
+                    frames.append(among(skin.frame(reached.state.wood), params, reached.time))
                 rows.append(_row(reached, wood, need, time.perf_counter() - begun))
                 context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
@@ -135,7 +136,10 @@ def _dataset(
         if name != "stage":
             data[name] = (dims.get(name, ("stage",)), values.astype(np.int8) if name == "converged" else values)
     if frames:
-        bare = [f if "inside" in need.fields else f._replace(fields={}) for f in frames[: len(rows)]]
+        bare = [
+            f._replace(fields={name: value for name, value in f.fields.items() if name in need.fields})
+            for f in frames[: len(rows)]
+        ]
         meshes = changing(bare, need.dtype)
         data |= {name: value for name, value in meshes.items() if name not in _MESH or name in need.fields}
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
