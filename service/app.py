@@ -16,7 +16,7 @@ from starlette.routing import Route
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, maps, page, problems, results
+from . import catalogue, hours, maps, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import fields as jobs_fields
@@ -100,6 +100,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         jobs_results.router,
         results.router,
         maps.router,
+        hours.router,
     )
     app.include_router(catalogue.open_router, responses=problems.responses(414))
     for router in guarded:

@@ -4,8 +4,9 @@
 progress, cancellation and randomness, and every failure is a `SolverError` that says what to change.
 """
 
+from .clock import Clock
 from .context import Context
-from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, SolverError, Unstable
+from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
 from .looks import Fur, Label, Looks, Place, Shade, Skin
 from .need import Need, Quality, Region
 from .params import Params
@@ -14,6 +15,7 @@ from .surface import Fresh, Surface
 
 __all__ = [
     "Cancelled",
+    "Clock",
     "Context",
     "Cost",
     "Fresh",
@@ -24,6 +26,7 @@ __all__ = [
     "Looks",
     "Need",
     "NotConverged",
+    "OverBudget",
     "Params",
     "Place",
     "Quality",

@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import __version__, quantities
 from ..arrays import Floats
+from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
 from .looks import Looks
@@ -61,7 +62,8 @@ class Solver:
     error to expect of these parameters, which refuses what was never measured; `relax(params, position, stage, need,
     context)`, which brings a surface on the lattice into the equilibrium next to it and returns what `run` returns of
     one stage, and how far it `moved`. `tolerances` are the worst of each
-    quality over all that was.
+    quality over all that was. `clock` turns hours under given conditions into
+    stages.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Solver:
     incidental: tuple[str, ...] = ("seed",)
     error: Callable[[Any, Quality, float], float] | None = None
     relax: Callable[[Any, Floats, float, Need, Context], xr.Dataset] | None = None
+    clock: Clock | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.
@@ -103,6 +106,22 @@ class Solver:
             base = self.presets[preset]
         # a whole field given by hand replaces the preset's; a scalar axis replaces one entry of it
         return self.params.parse({**base, **named(values)})
+
+    def stages_after(
+        self, hours: Iterable[float], under: Mapping[str, Any], preset: str | None = None
+    ) -> tuple[float, ...]:
+        """Return the stages after hours under conditions, those of a preset if one is named.
+
+        Raises:
+            InvalidInput: this solver knows no hours, or not under these conditions.
+
+        """
+        if self.clock is None:
+            raise InvalidInput(
+                f"{self.name} does not turn hours into stages.",
+                advice=f"Name stages: {self.stages.long_name} [{self.stages.units}].",
+            )
+        return self.clock.stages(hours, under, preset)
 
     def axis_units(self) -> dict[str, str]:
         """Return the units of the scalar axes, from the parameters' schema."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..contract import Context, Cost, Need, Quality, Solver, StageAxis
 from ..fresh import SURFACE
 from ..fruit import PRESETS
+from .drying import CLOCK
 from .looks import LOOKS
 from .params import DehydrationParams
 
@@ -89,7 +90,7 @@ SOLVER = Solver(
     ),
     default_resolution={"preview": 64, "default": 96, "fine": 128},
     # the worst of what was measured: te = 0.04, gamma = 50
-    tolerances={"preview": 0.5, "default": 0.31, "fine": 0.17},
+    tolerances={"preview": 0.45, "default": 0.36, "fine": 0.3},
     error=_error,
     presets=PRESETS,
     run=_run,
@@ -97,6 +98,7 @@ SOLVER = Solver(
     surface=SURFACE,
     looks=LOOKS,
     onset=onset,
+    clock=CLOCK,
     relax=_relax,
     incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )

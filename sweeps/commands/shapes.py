@@ -10,8 +10,20 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid
-from .terminal.options import As_json, Out, Preset, Set, Stages, StoreToRead, assignments, numbers
-from .terminal.tables import asked_table, open_store
+from .terminal.options import (
+    As_json,
+    Hours,
+    Out,
+    Preset,
+    Set,
+    Stages,
+    StoreToRead,
+    Under,
+    assignments,
+    numbers,
+    stages_asked,
+)
+from .terminal.tables import asked_table, open_store, solver_of
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -74,6 +86,8 @@ def query(
     store: StoreToRead = None,
     set_: Set = None,
     stages: Stages = None,
+    hours: Hours = None,
+    under: Under = None,
     preset: Preset = None,
     name: Annotated[
         str | None, typer.Option("--name", help="The table; without, the one of --solver that holds this.")
@@ -106,6 +120,8 @@ def query(
 
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --method idw --out paper.glb
 
+    wizen query --set te=0.034 --set gamma=22 --hours 48 --under kinetics=grape --out sunny.glb
+
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --max-error rgh:0.1,dB:3
 
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --relax --out balanced.glb
@@ -118,7 +134,8 @@ def query(
     from .. import outputs
     from ..formats import Made
 
-    wanted, said = numbers(stages), assignments(set_)
+    said = assignments(set_)
+    wanted = stages_asked(solver_of(open_store(store), name, solver), stages, hours, under, preset)
     table, values = asked_table(store, name, solver, said, max(wanted, key=abs, default=None), preset)
     name = table.info.name
     if not wanted:
