@@ -214,8 +214,8 @@ class ShapeTable:
     ) -> tuple[_Fields, int | None]:
         """Return what is asked for, out of contact with itself, and the pairs of triangles that cross nevertheless.
 
-        A stored result stays as it is, and so does a displacement that is asked for alone: it is the blend. None: no
-        positions were computed, or those of a part.
+        A stored result stays as it is unless it crosses on this lattice, coarser than the run's or finer. So does a
+        displacement that is asked for alone: it is the blend. None: no positions were computed, or those of a part.
         """
         if not fields:
             return (None, None, None), None

@@ -1,15 +1,17 @@
 """Contact sheets of stored runs as they are, nothing interpolated.
 
-python -m benchmarks.dehydration.sheets STORE FILE.png
+python -m benchmarks.dehydration.sheets STORE FILE.png [--plans raisin,plum1 --first]
 
-One row per skin thickness, one column per sample in the order of the other axes; --stages draws one row per sample
-instead, as in Fig. 11 of Liu et al. 2014.
+Of all runs in the store, of those of some plans, or of the first sample of each plan. One row per skin thickness, one
+column per sample in the order of the other axes; --stages draws one row per sample instead, as in Fig. 11 of Liu et
+al. 2014.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -45,6 +47,13 @@ def _image(params: DehydrationParams, data: xr.Dataset, stage: float) -> np.ndar
     return np.asarray(render(params.surface(*lattice(len(shift))) + shift, pixels=PIXELS))
 
 
+def _keys(store: Store, plans: Sequence[str] | None, first: bool) -> list[str]:
+    if plans is None:
+        return list(store.keys())
+    found = [[job.key for job in store.ledger.jobs("done", plan)] for plan in plans]
+    return list(dict.fromkeys(key for keys in found for key in keys[: 1 if first else None]))
+
+
 def main() -> None:
     """Draw one sheet."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -54,10 +63,12 @@ def main() -> None:
     parser.add_argument(
         "--stages", type=lambda text: [float(part) for part in text.split(",")], help="one row a sample"
     )
+    parser.add_argument("--plans", type=lambda text: text.split(","), help="runs of these plans only")
+    parser.add_argument("--first", action="store_true", help="of each plan the run that was asked for first")
     asked = parser.parse_args()
     store = Store.open(asked.store)
     samples = []
-    for key in store.keys():  # noqa: SIM118  a store is no mapping
+    for key in _keys(store, asked.plans, asked.first):
         data = store.get(key)
         samples.append((DehydrationParams.model_validate(json.loads(data.attrs["params"])), data))
     samples.sort(key=lambda sample: (-sample[0].exocarp_thickness, _order(sample[0])))

@@ -28,7 +28,7 @@ _ENOUGH, _AT_LAST = 0.5, 0.02
 #: Way of a corner in each round, in overlaps with the gap added.
 _WAY = 2.0
 #: Most rounds, and rounds between two looks at the whole surface.
-_ROUNDS, _STEPS = 60, 12
+_ROUNDS, _STEPS = 240, 12
 
 
 class Topology(NamedTuple):

@@ -37,7 +37,7 @@ class Evened(NamedTuple):
 def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = False) -> Evened:
     """Return how the surface `whole(n)`, points and poles of the lattice of n colatitudes, comes out of contact.
 
-    `keep` moves nothing: then crossings are only counted.
+    `keep` moves nothing where nothing crosses, however near it comes: a stored result, on a lattice fine enough.
     """
     points, poles = whole(n)
     given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
@@ -45,8 +45,10 @@ def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = F
     # of a fine lattice only whether it has to be, at first
     found = put_apart(moved, topology, 0) if keep or n > COARSE else put_apart(moved, topology)
     near = found.near
-    if keep or not near:
+    if not near or (keep and not found.crossings):
         return Evened(None, None, found.crossings, near)
+    if keep and n <= COARSE:
+        found = put_apart(moved, topology)
     if n > COARSE:
         coarse = even_out(whole, COARSE)
         if coarse.points is not None and coarse.poles is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,13 @@ import pytest
 
 from solver import registry
 from solver.dehydration.measures.penetration import of_lattice
+from solver.geometry.crossings import crossings
+from solver.lattice import closed_lattice
 from store import seal, starter, tables
+from store.families import stored
 from store.lookup import ShapeTable
 from store.store import Store
+from sweeps.planning.plan import Plan
 
 
 def test_it_serves_shapes_at_once() -> None:
@@ -42,11 +47,46 @@ def test_no_sample_of_it_crosses_itself_as_handed_over() -> None:
         assert of_lattice(np.asarray(shape.position, float)).count == 0, (te, gamma)
 
 
-def test_its_file_is_whole_and_small() -> None:
+FAMILIES = [name for name in Store.open(starter.ROOT).table_names() if name != "default"]
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_no_sample_of_a_family_crosses_itself_as_handed_over(name: str) -> None:
+    """Packed and mirrored ones, too: what the runs say of their lattices, and the deepest stage counted anew."""
     store = Store.open(starter.ROOT)
-    path = tables.path_of(store, tables.info(store))
-    assert seal.is_whole(path)
-    assert path.stat().st_size < 20e6
+    table = ShapeTable.open(store, name, surfaces=registry.surface)
+    places = stored.samples(store, table.info)
+    rows = [()] if places is None else places.tolist()
+    assert len(rows) == table.info.samples
+    for row in rows:
+        place = dict(zip(table.info.axes, row, strict=True))
+        for stage in table.stages:
+            found = table.at(place, stage, resolution=8, fields=()).descriptors
+            assert found["crossings"] == found["lattice_crossings"] == 0
+            assert found["least_jacobian"] > 0
+        shape = table.at(place, table.stages[-1], resolution=64, fields=("position",))
+        assert shape.position is not None
+        assert shape.poles is not None
+        points = np.concatenate([shape.position.reshape(-1, 3), shape.poles], dtype=np.float64)
+        assert crossings(points, closed_lattice(64)).count == shape.crossings == 0, place
+
+
+def test_every_family_says_how_it_was_made() -> None:
+    """By the plan that makes the rest of it, and with what packing lost."""
+    store = Store.open(starter.ROOT)
+    for name in FAMILIES:
+        info = tables.info(store, name)
+        plan = Plan.parse(tomllib.loads(info.plan or ""), name)
+        assert {plan.solver.name, name} == {info.solver, plan.name}
+        assert info.version == registry.get(info.solver).version
+        assert info.dtype == "int16"
+
+
+def test_its_files_are_whole_and_small() -> None:
+    store = Store.open(starter.ROOT)
+    paths = [tables.path_of(store, tables.info(store, name)) for name in store.table_names()]
+    assert all(seal.is_whole(path) for path in paths)
+    assert sum(path.stat().st_size for path in paths) < 40e6
 
 
 @pytest.mark.parametrize("given", [None, "nowhere"])

@@ -1,0 +1,70 @@
+"""The families that come with wizen: how the runs behind them settled, and what packing them lost.
+
+    python -m benchmarks.dehydration.families --store maps
+
+Of each table in the package, from the runs in the store that it was made of: how many stages meet their residual, the
+worst one, crossing triangles of finite elements and lattices, the least J; and of its file bytes and loss.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.figures import Sheet
+from store import starter, tables
+from store.manifest import TableInfo
+from store.store import Store
+
+_HEAD = (
+    *("family", "samples", "quality", "part solved", "stages met", "worst residual"),
+    *("crossing pairs", "least J", "MB", "loss [r1]"),
+)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--store", type=Path, required=True, help="where the runs are")
+    runs, package = Store.open(parser.parse_args().store), Store.open(starter.ROOT)
+    sheet = Sheet("dehydration-families", _HEAD, "dehydration")
+    for name in package.table_names():
+        _add(sheet, name, tables.info(package, name), package, runs)
+    sheet.keep()
+
+
+def _add(sheet: Sheet, name: str, info: TableInfo, package: Store, runs: Store) -> None:
+    path = tables.path_of(package, info)
+    with xr.open_dataset(path, engine="h5netcdf", group="/") as stored:
+        loss = float(stored["spectrum"].attrs.get("max_loss", 0.0)) if "spectrum" in stored else 0.0
+    found = [_row(runs.get(key)) for key in info.keys]
+    met, asked = sum(row["met"] for row in found), sum(row["stages"] for row in found)
+    residual, least = max(row["residual"] for row in found), min(row["least_jacobian"] for row in found)
+    pairs, size = sum(row["pairs"] for row in found), path.stat().st_size / 1e6
+    part = {"": "whole", "xz": "quarter", "xyz": "eighth"}[str(info.fixed.get("mirrors", ""))]
+    quality = str(dict(info.need)["quality"])
+    settled = f"{met} of {asked}", f"{residual:.1e}"
+    sheet.add(
+        (name, len(found), quality, part, *settled, pairs, f"{least:.2f}", f"{size:.1f}", f"{loss:.0e}"),
+        family=name, quality=quality, part=part, runs=found, bytes=path.stat().st_size, loss=loss,
+    )  # fmt: skip
+
+
+def _row(run: xr.Dataset) -> Mapping[str, Any]:
+    return {
+        "params": run.attrs["params"],
+        "version": str(run.attrs["solver_version"]),
+        "stages": run.sizes["stage"],
+        "met": int(run["converged"].sum()),
+        "residual": float(run["residual"].max()),
+        "pairs": int(run["crossings"].sum() + run["lattice_crossings"].sum()),
+        "least_jacobian": float(np.min(run["least_jacobian"])),
+    }
+
+
+if __name__ == "__main__":
+    main()
