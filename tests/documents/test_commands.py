@@ -24,7 +24,7 @@ import trimesh
 from benchmarks.service import lookup
 from solver.contract import Need
 from solver.dehydration import SOLVER
-from store import shards
+from store import shards, starter
 from store.store import Store
 from sweeps.planning.plan import Plan
 from tests.service._asking import until
@@ -127,6 +127,8 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
         shards.write(at / name, rotting(), "0" * 64)
     for name in ("patch.obj", "my.obj", "banana.glb"):
         trimesh.creation.icosphere(3).export(at / name)
+    # the package is served, too, where nothing else is named
+    shutil.copytree(starter.ROOT / "tables" / "raisin", at / "demo" / "tables" / "raisin")
     with _served(at) as port:
         yield Workshop(at, port, next(iter(store.keys())))
 
