@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..contract import Context, Cost, Need, Solver, StageAxis
 from .looks import LOOKS
 from .params import Body, Grain, Notch, Waypoint, WoodParams
-from .presets import PRESETS
+from .presets import PRESETS, STAGES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,21 +36,27 @@ _NUMBERS = (
     "broken_rods",
     "broken_bonds",
     "impulse",
+    "body_impulse",
+    "grip_impulse",
+    "grip_moment",
+    "fracture_energy",
+    "crack_area",
     "tip_position",
 )
 
 SOLVER = Solver(
     name="wood",
-    version="3",
+    version="4",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
-    fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside"),
+    fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),
     default_fields=("rod_cut", *_NUMBERS, "rod_position"),
     stages=StageAxis("t", "time", "s", 0.0, 60.0, (0.005, 0.01, 0.015, 0.02)),
     default_resolution={"preview": 32, "default": 64, "fine": 128},
     # largest error of a bundle's stiffness and first frequency against the beam's (docs/wood.md)
     tolerances={"preview": 0.02, "default": 0.01, "fine": 0.01},
     presets=PRESETS,
+    preset_stages=STAGES,
     run=_run,
     cost=_cost,
     looks=LOOKS,

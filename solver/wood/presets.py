@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["PRESETS"]
+__all__ = ["PRESETS", "STAGES"]
 
 
 def _block(x: float, z: float, down: float = 0.0, until: float = 3.0) -> dict[str, Any]:
@@ -61,4 +61,16 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "pull": (1.0, 0.0, 0.0),
         "grain": {"stiffness": 0.05, "strength": 0.15},
     },
+}
+
+#: When there is something to see [s]; equilibria have their full loads at 1 s.
+STAGES: Mapping[str, tuple[float, ...]] = {
+    "cantilever": (0.25, 0.5, 1.0),
+    "fig-4.1": (0.001, 0.002, 0.003, 0.004),
+    "fig-4.2": (0.75, 1.5, 2.25, 3.0),
+    "press": (0.75, 1.5, 2.25, 3.0),
+    # the block meets the branchlet at some 12 ms
+    "twig": (0.01, 0.02, 0.03, 0.04, 0.05),
+    # a hundredth of its length is drawn out within a millisecond
+    "pulled": (0.0005, 0.001, 0.0015, 0.002, 0.003),
 }

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
 from .contact.listing import law
+from .fracture import sawed
 from .model.bundle import lay
 from .model.state import Wood
 from .params import WoodParams
@@ -21,12 +22,13 @@ from .stepping.marching import explicit
 from .stepping.moment import Reached
 from .stepping.stability import longest_step, touchable
 from .surface.skin import Skin
+from .surface.solids import among
 
 __all__ = ["run"]
 
 #: Energy that may be missing from the balance of a sound stage, over the largest energy of the run.
 _BALANCE = {"preview": 0.05, "default": 0.01, "fine": 0.003}
-_MESH = frozenset({"mesh_position", "inside"})
+_MESH = frozenset({"mesh_position", "inside", "body"})
 
 
 def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
@@ -56,6 +58,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
     }
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
+    laid, wood = wood, sawed(wood, params)
     frames: list[Frame] = []
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]
@@ -76,8 +79,8 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         with threadpool_limits(1, user_api="blas"):
             for reached in marching:
                 if skin is not None:
-                    frames.append(skin.frame(reached.state.wood))
-                rows.append(_row(reached, wood, need, time.perf_counter() - begun))
+                    frames.append(among(skin.frame(reached.state.wood), params, reached.time))
+                rows.append(_row(reached, laid, need, time.perf_counter() - begun))
                 context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
@@ -102,6 +105,11 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
         "broken_rods": state.rods,
         "broken_bonds": state.bonds,
         "impulse": state.impulse.sum(0),
+        "fracture_energy": state.spent,
+        "crack_area": float(wood.bonds.area @ wood.bonds.damage),
+        "body_impulse": state.impulse.copy(),
+        "grip_impulse": state.gripped[:, :3].copy(),
+        "grip_moment": state.gripped[:, 3:].copy(),
         "tip_position": weight @ wood.motion.x[ends] / weight.sum(),
     }
     real = laid.rods.k > 0
@@ -125,6 +133,9 @@ def _dataset(
 ) -> xr.Dataset:
     dims = {
         "impulse": ("stage", "component"),
+        "body_impulse": ("stage", "body", "component"),
+        "grip_impulse": ("stage", "grip", "component"),
+        "grip_moment": ("stage", "grip", "component"),
         "tip_position": ("stage", "component"),
         "rod_position": ("stage", "rod_edge", "end", "component"),
         "rod_cut": ("stage", "rod_edge"),
@@ -135,7 +146,10 @@ def _dataset(
         if name != "stage":
             data[name] = (dims.get(name, ("stage",)), values.astype(np.int8) if name == "converged" else values)
     if frames:
-        bare = [f if "inside" in need.fields else f._replace(fields={}) for f in frames[: len(rows)]]
+        bare = [
+            f._replace(fields={name: value for name, value in f.fields.items() if name in need.fields})
+            for f in frames[: len(rows)]
+        ]
         meshes = changing(bare, need.dtype)
         data |= {name: value for name, value in meshes.items() if name not in _MESH or name in need.fields}
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}

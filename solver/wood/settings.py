@@ -38,7 +38,7 @@ def _least(params: WoodParams) -> int:
     """
     if params.rods == 1 or params.reach == 0 or params.unevenness == 0:
         return 0
-    edges: float = (params.rods * (params.length / params.radius) ** 4 / _EVEN) ** (1 / 6)
+    edges: float = (params.rods * (params.length / params.wide) ** 4 / _EVEN) ** (1 / 6)
     return math.ceil(edges)
 
 

@@ -19,7 +19,7 @@ def split_at(wood: Wood, hinge: int) -> tuple[Wood, int, int]:
     edge = wood.rods.after[hinge]
     ratio[edge] = 2.0
     old, count = int(wood.rods.a[edge]), len(wood.motion.x)
-    found = break_worst(wood, ratio, place, np.zeros(len(wood.bonds.i)), np.inf)
+    found = break_worst(wood, ratio, place, np.inf)
     assert (found.rods, found.bonds) == (1, 0)
     assert len(found.wood.motion.x) == count + 1
     return found.wood, old, count
@@ -47,11 +47,11 @@ def test_halves_of_a_split_vertex_share_bonds_mass_and_load(which):
         was = (before.bonds.i == old) & (before.bonds.j == j) & (before.bonds.rest == rest)
         pair = [np.flatnonzero((b.i == v) & (b.j == j) & (b.rest == rest)) for v in (old, new)]
         assert [len(p) for p in pair] == [1, 1]
-        for name in ("k", "s", "limit"):
+        for name in ("k", "s", "opens", "slides", "torn", "shorn", "area"):
             shared = [float(getattr(b, name)[p[0]]) for p in pair]
             assert shared == pytest.approx(float(getattr(before.bonds, name)[was][0]) * np.array([0.25, 0.75]))
     others = np.flatnonzero(before.bonds.i != old)
-    for name in ("k", "s", "limit", "rest", "share"):
+    for name in ("k", "s", "opens", "slides", "torn", "shorn", "area", "damage", "rest", "share"):
         assert np.array_equal(getattr(b, name)[others], getattr(before.bonds, name)[others])
 
 
