@@ -14,7 +14,7 @@ from .drive import Drive
 from .fresh.imperfection import heights
 from .fresh.mesh import FruitMesh, build_mesh
 from .fresh.pattern import pattern_heights
-from .fresh.sector import cut, evened
+from .fresh.sector import cut, evened, mirrored
 from .kernel import (
     ElementReport,
     Layout,
@@ -78,10 +78,11 @@ class Motion:
         directions = self.mesh.sphere.directions
         # waves that the mesh cannot carry (fewer than four nodes) would be noise that depends on it
         bumps = params.imperfection * heights(params, directions, context, highest=settings.n)
+        bumps = evened(bumps, self.sector)
         if params.pattern is not None:
-            bumps = bumps + pattern_heights(params, directions, context)
+            bumps = bumps + mirrored(pattern_heights(params, directions, context), self.sector)
         mesh = self.sector.mesh
-        bumps = evened(bumps, self.sector)[self.sector.own]
+        bumps = bumps[self.sector.own]
         fade = (bumps[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
         bumpy = mesh.positions + fade * np.repeat(mesh.rays, mesh.levels, axis=0)
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)

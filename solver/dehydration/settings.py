@@ -92,7 +92,7 @@ _STEPS, _STEPS_N, _STEPS_KAPPA, _STEPS_SPAN = 6400.0, 24, 30.0, 0.3
 #: modes keep their shape on every mesh, so per step they slow down as the step shrinks, and damping with them.
 _DAMPING, _SWING_DAMPING = 0.004, 0.0005
 #: Longest turns of swinging (at the same reference) and calming, and most steps that a stage may settle for.
-_SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 10_000
+_SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 20_000
 #: Bulk over shear modulus that all qualities stand for: off by 1e-4 from incompressible in radius.
 _KAPPA = 1000.0
 #: Thickness of the core layer at the interface, in wavelengths, and how fast layers grow inwards.
@@ -162,8 +162,8 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     last = max(need.stages, default=0.0)
     settings = choose(params, need.quality, last)
     rungs = {RUNG * k for k in range(math.floor(settings.start / RUNG) + 1, math.floor(last / RUNG + 1e-9) + 1)}
-    # most settle for a third of the steps they may take
+    # most settle for a sixth of the steps they may take
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
-    steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 3 * states
+    steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 6 * states
     seconds = steps * settings.elements * _SECONDS_PER_ELEMENT_STEP / (os.cpu_count() or 1)
     return Cost(_LOADING + seconds, settings.elements * 1200 + 150_000_000)

@@ -1,6 +1,7 @@
 """Where jobs run: here, in local processes, or on Dask. All are `concurrent.futures.Executor`s to the runner.
 
-Workers of one machine share its cores: each gets `cores // workers` threads, set before numerical libraries load.
+Workers of one machine share its cores: each gets `cores // workers` threads, set before numerical libraries load,
+unless the user has set `NUMBA_NUM_THREADS` and the like.
 """
 
 from __future__ import annotations
@@ -217,7 +218,9 @@ def _positive(count: int) -> None:
 
 
 def _threads(workers: int) -> dict[str, str]:
-    return dict.fromkeys(_THREADS, str(max(1, cores() // workers)))
+    """Return each worker's share of the cores; what the user has set stays as it is."""
+    share = str(max(1, cores() // workers))
+    return {name: os.environ.get(name, share) for name in _THREADS}
 
 
 @contextmanager

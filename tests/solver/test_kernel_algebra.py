@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ._kernel_twin import KINDS, algebra_forces, block_mesh, close, random_hex, twin_force, twin_gradient
+from ._kernel_twin import (
+    KINDS,
+    NODE,
+    algebra_forces,
+    block_mesh,
+    close,
+    random_hex,
+    twin_energy,
+    twin_force,
+    twin_gradient,
+)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -62,3 +72,35 @@ def test_patch_of_exocarp_parallelepipeds_carries_affine_deformation_exactly():
     nodal = np.zeros_like(slanted)
     np.add.at(nodal, mesh["connectivity"], forces)
     assert np.max(np.abs(nodal[13])) < 1e-12 * np.max(np.abs(forces))
+
+
+def test_a_skin_of_two_layers_bends_with_its_full_stiffness():
+    """Plane sections of a strip turn against each other, as in a wrinkle, and its faces move freely in thickness.
+
+    The energy of an area is then D kappa^2 / 2 with D = E h^3 / (12 (1 - nu^2)) = mu h^3 / 3 where the volume is kept.
+    The strip is short, so that the shear of straight-edged elements in the tenth that is fully integrated is nothing.
+    """
+    h, length, curvature, mu = 1.0, 0.01, 1e-3, 1.3
+    levels = np.linspace(-h / 2, h / 2, 3)
+
+    def strain_energy(swelling):
+        total = 0.0
+        for low, high in ((0, 1), (1, 2)):
+            fresh, moved = np.empty((8, 3)), np.empty((8, 3))
+            for a, (sx, sy, sz) in enumerate(NODE):
+                level = high if sz > 0 else low
+                fresh[a] = sx * length / 2, sy / 2, levels[level]
+                angle = sx * curvature * length / 2
+                moved[a] = fresh[a] + [angle * levels[level], 0.0, swelling[level]]
+            total += twin_energy(fresh, moved, "exocarp", mu, 1e5, 1.0)
+        return total
+
+    # quadratic in how far the two faces move, to leading order: Newton's step from rest, by differences
+    step = np.eye(3)[[0, 2]] * 1e-4
+    at_rest = strain_energy(np.zeros(3))
+    slope = np.array([(strain_energy(e) - strain_energy(-e)) / 2 for e in step])
+    hessian = np.array(
+        [[strain_energy(d + e) - strain_energy(d) - strain_energy(e) + at_rest for d in step] for e in step]
+    )
+    least = strain_energy(-np.linalg.solve(hessian, slope) @ step)
+    assert least / length == pytest.approx(mu * h**3 / 3 * curvature**2 / 2, rel=2e-3)

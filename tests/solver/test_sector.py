@@ -13,7 +13,7 @@ from solver.dehydration import motion
 from solver.dehydration.contact.data import HITS
 from solver.dehydration.fresh.imperfection import heights
 from solver.dehydration.fresh.mesh import build_mesh
-from solver.dehydration.fresh.sector import cut, evened
+from solver.dehydration.fresh.sector import cut, evened, mirrored
 from solver.dehydration.kernel import build_layout, make_skin, march, new_state, positions
 from solver.dehydration.path import Path
 from solver.dehydration.settings import choose
@@ -54,6 +54,18 @@ def test_evened_heights_are_symmetric_and_as_rough():
     groups = even[order][away[order]].reshape(-1, 8)
     assert np.ptp(groups, axis=1).max() < 1e-12
     assert even.std() == pytest.approx(rough.std(), rel=0.3)
+
+
+def test_a_pattern_that_is_symmetric_already_is_kept_as_it_is():
+    sector, sphere = cut(_mesh(24), "xz"), _mesh(24).sphere
+    x, y, z = sphere.directions.T
+    pattern = np.cos(7 * x) * np.cos(5 * z) * (1 + y)
+    assert np.allclose(mirrored(pattern, sector), pattern, rtol=0, atol=1e-12)
+    # one that is not becomes so, and stays as high
+    uneven = pattern + 0.3 * x
+    found = mirrored(uneven, sector)
+    assert np.abs(found).max() == pytest.approx(np.abs(uneven).max(), rel=1e-12)
+    assert np.allclose(found / np.abs(found).max(), pattern / np.abs(pattern).max(), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("mirrors", ["x", "xyz"])

@@ -27,7 +27,10 @@ def digests(store: Store) -> dict[str, str]:
     return {job.key: store.get(job.key).attrs["digest"] for job in store.ledger.jobs("done")}
 
 
-def test_every_executor_stores_the_same(shrinking: Solves, tmp_path: Path, write_plan: Write) -> None:
+def test_every_executor_stores_the_same(
+    shrinking: Solves, tmp_path: Path, write_plan: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)
     plan, found = Plan.load(write_plan()), []
     for name, opened in {"serial": executors.serial(), "processes": executors.processes(2)}.items():
         store = Store.open(tmp_path / name, create=True)
@@ -97,6 +100,12 @@ def test_options_that_contradict_each_other() -> None:
     for options in ({"workers": 0}, {"workers": -1, "dask": True}, {"scheduler": "tcp://x:1", "dask": True}):
         with pytest.raises(InvalidOption), executors.choose(**options):
             pass
+
+
+def test_threads_that_the_user_has_set_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "3")
+    with executors.processes(1) as workers:
+        assert workers.submit(surroundings).result()[0] == "3"
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://"])

@@ -90,14 +90,27 @@ def cut(mesh: FruitMesh, mirrors: str) -> Sector:
 
 
 def evened(heights: Floats, sector: Sector) -> Floats:
-    """Return heights (nc,) made equal on all images of a column, as rough as before: their sum over root of copies."""
+    """Return random heights (nc,) made equal on all images of a column, as rough as before: sums over root of copies."""
+    return _mean(heights, sector) * np.sqrt(sector.copies)
+
+
+def mirrored(heights: Floats, sector: Sector) -> Floats:
+    """Return heights (nc,) of a pattern made equal on all images of a column; the largest stays as large as it was.
+
+    What has the sector's symmetry already is kept as it is.
+    """
+    mean = _mean(heights, sector)
+    highest = np.abs(mean).max()
+    found: Floats = mean * (np.abs(heights).max() / highest) if highest > 0 else mean
+    return found
+
+
+def _mean(heights: Floats, sector: Sector) -> Floats:
+    """Return the mean of heights (nc,) over all images of each column."""
     if sector.copies == 1:
         return heights
-    total = np.bincount(sector.image, weights=heights)
-    count = np.bincount(sector.image)
-    mean: Floats = (total / count)[sector.image]
-    found: Floats = mean * np.sqrt(sector.copies)
-    return found
+    mean: Floats = (np.bincount(sector.image, weights=heights) / np.bincount(sector.image))[sector.image]
+    return mean
 
 
 def _rounded(directions: Floats) -> Ints:

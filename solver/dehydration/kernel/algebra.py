@@ -46,6 +46,12 @@ HOURGLASS = (XI | ETA, ETA | ZETA, XI | ZETA, XI | ETA | ZETA)
 FULL_SHARE = 0.1
 """Share of the exocarp integrated 2x2x2; the rest uses two points through the thickness at the in-plane centre
 (full integration locks in shear, none at all leaves hourglass modes)."""
+LINE = (29 / 27) ** 0.5
+"""Places of these two points, zeta = -LINE and +LINE. An element has one pressure, so that what bends within a layer is
+borne by the deviatoric stress alone, which is a third of what a plate that keeps its volume has (2/3 mu e^2 of 2 mu e^2 where it
+bends along one direction). The mean of zeta^2 over all points is therefore 1 in place of 1/3: FULL_SHARE / 3 +
+(1 - FULL_SHARE) LINE^2 = 1. Then a skin of two layers bends with its full stiffness, at Gauss points with 5/6 of it. Every plane
+wave bends a plate along one direction, and the rest of a bending energy, its Gaussian curvature, integrates to nothing."""
 BARRIER_BELOW, BARRIER_STIFFNESS, TANGENT_BELOW = 0.6, 8.0, 0.25
 
 MU, KAPPA, INVERSE_VOLUME, GEOMETRY = 0, 1, 2, 3
@@ -61,7 +67,7 @@ ONE_POINT_PLANES = MEAN_PLANES + 9
 
 CORE_WEIGHTS = (1.0,) * 8
 EXOCARP_WEIGHTS = (FULL_SHARE,) * 8 + (4.0 * (1.0 - FULL_SHARE),) * 2
-"""Quadrature weights on the cube [-1, 1]^3, in stored order (2x2x2 first, then zeta = -GAUSS, +GAUSS)."""
+"""Quadrature weights on the cube [-1, 1]^3, in stored order (2x2x2 first, then zeta = -LINE, +LINE)."""
 
 
 class Arithmetic(Protocol):
@@ -156,11 +162,11 @@ def gauss_derivatives(modes: Sequence[Vector]) -> list[list[Vector]]:
 
 
 def centre_line_derivatives(modes: Sequence[Vector]) -> list[list[Vector]]:
-    """D at the two points on the in-plane centre line, zeta = -GAUSS and +GAUSS: [point][direction] -> vector."""
+    """D at the two points on the in-plane centre line, zeta = -LINE and +LINE: [point][direction] -> vector."""
     return [
         [
-            [p + (s * GAUSS) * q for p, q in zip(modes[XI], modes[XI | ZETA], strict=True)],
-            [p + (s * GAUSS) * q for p, q in zip(modes[ETA], modes[ETA | ZETA], strict=True)],
+            [p + (s * LINE) * q for p, q in zip(modes[XI], modes[XI | ZETA], strict=True)],
+            [p + (s * LINE) * q for p, q in zip(modes[ETA], modes[ETA | ZETA], strict=True)],
             list(modes[ZETA]),
         ]
         for s in SIGNS
@@ -188,7 +194,7 @@ def modal_from_points(stress: Sequence[Sequence[Vector]]) -> dict[int, Vector]:
     for s, point in zip(SIGNS, stress[8:], strict=False):
         for k, own in enumerate((XI, ETA)):
             add(own, point[k])
-            add(own | ZETA, [(s * GAUSS) * p for p in point[k]])
+            add(own | ZETA, [(s * LINE) * p for p in point[k]])
         add(ZETA, point[2])
     return modal
 

@@ -13,6 +13,7 @@ from solver.dehydration.kernel.algebra import (
     GAUSS,
     GAUSS_SIGNS,
     HOURGLASS,
+    LINE,
     SIGNS,
     XI,
     ZETA,
@@ -26,7 +27,7 @@ from ...arrays import Floats
 CORNERS = HEX8.nodes
 """Local coordinates of the eight nodes, (8, 3): bits of the node's number."""
 GAUSS_POINTS = GAUSS * np.array(GAUSS_SIGNS, dtype=np.float64)
-EXOCARP_POINTS = np.concatenate([GAUSS_POINTS, [(0.0, 0.0, s * GAUSS) for s in SIGNS]])
+EXOCARP_POINTS = np.concatenate([GAUSS_POINTS, [(0.0, 0.0, s * LINE) for s in SIGNS]])
 
 
 def quadrature(exocarp: bool) -> tuple[Floats, Floats]:
