@@ -1,8 +1,7 @@
 """The slopes of rods at their vertices: of the parabola through a vertex and its neighbours, by rest lengths.
 
 A bond is sheared by the mean slope of both rods that it joins. By the slope of one alone, two rods that turn apart, as
-the faces of a crack that opens, would be sheared, and hold together by what no crack has: a split beam of 7 rods to its
-height bore a quarter too much.
+the faces of a crack that opens, would be sheared, and hold together by what no crack has.
 """
 
 from __future__ import annotations
