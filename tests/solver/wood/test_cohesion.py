@@ -12,13 +12,15 @@ from solver.wood.model.plan import KEEP
 from solver.wood.model.state import scratch_for
 
 PLAIN = {"grain": {"stiffness": 0.0, "strength": 0.0}}
+#: So weak that rods as coarse as these hold less at their strength than cracks cost.
+WEAK = {"rods": 9, "vertices": 6, "cleavage": 1e6, "shear_strength": 2e6, **PLAIN}
 PLANK = {"outline": [(-0.005, -0.01), (0.005, -0.01), (0.005, 0.01), (-0.005, 0.01)]}
 
 
 @pytest.mark.parametrize("mix", [0.0, 0.3, 1.0])
 def test_taking_a_bond_apart_costs_its_crack(mix):
     """By summing what each growth of damage sets free; Benzeggagh and Kenane between opening and shear."""
-    params = SOLVER.parse({"rods": 9, "vertices": 6, "toughness": 200.0, "toughness_sliding": 800.0, **PLAIN})
+    params = SOLVER.parse({**WEAK, "toughness": 200.0, "toughness_sliding": 800.0})
     wood = lay(params, 6)
     b, plan = wood.bonds, scratch_for(wood).plan
     last = np.zeros(len(b.i))
@@ -40,7 +42,7 @@ def test_taking_a_bond_apart_costs_its_crack(mix):
 
 
 def test_damage_does_not_heal_and_begins_at_the_strength():
-    wood = lay(SOLVER.parse({"rods": 9, "vertices": 6, **PLAIN}), 6)
+    wood = lay(SOLVER.parse(WEAK), 6)
     b, plan = wood.bonds, scratch_for(wood).plan
     zero = np.zeros(len(b.i))
     assert soften(plan, b, np.stack([0.99 * b.opens, zero]), 2.0) == (0, 0, 0)
@@ -54,6 +56,15 @@ def test_damage_does_not_heal_and_begins_at_the_strength():
     # broken ones that are far from what they joined are forgotten
     assert soften(plan, b, np.stack([b.k * b.rest, zero]), 2.0)[2] == len(b.i)
     assert (b.on == 0).all()
+
+
+def test_coarse_bonds_are_weaker_and_as_tough():
+    wood = lay(SOLVER.parse({**WEAK, "cleavage": 1e8}), 6)
+    b, plan = wood.bonds, scratch_for(wood).plan
+    zero = np.zeros(len(b.i))
+    assert (b.opens > b.torn).all()
+    assert soften(plan, b, np.stack([0.9 * b.torn, zero]), 2.0)[0] == 0
+    assert soften(plan, b, np.stack([1.1 * b.torn, zero]), 2.0)[1] == len(b.i)
 
 
 @pytest.mark.parametrize("values", [{}, PLANK])
