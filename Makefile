@@ -14,7 +14,7 @@ PAGE   := $(VIEWER)/dist/index.html
 NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
 
-.PHONY: demo page test test-processor test-slow mutants bench docs stress lint format clean constraints
+.PHONY: demo demo-map page test test-processor test-slow mutants bench docs stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -30,8 +30,14 @@ $(PAGE): $(VIEWER)/package-lock.json $(wildcard $(VIEWER)/*.html $(VIEWER)/*.ts 
 ## page: build the web page that `wizen serve` shows at /; half a minute, and only when its sources changed
 page: $(PAGE)
 
-## demo: run the six fruits of Fig. 7's right part, build their table, draw it and serve it
+## demo: draw what comes with the package and serve it, before any run
 demo: $(STAMP)
+	$(BIN)/wizen table list --picture fruits.png
+	@$(MAKE) page || echo 'the page is not built (see above); the service answers without it'
+	WIZEN_STORE= XDG_DATA_HOME=$(abspath $(VENV))/none $(BIN)/wizen serve --port $(PORT)
+
+## demo-map: run the six fruits of Fig. 7's right part, build their table, draw it and serve it; some minutes
+demo-map: $(STAMP)
 	@$(MAKE) page || echo 'the page is not built (see above); the service answers without it'
 	$(BIN)/wizen sweep examples/fig7-right.toml --store $(STORE)
 	$(BIN)/wizen table build --store $(STORE)

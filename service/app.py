@@ -16,7 +16,7 @@ from starlette.routing import Route
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, page, problems, results
+from . import catalogue, maps, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import results as jobs_results
@@ -96,6 +96,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         jobs_events.router,
         jobs_results.router,
         results.router,
+        maps.router,
     )
     app.include_router(catalogue.open_router, responses=problems.responses(414))
     for router in guarded:

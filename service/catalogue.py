@@ -37,6 +37,7 @@ def index(request: Request) -> Response:
     if page.wanted(request.headers.get("accept")):
         return page.answer(request)
     links = {
+        "maps": "/v1/maps",
         "tables": "/v1/tables",
         "solvers": "/v1/solvers",
         "shapes": "/v1/shapes/{solver}",

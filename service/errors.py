@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 __all__ = [
-    "AmbiguousTable",
     "BatchTooLarge",
     "BodyTooLarge",
     "Forbidden",
@@ -25,6 +24,7 @@ __all__ = [
     "TooManyListeners",
     "Unauthorized",
     "Unavailable",
+    "Uncertain",
     "UncertainBatch",
     "UnfitFormat",
     "UnknownSolver",
@@ -43,19 +43,26 @@ class Wrong(NamedTuple):
 class ServiceError(Exception):
     """Something asked for that cannot be answered. `advice` says what to change; `wrong` lists every culprit.
 
-    `headers` are for the answer that reports it.
+    `headers` are for the answer that reports it, `more` is said in it besides.
     """
 
     code: ClassVar[str] = "service-error"
 
     def __init__(
-        self, message: str, *, advice: str = "", wrong: Sequence[Wrong] = (), headers: Mapping[str, str] | None = None
+        self,
+        message: str,
+        *,
+        advice: str = "",
+        wrong: Sequence[Wrong] = (),
+        headers: Mapping[str, str] | None = None,
+        more: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__(message)
         self.message = message
         self.advice = advice
         self.wrong = tuple(wrong)
         self.headers = dict(headers or {})
+        self.more = dict(more or {})
 
     def __str__(self) -> str:
         return f"{self.message} {self.advice}".strip()
@@ -80,10 +87,10 @@ class OutsideRanges(InvalidQuery):
     code = "outside-table"
 
 
-class AmbiguousTable(InvalidQuery):
-    """A solver with several tables, none of which was chosen."""
+class Uncertain(InvalidQuery):
+    """A shape whose expected error is above what was asked for."""
 
-    code = "ambiguous-table"
+    code = "too-uncertain"
 
 
 class UncertainBatch(InvalidQuery):

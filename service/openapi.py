@@ -173,7 +173,13 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
         *(_query(name, text, dict(schema)) for name, (text, schema) in detail.parameters().items()),
         _query(
             "table",
-            "Name of the table; needed only where a solver has several",
+            "Name of the table. Without it, the one that holds what is asked",
+            {"type": "string"},
+        ),
+        _query(
+            "preset",
+            "Named parameters, for what is not said: "
+            + ", ".join(f"{name}: {', '.join(vocabulary.solver_named(name).presets)}" for name in registry.names()),
             {"type": "string"},
         ),
         _query(

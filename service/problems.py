@@ -85,6 +85,14 @@ class Culprit(BaseModel):
     advice: str = Field("", description="What to change")
 
 
+class Nearest(BaseModel):
+    """The table that comes nearest to what was asked for."""
+
+    table: str = Field(description="Its name")
+    distance: float = Field(description="Over all parameters: logarithms of ratios, or differences")
+    parameters: dict[str, dict[str, Any]] = Field(description="What was asked, the nearest in the table, how far")
+
+
 class Problem(BaseModel):
     """An error as RFC 9457 describes it, with advice."""
 
@@ -98,6 +106,8 @@ class Problem(BaseModel):
     instance: str = Field(description="The request that met the problem")
     request_id: str = Field("", description="Names the request in the service's log")
     errors: list[Culprit] = Field(default_factory=list, description="Every wrong parameter")
+    nearest: Nearest | None = Field(None, description="The table that comes nearest")
+    links: dict[str, str] = Field(default_factory=dict, description="The run that answers: its address and its command")
 
 
 def of(error: Exception, scope: Scope) -> Response:
@@ -111,6 +121,7 @@ def of(error: Exception, scope: Scope) -> Response:
         str(getattr(error, "advice", "")),
         [Culprit(**wrong._asdict()) for wrong in getattr(error, "wrong", ())],
         getattr(error, "headers", None),
+        getattr(error, "more", {}),
     )
 
 
@@ -185,6 +196,7 @@ def _response(
     advice: str = "",
     wrong: Iterable[Culprit] = (),
     headers: Mapping[str, str] | None = None,
+    more: Mapping[str, Any] | None = None,
 ) -> Response:
     query = scope.get("query_string", b"").decode("latin-1")
     problem = Problem(
@@ -196,6 +208,7 @@ def _response(
         instance=quote(scope["path"]) + (f"?{query[:512]}" if query else ""),
         request_id=scope.get("state", {}).get("request_id", ""),
         errors=list(wrong),
+        **(more or {}),
     )
     body = problem.model_dump(exclude_defaults=True)
     extra = {"Cache-Control": "no-store", **(headers or {})}

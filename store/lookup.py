@@ -196,7 +196,7 @@ class ShapeTable:
             displacement=found[1],
             poles=found[2],
             stage=s,
-            parameters=values,
+            parameters=self.info.complete(values),
             descriptors=self._describe(near, stages),
             weights={self._keys[i]: float(w) for i, w in zip(near.samples, near.weights, strict=True)},
             nearest=near.nearest,
@@ -292,7 +292,7 @@ class ShapeTable:
 
     def at_parameters(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return the solver's parameters of a point on the varying axes."""
-        return insert(self.info.template, self.info.places, values)
+        return insert(self.info.template, self.info.places, self.info.complete(values))
 
     def fresh(self, values: Mapping[str, float]) -> Fresh:
         """Return the fresh shape at a point on the varying axes.
@@ -308,7 +308,8 @@ class ShapeTable:
                 "Ask for 'displacement', or open it with surfaces=solver.registry.surface.",
             )
         places = self._fresh_places
-        known = {name: values[name] for name in places if name in values}
+        full = self.info.complete(values)
+        known = {name: full[name] for name in places if name in full}
         return self._surface.of(insert(self._fresh_template, places, known))
 
 

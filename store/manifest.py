@@ -6,13 +6,14 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from . import seal
 from .canonical import canonical
 from .errors import CorruptTable, UnknownTable
+from .families.ties import Tie
 
 __all__ = ["TableInfo", "directory", "read_manifest", "write_manifest"]
 
@@ -25,7 +26,8 @@ class TableInfo:
 
     `axes` are the parameters that vary, with their bounds; `fixed` those that do not. `places` says where each scalar
     sits in the solver's parameters, of which `template` is one complete set. `resolution` is the band limit and the
-    lattice that holds it exactly. `digest` is that of the content; `created` (UTC) is not part of it.
+    lattice that holds it exactly. `digest` is that of the content; `created` (UTC) is not part of it. `tied` are
+    parameters that vary along with an axis, `plan` is the text of the plan whose runs it holds.
     """
 
     name: str
@@ -45,6 +47,14 @@ class TableInfo:
     places: dict[str, tuple[str, int | None]]
     keys: tuple[str, ...]
     created: str
+    tied: dict[str, Tie] = field(default_factory=dict)
+    plan: str = ""
+
+    def complete(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return values on the axes, and with them those of the parameters that follow."""
+        if not self.tied:
+            return dict(values)
+        return {**values, **{name: tie(values[tie.leader]) for name, tie in self.tied.items() if tie.leader in values}}
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -69,6 +79,7 @@ class TableInfo:
             fields[name] = tuple(fields[name])
         fields["axes"] = {axis: (float(low), float(high)) for axis, (low, high) in fields["axes"].items()}
         fields["places"] = {axis: (field, index) for axis, (field, index) in fields["places"].items()}
+        fields["tied"] = {name: Tie.from_json(tie) for name, tie in fields.get("tied", {}).items()}
         return cls(**fields)
 
 

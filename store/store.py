@@ -2,6 +2,7 @@
 
 root/shards/ab/abcd....h5   one file per result, named by its key
 root/tables/<name>/         generations of look-up tables
+root/plans/<name>.toml      plans as they were written when last swept
 root/ledger.sqlite          who computes what; can be rebuilt from the shards
 """
 
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
+from urllib.parse import quote
 
 from . import seal, shards
 from .errors import CorruptShard, MissingStore, UnknownJob
@@ -69,6 +71,22 @@ class Store:
     def ledger(self) -> Ledger:
         """The record of jobs; its file appears with the first job."""
         return Ledger(self.root / "ledger.sqlite")
+
+    def keep_plan(self, name: str, text: str) -> None:
+        """Keep a plan as it is written, for the tables that are built of its runs."""
+        seal.make_directory(self.root / "plans")
+        seal.publish(self._plan(name), text.encode())
+
+    def plan(self, name: str) -> str:
+        """Return a plan as it was written when it was last swept; an empty text where nobody kept it."""
+        try:
+            return self._plan(name).read_text(encoding="utf-8")
+        except OSError:
+            return ""
+
+    def _plan(self, name: str) -> Path:
+        # plans may be called anything
+        return self.root / "plans" / f"{quote(name, safe=' ')[:200]}.toml"
 
     def table_names(self) -> list[str]:
         """Return the names of the tables that can be opened, sorted."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 from solver.contract import Solver
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Precision", "TableInfo", "build", "info", "open", "path_of", "prune", "rebuild"]
 
-#: How a spectrum's numbers are stored.
-Precision = Literal["float32", "float64"]
+#: How a spectrum's numbers are stored; int16 is packed, see `surfaces.packed`.
+Precision = Literal["int16", "float32", "float64"]
 
 
 def build(
@@ -44,11 +44,13 @@ def build(
     keys: Collection[str] | None = None,
     resolution: int | None = None,
     dtype: Precision = "float32",
+    text: str = "",
 ) -> TableInfo:
     """Build a table from the finished runs of `solver` and make it current.
 
     `keys` names the results, if not all that fit are wanted; `resolution` cuts the spectra to that band, and so the
-    lattice that holds them. The same results make the same digest, in whatever order they were stored.
+    lattice that holds them; `text` is the plan as it is written, for those who want to make more. The same results make
+    the same digest, in whatever order they were stored.
 
     Raises:
         EmptyTable: no finished run fits.
@@ -59,11 +61,11 @@ def build(
 
     """
     samples = collect(store, solver.name, solver.params.axes, Choice(plan, quality, version, keys))
-    return _write(store, solver, name, samples, resolution, dtype)
+    return _write(store, solver, name, samples, resolution, dtype, text)
 
 
 def _write(
-    store: Store, solver: Solver, name: str, samples: Samples, resolution: int | None, dtype: Precision
+    store: Store, solver: Solver, name: str, samples: Samples, resolution: int | None, dtype: Precision, text: str
 ) -> TableInfo:
     home = directory(store.tables_dir, name)
     band = min(resolution or samples.need["resolution"], samples.need["resolution"])
@@ -92,6 +94,8 @@ def _write(
         places=samples.axes,
         keys=samples.keys,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
+        tied=samples.tied,
+        plan=text,
     )
     write_manifest(store.tables_dir, table)
     return table
@@ -123,9 +127,9 @@ def rebuild(
     now = info(store, name)
     if now.solver != solver.name:
         raise MixedSamples(f"table {name!r} is of {now.solver}, not of {solver.name}.", "Build one under another name.")
-    precision: Precision = dtype or ("float64" if now.dtype == "float64" else "float32")
+    precision: Precision = dtype or cast(Precision, now.dtype)
     samples = collect(store, solver.name, now.places, Choice(keys={*now.keys, *more}))
-    return _write(store, solver, name, samples, resolution or now.resolution, precision)
+    return _write(store, solver, name, samples, resolution or now.resolution, precision, now.plan)
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from solver.arrays import Floats
 from solver.contract import InvalidInput
 
 if TYPE_CHECKING:
+    from store.families.choose import Families
     from store.lookup import ShapeTable
 
 __all__ = ["shape"]
@@ -31,21 +32,40 @@ def shape(solver: str, point: Mapping[str, float], stage: float, resolution: int
     from store.errors import OutsideTable
 
     try:
-        found = _table(solver).at(point, stage, resolution=resolution, fields=("displacement",))
+        found = _table(solver, tuple(point.items()), stage).at(
+            point, stage, resolution=resolution, fields=("displacement",)
+        )
     except OutsideTable as error:
         raise InvalidInput(f"no shape of {solver}: {error.message}", advice=error.advice) from error
     assert found.displacement is not None
     return np.asarray(found.displacement, float)
 
 
+def _table(solver: str, point: tuple[tuple[str, float], ...], stage: float) -> ShapeTable:
+    """Return the table that holds a point, or the nearest one, which says what it does not hold."""
+    families = _families(solver)
+    fit = families.choose(dict(point), stage)
+    return _open((fit or families.nearest(dict(point), stage)[0]).info.name)
+
+
 @cache
-def _table(solver: str) -> ShapeTable:
-    from store import starter, tables
+def _families(solver: str) -> Families:
+    from solver import registry
+    from store import starter
+    from store.errors import UnknownTable
+    from store.families import stored
+    from store.store import Store
+
+    try:
+        return stored.families(Store.open(starter.ROOT), registry.get(solver))
+    except UnknownTable:
+        raise InvalidInput(f"no table of {solver} comes with wizen.", advice="Solve that shape itself.") from None
+
+
+@cache
+def _open(name: str) -> ShapeTable:
+    from store import starter
     from store.lookup import ShapeTable
     from store.store import Store
 
-    opened = Store.open(starter.ROOT)
-    for name in opened.table_names():
-        if tables.info(opened, name).solver == solver:
-            return ShapeTable.open(opened, name)
-    raise InvalidInput(f"no table of {solver} comes with wizen.", advice="Solve that shape itself.")
+    return ShapeTable.open(Store.open(starter.ROOT), name)

@@ -22,6 +22,7 @@ LENGTH_UNIT = "r1"
 class About:
     """What a shape does not know of itself: its solver, its table's name, what the table holds fixed.
 
+    `made` says how its runs were done where that is not the usual: mirror planes, a pattern that they start from.
     `units` are those of the parameters and the stage; `detail` says what was chosen of resolution, part and fields;
     `links` and `timings` [ms] appear in JSON alone.
     """
@@ -34,6 +35,7 @@ class About:
     detail: Mapping[str, Any] = field(default_factory=dict)
     links: Mapping[str, str] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
+    made: Mapping[str, Any] = field(default_factory=dict)
 
 
 def extras(shape: Shape, about: About) -> dict[str, Any]:
@@ -44,6 +46,7 @@ def extras(shape: Shape, about: About) -> dict[str, Any]:
         "table": about.table,
         "digest": shape.table,
         "params": {**about.fixed, **shape.parameters},
+        **({"made": dict(about.made)} if about.made else {}),
         "stage": {"symbol": about.stage_symbol, "value": shape.stage},
         "exact": shape.exact,
         "converged": shape.converged,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from starlette.datastructures import State
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from solver.contract import SolverError
+from solver.contract import Solver, SolverError
 from store.errors import StoreError
 
 from ..errors import ServiceError
@@ -44,8 +44,9 @@ class Answer(NamedTuple):
 
 
 class _Asked(NamedTuple):
-    solver: str
-    table: str | None
+    solver: Solver
+    table: str
+    families: object
     digest: str
     tag: str
     route: object
@@ -90,13 +91,15 @@ class Answers:
             while self._held > self._room:
                 self._held -= len(self._bodies.popitem(last=False)[1].body)
 
-    def remember(self, scope: Scope, solver: str, table: str | None, digest: str, tag: str) -> None:
-        """Remember that the words of a request ask for the answer `tag` while the table has that digest."""
+    def remember(self, scope: Scope, solver: Solver, table: str, families: object, digest: str, tag: str) -> None:
+        """Remember that the words of a request ask for the answer `tag` while the solver's tables are those `families`,
+        and the one that answers has that digest.
+        """
         asked = _question(scope)
         if len(asked.query) + len(asked.path) + len(asked.accept) > _LONGEST:
             return
         with self._guard:
-            self._asked[asked] = _Asked(solver, table, digest, tag, scope.get("route"))
+            self._asked[asked] = _Asked(solver, table, families, digest, tag, scope.get("route"))
             self._asked.move_to_end(asked)
             while len(self._asked) > _QUESTIONS:
                 self._asked.popitem(last=False)
@@ -107,10 +110,11 @@ class Answers:
         if asked is None:
             return None
         try:
-            table = state.tables.get(state.tables.choose(asked.solver, asked.table))
+            table = state.tables.get(asked.table)
+            families = state.tables.families(asked.solver)
         except (StoreError, ServiceError, SolverError, OSError):
             return None  # the handler meets the same, and explains it
-        if table.digest != asked.digest:
+        if table.digest != asked.digest or families is not asked.families:
             return None
         found = self.get(asked.tag)
         if found is not None:

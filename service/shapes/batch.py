@@ -12,7 +12,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from starlette.responses import Response, StreamingResponse
 
-from solver.contract import SolverError
+from solver.contract import Solver, SolverError
 from store.errors import StoreError, TooUncertain
 from store.lookup import ShapeTable
 from store.shape import Shape
@@ -23,11 +23,11 @@ from ..formats import About
 from ..settings import Settings
 from . import batch_formats
 from . import detail as level
+from .asking import Found, beyond, choose, preset_of, words_of
 from .batch_formats import Batch
 from .batch_request import BatchRequest, expand
 from .live import LiveTables
 from .query import RESERVED, ShapeQuery, Words, parse
-from .routes import words_of
 
 __all__ = ["router"]
 
@@ -59,18 +59,18 @@ def batch(request: Request, body: BatchRequest) -> Response:
     tables: LiveTables = request.app.state.tables
     solver = vocabulary.solver_named(body.solver)
     chosen = batch_formats.negotiate(request.headers.get("accept"), body.format)
-    name = tables.choose(body.solver, body.table)
-    table = tables.get(name)
+    entries = expand(body.points)
+    found = _table(tables, solver, body, entries)
+    name, table = found.name, tables.get(found.name)
     words = words_of(solver, table, settings.max_resolution)
     detail = level.read(body.detail)
     # what is wrong with all of them is said first, and alone: it would hide what is wrong with some
     resolution = detail.resolution(body.resolution, table.resolution, settings.max_resolution)
-    entries = expand(body.points)
     _check_size(detail, resolution, len(entries), settings)
     wrong = [*detail.refused(chosen), *_off(body, settings)]
     if wrong:
         raise InvalidQuery.of(wrong)
-    queries = _queries(entries, words)
+    queries = _queries(entries, words, found)
     # of an archive, positions: the other half of it only for those who name it
     fields = ("position",) if chosen.name == "npz" and detail.fields is None else detail.of(chosen)
     _check_shapes(table, queries, "position" in fields)
@@ -91,9 +91,34 @@ def batch(request: Request, body: BatchRequest) -> Response:
         stage_symbol=words.stage,
         units=words.units,
         detail=detail.said(resolution, table.resolution),
+        made=words.made,
     )
-    found = Batch(table, about, queries, resolution, detail.window, fields, look_up)
-    return _answer(batch_formats.encode(chosen, found), batch_formats.media_type(chosen, found))
+    made = Batch(table, about, queries, resolution, detail.window, fields, look_up)
+    return _answer(batch_formats.encode(chosen, made), batch_formats.media_type(chosen, made))
+
+
+def _table(tables: LiveTables, solver: Solver, body: BatchRequest, entries: list[Mapping[str, float]]) -> Found:
+    """Return the table that holds all entries, or else the one nearest to the first that is held by another.
+
+    Raises:
+        UnknownTable: there is none of that name, or none at all.
+        InvalidQuery: there is no such preset.
+
+    """
+    preset = preset_of(solver, body.preset)
+    if body.table is not None:
+        tables.belongs(body.table, solver.name)
+        filled = {} if preset is None else tables.families(solver).values({}, preset)
+        return Found(body.table, preset, filled)
+    families = tables.families(solver)
+    found = [choose(families, entry, solver.stages.symbol, preset) for entry in entries]
+    best = found[0]
+    for one in {one.name: one for one in found}.values():
+        # of those that answer some entry, one that answers all
+        only = families.only(one.name)
+        if all(not choose(only, entry, solver.stages.symbol, preset).fits for entry in entries):
+            best = one
+    return best
 
 
 def _answer(parts: Iterator[bytes], media_type: str) -> Response:
@@ -151,7 +176,7 @@ def _off(body: BatchRequest, settings: Settings) -> list[Wrong]:
     return [Wrong("resolution", detail, "An operator raises the limit with WIZEN_MAX_RESOLUTION.")]
 
 
-def _queries(entries: list[Mapping[str, float]], words: Words) -> list[ShapeQuery]:
+def _queries(entries: list[Mapping[str, float]], words: Words, found: Found) -> list[ShapeQuery]:
     """Return the questions of all entries.
 
     Raises:
@@ -164,7 +189,8 @@ def _queries(entries: list[Mapping[str, float]], words: Words) -> list[ShapeQuer
     for i, entry in enumerate(entries):
         common = [Wrong(n, "is not a parameter of one shape", "Give it for all.") for n in RESERVED if n in entry]
         try:
-            query = parse([(name, repr(value)) for name, value in entry.items()], words, common)
+            items = [(name, repr(value)) for name, value in entry.items()]
+            query = parse(items, words, common, found.filled, beyond(found, words))
         except InvalidQuery as error:
             only_outside = False
             wrong += _entry(i, error.wrong)

@@ -200,6 +200,7 @@ def _about(batch: Batch, rows: _Rows) -> str:
         "table": about.table,
         "digest": batch.table.digest,
         "params": dict(about.fixed),
+        "made": dict(about.made),
         "axes": list(batch.table.axes),
         "stage": about.stage_symbol,
         "method": rows.method,

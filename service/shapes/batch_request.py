@@ -28,7 +28,8 @@ class BatchRequest(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     solver: str = Field(description="Name of a solver; GET /v1/solvers lists them", examples=["dehydration"])
-    table: str | None = Field(None, description="Name of the table; needed only where a solver has several")
+    table: str | None = Field(None, description="Name of the table; else the one that holds all points")
+    preset: str | None = Field(None, description="Named parameters, for what the points do not say")
     points: Annotated[list[Row], Field(min_length=1)] | Columns = Field(
         description="One object per shape with the table's axes and the stage; or one list per name, all of one "
         "length, where a number stands for all shapes",

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlencode
 
 from fastapi import Request
 from starlette.responses import Response
 
-from solver.contract import Need, Solver
+from solver.contract import Need
 from store.errors import TooUncertain
-from store.lookup import ShapeTable
+from store.families.stored import document
+from sweeps.commands.terminal.tables import run_command
 
-from ..errors import OutsideRanges
-from ..formats import Format
+from ..errors import OutsideRanges, Uncertain
 from ..jobs.submit import submit
 from ..security import authorize, bearer
-from .query import ShapeQuery
+from .asking import Asked
 
 __all__ = ["RESPONSE", "offered", "redirect"]
 
@@ -29,18 +30,29 @@ RESPONSE: dict[str, Any] = {
 _OFFER = "With exact=run and a token of the scope run, the service runs exactly this."
 
 
-def offered(error: OutsideRanges | TooUncertain) -> OutsideRanges | TooUncertain:
-    """Return a refusal whose advice says that the shape can be run."""
+def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain) -> OutsideRanges | Uncertain:
+    """Return a refusal that says which table is the nearest, and how the shape can be run."""
     advice = f"{error.advice} {_OFFER}".strip()
+    kept = [(name, text) for name, text in request.query_params.multi_items() if name != "exact"]
+    said = {name: value for name, value in asked.query.said.items() if name != asked.words.stage}
+    command = run_command(asked.solver.name, asked.found.preset, said, asked.query.stage)
+    links = {"exact": f"{request.url.path}?{urlencode([*kept, ('exact', 'run')])}", "command": command}
+    more: dict[str, Any] = {"links": links}
+    if asked.found.fits:
+        near = asked.found.fits[0]
+        more["nearest"] = document(near)
+        advice = f"The nearest table is {near.info.name!r}, {near.distance:.3g} away. {advice}"
     if isinstance(error, OutsideRanges):
-        return OutsideRanges(error.message, advice=advice, wrong=error.wrong)
-    return TooUncertain(error.message, advice)
+        return OutsideRanges(error.message, advice=advice, wrong=error.wrong, more=more)
+    return Uncertain(error.message, advice=advice, more=more)
 
 
-def redirect(request: Request, solver: Solver, table: ShapeTable, query: ShapeQuery, chosen: Format) -> Response:
+def redirect(request: Request, asked: Asked) -> Response:
     """Ask for the run of a query in the name of the request's token, and send its asker there.
 
-    Parameters that the query does not name are the table's; the quality is `default`.
+    Where the table holds the fruit, and only the point or the stage is off its axes, parameters that the query does
+    not name are the table's, so that the run goes with its samples; else they are the preset's or the solver's
+    defaults. The quality is `default`.
 
     Raises:
         Unauthorized, Forbidden: the request has no token for it.
@@ -49,10 +61,21 @@ def redirect(request: Request, solver: Solver, table: ShapeTable, query: ShapeQu
 
     """
     token = authorize(request.app.state, bearer(request), "run")
-    params = {**table.info.template, **query.named, **query.point}
-    need = Need(stages=(query.stage,), quality="default")
-    found = submit(request.app.state, solver, params, need, token.id, unlimited=token.allows("admin"))
+    query, need = asked.query, Need(stages=(asked.query.stage,), quality="default")
+    params, preset = _run(asked)
+    found = submit(
+        request.app.state, asked.solver, params, need, token.id, preset=preset, unlimited=token.allows("admin")
+    )
     location = found.location
     if found.job.state == "done":
-        location += f"/result?{urlencode({'format': chosen.name})}"
+        location += f"/result?{urlencode({'format': asked.chosen.name})}"
+    assert query.exact
     return Response(status_code=303, headers={"Location": location, "Cache-Control": "no-store"})
+
+
+def _run(asked: Asked) -> tuple[Mapping[str, Any], str | None]:
+    """Return the parameters of the run of a question, and the preset that they go over."""
+    query, table = asked.query, asked.table.info
+    if query.is_elsewhere:
+        return {name: value for name, value in query.said.items() if name != asked.words.stage}, asked.found.preset
+    return {**table.template, **table.complete(query.point), **query.named}, None

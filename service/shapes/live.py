@@ -6,7 +6,6 @@ Readers hold the `ShapeTable` that they were given until they are done; a swap o
 from __future__ import annotations
 
 import difflib
-import math
 import threading
 import time
 from dataclasses import dataclass
@@ -14,13 +13,15 @@ from functools import lru_cache
 from pathlib import Path
 
 from solver import registry
+from solver.contract import Solver
 from store.errors import CorruptTable, StoreError, UnknownTable
+from store.families.choose import Families
+from store.families.stored import families
 from store.generations.generation import Judged, judged
 from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, info, path_of
 
-from ..errors import AmbiguousTable, Wrong
 from ..telemetry import LOGGER
 
 __all__ = ["LiveTables"]
@@ -44,7 +45,8 @@ class LiveTables:
         self._root = root
         self._interval = interval
         self._open: dict[str, _Open] = {}
-        self._chosen: dict[str, tuple[str, float]] = {}
+        self._manifests: dict[str, tuple[Stamp, TableInfo]] = {}
+        self._families: dict[str, tuple[Families, float]] = {}
         self._opening = threading.Lock()
         self._looking = threading.Lock()
         self._store: Store | None = None
@@ -115,53 +117,54 @@ class LiveTables:
                 self._looking.release()
         return entry.table
 
-    def choose(self, solver: str, name: str | None = None) -> str:
-        """Return `name`, or else the solver's table: the one of its name, the default, or the only one.
+    def belongs(self, name: str, solver: str) -> None:
+        """Refuse a table that is not the solver's.
 
         Raises:
-            UnknownTable: the solver has no table, or none of that name.
-            AmbiguousTable: it has several, none of which goes before the others.
+            UnknownTable: it is another's, or there is none of that name.
 
         """
-        if name is not None:
-            found = self._solver(name)
-            if found != solver:
-                raise UnknownTable(
-                    f"table {name!r} belongs to the solver {found!r}, not to {solver!r}.",
-                    f"Ask /v1/shapes/{found}, or choose another table.",
-                )
-            return name
-        chosen, looked = self._chosen.get(solver, ("", -math.inf))
-        if time.monotonic() - looked < self._interval and chosen in self._open:
-            return chosen  # the directory is not listed for every request
-        found = self._usual(solver)
-        self._chosen[solver] = found, time.monotonic()
+        found = self._solver(name)
+        if found != solver:
+            raise UnknownTable(
+                f"table {name!r} belongs to the solver {found!r}, not to {solver!r}.",
+                f"Ask /v1/shapes/{found}, or choose another table.",
+            )
+
+    def families(self, solver: Solver) -> Families:
+        """Return the solver's tables, to choose among; the same object until one of them changes.
+
+        Raises:
+            UnknownTable: there is none.
+
+        """
+        known = self._families.get(solver.name)
+        now = time.monotonic()
+        if known is not None and now - known[1] < self._interval:
+            return known[0]  # the directory is not listed for every request
+        found = families(self.store, solver, self._manifest)
+        if known is not None and found.infos == known[0].infos:
+            found = known[0]
+        self._families[solver.name] = found, now
         return found
 
-    def is_ready(self, solver: str, name: str | None = None) -> bool:
-        """Return whether `choose` and `get` will find an open table at once."""
-        return (self._chosen.get(solver, ("", 0.0))[0] if name is None else name) in self._open
+    def is_open(self, name: str) -> bool:
+        """Return whether `get` will find the table open."""
+        return name in self._open
 
-    def _usual(self, solver: str) -> str:
-        names = self.names()
-        own = [n for n in names if self._belongs(n, solver)]
-        for usual in (solver, "default"):
-            if usual in own:
-                return usual
-        if len(own) == 1:
-            return own[0]
-        if not own:
-            raise UnknownTable(
-                f"there is no table of {solver!r} yet.", "Run a sweep and build a table; GET /v1/tables lists all."
-            )
-        wrong = Wrong("table", f"{solver} has several tables", f"Add table= and one of {', '.join(own)}.")
-        raise AmbiguousTable.of([wrong])
-
-    def _belongs(self, name: str, solver: str) -> bool:
-        try:
-            return self._solver(name) == solver
-        except CorruptTable:
-            return False  # a damaged table must not hide the others
+    def _manifest(self, name: str) -> TableInfo:
+        """Return a table's manifest, that of the generation which is served where the newest is damaged."""
+        stamp = self._stamp(name)
+        known = self._manifests.get(name)
+        if known is None or known[0] != stamp:
+            try:
+                known = stamp, info(self.store, name)
+            except CorruptTable:
+                if name not in self._open:
+                    raise
+                known = stamp, self._open[name].table.info
+            self._manifests[name] = known
+        return known[1]
 
     def _solver(self, name: str) -> str:
         # a table that is open need not be read again to know whose it is

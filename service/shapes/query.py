@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 from store.blending import methods
 from store.errors import OutsideTable
+from store.families.match import TIED, same
+from store.families.ties import Tie
 from store.surfaces.measures import Measures
 
 from ..errors import InvalidQuery, Wrong
@@ -19,7 +21,7 @@ from . import detail
 __all__ = ["LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
 
 #: Names that are not axes.
-RESERVED = ("resolution", "table", "format", "method", "max_error", "exact", *detail.NAMES)
+RESERVED = ("resolution", "table", "preset", "format", "method", "max_error", "exact", *detail.NAMES)
 
 #: Fewer colatitude samples hold no shape.
 LOWEST_RESOLUTION = 4
@@ -36,7 +38,9 @@ Range = tuple[float, float]
 
 
 class Words(NamedTuple):
-    """What may be asked: axes and stage with their ranges and units, and the numbers that the table holds fixed."""
+    """What may be asked: axes and stage with their ranges and units, the numbers that the table holds fixed, and those
+    that follow one of its axes. `made` says how its runs were done.
+    """
 
     axes: Mapping[str, Range]
     fixed: Mapping[str, float]
@@ -44,6 +48,8 @@ class Words(NamedTuple):
     stages: Range
     units: Mapping[str, str]
     max_resolution: int
+    tied: Mapping[str, Tie] = {}
+    made: Mapping[str, Any] = {}
 
     @property
     def ranges(self) -> dict[str, Range]:
@@ -62,7 +68,8 @@ class ShapeQuery(NamedTuple):
 
     `named` are fixed parameters that were given all the same, and `outside` what is off the table: then `point`,
     `stage` and `named` are a question to the solver, not to the table. `method` is spelt in one way. `max_error` limits
-    errors by measure. `exact`: what the table cannot answer is to be run.
+    errors by measure. `exact`: what the table cannot answer is to be run. `said` are the numbers that the asker named,
+    and `is_elsewhere`: no table holds this fruit, whatever its skin and stage.
     """
 
     point: dict[str, float]
@@ -73,12 +80,21 @@ class ShapeQuery(NamedTuple):
     method: str = methods.DEFAULT
     max_error: dict[str, float] | None = None
     exact: bool = False
+    said: Mapping[str, float] = {}
+    is_elsewhere: bool = False
 
 
-def parse(items: Sequence[tuple[str, str]], words: Words, also: Sequence[Wrong] = ()) -> ShapeQuery:
+def parse(
+    items: Sequence[tuple[str, str]],
+    words: Words,
+    also: Sequence[Wrong] = (),
+    filled: Mapping[str, Any] | None = None,
+    beyond: Sequence[Wrong] = (),
+) -> ShapeQuery:
     """Return the question that the decoded `items` of a query string ask; it may lie outside the table.
 
-    `also` is what is wrong besides.
+    `also` is what is wrong besides, `beyond` how the table is not the one that is asked for. `filled` are the
+    numbers of a preset, for what the asker does not say.
 
     Raises:
         InvalidQuery: listing every name that is unknown, missing or repeated, and every value that cannot be used.
@@ -96,22 +112,29 @@ def parse(items: Sequence[tuple[str, str]], words: Words, also: Sequence[Wrong] 
                 wrong.append(found)
             else:
                 chosen[name] = found
-        elif name in words.ranges or name in words.fixed:
+        elif name in words.ranges or name in words.fixed or name in words.tied:
             number = _number(text)
             if number is None:
                 wrong.append(Wrong(name, f"{text[:40]!r} is not a finite number", "Write it like 0.05."))
             else:
                 numbers[name] = number
-                outside += _off(name, number, words)
         elif name not in RESERVED:
-            wrong.append(_unknown(name, [*words.ranges, *words.fixed, *RESERVED]))
+            wrong.append(_unknown(name, [*words.ranges, *words.tied, *words.fixed, *RESERVED]))
+    said = dict(numbers)
+    known = {**words.ranges, **words.fixed, **words.tied}
+    numbers = {**{name: value for name, value in (filled or {}).items() if name in known}, **numbers}
+    for name, number in numbers.items():
+        outside += _off(name, number, words, numbers)
     for name in words.ranges:
-        if name not in given:
+        if name not in numbers and name not in given:
             wrong.append(Wrong(name, "is missing", f"Add {name}= and a number from {words.say(name)}."))
     if wrong:
         raise InvalidQuery.of([*wrong, *outside])
+    named_already = {w.name for w in outside}
+    outside += [w for w in beyond if w.name not in named_already]
     point = {name: numbers[name] for name in words.axes}
-    named = {name: value for name, value in numbers.items() if name in words.fixed}
+    named = {name: value for name, value in said.items() if name not in words.ranges}
+    chosen |= {"said": said, "is_elsewhere": any(w.name not in words.ranges for w in outside)}
     return ShapeQuery(point, numbers[words.stage], named=named, outside=tuple(outside), **chosen)
 
 
@@ -121,8 +144,15 @@ def _unknown(name: str, known: Sequence[str]) -> Wrong:
     return Wrong(name[:40], "is not a parameter of this table", advice)
 
 
-def _off(name: str, number: float, words: Words) -> list[Wrong]:
+def _off(name: str, number: float, words: Words, numbers: Mapping[str, float]) -> list[Wrong]:
     """Return what is wrong with a number that the table does not reach, or nothing."""
+    if name in words.tied:
+        tie = words.tied[name]
+        lead = numbers.get(tie.leader)
+        if lead is None or same(number, tie(lead), TIED):
+            return []
+        detail = f"{number:g} is not what goes with {tie.leader} = {lead:g} in this table, {tie(lead):.4g}"
+        return [Wrong(name, detail, f"Leave {name} out, or choose another table.")]
     if name in words.fixed:
         held = words.fixed[name]
         if math.isclose(number, held, rel_tol=_SLACK, abs_tol=1e-12):

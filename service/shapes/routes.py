@@ -5,31 +5,28 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 from urllib.parse import urlencode
-from weakref import WeakKeyDictionary
 
 from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from solver import __version__
-from solver.contract import Solver, SolverError
 from store.canonical import canonical
-from store.errors import StoreError, TooUncertain
-from store.lookup import ShapeTable
+from store.errors import TooUncertain
 
-from .. import problems, vocabulary
-from ..errors import OutsideRanges, ServiceError
-from ..formats import FORMATS, About, Format, negotiate
+from .. import problems
+from ..errors import OutsideRanges
+from ..formats import FORMATS, About, Format
 from ..settings import Settings
+from . import asking, exact
 from . import detail as level
-from . import exact
 from .answers import Answer, Answers, matches
-from .live import LiveTables
-from .query import ShapeQuery, Words, parse
+from .asking import Asked
+from .query import ShapeQuery
 
-__all__ = ["at_once", "router", "words_of"]
+__all__ = ["at_once", "router"]
 
 router = APIRouter(tags=["shapes"])
 
@@ -37,12 +34,6 @@ router = APIRouter(tags=["shapes"])
 #: for the interpreter there.
 _QUICK = ("points", "npz", "json")
 _SMALL = 128
-
-#: Where a request keeps its question, or what is wrong with it.
-_QUESTION = "wizen.question"
-
-#: The words of the tables in use, which one application serves with one limit.
-_kept_words: WeakKeyDictionary[ShapeTable, Words] = WeakKeyDictionary()
 
 _BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
 _CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()}
@@ -79,80 +70,21 @@ async def at_once(request: Request, solver: str) -> Response | None:
         ServiceError, StoreError, SolverError: as `_ask` and `_settle`, or too many wait already.
 
     """
-    if not request.app.state.tables.is_ready(solver, request.query_params.get("table")):
+    if not request.app.state.tables.is_open(asking.table_for(request, solver).name):
         return None  # opening a large table takes seconds
-    asked = _asked(request, solver)
-    if not asked.is_quick:
+    asked = asking.asked(request, solver)
+    # a shape is small, and no job is to be asked for
+    if asked.resolution > _SMALL or asked.chosen.name not in _QUICK or asked.query.exact:
         return None
     async with request.app.state.turns:
         return _settle(request, asked)
 
 
-class _Asked(NamedTuple):
-    """A question understood: what to look up where, and in which format to send it."""
-
-    solver: Solver
-    name: str
-    table: ShapeTable
-    words: Words
-    query: ShapeQuery
-    detail: level.Detail
-    chosen: Format
-    resolution: int
-
-    @property
-    def is_quick(self) -> bool:
-        """Whether a shape is small, and no job is to be asked for."""
-        return self.resolution <= _SMALL and self.chosen.name in _QUICK and not self.query.exact
-
-
 def _shape(request: Request, solver: str) -> Response:
-    return _settle(request, _asked(request, solver))
+    return _settle(request, asking.asked(request, solver))
 
 
-def _asked(request: Request, solver: str) -> _Asked:
-    """Return the question of a request, read and checked once: the way in and the handler share what came of it.
-
-    Raises:
-        ServiceError, StoreError, SolverError: it cannot be understood, or there is no table for it.
-
-    """
-    found = request.scope.get(_QUESTION)
-    if found is None:
-        try:
-            found = _ask(request, solver)
-        except (ServiceError, StoreError, SolverError) as error:
-            found = error
-        request.scope[_QUESTION] = found
-    if isinstance(found, Exception):
-        raise found
-    return found
-
-
-def _ask(request: Request, solver: str) -> _Asked:
-    """Return the question of a request.
-
-    Raises:
-        ServiceError, StoreError: it cannot be understood, or there is no table for it.
-
-    """
-    settings: Settings = request.app.state.settings
-    tables: LiveTables = request.app.state.tables
-    given = request.query_params
-    known = vocabulary.solver_named(solver)
-    chosen = negotiate(request.headers.get("accept"), given.get("format"))
-    name = tables.choose(solver, given.get("table"))
-    table = tables.get(name)
-    words = _kept_words.get(table)
-    if words is None:
-        words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
-    detail = level.read(given)
-    query = parse(given.multi_items(), words, detail.refused(chosen))
-    resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
-    return _Asked(known, name, table, words, query, detail, chosen, resolution)
-
-
-def _settle(request: Request, asked: _Asked) -> Response:
+def _settle(request: Request, asked: Asked) -> Response:
     """Return the shape, or send its asker to the run of it."""
     try:
         if asked.query.outside:
@@ -160,11 +92,11 @@ def _settle(request: Request, asked: _Asked) -> Response:
         return _answer(request, asked)
     except (OutsideRanges, TooUncertain) as error:
         if not asked.query.exact:
-            raise exact.offered(error) from None
-        return exact.redirect(request, asked.solver, asked.table, asked.query, asked.chosen)
+            raise exact.offered(request, asked, error) from None
+        return exact.redirect(request, asked)
 
 
-def _answer(request: Request, asked: _Asked) -> Response:
+def _answer(request: Request, asked: Asked) -> Response:
     """Return the shape, or that the asker has it already.
 
     Raises:
@@ -173,7 +105,8 @@ def _answer(request: Request, asked: _Asked) -> Response:
     """
     settings: Settings = request.app.state.settings
     answers: Answers = request.app.state.answers
-    solver, name, table, words, query, detail, chosen, resolution = asked
+    solver, found, table, words, query, detail, chosen, resolution = asked
+    name = found.name
     tag = _tag(chosen, name, table.digest, query, resolution, *detail.key)
     headers = {
         "ETag": tag,
@@ -184,11 +117,11 @@ def _answer(request: Request, asked: _Asked) -> Response:
         return Response(status_code=304, headers=headers)
     kept = answers.get(tag)
     if kept is not None:
-        answers.remember(request.scope, solver.name, request.query_params.get("table"), table.digest, tag)
+        answers.remember(request.scope, solver, name, request.app.state.tables.families(solver), table.digest, tag)
         return _whole(kept)
 
     begin = time.perf_counter()
-    found = table.at(
+    shape = table.at(
         query.point,
         query.stage,
         resolution=resolution,
@@ -207,8 +140,9 @@ def _answer(request: Request, asked: _Asked) -> Response:
         detail=detail.said(resolution, table.resolution),
         links=_links(request, resolution, detail) if chosen.name == "json" else {},
         timings={"lookup": 1e3 * (looked - begin)},
+        made=words.made,
     )
-    body = chosen.encode(found, about)
+    body = chosen.encode(shape, about)
     encoded = time.perf_counter()
     timing = f"lookup;dur={1e3 * (looked - begin):.3f}, encode;dur={1e3 * (encoded - looked):.3f}"
     if chosen.name == "json":  # its timings and its links are this request's own
@@ -218,7 +152,7 @@ def _answer(request: Request, asked: _Asked) -> Response:
     wire = tuple((key.lower().encode("latin-1"), value.encode("latin-1")) for key, value in headers.items())
     made = Answer(tag, (*wire, (b"server-timing", b"kept;desc=answered-before")), body)
     answers.keep(made)
-    answers.remember(request.scope, solver.name, request.query_params.get("table"), table.digest, tag)
+    answers.remember(request.scope, solver, name, request.app.state.tables.families(solver), table.digest, tag)
     return _whole(Answer(tag, (*wire, (b"server-timing", timing.encode("latin-1"))), body))
 
 
@@ -227,21 +161,6 @@ def _whole(answer: Answer) -> Response:
     response = Response(answer.body)
     response.raw_headers = list(answer.headers)
     return response
-
-
-def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
-    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers."""
-    described = vocabulary.axes(solver.name)
-    fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
-    units = {name: described[name].units for name in (*table.axes, *fixed) if name in described}
-    return Words(
-        axes=table.axes,
-        fixed=fixed,
-        stage=solver.stages.symbol,
-        stages=table.reach,
-        units={**units, solver.stages.symbol: solver.stages.units},
-        max_resolution=max_resolution,
-    )
 
 
 def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int, *detail: str) -> str:

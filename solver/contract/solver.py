@@ -55,7 +55,8 @@ class Solver:
     The rest is what the floors above want to know of it: `surface`, where the fresh shape is parametric, so that
     tables of shapes can be built; `looks`, its colours and labels; `preset_stages`, the stages worth a look of those
     presets that the default ones do not suit; `onset(params, method=, kappa_ratio=, quality=, context=)`, where it
-    can say at which stage its shape begins to lose its symmetry; `error(params, quality, last stage)`, the relative
+    can say at which stage its shape begins to lose its symmetry; `incidental`, parameters that say how a run is done
+    and not what of: tables that differ in them hold the same shapes; `error(params, quality, last stage)`, the relative
     error to expect of these parameters, which refuses what was never measured. `tolerances` are the worst of each
     quality over all that was.
     """
@@ -76,6 +77,7 @@ class Solver:
     looks: Looks = field(default_factory=Looks)
     preset_stages: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     onset: Callable[..., Any] | None = None
+    incidental: tuple[str, ...] = ("seed",)
     error: Callable[[Any, Quality, float], float] | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:

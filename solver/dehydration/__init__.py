@@ -89,4 +89,5 @@ SOLVER = Solver(
     surface=SURFACE,
     looks=LOOKS,
     onset=onset,
+    incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )

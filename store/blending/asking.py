@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import OutsideTable
+from ..families.match import compare
 from ..manifest import TableInfo
 
 __all__ = ["check_names", "check_number", "settle", "settle_stage"]
@@ -23,7 +24,7 @@ def settle(table: TableInfo, query: Mapping[str, float]) -> dict[str, float]:
         OutsideTable: a missing or unknown name, a value that is not finite, off its axis, or against what is fixed.
 
     """
-    known = [*table.axes, *table.fixed]
+    known = [*table.axes, *table.tied, *table.fixed]
     check_names("parameter", query, known)
     missing = [name for name in table.axes if name not in query]
     if missing:
@@ -31,7 +32,14 @@ def settle(table: TableInfo, query: Mapping[str, float]) -> dict[str, float]:
     for name in query:
         if name in table.fixed:
             _check_fixed(name, query[name], table.fixed[name])
-    return {name: _inside(name, query[name], *bounds, table) for name, bounds in table.axes.items()}
+    found = {name: _inside(name, query[name], *bounds, table) for name, bounds in table.axes.items()}
+    for miss in compare(table, {**query, **found}, [name for name in query if name in table.tied]):
+        lead = table.tied[miss.name].leader
+        raise OutsideTable(
+            f"{miss.name} = {miss.asked} is not in the table.",
+            f"It goes with {lead}: {miss.held:.4g} where {lead} = {found[lead]:g}. Leave it out.",
+        )
+    return found
 
 
 def settle_stage(table: TableInfo, stage: float) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ..surfaces import harmonics, window
+from ..surfaces.packed import Stored
 from ..surfaces.window import Patch
 from .methods import Method, bands, envelope, poles
 from .methods.cells import Cells
@@ -59,7 +60,7 @@ class Blender:
     `power` (sample, stage, l) by degree is read from the spectra where a table does not say.
     """
 
-    def __init__(self, stored: Array, samples: Samples | None, power: Array | None = None) -> None:
+    def __init__(self, stored: Stored, samples: Samples | None, power: Array | None = None) -> None:
         self._stored = stored
         self._samples = samples
         self._given = power
@@ -139,7 +140,7 @@ def complex_view(parts: Array) -> Array:
     return parts.view(np.result_type(parts.dtype, np.complex64))[..., 0]
 
 
-def powers(stored: Array) -> Array:
+def powers(stored: Stored) -> Array:
     """Return the power by degree (sample, stage, l) of spectra (sample, stage, component, m, k, part)."""
     return np.array(
         [[harmonics.power(harmonics.degrees(complex_view(stage))).sum(axis=0) for stage in sample] for sample in stored]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -24,10 +24,10 @@ from ..blending.methods.weights import Samples as Points
 from ..canonical import canonical
 from ..errors import MixedSamples, StorageFull
 from ..store import Store
-from ..surfaces import spectra
+from ..surfaces import packed, spectra
 from ..surfaces.measures import UNITS, Measures
 from . import trust
-from .generation import CONVERGENCE, DIMS, combined, map_spectra
+from .generation import CONVERGENCE, DIMS, PACKED, combined, map_spectra
 from .samples import Samples
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def write(
     samples: Samples,
     solver: Solver,
     band: int,
-    dtype: Literal["float32", "float64"],
+    dtype: Literal["int16", "float32", "float64"],
 ) -> Written:
     """Write the generation of `samples` to `path`, one sample in memory at a time.
 
@@ -67,21 +67,35 @@ def write(
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
     if shutil.disk_usage(path.parent).free < size:
         raise StorageFull(f"a table of {size / 1e6:.0f} MB does not fit on the disk of {path}.", "Free space first.")
-    total = hashlib.sha256()
     rows: list[Rows] = []
-    with h5netcdf.File(path, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file:
-        file.dimensions = dict(zip(DIMS, shape, strict=True))
-        target = file.create_variable("spectrum", DIMS, dtype)
-        target.attrs["units"] = quantities.QUANTITIES["displacement"].units
-        target.attrs["long_name"] = "double-Fourier-sphere amplitudes of the displacement, see `store.surfaces`"
-        for i, key in enumerate(samples.keys):
+
+    def blocks() -> Iterator[Array]:
+        for key in samples.keys:
             result = store.get(key)
-            block = spectra_of(result, key, samples.need, band).astype(dtype)
+            rows.append(_rows(result))
+            yield spectra_of(result, key, samples.need, band)
+
+    total = hashlib.sha256()
+    more: dict[str, Any] = {}
+    stored: packed.Packed | None = None
+    with h5netcdf.File(path, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file:
+        if dtype == "int16":
+            whole = [block.astype(np.float32) for block in blocks()]
+            codes = packed.encode(whole)
+            file.dimensions = dict(zip(PACKED, codes.codes.shape, strict=True))
+            target = _spectrum(file, PACKED, dtype)
+            target.attrs["rms_loss"], target.attrs["max_loss"] = packed.loss(whole, codes)
+            more, stored = _packing(codes), packed.Packed(codes)
+            written: Iterable[Array] = codes.codes
+        else:
+            file.dimensions = dict(zip(DIMS, shape, strict=True))
+            target = _spectrum(file, DIMS, dtype)
+            written = (block.astype(dtype) for block in blocks())
+        for i, block in enumerate(written):
             total.update(block.data)
             target[i] = block
-            rows.append(_rows(result))
-    small = _small(samples, rows, solver, band)
-    small = small.assign(_judge(map_spectra(path), samples, solver))
+    small = _small(samples, rows, solver, band).assign(more)
+    small = small.assign(_judge(map_spectra(path) if stored is None else stored, samples, solver))
     content = combined(small, total.hexdigest())
     small.attrs["digest"] = content
     encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
@@ -89,6 +103,27 @@ def write(
         encoding[name]["dtype"] = "S1"
     small.to_netcdf(path, mode="a", engine="h5netcdf", encoding=encoding)
     return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
+
+
+def _spectrum(file: Any, dims: tuple[str, ...], dtype: str) -> Any:
+    target = file.create_variable("spectrum", dims, dtype)
+    target.attrs["units"] = quantities.QUANTITIES["displacement"].units
+    target.attrs["long_name"] = "double-Fourier-sphere amplitudes of the displacement, see `store.surfaces`" + (
+        "; times wave_step of their shell" if dims == PACKED else ""
+    )
+    return target
+
+
+def _packing(codes: packed.Codes) -> dict[str, xr.Variable]:
+    """Return what packed spectra are read with."""
+    import xarray as xr
+
+    place = {"units": "1", "long_name": "place of a wave among the flat (component, m, k, part); all others are zero"}
+    step = {
+        "units": quantities.QUANTITIES["displacement"].units,
+        "long_name": "what one step of the spectrum is, by the larger of m and k",
+    }
+    return {"wave_place": xr.Variable("wave", codes.place, place), "wave_step": xr.Variable("m", codes.step, step)}
 
 
 def spectra_of(result: xr.Dataset, key: str, need: Mapping[str, Any], band: int) -> Array:
@@ -152,7 +187,7 @@ def _small(samples: Samples, rows: list[Rows], solver: Solver, band: int) -> xr.
     return xr.Dataset(data, coords, attrs)
 
 
-def _judge(stored: Array, samples: Samples, solver: Solver) -> dict[str, xr.Variable]:
+def _judge(stored: packed.Stored, samples: Samples, solver: Solver) -> dict[str, xr.Variable]:
     """Return what look-ups want to know of the spectra: power by degree, errors, likeness of neighbours."""
     import xarray as xr
 

@@ -19,6 +19,7 @@ from .. import shards
 from ..canonical import canonical
 from ..errors import CorruptTable
 from ..surfaces.measures import Measures
+from ..surfaces.packed import Codes, Packed, Stored
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CONVERGENCE",
     "DIMS",
+    "PACKED",
     "Column",
     "Judged",
     "combined",
@@ -38,6 +40,8 @@ __all__ = [
 ]
 
 DIMS = ("sample", "stage", "component", "m", "k", "part")
+#: Dimensions of packed spectra, see `surfaces.packed`.
+PACKED = ("sample", "stage", "wave")
 
 #: Rows of a result that say how its run went, not what the surface is like.
 CONVERGENCE = ("converged", "residual", "iterations")
@@ -114,8 +118,8 @@ def judged(path: Path) -> Judged:
     return Judged(found[1] if found else None, tuple(likeness.values.tolist()) if likeness else None)
 
 
-def map_spectra(path: Path) -> Array:
-    """Map the spectra (sample, stage, component, m, k, part) of a generation, read-only.
+def map_spectra(path: Path) -> Stored:
+    """Map the spectra (sample, stage, component, m, k, part) of a generation, read-only; packed ones read alike.
 
     The mapping outlives the file's name. `path` must have been verified: HDF5 only tells where the values lie.
 
@@ -127,9 +131,11 @@ def map_spectra(path: Path) -> Array:
         with h5py.File(path) as file:
             variable = file["spectrum"]
             offset, shape, dtype = variable.id.get_offset(), variable.shape, variable.dtype
+            more = (file["wave_place"][()], file["wave_step"][()]) if len(shape) == len(PACKED) else None
         if offset is None:
             raise ValueError("the spectra are in chunks")
-        return np.asarray(np.memmap(path, dtype, "r", offset, shape))
+        mapped = np.asarray(np.memmap(path, dtype, "r", offset, shape))
+        return mapped if more is None else Packed(Codes(mapped, *more))
     except (OSError, KeyError, ValueError, RuntimeError) as error:
         if isinstance(error, FileNotFoundError):
             raise
@@ -144,7 +150,8 @@ def digest(path: Path) -> str:
 
     """
     total = hashlib.sha256()
-    for block in map_spectra(path):
+    stored = map_spectra(path)
+    for block in stored.codes if isinstance(stored, Packed) else stored:
         total.update(np.ascontiguousarray(block).data)
     with open(path) as opened:
         small = opened.drop_vars("spectrum").load()

@@ -12,6 +12,7 @@ from solver.contract import Fresh, Surface
 
 from ..canonical import canonical
 from ..errors import EmptyTable, MixedSamples, UnknownJob
+from ..families import ties
 from ..ledger.jobs import Job
 from ..store import Store
 
@@ -37,7 +38,7 @@ _HARMLESS = ("fields", "dtype", "tolerance")
 
 
 class Samples(NamedTuple):
-    """Results that agree in all but their axes, sorted by key."""
+    """Results that agree in all but their axes, sorted by key; `tied` are parameters that follow one of the axes."""
 
     keys: tuple[str, ...]
     values: tuple[dict[str, float], ...]
@@ -46,11 +47,12 @@ class Samples(NamedTuple):
     template: dict[str, Any]
     need: dict[str, Any]
     version: str
+    tied: dict[str, ties.Tie]
 
     @property
     def varying(self) -> list[str]:
-        """Names of the axes that take more than one value."""
-        return [name for name in self.axes if name not in self.fixed]
+        """Names of the axes that take more than one value, and follow no other."""
+        return [name for name in self.axes if name not in self.fixed and name not in self.tied]
 
     def points(self) -> Array | None:
         """Return the samples' places (sample, axes) on the varying axes; None for a single one."""
@@ -109,6 +111,7 @@ def collect(store: Store, solver: str, axes: Axes, choice: Choice) -> Samples:
         template=insert(first.params, axes, {name: min(v[name] for _, v in chosen) for name in axes}),
         need={**first.need, "fields": sorted(common)},
         version=first.version,
+        tied=ties.find({name: [v[name] for _, v in chosen] for name in axes if name not in constant}),
     )
 
 

@@ -21,6 +21,7 @@ from ..blending.neighbours import Weighted
 from ..errors import OutsideTable, TooUncertain
 from ..surfaces import harmonics
 from ..surfaces.measures import LATTICE, Measures, Surface, compare
+from ..surfaces.packed import Stored
 from ..surfaces.window import WHOLE
 
 __all__ = ["Trust", "correlations", "errors", "fresh", "leave_one_out", "refuse", "surface_of"]
@@ -37,7 +38,7 @@ def surface_of(blend: Blend, start: Array) -> Surface:
         return Surface(start, np.moveaxis(planes, 0, -1))
 
 
-def leave_one_out(blender: Blender, stored: Array, samples: Samples, shapes: list[Fresh], method: Method) -> Array:
+def leave_one_out(blender: Blender, stored: Stored, samples: Samples, shapes: list[Fresh], method: Method) -> Array:
     """Return measures (sample, stage, measure) of every sample predicted by the others.
 
     The log-linear fit behind LL is that of the whole table.
@@ -62,7 +63,7 @@ def fresh(shape: Fresh, n: int = LATTICE) -> Array:
     return shape.points(*lattice(n))
 
 
-def correlations(stored: Array, samples: Samples, shapes: list[Fresh]) -> Array:
+def correlations(stored: Stored, samples: Samples, shapes: list[Fresh]) -> Array:
     """Return the mean correlation (stage,) of the radial wrinkles of neighbouring samples."""
     pairs = samples.adjacent()
     found = np.empty((len(pairs), stored.shape[1]))

@@ -28,7 +28,8 @@ def rebuild(
         int | None, typer.Option("--resolution", min=4, help="Waves to keep, and the grid that holds them.")
     ] = None,
     precision: Annotated[
-        Literal["float32", "float64"] | None, typer.Option("--precision", help="float32 or float64.")
+        Literal["int16", "float32", "float64"] | None,
+        typer.Option("--precision", help="float32, float64, or int16: packed, a quarter to a twelfth of the bytes."),
     ] = None,
     as_json: As_json = False,
 ) -> None:

@@ -129,6 +129,7 @@ def sweep(
     read = Plan.load(plan)
     with executors.choose(workers, dask, scheduler) as pool:
         opened = Store.open(store, create=True)
+        opened.keep_plan(read.name, plan.read_text(encoding="utf-8"))
         left_out = f", {read.skipped} impossible ones left out" if read.skipped else ""
         note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
         reports = []

@@ -9,7 +9,8 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid
-from .terminal.options import As_json, Out, Set, Stages, StoreToRead, TableName, assignments, numbers
+from .terminal.options import As_json, Out, Preset, Set, Stages, StoreToRead, assignments, numbers
+from .terminal.tables import asked_table, open_store
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -26,7 +27,10 @@ def add_to(app: typer.Typer) -> None:
 def draw_map(
     out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="The picture.")],
     store: StoreToRead = None,
-    name: TableName = "default",
+    name: Annotated[
+        str | None, typer.Option("--name", help="The table; without, the one that holds --preset and --set.")
+    ] = None,
+    preset: Preset = None,
     x: Annotated[str | None, typer.Option("--x", metavar="AXIS", help="From left to right.")] = None,
     y: Annotated[str | None, typer.Option("--y", metavar="AXIS", help="From bottom to top.")] = None,
     stage: Annotated[float | None, typer.Option("--stage", help="One stage; the last one if not given.")] = None,
@@ -44,9 +48,7 @@ def draw_map(
     wizen map --store demo --out stages.png --stages 0.1,0.2,0.3
     """
     from solver import registry
-    from store import seal, starter
-    from store.lookup import ShapeTable
-    from store.store import Store
+    from store import seal
 
     from .. import outputs
     from ..pictures.maps import Map
@@ -56,9 +58,10 @@ def draw_map(
     if stage is not None and stages is not None:
         raise InvalidOption("--stage and --stages exclude each other.", "Keep one of them.")
     outputs.check_suffix(out, False, 1)
-    opened = Store.open(store or starter.ROOT)
-    table = ShapeTable.open(opened, name, surfaces=registry.surface)
-    drawing = Map(opened, table, registry.get(table.info.solver).axis_units(), assignments(set_), pixels)
+    said = assignments(set_)
+    table, values = asked_table(store, name, None, said, stage, preset)
+    name, given = table.info.name, {axis: value for axis, value in values.items() if axis in said}
+    drawing = Map(open_store(store), table, registry.get(table.info.solver).axis_units(), given, pixels)
     at = table.stages[-1] if stage is None else stage
     picture = drawing.by_stages(numbers(stages)) if stages is not None else drawing.by_axes(x, y, at)
     seal.publish(out, picture)
@@ -70,7 +73,11 @@ def query(
     store: StoreToRead = None,
     set_: Set = None,
     stages: Stages = None,
-    name: TableName = "default",
+    preset: Preset = None,
+    name: Annotated[
+        str | None, typer.Option("--name", help="The table; without, the one of --solver that holds this.")
+    ] = None,
+    solver: Annotated[str | None, typer.Option("--solver", help="Whose shapes, if several have tables.")] = None,
     resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None,
     method: Annotated[str | None, typer.Option("--method", help="How to look up, as `table score` names it.")] = None,
     max_error: Annotated[
@@ -80,9 +87,14 @@ def query(
     out: Out = None,
     as_json: As_json = False,
 ) -> None:
-    """Ask a table for a shape between its samples, and write it as .obj, .glb, .npz or .png.
+    """Ask the tables for a shape between their samples, and write it as .obj, .glb, .npz or .png.
+
+    Presets fill what is not set. The table is the one that holds these parameters; where none does, the nearest is
+    named, with what differs.
 
     [bold]Examples[/bold]
+
+    wizen query --preset sphere --set te=0.034 --stages 0.2 --out fruit.glb
 
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --out fruit.glb
 
@@ -95,22 +107,21 @@ def query(
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
     from solver import registry
-    from store import starter
     from store.blending import methods
-    from store.lookup import ShapeTable
 
     from .. import outputs
     from ..formats import Made
 
-    wanted = numbers(stages)
-    table = ShapeTable.open(store or starter.ROOT, name, surfaces=registry.surface)
+    wanted, said = numbers(stages), assignments(set_)
+    table, values = asked_table(store, name, solver, said, max(wanted, key=abs, default=None), preset)
+    name = table.info.name
     if not wanted:
         low, high = table.reach
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
     fields = outputs.fields_for(out, False)
-    values, how, limits = assignments(set_), method or methods.DEFAULT, _limits(max_error)
+    how, limits = method or methods.DEFAULT, _limits(max_error)
     told: dict[str, Any] = {"resolution": resolution, "fields": fields, "method": how, "max_error": limits}
     shapes = [table.at(values, stage, **told) for stage in wanted]
     document = {
@@ -121,11 +132,11 @@ def query(
         "path": None if out is None else str(out),
         "stages": [_document(shape) for shape in shapes],
     }
-    solver = registry.get(table.info.solver)
+    known = registry.get(table.info.solver)
     if out is not None:
         title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
-        outputs.save(out, Made(shapes, document, title, solver.name, name, table.fixed, units=solver.axis_units()))
-    emit(document, as_json, lambda console: _show(console, shapes, solver.stages.symbol, out))
+        outputs.save(out, Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units()))
+    emit(document, as_json, lambda console: _show(console, shapes, known.stages.symbol, out))
 
 
 def _show(console: Any, shapes: list[Shape], symbol: str, out: Path | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -11,6 +11,7 @@ from ..errors import InvalidOption
 from . import care as cli_tools
 from .terminal.console import emit, grid
 from .terminal.options import As_json, Quality, StorePath, StoreToRead, TableName
+from .terminal.tables import open_store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,9 +36,14 @@ def build(
     store: StorePath,
     name: TableName = "default",
     solver: Annotated[str | None, typer.Option("--solver", help="Whose results, if not of one solver.")] = None,
-    plan: Annotated[str | None, typer.Option("--plan", help="Only the results of this plan.")] = None,
+    plan: Annotated[
+        str | None, typer.Option("--plan", help="Only the results of this plan: its name, or its file.")
+    ] = None,
     quality: Quality = None,
     resolution: Annotated[int | None, typer.Option("--resolution", help="Cut the spectra to this band.")] = None,
+    precision: Annotated[
+        Literal["int16", "float32", "float64"], typer.Option("--precision", help="As for `table rebuild`.")
+    ] = "float32",
     as_json: As_json = False,
 ) -> None:
     """Build a table from the finished runs in a store, and make it the current one.
@@ -58,10 +64,12 @@ def build(
     from store.store import Store
 
     opened = Store.open(store)
+    plan, text = _plan(opened, plan)
     chosen = registry.get(solver or _only_solver(opened, plan))
     made = None
     if chosen.surface is not None and finished(opened, chosen.name, Choice(plan, quality), is_surface):
-        made = tables.build(opened, chosen, name, plan=plan, quality=quality, resolution=resolution)
+        told: dict[str, Any] = {"resolution": resolution, "text": text, "dtype": precision}
+        made = tables.build(opened, chosen, name, plan=plan, quality=quality, **told)
     elif resolution is not None:
         raise InvalidOption("--resolution cuts shapes, and there are none.", "Leave it out.")
     numbers: dict[str, Any] | None = None
@@ -76,6 +84,86 @@ def build(
     elif numbers is not None:
         found = numbers
         emit({"name": name, "scalars": found}, as_json, lambda console: _show_numbers(console, name, found))
+
+
+@table_app.command("list")
+def list_(
+    store: StoreToRead = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="A picture of each, side by side.")
+    ] = None,
+    as_json: As_json = False,
+) -> None:
+    """List the tables of shapes: what each covers, how good it is, which presets it holds.
+
+    [bold]Examples[/bold]
+
+    wizen table list
+
+    wizen table list --picture fruits.png
+
+    wizen table list --store demo --json
+    """
+    from solver import registry
+    from store import seal, tables
+    from store.families import stored
+
+    from ..families import covered, gallery
+
+    opened = open_store(store)
+    if picture is not None and picture.suffix != ".png":
+        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+    found = []
+    for name in opened.table_names():
+        table = tables.info(opened, name)
+        solver = registry.get(table.solver)
+        found.append(covered(opened, stored.families(opened, solver), table, solver))
+
+    if picture is not None:
+        seal.publish(picture, gallery(opened))
+
+    def show(console: Any) -> None:
+        rows = []
+        for one in found:
+            axes = "; ".join(
+                f"{axis} {', '.join(f'{v:g}' for v in said['values'])}" for axis, said in one["axes"].items()
+            )
+            stages = ", ".join(f"{said['stage']:g}" for said in one["stages"])
+            good = sum(said["converged"] or 0 for said in one["stages"])
+            rows.append(
+                [
+                    one["name"],
+                    axes,
+                    stages,
+                    f"{good} of {one['samples'] * len(one['stages'])}",
+                    str(one["quality"]),
+                    f"{one['solver']} {one['version']}",
+                    ", ".join(one["presets"]),
+                    f"{one['bytes'] / 1e6:.3g} MB",
+                ]
+            )
+        grid(console, ["table", "axes", "stages", "converged", "quality", "version", "presets", "size"], rows)
+
+    emit({"tables": found}, as_json, show)
+
+
+@table_app.command("plan")
+def plan_(name: Annotated[str, typer.Argument(help="Name of the table.")], store: StoreToRead = None) -> None:
+    """Print the plan that a table was made from, so that anybody can make the rest of it, or all of it again.
+
+    [bold]Examples[/bold]
+
+    wizen table plan sphere > sphere.toml
+    """
+    from store import tables
+    from store.errors import UnknownTable
+
+    text = tables.info(open_store(store), name).plan
+    if not text:
+        raise UnknownTable(
+            f"nobody kept the plan of table {name!r}.", "Build it again with --plan and the plan's file."
+        )
+    typer.echo(text, nl=not text.endswith("\n"))
 
 
 @table_app.command()
@@ -211,6 +299,16 @@ def _show_numbers(console: Any, name: str, numbers: dict[str, Any]) -> None:
     console.print(f"table {name}: {len(numbers['variables'])} numbers of {numbers['solver']} over {over}", markup=False)
     console.print(", ".join(numbers["variables"]), markup=False)
     console.print(numbers["path"], markup=False)
+
+
+def _plan(store: Store, plan: str | None) -> tuple[str | None, str]:
+    """Return a plan's name and its text, of its name or of its file."""
+    if plan is None or not plan.endswith(".toml"):
+        return plan, store.plan(plan) if plan is not None else ""
+    from ..planning.plan import Plan
+
+    path = Path(plan)
+    return Plan.load(path).name, path.read_text(encoding="utf-8")
 
 
 def _show_table(table: Any, path: Path, as_json: bool, numbers: dict[str, Any] | None) -> None:

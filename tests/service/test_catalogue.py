@@ -119,7 +119,7 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     operations = {op["operationId"]: op for each in document["paths"].values() for op in each.values()}
     assert set(operations) == {
         "index", "health", "tables", "table", "solvers", "solver", "shape", "batch", "jobs", "ask", "job", "cancel",
-        "events", "result", "results",
+        "events", "result", "results", "maps", "thumbnail", "plan",
     }  # fmt: skip
     assert document["servers"]
     needs = {name: operation["security"] for name, operation in operations.items()}

@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from service.formats import FORMATS
-from service.shapes import detail, routes
+from service.shapes import asking, detail
 
 from .conftest import QUERY, SHAPE, client_of
 
@@ -20,7 +20,7 @@ class Counted:
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.queries = self.details = 0
-        parse, read = routes.parse, detail.read
+        parse, read = asking.parse, detail.read
 
         def counted_parse(*values: Any) -> Any:
             self.queries += 1
@@ -30,7 +30,7 @@ class Counted:
             self.details += 1
             return read(*values)
 
-        patch.setattr(routes, "parse", counted_parse)
+        patch.setattr(asking, "parse", counted_parse)
         patch.setattr(detail, "read", counted_read)
 
 

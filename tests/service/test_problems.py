@@ -50,7 +50,7 @@ EXPECTED: dict[type[Exception], int] = {
     errors.ServiceError: 500,
     errors.InvalidQuery: 422,
     errors.OutsideRanges: 422,
-    errors.AmbiguousTable: 422,
+    errors.Uncertain: 422,
     errors.NotAcceptable: 406,
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,

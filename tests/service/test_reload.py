@@ -8,8 +8,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.errors import AmbiguousTable
 from service.shapes.live import LiveTables
+from solver import registry
+from solver.dehydration import SOLVER
 from store import tables
 from store.errors import UnknownTable
 from store.store import Store
@@ -83,11 +84,11 @@ def test_a_deleted_table_is_gone_and_may_come_back(own: Store) -> None:
     assert live.get("default").size == 4
     (own.tables_dir / "default" / "current.json").unlink()
     with pytest.raises(UnknownTable):
-        live.choose("dehydration")
+        live.families(SOLVER)
     with pytest.raises(UnknownTable):
         live.get("default")
     build(own)
-    assert live.get(live.choose("dehydration")).size == 4
+    assert live.get(live.families(SOLVER).infos[0].name).size == 4
 
 
 def test_a_manifest_is_not_looked_at_for_every_request(own: Store) -> None:
@@ -100,18 +101,16 @@ def test_a_manifest_is_not_looked_at_for_every_request(own: Store) -> None:
 def test_choosing(own: Store) -> None:
     live = LiveTables(own.root, 0)
     build(own, "dehydration")
-    assert live.choose("dehydration") == "dehydration"
+    live.belongs("default", "dehydration")
     with pytest.raises(UnknownTable, match="belongs to the solver"):
-        live.choose("decay", "default")
+        live.belongs("default", "decay")
     with pytest.raises(UnknownTable, match="no table of 'decay'"):
-        live.choose("decay")
-    build(own, "other")
-    for name in ("default", "dehydration"):
-        (own.tables_dir / name / "current.json").unlink()
-    assert live.choose("dehydration") == "other"
-    build(own, "another")
-    with pytest.raises(AmbiguousTable, match="another, other"):
-        live.choose("dehydration")
+        live.families(registry.get("decay"))
+    both = live.families(SOLVER)
+    assert [info.name for info in both.infos] == ["default", "dehydration"]
+    assert live.families(SOLVER) is both
+    (own.tables_dir / "default" / "current.json").unlink()
+    assert [info.name for info in live.families(SOLVER).infos] == ["dehydration"]
 
 
 @pytest.mark.slow

@@ -229,12 +229,9 @@ def test_tables_are_chosen_by_name(own: Store) -> None:
         assert client.get("/v1/shapes/rot", params=QUERY).status_code == 404
 
 
-def test_several_tables_none_of_them_usual(own: Store) -> None:
-    for name in ("a", "b"):
-        build(own, name)
+def test_of_several_tables_that_hold_it_the_finer_answers(own: Store) -> None:
+    build(own, "a", resolution=8)
+    build(own, "b")
     (own.tables_dir / "default" / "current.json").unlink()
     with client_of(own.root) as client:
-        answer = ask(client, QUERY)
-        assert answer.status_code == 422
-        assert answer.json()["type"] == "urn:wizen:problem:ambiguous-table"
-        assert "a, b" in answer.json()["advice"]
+        assert ask(client, QUERY).json()["table"] == "b"

@@ -24,6 +24,19 @@ export interface Table {
   complaint?: string;
 }
 
+/** What a table covers, and where its picture is taken. */
+export interface Family {
+  name: string;
+  solver: string;
+  samples: number;
+  quality: string | null;
+  axes: Record<string, { values: number[] }>;
+  presets: string[];
+  portrait: Point;
+  links: { thumbnail: string };
+  complaint?: string;
+}
+
 export interface Solver {
   name: string;
   title: string;
@@ -92,6 +105,11 @@ async function get(path: string, options: RequestInit = {}): Promise<Response> {
 
 export async function tables(): Promise<Table[]> {
   return (await (await get("v1/tables")).json()).tables;
+}
+
+export async function families(): Promise<Family[]> {
+  const all: Family[] = (await (await get("v1/maps")).json()).maps;
+  return all.filter((family) => !family.complaint);
 }
 
 export async function solver(name: string): Promise<Solver> {

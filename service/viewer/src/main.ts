@@ -1,11 +1,23 @@
 // The page: catalogue -> sliders -> questions -> mesh. Each part is its own module and knows nothing of the others.
 
 import { Actions } from "./actions";
-import { Problem, shape, solver as askSolver, tables as askTables, type Answer, type Asked, type Point, type Table } from "./api";
+import {
+  Problem,
+  families as askFamilies,
+  shape,
+  solver as askSolver,
+  tables as askTables,
+  type Answer,
+  type Asked,
+  type Family,
+  type Point,
+  type Table,
+} from "./api";
 import { Choice, Slider } from "./controls";
 import { Detail } from "./detail";
 import { button, byId, el } from "./dom";
 import { Exact } from "./exact";
+import { familyChoice, familyOf } from "./families";
 import { Fruit } from "./fruit";
 import { Latest } from "./live";
 import { dressed } from "./looks";
@@ -45,11 +57,14 @@ async function start(): Promise<void> {
     );
   }
   const wanted = fromHash();
-  const table = usable.find((t) => t.name === wanted.table) ?? usable.find((t) => t.name === "default") ?? usable[0];
-  await page(table, usable, wanted);
+  const covered = await askFamilies();
+  const family = familyOf(covered, wanted.preset);
+  const first = [wanted.table ?? family?.name, "default", "sphere"].map((name) => usable.find((t) => t.name === name));
+  const table = first.find((found) => found !== undefined) ?? usable[0];
+  await page(table, covered, wanted);
 }
 
-async function page(table: Table, all: Table[], wanted: Record<string, string>): Promise<void> {
+async function page(table: Table, covered: Family[], wanted: Record<string, string>): Promise<void> {
   const solver = await askSolver(table.solver);
   const look = dressed(solver.looks);
   const axes = scales(table);
@@ -59,7 +74,10 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
     const given = wanted[scale.name] === undefined ? NaN : Number(wanted[scale.name]);
     point[scale.name] = Number.isFinite(given) ? clamp(scale, given) : at(scale, scale === stage ? 0.8 : 0.35);
   }
-  let skin = wanted.skin in look.shades ? wanted.skin : Object.keys(look.shades)[0];
+  const meant = presetsIn(table, solver)[wanted.preset ?? ""] ?? {};
+  for (const [name, value] of Object.entries(meant)) if (wanted[name] === undefined) point[name] = value;
+  const shades = Object.keys(look.shades);
+  let skin = wanted.skin in look.shades ? wanted.skin : (shades.find((name) => table.name.startsWith(name)) ?? shades[0]);
 
   const fruit = new Fruit();
   const studio = new Studio(canvas, fruit);
@@ -198,7 +216,7 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
 
   byId("subject").textContent = `${solver.title} · ${table.samples} runs`;
   byId("controls").replaceChildren(
-    ...(all.length > 1 ? [tableChoice(all, table)] : []),
+    ...(covered.length > 1 ? [familyChoice(covered, table.name, visit)] : []),
     ...sliders.slice(0, 1).map((slider) => slider.root),
     el("div", { class: "row" }, play, button("Reset view", () => studio.home())),
     ...sliders.slice(1).map((slider) => slider.root),
@@ -212,14 +230,12 @@ async function page(table: Table, all: Table[], wanted: Record<string, string>):
 const shares = (axes: Scale[], given: Record<string, number>): Point =>
   Object.fromEntries(axes.filter((axis) => axis.name in given).map((axis) => [axis.name, at(axis, given[axis.name])]));
 
-function tableChoice(all: Table[], current: Table): HTMLElement {
-  const select = el("select", { id: "table" }, ...all.map((t) => el("option", { value: t.name }, `${t.name} (${t.solver})`)));
-  select.value = current.name;
-  select.addEventListener("change", () => {
-    location.hash = new URLSearchParams({ table: select.value }).toString();
-    location.reload();
-  });
-  return el("div", { class: "choice" }, el("label", { for: "table" }, "Table"), select);
+/** Go to another family, to where its picture was taken. */
+function visit(family: Family): void {
+  const words = new URLSearchParams({ table: family.name });
+  for (const [name, value] of Object.entries(family.portrait)) words.set(name, String(value));
+  location.hash = words.toString();
+  location.reload();
 }
 
 async function keepTrying(): Promise<void> {

@@ -15,6 +15,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ...surfaces import harmonics, spectra
+from ...surfaces.packed import Stored
 from .bands import Bands
 
 __all__ = ["COARSE", "Cell", "Cells"]
@@ -42,7 +43,7 @@ class Cell(NamedTuple):
 class Cells:
     """Products of the spectra (sample, stage, component, m, k, part) of a table, kept for the cells last visited."""
 
-    def __init__(self, stored: Array, bands: Bands) -> None:
+    def __init__(self, stored: Stored, bands: Bands) -> None:
         self._stored = stored
         self._bands = bands
         self.of = lru_cache(maxsize=64)(self._of)

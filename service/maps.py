@@ -1,0 +1,98 @@
+"""`GET /v1/maps`: what the tables of shapes cover, by axis and stage, with a picture of each."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+from fastapi import APIRouter, Path, Request
+from starlette.responses import Response
+
+from solver.contract import InvalidGeometry, Solver
+from store.errors import CorruptTable, UnknownTable
+from store.families.choose import Families
+from store.lookup import ShapeTable
+from store.tables import TableInfo
+from sweeps import families as covering
+
+from . import problems, vocabulary
+from .shapes.answers import matches
+from .shapes.live import LiveTables
+
+__all__ = ["router"]
+
+router = APIRouter(tags=["catalogue"])
+
+_PNG: dict[str, Any] = {"image/png": {"schema": {"type": "string", "format": "binary"}}}
+
+
+@router.get("/v1/maps", summary="What is covered", responses=problems.responses(503))
+def maps(request: Request) -> dict[str, Any]:
+    """List the families of shapes that can be asked for: axes with the values that were run, stages with how many runs
+    converged and how far they are off, quality, version, how they were made, the presets that they hold.
+    """
+    live: LiveTables = request.app.state.tables
+    found: list[dict[str, Any]] = []
+    for name in live.names():
+        try:
+            info, solver, families = _known(live, name)
+            said = covering.covered(live.store, families, info, solver)
+        except (CorruptTable, FileNotFoundError) as error:
+            found.append({"name": name, "complaint": str(error)})
+            continue
+        point, stage = covering.portrait(live.store, families, info)
+        links: dict[str, str] = {
+            "self": f"/v1/tables/{name}",
+            "shapes": f"/v1/shapes/{info.solver}?table={name}",
+            "thumbnail": f"/v1/maps/{name}/thumbnail.png?v={info.digest[:12]}",
+        }
+        if info.plan:
+            links["plan"] = f"/v1/maps/{name}/plan.toml"
+        found.append({**said, "portrait": {**point, solver.stages.symbol: stage}, "links": links})
+    return {"maps": found}
+
+
+@router.get(
+    "/v1/maps/{name}/thumbnail.png",
+    summary="A picture of a family",
+    response_class=Response,
+    responses={200: {"content": _PNG}, 304: {"description": "It has not changed"}, **problems.responses(404, 503)},
+)
+def thumbnail(request: Request, name: str = Path(description="Name of a table; GET /v1/maps lists them")) -> Response:
+    """Draw a family's preset, or its middle sample, dried up."""
+    live: LiveTables = request.app.state.tables
+    info, _, families = _known(live, name)
+    headers = {"ETag": f'"{info.digest[:32]}-thumbnail"', "Cache-Control": "public, max-age=86400"}
+    if matches(request.headers.get("if-none-match", ""), headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    table = live.get(name)
+    point, stage = covering.portrait(live.store, families, table.info)
+    return Response(_drawn(table, tuple(point.items()), stage), headers=headers, media_type="image/png")
+
+
+@router.get(
+    "/v1/maps/{name}/plan.toml",
+    summary="The plan behind a family",
+    response_class=Response,
+    responses={200: {"content": {"application/toml": {"schema": {"type": "string"}}}}, **problems.responses(404, 503)},
+)
+def plan(request: Request, name: str = Path(description="Name of a table; GET /v1/maps lists them")) -> Response:
+    """Return the plan of the sweep that a table was made from: `wizen sweep` makes the rest of it."""
+    info: TableInfo = request.app.state.tables.info(name)
+    if not info.plan:
+        raise UnknownTable(f"nobody kept the plan of table {name!r}.", "GET /v1/maps says which have one.")
+    return Response(info.plan, media_type="application/toml")
+
+
+def _known(live: LiveTables, name: str) -> tuple[TableInfo, Solver, Families]:
+    info = live.info(name)
+    solver = vocabulary.solver_named(info.solver)
+    return info, solver, live.families(solver)
+
+
+@lru_cache(maxsize=64)
+def _drawn(table: ShapeTable, point: tuple[tuple[str, float], ...], stage: float) -> bytes:
+    try:
+        return covering.thumbnail(table, dict(point), stage)
+    except InvalidGeometry:
+        return covering.thumbnail(table, table.sample(table.size // 2), stage)

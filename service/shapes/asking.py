@@ -1,0 +1,179 @@
+"""From a request to a question understood: which table, which preset, which numbers, in which format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+from fastapi import Request
+
+from solver.contract import InvalidInput, Solver, SolverError
+from store.errors import StoreError
+from store.families import stored
+from store.families.choose import Families
+from store.families.match import STAGE, Fit
+from store.lookup import ShapeTable
+
+from .. import vocabulary
+from ..errors import InvalidQuery, ServiceError, Wrong
+from ..formats import Format, negotiate
+from ..settings import Settings
+from . import detail as level
+from .live import LiveTables
+from .query import RESERVED, ShapeQuery, Words, parse
+
+__all__ = ["Asked", "Found", "asked", "preset_of", "table_for", "words_of"]
+
+#: Where a request keeps which table answers it, and its question, or what is wrong with it.
+_TABLE, _QUESTION = "wizen.table", "wizen.question"
+
+#: The words of the tables in use, which one application serves with one limit.
+_kept_words: WeakKeyDictionary[ShapeTable, Words] = WeakKeyDictionary()
+
+
+class Found(NamedTuple):
+    """The table for a question, and the numbers of its preset; `fits` are the nearest ones where none holds it."""
+
+    name: str
+    preset: str | None = None
+    filled: Mapping[str, Any] = {}
+    fits: tuple[Fit, ...] = ()
+
+
+class Asked(NamedTuple):
+    """A question understood: what to look up where, and in which format to send it."""
+
+    solver: Solver
+    found: Found
+    table: ShapeTable
+    words: Words
+    query: ShapeQuery
+    detail: level.Detail
+    chosen: Format
+    resolution: int
+
+
+def table_for(request: Request, solver: str) -> Found:
+    """Return which table answers a request; read once for each.
+
+    Raises:
+        ServiceError, StoreError: there is no such solver, preset or table.
+
+    """
+    found = request.scope.get(_TABLE)
+    if found is None:
+        known, given = vocabulary.solver_named(solver), request.query_params
+        tables: LiveTables = request.app.state.tables
+        name, preset = given.get("table"), preset_of(known, given.get("preset"))
+        if name is not None:
+            tables.belongs(name, solver)
+            found = Found(name, preset, {} if preset is None else tables.families(known).values({}, preset))
+        else:
+            said = {k: number for k, v in given.items() if k not in RESERVED and (number := _number(v)) is not None}
+            found = choose(tables.families(known), said, known.stages.symbol, preset)
+        request.scope[_TABLE] = found
+    assert isinstance(found, Found)
+    return found
+
+
+def choose(families: Families, said: Mapping[str, Any], symbol: str, preset: str | None) -> Found:
+    """Return which of several tables holds the numbers that are said, the stage among them."""
+    known = families.infos[0].places
+    numbers = {name: value for name, value in said.items() if name in known or name in families.infos[0].fixed}
+    stage = said.get(symbol)
+    fit = families.choose(numbers, stage, preset)
+    filled = families.values({}, preset) if preset is not None else {}
+    if fit is not None:
+        return Found(fit.info.name, preset, filled)
+    fits = tuple(families.nearest(numbers, stage, preset))
+    return Found(fits[0].info.name, preset, filled, fits)
+
+
+def preset_of(solver: Solver, name: str | None) -> str | None:
+    """Return the name of a preset.
+
+    Raises:
+        InvalidQuery: the solver has none of that name.
+
+    """
+    if name is not None and name not in solver.presets:
+        try:
+            solver.parse({}, name[:40])
+        except InvalidInput as error:
+            raise InvalidQuery.of([Wrong("preset", error.message.rstrip("."), error.advice)]) from None
+    return name
+
+
+def asked(request: Request, solver: str) -> Asked:
+    """Return the question of a request, read and checked once: the way in and the handler share what came of it.
+
+    Raises:
+        ServiceError, StoreError, SolverError: it cannot be understood, or there is no table for it.
+
+    """
+    found = request.scope.get(_QUESTION)
+    if found is None:
+        try:
+            found = _ask(request, solver)
+        except (ServiceError, StoreError, SolverError) as error:
+            found = error
+        request.scope[_QUESTION] = found
+    if isinstance(found, Exception):
+        raise found
+    assert isinstance(found, Asked)
+    return found
+
+
+def _ask(request: Request, solver: str) -> Asked:
+    settings: Settings = request.app.state.settings
+    tables: LiveTables = request.app.state.tables
+    given = request.query_params
+    known = vocabulary.solver_named(solver)
+    chosen = negotiate(request.headers.get("accept"), given.get("format"))
+    found = table_for(request, solver)
+    table = tables.get(found.name)
+    words = _kept_words.get(table)
+    if words is None:
+        words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
+    detail = level.read(given)
+    query = parse(given.multi_items(), words, detail.refused(chosen), found.filled, beyond(found, words))
+    resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
+    return Asked(known, found, table, words, query, detail, chosen, resolution)
+
+
+def beyond(found: Found, words: Words) -> list[Wrong]:
+    """Return how the nearest table is not the one that is asked for, where none is."""
+    if not found.fits:
+        return []
+    near = found.fits[0]
+    return [
+        Wrong(words.stage if miss.name == STAGE else miss.name, *stored.describe(miss, near.info))
+        for miss in (*near.misses, *near.unusual)
+    ]
+
+
+def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
+    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers."""
+    described = vocabulary.axes(solver.name)
+    fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
+    units = {name: described[name].units for name in (*table.axes, *table.info.tied, *fixed) if name in described}
+    return Words(
+        axes=table.axes,
+        fixed=fixed,
+        stage=solver.stages.symbol,
+        stages=table.reach,
+        units={**units, solver.stages.symbol: solver.stages.units},
+        max_resolution=max_resolution,
+        tied=table.info.tied,
+        made=stored.made(table.info, solver),
+    )
+
+
+def _number(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None

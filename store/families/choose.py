@@ -1,0 +1,144 @@
+"""One question over all tables of a solver: which family answers it.
+
+What is said must fit, a preset's values like the asker's own. What nobody said is the solver's default, but in a lone
+table and in those called `default` or like the solver, which stand for themselves. Of several families that hold the
+fruit, the one with the nearest sample answers, then the one of the better quality, then of the finer waves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solver.arrays import Array
+
+from ..manifest import TableInfo
+from .match import STAGE, Fit, compare, flat
+
+__all__ = ["Base", "Families"]
+
+_QUALITIES = ("fine", "default", "preview")
+
+
+class Base(NamedTuple):
+    """What questions start from: the solver's name, its defaults, what only says how a run is done, and its presets."""
+
+    solver: str
+    defaults: Mapping[str, Any]
+    incidental: Collection[str]
+    presets: Mapping[str, Mapping[str, Any]]
+
+
+class _Still(NamedTuple):
+    """What of a fit does not depend on the numbers of a question, only on their names."""
+
+    fit: Fit
+    known: Mapping[str, Any]
+    tied: tuple[str, ...]
+
+
+class Families:
+    """The tables of one solver. `places` returns the samples (sample, axes) of one of them, on its own axes."""
+
+    def __init__(self, infos: Sequence[TableInfo], base: Base, places: Callable[[TableInfo], Array | None]) -> None:
+        self.infos = tuple(infos)
+        self._count = len(self.infos)
+        self._base = base
+        self._places = places
+        self._axes = infos[0].places if infos else {}
+        self._usual = flat(base.defaults, self._axes)
+        self._presets = {name: flat(values, self._axes) for name, values in base.presets.items()}
+        self._still = lru_cache(maxsize=256)(self._stand)
+
+    def only(self, name: str) -> Families:
+        """Return these families with that one alone; what nobody says is still the solver's default."""
+        found = Families([info for info in self.infos if info.name == name], self._base, self._places)
+        found._count = self._count
+        return found
+
+    def values(self, said: Mapping[str, Any], preset: str | None = None) -> dict[str, Any]:
+        """Return what is said, by the names that tables use: a preset's values, and over them the asker's."""
+        return {**(self._presets[preset] if preset is not None else {}), **flat(said, self._axes)}
+
+    def presets_of(self, info: TableInfo) -> list[str]:
+        """Return the presets that lie in a table, whatever else is said."""
+        return [name for name, values in self._presets.items() if not compare(info, values, self._counting(values))]
+
+    def choose(self, said: Mapping[str, Any], stage: float | None, preset: str | None = None) -> Fit | None:
+        """Return the fit of the family that answers, None if there is none; its `missing` axes have no value yet."""
+        own = said if said.keys() <= self._axes.keys() else flat(said, self._axes)
+        values = {**self._presets[preset], **own} if preset is not None else dict(own)
+        if stage is not None:
+            values[STAGE] = stage
+        names = [*own, STAGE] if stage is not None else list(own)
+        holding = [
+            still.fit
+            for still in self._still(preset, frozenset(own))
+            if not compare(still.fit.info, {**still.known, **values}, [*names, *still.tied])
+        ]
+        if len(holding) < 2:
+            return holding[0] if holding else None
+        least = min(len(fit.missing) for fit in holding)
+        fits = [fit for fit in holding if len(fit.missing) == least]
+        return fits[0] if len(fits) == 1 else min(fits, key=lambda fit: self._rank(fit, values))
+
+    def nearest(self, said: Mapping[str, Any], stage: float | None, preset: str | None = None) -> list[Fit]:
+        """Return all families with what each misses, the nearest first: for a question that none of them holds."""
+        values = self.values(said, preset) | ({STAGE: stage} if stage is not None else {})
+        return sorted((self.fit(info, values) for info in self.infos), key=lambda fit: (fit.distance, fit.info.name))
+
+    def fit(self, info: TableInfo, values: Mapping[str, Any]) -> Fit:
+        """Return how a table fits all that is said."""
+        rest = {} if self._is_own(info) else {k: v for k, v in self._usual.items() if k not in values}
+        unsaid = [name for name in self._counting(rest) if name not in info.axes]
+        return Fit(
+            info,
+            tuple(compare(info, values, self._counting(values))),
+            tuple(compare(info, {**rest, **values}, unsaid)),
+            tuple(name for name in info.axes if name not in values),
+        )
+
+    def _stand(self, preset: str | None, names: frozenset[str]) -> tuple[_Still, ...]:
+        """Return the families that fit as far as the preset and the defaults go, where `names` have other values."""
+        found = []
+        given = {k: v for k, v in (self._presets[preset] if preset is not None else {}).items() if k not in names}
+        for info in self.infos:
+            rest = {k: v for k, v in self._usual.items() if k not in names and k not in given}
+            known = given if self._is_own(info) else {**rest, **given}
+            counting = [k for k in self._counting(known) if k not in info.axes or k in given]
+            tied = tuple(k for k in counting if k in info.tied and info.tied[k].leader in names)
+            misses = compare(info, known, [k for k in counting if k not in tied])
+            if not misses:
+                missing = tuple(k for k in info.axes if k not in given and k not in names)
+                found.append(_Still(Fit(info, (), (), missing), known, tied))
+        return tuple(found)
+
+    def _counting(self, values: Mapping[str, Any]) -> list[str]:
+        """Return the names that count where nobody named them: all but the incidental ones."""
+        return [name for name in values if name not in self._base.incidental]
+
+    def _is_own(self, info: TableInfo) -> bool:
+        return self._count == 1 or info.name in ("default", self._base.solver)
+
+    def _rank(self, fit: Fit, values: Mapping[str, Any]) -> tuple[float, int, int, bool, str]:
+        quality = fit.info.need.get("quality", "")
+        place = _QUALITIES.index(quality) if quality in _QUALITIES else len(_QUALITIES)
+        info = fit.info
+        return round(self._nearest_sample(info, values), 9), place, -info.resolution, not self._is_own(info), info.name
+
+    def _nearest_sample(self, info: TableInfo, values: Mapping[str, Any]) -> float:
+        samples = self._places(info)
+        if samples is None:
+            return 0.0
+        offsets = []
+        for column, name in zip(samples.T, info.axes, strict=True):
+            asked = values.get(name)
+            if asked is None:
+                continue
+            is_ratio = asked > 0 and bool((column > 0).all())
+            offsets.append(np.log(column / asked) if is_ratio else column - asked)
+        return math.sqrt(float(np.min(np.sum(np.square(offsets), axis=0)))) if offsets else 0.0

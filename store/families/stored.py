@@ -1,0 +1,133 @@
+"""The families in a store, and what to say to whom none of them can answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.arrays import Array
+from solver.contract import Solver
+
+from ..errors import CorruptTable, OutsideTable, UnknownTable
+from ..generations import generation
+from ..manifest import TableInfo, directory, read_manifest
+from ..store import Store
+from .choose import Base, Families
+from .match import Fit, Miss, same
+
+__all__ = ["base", "describe", "document", "families", "made", "refusal", "samples", "values"]
+
+
+def base(solver: Solver) -> Base:
+    """Return what questions about shapes of a solver start from."""
+    defaults = {name: field.default for name, field in solver.params.model_fields.items() if not field.is_required()}
+    return Base(solver.name, defaults, solver.incidental, solver.presets)
+
+
+def families(store: Store, solver: Solver, read: Callable[[str], TableInfo] | None = None) -> Families:
+    """Return the tables of a solver in a store; damaged ones do not hide the others. `read` returns a table's manifest.
+
+    Raises:
+        UnknownTable: it has none.
+
+    """
+    infos, broken = [], None
+    for name in store.table_names():
+        try:
+            infos.append(read(name) if read is not None else read_manifest(store.tables_dir, name))
+        except CorruptTable as error:
+            broken = error
+        except UnknownTable:
+            continue  # deleted since the names were read
+    own = [info for info in infos if info.solver == solver.name]
+    if not own and broken is not None:
+        raise broken
+    if not own:
+        raise UnknownTable(f"there is no table of {solver.name!r} yet.", "Run a sweep and build a table.")
+    return Families(own, base(solver), lambda info: samples(store, info))
+
+
+def samples(store: Store, info: TableInfo) -> Array | None:
+    """Return the samples (sample, axes) of a table on its axes; None for a single one.
+
+    Raises:
+        CorruptTable, FileNotFoundError: its generation cannot be read.
+
+    """
+    return _samples(directory(store.tables_dir, info.name) / info.file, tuple(info.axes))
+
+
+def values(store: Store, info: TableInfo) -> dict[str, list[float]]:
+    """Return the values that a table's samples take on each of its axes, in ascending order."""
+    found = samples(store, info)
+    columns = [] if found is None else [np.unique(column).tolist() for column in found.T]
+    return dict(zip(info.axes, columns, strict=True)) if columns else {}
+
+
+@lru_cache(maxsize=256)
+def _samples(path: Path, axes: tuple[str, ...]) -> Array | None:
+    if not axes:
+        return None
+    opened = generation.read(path)  # a generation's file never changes
+    return np.stack([opened[name].values for name in axes], axis=-1)
+
+
+def made(info: TableInfo, solver: Solver) -> dict[str, Any]:
+    """Return how a table's runs were done, where that is not the solver's default: what is incidental to the fruit."""
+    usual = {name: field.default for name, field in solver.params.model_fields.items()}
+    return {
+        name: info.fixed[name]
+        for name in solver.incidental
+        if name in info.fixed and not same(info.fixed[name], usual.get(name))
+    }
+
+
+def describe(miss: Miss, info: TableInfo) -> tuple[str, str]:
+    """Return what is wrong with a parameter that a table does not hold, and what to change."""
+    if miss.reach is not None:
+        span = f"{miss.reach[0]:g} to {miss.reach[1]:g}"
+        return f"{_said(miss.asked)} is off the table's {span}", f"Take {miss.name} from {span}."
+    if miss.name in info.tied:
+        lead = info.tied[miss.name].leader
+        detail = f"goes with {lead} in this table: {_said(miss.held)} there, not {_said(miss.asked)}"
+    else:
+        detail = f"this table holds {miss.name} = {_said(miss.held)} only"
+    return detail, f"Leave {miss.name} out, or choose another table."
+
+
+def refusal(fits: Sequence[Fit]) -> OutsideTable:
+    """Return the refusal of a question that no family holds; `fits` has the nearest first."""
+    near = fits[0]
+    said = [
+        f"{miss.name} = {_said(miss.asked)} ("
+        + (f"holds {miss.reach[0]:g} to {miss.reach[1]:g}" if miss.reach else f"holds {_said(miss.held)}")
+        + ")"
+        for miss in (*near.misses, *near.unusual)
+    ]
+    more = f" and {len(said) - 4} more" if len(said) > 4 else ""
+    others = ", ".join(f"{fit.info.name} {fit.distance:.3g}" for fit in fits[1:4])
+    return OutsideTable(
+        f"no table holds this; the nearest is {near.info.name!r}, {near.distance:.3g} away in "
+        f"{', '.join(said[:4])}{more}.",
+        "Change these, run it, or take the nearest by its name." + (f" The next: {others}." if others else ""),
+    )
+
+
+def document(fit: Fit) -> dict[str, Any]:
+    """Return a family that was not near enough as JSON values."""
+    return {
+        "table": fit.info.name,
+        "distance": round(fit.distance, 6),
+        "parameters": {
+            miss.name: {"asked": miss.asked, "nearest": miss.held, "distance": round(miss.distance, 6)}
+            for miss in (*fit.misses, *fit.unusual)
+        },
+    }
+
+
+def _said(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

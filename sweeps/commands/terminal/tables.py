@@ -1,0 +1,95 @@
+"""Which table a command is about: the one that is named, or the one that holds what is asked."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...errors import InvalidOption
+
+if TYPE_CHECKING:
+    from store.lookup import ShapeTable
+    from store.store import Store
+
+__all__ = ["asked_table", "open_store", "run_command"]
+
+
+def open_store(root: Path | None) -> Store:
+    """Open the store that a command names, or the one in the package.
+
+    Raises:
+        MissingStore: there is none.
+
+    """
+    from store import starter
+    from store.store import Store
+
+    return Store.open(root or starter.ROOT)
+
+
+def asked_table(
+    root: Path | None,
+    name: str | None,
+    solver: str | None,
+    said: Mapping[str, Any],
+    stage: float | None,
+    preset: str | None,
+) -> tuple[ShapeTable, dict[str, Any]]:
+    """Return the table that a question is for, and the question's values as that table names them.
+
+    Raises:
+        InvalidOption: tables of several solvers are there, and none is chosen.
+        InvalidInput: there is no such preset, or no fruit can be like that.
+        OutsideTable: no table holds what is asked; which is the nearest, and what differs.
+        UnknownTable, CorruptTable, MissingStore: there is no such table, it is damaged, or there is no store.
+
+    """
+    from solver import registry
+    from store.errors import OutsideTable
+    from store.families import stored
+    from store.lookup import ShapeTable
+    from store.tables import info
+
+    opened = open_store(root)
+    chosen = registry.get(solver or (_only_solver(opened) if name is None else info(opened, name).solver))
+    if preset is not None and preset not in chosen.presets:
+        chosen.parse({}, preset)  # says which there are
+    families = stored.families(opened, chosen)
+    if name is None:
+        fit = families.choose(said, stage, preset)
+        if fit is None and (preset is not None or len(families.infos) > 1):
+            chosen.parse(said, preset)  # what no fruit can be is said before what no table holds
+            error = stored.refusal(families.nearest(said, stage, preset))
+            raise OutsideTable(
+                error.message, f"{error.advice} To run it: {run_command(chosen.name, preset, said, stage)}"
+            )
+        # a lone table says itself what it does not hold
+        name = families.infos[0].name if fit is None else fit.info.name
+    table = ShapeTable.open(opened, name, surfaces=registry.surface)
+    asked = families.values(said, preset)
+    # entries that no axis reaches are no names to ask by
+    quiet = {key for key in asked if key not in said and (key in chosen.incidental or not key.isidentifier())}
+    return table, {key: value for key, value in asked.items() if key not in quiet}
+
+
+def run_command(solver: str, preset: str | None, said: Mapping[str, Any], stage: float | None) -> str:
+    """Return what to type to have a shape solved."""
+    words = ["wizen", "solve", solver, *(["--preset", preset] if preset else [])]
+    for name, value in said.items():
+        shown = ",".join(map(str, value)) if isinstance(value, list | tuple) else value
+        words += ["--set", f"{name}={f'{value:g}' if isinstance(value, float) else shown}"]
+    return shlex.join([*words, *([] if stage is None else ["--stages", f"{stage:g}"]), "--out", "shape.h5"])
+
+
+def _only_solver(store: Store) -> str:
+    from store.tables import info
+
+    found = sorted({info(store, name).solver for name in store.table_names()})
+    if len(found) != 1:
+        raise InvalidOption(
+            f"the store has tables of {', '.join(found)}." if found else "the store has no table of shapes.",
+            "Choose with --solver or --name." if found else "Build one: `wizen table build`.",
+        )
+    return found[0]

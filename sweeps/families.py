@@ -1,0 +1,141 @@
+"""What the tables of shapes in a store cover, for people who look for something to ask: numbers and a picture."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from solver import registry
+from solver.contract import Solver
+from store.errors import UnknownTable
+from store.families import stored
+from store.families.choose import Families
+from store.generations import generation
+from store.lookup import ShapeTable
+from store.store import Store
+from store.tables import TableInfo, path_of
+
+from .pictures.sheet import Panel, sheet
+
+__all__ = ["covered", "gallery", "portrait", "thumbnail"]
+
+#: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
+_DRY = 0.67
+
+
+def covered(store: Store, families: Families, info: TableInfo, solver: Solver) -> dict[str, Any]:
+    """Return what a table covers as JSON values.
+
+    Per stage: how many of the samples converged, and the median error of the roughness with every sample predicted
+    from the others, null where nobody knows.
+
+    Raises:
+        CorruptTable, FileNotFoundError: its generation cannot be read.
+
+    """
+    opened = generation.read(path_of(store, info))
+    units, values = solver.axis_units(), stored.values(store, info)
+    converged = opened["converged"].values if "converged" in opened else None
+    judged = generation.left_out(opened)
+    off = None if judged is None else np.median(np.abs(judged[0][..., 0] - 1), axis=0)
+    likeness = opened.get("neighbour_correlation")
+    return {
+        "name": info.name,
+        "solver": info.solver,
+        "version": info.version,
+        "is_current": info.version == solver.version,
+        "quality": info.need.get("quality"),
+        "samples": info.samples,
+        "resolution": info.resolution,
+        "bytes": path_of(store, info).stat().st_size,
+        "axes": {
+            name: {"lowest": low, "highest": high, "values": values[name], "units": units.get(name, "1")}
+            for name, (low, high) in info.axes.items()
+        },
+        "tied": {name: tie.leader for name, tie in info.tied.items()},
+        "fixed": {name: v for name, v in info.fixed.items() if name in info.places},
+        "made": stored.made(info, solver),
+        "stages": [
+            {
+                "stage": stage,
+                "converged": None if converged is None else int(converged[:, j].astype(bool).sum()),
+                "roughness_error": None if off is None else round(float(off[j]), 4),
+                "neighbour_correlation": None if likeness is None else round(float(likeness.values[j]), 4),
+            }
+            for j, stage in enumerate(info.stages)
+        ],
+        "method": None if judged is None else judged[1],
+        "presets": families.presets_of(info),
+        "has_plan": bool(info.plan),
+    }
+
+
+def portrait(store: Store, families: Families, info: TableInfo) -> tuple[dict[str, float], float]:
+    """Return the point and the stage at which a table is shown: its preset's, else its middle sample's."""
+    stage = min(info.stages, key=lambda s: abs(abs(s) - _DRY * max(map(abs, info.stages))))
+    presets = families.presets_of(info)
+    if presets:
+        preset = info.name if info.name in presets else presets[0]
+        known = families.values({}, preset)
+        if info.axes.keys() <= known.keys():
+            return {name: float(known[name]) for name in info.axes}, stage
+    values = stored.values(store, info)
+    return {name: values[name][len(values[name]) // 2] for name in info.axes}, stage
+
+
+def thumbnail(table: ShapeTable, point: Mapping[str, float], stage: float, pixels: int = 160) -> bytes:
+    """Return a PNG (pixels, pixels) of a shape, in the colours of its solver that its table is named after.
+
+    Raises:
+        InvalidGeometry: no shape has these parameters.
+
+    """
+    from PIL import Image
+
+    from .pictures.render import render
+
+    shape = table.at(point, stage, resolution=96)
+    assert shape.position is not None  # asked for by default
+    tint = _tint(table.info)
+    colour = None if tint is None else np.broadcast_to(tint, shape.position.shape)
+    out = io.BytesIO()
+    Image.fromarray(render(shape.position, shape.poles, pixels, colour=colour)).save(out, "PNG", optimize=True)
+    return out.getvalue()
+
+
+def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
+    """Return a PNG with the portraits of all tables of shapes in a store.
+
+    Raises:
+        UnknownTable: there is none.
+
+    """
+    panels = []
+    for name in store.table_names():
+        table = ShapeTable.open(store, name, surfaces=registry.surface)
+        solver = registry.get(table.info.solver)
+        point, stage = portrait(store, stored.families(store, solver), table.info)
+        shape = table.at(point, stage, resolution=128)
+        assert shape.position is not None  # asked for by default
+        said = ", ".join(f"{axis} {value:g}" for axis, value in point.items())
+        colour = _tint(table.info)
+        skin = None if colour is None else np.broadcast_to(colour, shape.position.shape)
+        note = f"{name}: {said}, {solver.stages.symbol} {stage:g}"
+        panels.append(Panel(shape.position, shape.poles, note, skin))
+    if not panels:
+        raise UnknownTable("the store has no table of shapes.", "Build one: `wizen table build`.")
+    return sheet([panels[i : i + columns] for i in range(0, len(panels), columns)], pixels=pixels)
+
+
+def _tint(info: TableInfo) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """Return the colour, linear light, of the shade that begins a table's name; None where there is none."""
+    shades = registry.get(info.solver).looks.shades
+    name = next((name for name in shades if info.name.startswith(name)), None)
+    if name is None:
+        return None
+    text = shades[name].ridge[0]
+    display = np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.asarray(display**2.2)

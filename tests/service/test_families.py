@@ -1,0 +1,148 @@
+"""One question over all tables by HTTP: presets, the family that answers, and what to do where none does."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from PIL import Image
+
+from solver.dehydration import SOLVER
+from solver.fruit import lattice
+from store import tables
+from store.store import Store
+
+from ..store.conftest import displacement, fill
+from ._jobs import bearer
+from .conftest import SHAPE, client_of
+
+RAISIN = dict(SOLVER.presets["raisin"])
+PLAN = 'solver = "dehydration"\npreset = "raisin"\n'
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Spheres, and raisins of which a quarter was solved, as their metadata say."""
+    store = Store.open(tmp_path_factory.mktemp("families") / "store", create=True)
+    keys = fill(store, te=[0.03, 0.04], gamma=[10.0, 30.0])
+    tables.build(store, SOLVER, "sphere", keys=keys)
+    fruit = {name: RAISIN[name] for name in ("radii", "stone")}
+    keys = fill(store, te=[0.01, 0.02], gamma=[5.0, 20.0], mirrors="xz", **fruit)
+    tables.build(store, SOLVER, "raisin", keys=keys, text=PLAN)
+    return store.root
+
+
+@pytest.fixture(scope="module")
+def client(house: Path) -> Iterator[httpx.Client]:
+    with client_of(house, jobs_workers=0) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def allowed(house: Path) -> dict[str, str]:
+    return bearer(Store.open(house))
+
+
+def test_a_preset_fills_what_is_not_said(client: httpx.Client) -> None:
+    said = {"preset": "raisin", "s": 0.2, "te": 0.02, "gamma": 5, "resolution": 16, "format": "npz"}
+    answer = client.get(SHAPE, params=said)
+    assert answer.status_code == 200
+    fresh = SOLVER.parse({"te": 0.02, "gamma": 5.0}, "raisin").surface(*lattice(16))
+    with np.load(io.BytesIO(answer.content)) as archive:
+        assert np.abs(archive["position"] - fresh - displacement(0.02, 5.0, 0.2, 16)).max() < 1e-5
+    plain = client.get(SHAPE, params={"preset": "raisin", "s": 0.2, "format": "json"}).json()
+    assert plain["table"] == "raisin"
+    assert (plain["params"]["te"], plain["params"]["gamma"], plain["params"]["r4"]) == (0.01, 10.0, 0.45)
+    assert plain["made"] == {"mirrors": "xz"}
+    assert client.get(SHAPE, params={"te": 0.03, "gamma": 10, "s": 0.2, "format": "json"}).json()["table"] == "sphere"
+
+
+def test_all_radii_typed_in_are_that_fruit(client: httpx.Client) -> None:
+    radii = {f"r{i + 1}": r for i, r in enumerate(RAISIN["radii"]) if i}
+    said = {**radii, "rs1": 0.3, "rs2": 0.2, "te": 0.01, "gamma": 10, "s": 0.2, "format": "json"}
+    assert client.get(SHAPE, params=said).json()["table"] == "raisin"
+
+
+def test_what_no_family_holds_names_the_nearest_and_the_run(
+    client: httpx.Client, house: Path, allowed: dict[str, str]
+) -> None:
+    said: dict[str, Any] = {"preset": "raisin", "te": 0.03, "s": 0.2, "format": "npz"}
+    answer = client.get(SHAPE, params=said)
+    problem = answer.json()
+    assert (answer.status_code, problem["type"]) == (422, "urn:wizen:problem:outside-table")
+    assert problem["nearest"]["table"] == "raisin"
+    assert problem["nearest"]["parameters"] == {"te": {"asked": 0.03, "nearest": 0.02, "distance": 0.405465}}
+    assert problem["links"]["command"].startswith("wizen solve dehydration --preset raisin --set te=0.03 --stages 0.2")
+    assert [wrong["name"] for wrong in problem["errors"]] == ["te"]
+    store = Store.open(house)
+    run = client.get(problem["links"]["exact"], headers=allowed, follow_redirects=False)
+    assert run.status_code == 303
+    job = next(job for job in store.ledger.jobs() if run.headers["location"].endswith(job.key))
+    assert (job.params["exocarp_thickness"], job.params["radii"]) == (0.03, list(RAISIN["radii"]))
+    assert job.params["mirrors"] == "xz"  # the table holds that fruit: the run goes with its samples
+
+
+def test_a_fruit_that_no_table_has_is_run_whole(client: httpx.Client, house: Path, allowed: dict[str, str]) -> None:
+    problem = client.get(SHAPE, params={"preset": "plum2", "s": 0.2}).json()
+    assert problem["nearest"]["table"] == "sphere"
+    assert {"r8", "rs1"} <= set(problem["nearest"]["parameters"])
+    store = Store.open(house)
+    run = client.get(problem["links"]["exact"], headers=allowed, follow_redirects=False)
+    job = next(job for job in store.ledger.jobs() if run.headers["location"].endswith(job.key))
+    assert job.params == SOLVER.parse({}, "plum2").model_dump(mode="json")
+
+
+def test_unknown_presets_and_presets_of_another_table(client: httpx.Client) -> None:
+    problem = client.get(SHAPE, params={"preset": "raisn", "s": 0.2}).json()
+    assert (problem["status"], problem["errors"][0]["name"]) == (422, "preset")
+    assert "did you mean 'raisin'?" in problem["advice"]
+    problem = client.get(SHAPE, params={"preset": "raisin", "s": 0.2, "table": "sphere"}).json()
+    assert problem["status"] == 422
+    assert "r4" in {wrong["name"] for wrong in problem["errors"]}
+    assert client.get(SHAPE, params={"preset": "raisin"}).json()["errors"][0]["name"] == "s"
+
+
+def test_a_batch_finds_the_family_of_all_its_points(client: httpx.Client) -> None:
+    body: dict[str, Any] = {"solver": "dehydration", "preset": "raisin", "points": {"s": [0.1, 0.2]}, "format": "json"}
+    lines = client.post("/v1/shapes:batch", json=body).text.splitlines()
+    assert len(lines) == 2
+    assert '"raisin"' in lines[0]
+    wrong = client.post("/v1/shapes:batch", json={**body, "preset": "raisn"})
+    assert (wrong.status_code, wrong.json()["errors"][0]["name"]) == (422, "preset")
+    mixed = {**body, "points": [{"s": 0.1}, {"s": 0.1, "te": 0.05}]}
+    assert [e["name"] for e in client.post("/v1/shapes:batch", json=mixed).json()["errors"]] == ["points[1].te"]
+
+
+def test_maps_say_what_is_covered(client: httpx.Client) -> None:
+    raisin, sphere = client.get("/v1/maps").json()["maps"]
+    assert (raisin["name"], raisin["presets"], raisin["made"]) == ("raisin", ["raisin"], {"mirrors": "xz"})
+    assert raisin["axes"]["te"] == {"lowest": 0.01, "highest": 0.02, "values": [0.01, 0.02], "units": "r1"}
+    assert [stage["converged"] for stage in sphere["stages"]] == [4, 4, 4]
+    assert raisin["portrait"] == {"te": 0.01, "gamma": 10.0, "s": 0.2}
+    assert sphere["is_current"]
+    assert "plan" not in sphere["links"]
+    assert client.get(raisin["links"]["plan"]).text == PLAN
+    assert client.get("/v1/maps/sphere/plan.toml").status_code == 404
+    answer = client.get(raisin["links"]["thumbnail"])
+    picture = np.asarray(Image.open(io.BytesIO(answer.content)))
+    assert picture.shape == (160, 160, 3)
+    assert np.ptp(picture[40:120, 40:120]) > 30
+    again = client.get(raisin["links"]["thumbnail"], headers={"If-None-Match": answer.headers["etag"]})
+    assert again.status_code == 304
+    assert client.get("/v1/maps/rasin/thumbnail.png").status_code == 404
+
+
+def test_an_answer_kept_is_not_given_once_another_family_is_nearer(house: Path, tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store", create=True)
+    tables.build(store, SOLVER, "wide", keys=fill(store, te=[0.02, 0.06], gamma=[5.0, 60.0]))
+    query = {"te": 0.04, "gamma": 20, "s": 0.2, "resolution": 16, "format": "npz"}
+    with client_of(store.root, reload_interval=0) as client:
+        first = [client.get(SHAPE, params=query) for _ in range(2)][-1]
+        assert "kept" in first.headers["server-timing"]
+        tables.build(store, SOLVER, "near", keys=fill(store, te=[0.03, 0.04], gamma=[20.0, 30.0]))
+        assert client.get(SHAPE, params=query).headers["etag"] != first.headers["etag"]

@@ -1,0 +1,151 @@
+"""Which table answers a question: equal parameters, presets, ties, distances."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import registry
+from solver.dehydration import SOLVER
+from store import tables
+from store.errors import OutsideTable
+from store.families import stored, ties
+from store.families.choose import Families
+from store.lookup import ShapeTable
+from store.store import Store
+
+from .conftest import fill
+
+RADII = {"r2": 0.7, "r3": 0.5, "r4": 0.45, "r5": 0.5, "r6": 0.7, "r8": 0.45}
+
+
+@pytest.fixture(scope="module")
+def families(tmp_path_factory: pytest.TempPathFactory) -> Families:
+    """A table of spheres, one of spheres with thinner skins, and one of raisins, of which a part was solved."""
+    store = Store.open(tmp_path_factory.mktemp("families"), create=True)
+    fill(store, te=[0.03, 0.04], gamma=[10.0, 30.0])
+    sphere = tables.build(store, SOLVER, "sphere")
+    raisin = dataclasses.replace(
+        sphere,
+        name="raisin",
+        axes={"te": (0.005, 0.02), "gamma": (5.0, 20.0)},
+        fixed={**sphere.fixed, **RADII, "rs1": 0.3, "rs2": 0.2, "mirrors": "xz"},
+    )
+    thin = dataclasses.replace(sphere, name="thin", axes={"te": (0.01, 0.032), "gamma": (10.0, 30.0)})
+    places = {"sphere": [0.03, 0.04], "thin": [0.01, 0.032], "raisin": [0.005, 0.02]}
+    return Families(
+        [raisin, sphere, thin],
+        stored.base(SOLVER),
+        lambda info: np.array([[te, gamma] for te in places[info.name] for gamma in (10.0, 30.0)]),
+    )
+
+
+def chosen(families: Families, said: dict[str, Any], preset: str | None = None, stage: float = 0.2) -> str | None:
+    fit = families.choose(said, stage, preset)
+    return None if fit is None else fit.info.name
+
+
+def test_the_table_is_the_one_that_holds_the_fruit(families: Families) -> None:
+    assert chosen(families, {"te": 0.035, "gamma": 20.0}) == "sphere"
+    assert chosen(families, {}, "raisin") == "raisin"
+    assert chosen(families, {"te": 0.02, "gamma": 5.0}, "raisin") == "raisin"
+    assert chosen(families, {"te": 0.01, "gamma": 10.0, "rs1": 0.3, "rs2": 0.2, **RADII}) == "raisin"
+    assert chosen(families, {"stone": [0.3, 0.2], "te": 0.01, "gamma": 10.0, **RADII}) == "raisin"
+
+
+def test_what_nobody_said_is_the_solvers_default(families: Families) -> None:
+    assert chosen(families, {"te": 0.02, "gamma": 10.0}) == "thin"  # a raisin has that skin as well
+    alone = Families(families.infos[:1], stored.base(SOLVER), lambda info: None)
+    assert chosen(alone, {"te": 0.02, "gamma": 10.0}) == "raisin"  # a lone table stands for itself
+    assert chosen(families.only("raisin"), {"te": 0.02, "gamma": 10.0}) is None  # but not one of several
+
+
+def test_what_is_said_wins_over_the_preset(families: Families) -> None:
+    assert chosen(families, {"te": 0.03}, "raisin") is None
+    assert chosen(families, {"r4": 0.5}, "raisin") is None
+    fit = families.choose({"te": 0.015}, 0.2, "raisin")
+    assert fit is not None
+    assert families.values({"te": 0.015}, "raisin")["te"] == 0.015
+
+
+def test_how_a_run_was_done_counts_only_where_it_is_named(families: Families) -> None:
+    assert chosen(families, {"mirrors": "xz"}, "raisin") == "raisin"
+    assert chosen(families, {"mirrors": ""}, "raisin") is None
+    assert chosen(families, {"seed": 7}, "raisin") is None
+    assert stored.made(families.infos[0], SOLVER) == {"mirrors": "xz"}
+
+
+def test_of_several_the_one_with_the_nearest_sample_answers(families: Families) -> None:
+    assert chosen(families, {"te": 0.0319, "gamma": 10.0}) == "thin"
+    assert chosen(families, {"te": 0.0301, "gamma": 10.0}) == "sphere"
+
+
+def test_axes_without_a_value_and_stages_out_of_reach(families: Families) -> None:
+    fit = families.choose({"te": 0.035}, 0.2)
+    assert fit is not None
+    assert (fit.info.name, fit.missing) == ("sphere", ("gamma",))
+    assert families.choose({"te": 0.035, "gamma": 10.0}, 0.5) is None
+
+
+def test_the_nearest_table_and_how_far(families: Families) -> None:
+    fits = families.nearest({"te": 0.03}, 0.2, "raisin")
+    assert [fit.info.name for fit in fits] == ["raisin", "sphere", "thin"]
+    (miss,) = fits[0].misses
+    assert (miss.name, miss.asked, miss.held, miss.reach) == ("te", 0.03, 0.02, (0.005, 0.02))
+    assert fits[0].distance == pytest.approx(math.log(1.5))
+    assert fits[1].distance > fits[0].distance
+    refusal = stored.refusal(fits)
+    assert isinstance(refusal, OutsideTable)
+    assert "'raisin', 0.405 away in te = 0.03 (holds 0.005 to 0.02)" in str(refusal)
+    assert families.presets_of(families.infos[0]) == ["raisin"]
+    assert families.presets_of(families.infos[1]) == ["sphere"]
+
+
+def ellipse(r4: float) -> float:
+    """Radius at 60 degrees from the equator of an ellipse with half-axes 1 and r4."""
+    return 1 / math.hypot(math.cos(math.pi / 3) / r4, math.sin(math.pi / 3))
+
+
+def test_parameters_that_go_together_are_one_axis() -> None:
+    r4 = [0.6, 0.7, 0.8, 0.9]
+    columns = {
+        "te": [te for te in (0.02, 0.03) for _ in r4],
+        "r2": [ellipse(x) for _ in range(2) for x in r4],
+        "r4": [x for _ in range(2) for x in r4],
+    }
+    tied = ties.find(columns)
+    assert list(tied) == ["r2"]
+    tie = tied["r2"]
+    assert tie.leader == "r4"
+    assert [tie(x) for x in r4] == columns["r2"][:4]
+    assert max(abs(tie(x) - ellipse(x)) for x in np.linspace(0.6, 0.9, 61)) < 3e-4
+    assert (tie(0.1), tie(2.0)) == (columns["r2"][0], columns["r2"][3])
+    # equal ones lead in their order, and two that merely rise together in few samples are two axes
+    assert ties.find({"rs1": [0.3, 0.4], "rs2": [0.3, 0.4]})["rs2"].leader == "rs1"
+    assert ties.find({"te": [0.03, 0.04], "gamma": [10.0, 30.0]}) == {}
+
+
+def test_a_table_of_spherical_stones_is_asked_by_one_radius(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store", create=True)
+    for radius in (0.3, 0.4, 0.5):
+        fill(store, te=[0.03, 0.04], gamma=[10.0], rs1=radius, rs2=radius)
+    info = tables.build(store, SOLVER, "stones")
+    assert (set(info.axes), info.tied["rs2"].leader) == ({"te", "rs1"}, "rs1")
+    assert tables.info(store, "stones") == info
+    table = ShapeTable.open(store, "stones", surfaces=registry.surface)
+    shape = table.at({"te": 0.035, "rs1": 0.45}, 0.2)
+    assert shape.parameters == pytest.approx({"te": 0.035, "rs1": 0.45, "rs2": 0.45})
+    assert shape.inside
+    assert table.at({"te": 0.035, "rs1": 0.45, "rs2": 0.45}, 0.2).nearest == shape.nearest
+    with pytest.raises(OutsideTable, match=r"rs2 = 0\.3 is not in the table"):
+        table.at({"te": 0.035, "rs1": 0.45, "rs2": 0.3}, 0.2)
+    assert table.at_parameters({"te": 0.035, "rs1": 0.45})["stone"] == pytest.approx([0.45, 0.45])
+    found = stored.families(store, SOLVER)
+    assert found.choose({"te": 0.03, "rs1": 0.4, "rs2": 0.4}, 0.2) is not None
+    assert found.choose({"te": 0.03, "rs1": 0.4, "rs2": 0.3}, 0.2) is None
+    assert found.only("stones").choose({"te": 0.03, "rs1": 0.4}, 0.2) is not None
