@@ -31,9 +31,9 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost."""
     wood, scratch = state.wood, state.scratch
     anywhere = params.fracture == "stress"
-    damaged, parted, _ = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
+    damaged, parted, gone = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
     # most looks find nothing: a bound says so for less
-    if not damaged and anywhere and not wood.turning and float(scratch.found[:, 3].max()) < _BELOW:
+    if not (damaged or gone) and anywhere and not wood.turning and float(scratch.found[:, 3].max()) < _BELOW:
         return state
     ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
     m = wood.motion
@@ -49,13 +49,13 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
         ratio,
         place,
     )
-    if top <= 1 and not damaged:
+    if top <= 1 and not (damaged or gone):
         return state
     before = state.books[: CONTACT + 1].sum() + real(state)
     allowed = params.cascade * float(state.books[[STRETCH, BENDING, BONDS]].sum())
     wood, rods, bonds = break_worst(wood, ratio, place, allowed)
     # damage stands in the plan already; what falls apart needs another, and other fragments
-    if rods or parted:
+    if rods or parted or gone:
         scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)

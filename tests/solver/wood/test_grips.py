@@ -36,7 +36,7 @@ def test_a_grip_that_turns_takes_its_end_along_and_needs_a_moment():
     course = wood.grips[0]
     there = course.pivot + Rotation.from_rotvec(turn).apply(course.rest - course.pivot)
     ends = found.rod_position.values[-1, :, 1]
-    last = ends[np.argsort(ends[:, 0])[-9:]]
+    last = ends[np.argsort(ends[:, 0])[-len(there) :]]
     gap = np.linalg.norm(last[:, None] - there[None], axis=-1).min(0)
     assert gap.max() < 1e-9
     moment = np.diff(found.grip_moment.values[:, 0], axis=0)[0]
