@@ -19,6 +19,7 @@ from store.tokens import Tokens
 from . import catalogue, maps, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
+from .jobs import fields as jobs_fields
 from .jobs import results as jobs_results
 from .jobs import routes as jobs
 from .jobs.runner import JobRunner
@@ -36,6 +37,7 @@ from .shapes.shortcut import Shortcut
 from .shapes.turns import Turns
 from .stopping import at_signals
 from .telemetry import Metrics, Telemetry
+from .views.addresses import Rooted
 
 __all__ = ["create_app"]
 
@@ -94,6 +96,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         batch.router,
         jobs.reading,
         jobs_events.router,
+        jobs_fields.router,
         jobs_results.router,
         results.router,
         maps.router,
@@ -125,6 +128,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             expose_headers=["ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID"],
         )
     app.add_middleware(Telemetry, metrics=metrics)
+    if settings.root_path:
+        app.add_middleware(Rooted, root=settings.root_path)
     return app
 
 

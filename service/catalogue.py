@@ -17,6 +17,8 @@ from . import page, problems, vocabulary
 from .formats import FORMATS
 from .sequences import EXPORTS
 from .shapes.live import LiveTables
+from .views.addresses import link
+from .views.catalogue import Health, Index, SolverList, SolverPage, TableList, TablePage
 
 __all__ = ["open_router", "router"]
 
@@ -30,7 +32,7 @@ Json = dict[str, Any]
     "/",
     summary="Where to go from here",
     response_class=Response,
-    responses={200: {"content": {"application/json": {"schema": {"type": "object"}}, "text/html": {}}}},
+    responses={200: {"model": Index, "content": {"text/html": {"schema": {"type": "string"}}}}},
 )
 def index(request: Request) -> Response:
     """List the service's pages; a browser is shown the viewer."""
@@ -50,10 +52,17 @@ def index(request: Request) -> Response:
     formats = {f.name: {"media_type": f.media_type, "title": f.title} for f in FORMATS.values()}
     exports = {e.name: {"media_type": e.media_type, "title": e.title} for e in EXPORTS.values()}
     body = {"name": "wizen", "version": __version__, "links": links, "formats": formats, "result_formats": exports}
+    body["links"] = {name: link(path) for name, path in links.items()}
     return JSONResponse(body, headers={"Vary": "Accept"})
 
 
-@open_router.get("/healthz", summary="Whether shapes can be served", responses=problems.responses(503))
+@open_router.get(
+    "/healthz",
+    summary="Whether shapes can be served",
+    response_model=Health,
+    response_model_exclude_unset=True,
+    responses=problems.responses(503),
+)
 def health(request: Request) -> Json:
     """Open every table; 200 only if the store and all its tables can be read.
 
@@ -68,7 +77,13 @@ def health(request: Request) -> Json:
     return {"status": "ok", "version": __version__, "tables": found}
 
 
-@router.get("/v1/tables", summary="All tables", responses=problems.responses(503))
+@router.get(
+    "/v1/tables",
+    summary="All tables",
+    response_model=TableList,
+    response_model_exclude_unset=True,
+    responses=problems.responses(503),
+)
 def tables(request: Request) -> Json:
     """List the tables that shapes can be asked of; a damaged one has a `complaint` in place of its axes."""
     live: LiveTables = request.app.state.tables
@@ -81,22 +96,33 @@ def tables(request: Request) -> Json:
     return {"tables": found}
 
 
-@router.get("/v1/tables/{name}", summary="One table", responses=problems.responses(404, 503))
+@router.get(
+    "/v1/tables/{name}",
+    summary="One table",
+    response_model=TablePage,
+    response_model_exclude_unset=True,
+    responses=problems.responses(404, 503),
+)
 def table(request: Request, name: str = Path(description="Name of a table; GET /v1/tables lists them")) -> Json:
     """Describe a table: its axes with ranges and units, its stages and its generation."""
     live: LiveTables = request.app.state.tables
     return _table(request, live.info(name))
 
 
-@router.get("/v1/solvers", summary="All solvers")
+@router.get("/v1/solvers", summary="All solvers", response_model=SolverList)
 def solvers() -> Json:
     """List the solvers."""
-    return {
-        "solvers": [{"name": n, "title": registry.get(n).title, "href": f"/v1/solvers/{n}"} for n in registry.names()]
-    }
+    found = {name: registry.get(name).title for name in registry.names()}
+    return {"solvers": [{"name": n, "title": title, "href": link(f"/v1/solvers/{n}")} for n, title in found.items()]}
 
 
-@router.get("/v1/solvers/{name}", summary="One solver", responses=problems.responses(404))
+@router.get(
+    "/v1/solvers/{name}",
+    summary="One solver",
+    response_model=SolverPage,
+    response_model_exclude_unset=True,
+    responses=problems.responses(404),
+)
 def solver(name: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Json:
     """Describe a solver: parameter schema, query axes and stage axis with units, fields, presets, looks, qualities."""
     return _solver(vocabulary.solver_named(name))
@@ -120,7 +146,7 @@ def _solver(solver: Solver) -> Json:
             name: {"relative_error": solver.tolerances.get(name), "resolution": resolution}
             for name, resolution in solver.default_resolution.items()
         },
-        "links": {"shapes": f"/v1/shapes/{solver.name}"},
+        "links": {"shapes": link(f"/v1/shapes/{solver.name}")},
     }
 
 
@@ -172,5 +198,8 @@ def _table(request: Request, info: TableInfo) -> Json:
         },
         "methods": {"default": methods.DEFAULT, "known": methods.NAMED, "judged": judged.method},
         "descriptors": {name: quantities.attrs(name) for name in info.descriptors if name in quantities.QUANTITIES},
-        "links": {"self": f"/v1/tables/{info.name}", "shapes": f"/v1/shapes/{info.solver}?table={info.name}"},
+        "links": {
+            "self": link(f"/v1/tables/{info.name}"),
+            "shapes": link(f"/v1/shapes/{info.solver}?table={info.name}"),
+        },
     }

@@ -18,12 +18,13 @@ from sweeps import families as covering
 from . import problems, vocabulary
 from .shapes.answers import matches
 from .shapes.live import LiveTables
+from .views.addresses import link
 
 __all__ = ["router"]
 
 router = APIRouter(tags=["catalogue"])
 
-_PNG: dict[str, Any] = {"image/png": {"schema": {"type": "string", "format": "binary"}}}
+_PNG, _TOML = problems.files(["image/png"]), problems.files(["application/toml"])
 
 
 @router.get("/v1/maps", summary="What is covered", responses=problems.responses(503))
@@ -42,12 +43,12 @@ def maps(request: Request) -> dict[str, Any]:
             continue
         point, stage = covering.portrait(live.store, families, info)
         links: dict[str, str] = {
-            "self": f"/v1/tables/{name}",
-            "shapes": f"/v1/shapes/{info.solver}?table={name}",
-            "thumbnail": f"/v1/maps/{name}/thumbnail.png?v={info.digest[:12]}",
+            "self": link(f"/v1/tables/{name}"),
+            "shapes": link(f"/v1/shapes/{info.solver}?table={name}"),
+            "thumbnail": link(f"/v1/maps/{name}/thumbnail.png?v={info.digest[:12]}"),
         }
         if info.plan:
-            links["plan"] = f"/v1/maps/{name}/plan.toml"
+            links["plan"] = link(f"/v1/maps/{name}/plan.toml")
         found.append({**said, "portrait": {**point, solver.stages.symbol: stage}, "links": links})
     return {"maps": found}
 
@@ -74,7 +75,7 @@ def thumbnail(request: Request, name: str = Path(description="Name of a table; G
     "/v1/maps/{name}/plan.toml",
     summary="The plan behind a family",
     response_class=Response,
-    responses={200: {"content": {"application/toml": {"schema": {"type": "string"}}}}, **problems.responses(404, 503)},
+    responses={200: {"content": _TOML}, **problems.responses(404, 503)},
 )
 def plan(request: Request, name: str = Path(description="Name of a table; GET /v1/maps lists them")) -> Response:
     """Return the plan of the sweep that a table was made from: `wizen sweep` makes the rest of it."""

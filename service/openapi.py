@@ -47,10 +47,13 @@ class Documented(FastAPI):
             problem = problems.Problem.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas.update(problem.pop("$defs", {}), Problem=problem)
             get = document["paths"]["/v1/shapes/{solver}"]["get"]
-            get["parameters"] = [*get["parameters"], *_parameters(self.state.settings, examples)]
+            parameters = _parameters(self.state.settings, examples)
+            get["parameters"] = [*get["parameters"], *parameters]
+            info = document["paths"]["/v1/shapes/{solver}/info"]["get"]
+            info["parameters"] += [each for each in parameters if each["name"] not in ("format", "exact")]
             schemas["JobRequest"] = _job_request(schemas)
             _replace_validation(document)
-            _complete(document)
+            _complete(document, self.state.settings.root_path)
             document["x-examples"] = examples
         return self.openapi_schema  # type: ignore[return-value]
 
@@ -60,11 +63,11 @@ def operation_id(route: APIRoute) -> str:
     return route.name
 
 
-def _complete(document: Json) -> None:
+def _complete(document: Json, root: str) -> None:
     """Add what generators of clients and linters ask for: a server, whether each operation needs a token, and no
     keyword that JSON Schema does not know.
     """
-    document["servers"] = [{"url": "/", "description": "The service that sent this page"}]
+    document["servers"] = [{"url": root or "/", "description": "The service that sent this page"}]
     document["info"]["license"] = {"name": "Apache 2.0", "identifier": "Apache-2.0"}
     for operations in document["paths"].values():
         for operation in operations.values():

@@ -24,7 +24,7 @@ from store import errors as stored
 
 from . import errors
 
-__all__ = ["MEDIA_TYPE", "STATUS", "URN", "Culprit", "Problem", "install", "of", "responses", "unforeseen"]
+__all__ = ["MEDIA_TYPE", "STATUS", "URN", "Culprit", "Problem", "files", "install", "of", "responses", "unforeseen"]
 
 MEDIA_TYPE = "application/problem+json"
 URN = "urn:wizen:problem:"
@@ -47,8 +47,11 @@ STATUS: Mapping[type[Exception], int] = {
     stored.TooUncertain: 422,
     stored.MixedSamples: 503,
     stored.StorageFull: 507,
+    stored.StorageFailed: 503,
+    stored.CorruptBackup: 503,
     stored.UnknownJob: 404,
     stored.QueueFull: 429,
+    stored.QuotaSpent: 429,
     stored.ReadOnlyStore: 409,
     stored.NetworkFileSystem: 503,
     stored.CorruptTokens: 503,
@@ -140,6 +143,15 @@ def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Return the OpenAPI entries that declare these statuses as problems."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
+
+
+def files(media_types: Iterable[str]) -> dict[str, Any]:
+    """Return the OpenAPI content of an answer that is a file of one of these types.
+
+    Generators of clients look for a type that they know to be bytes: it comes first, and stands for all of them.
+    """
+    binary = {"schema": {"type": "string", "format": "binary"}}
+    return dict.fromkeys(("application/octet-stream", *media_types), binary)
 
 
 def install(app: FastAPI) -> None:

@@ -14,6 +14,7 @@ from sweeps.errors import InvalidOption
 
 from . import problems
 from .errors import InvalidQuery, Wrong
+from .views.addresses import link
 
 __all__ = ["router"]
 
@@ -65,11 +66,11 @@ def results(
     if end < len(rows):
         pairs: dict[str, Any] = {"solver": solver, "where": where, "sort": sort, "last": last or None}
         known = {name: value for name, value in pairs.items() if value is not None}
-        following = f"/v1/results?{urlencode({**known, 'limit': limit, 'after': end}, doseq=True)}"
+        following = link(f"/v1/results?{urlencode({**known, 'limit': limit, 'after': end}, doseq=True)}")
     return ResultList(results=[_row(row) for row in rows[after:end]], total=len(rows), next=following)
 
 
 def _row(row: stored.Row) -> ResultRow:
     finite = {name: None if value != value else value for name, value in row.numbers.items()}
-    links = {"job": f"/v1/jobs/{row.key}", "result": f"/v1/jobs/{row.key}/result"}
+    links = {"job": link(f"/v1/jobs/{row.key}"), "result": link(f"/v1/jobs/{row.key}/result")}
     return ResultRow(**{**row._asdict(), "numbers": finite}, links=links)

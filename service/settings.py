@@ -66,6 +66,9 @@ class Settings(BaseSettings):
     compress: Literal["off", "elsewhere", "always"] = Field(
         "elsewhere", description="Whose answers are compressed (zstd, br, gzip): none, those to other machines, or all"
     )
+    root_path: str = Field(
+        "", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="Where a proxy serves this, e.g. `/wizen`"
+    )
     public_read: bool = Field(True, description="Serve shapes, tables, solvers and the state of jobs without a token")
     jobs_workers: int = Field(
         1, ge=0, le=1024, description="Processes that run jobs; 0 leaves them to `wizen work` or another service"
@@ -73,6 +76,15 @@ class Settings(BaseSettings):
     scheduler: str | None = Field(None, description="A Dask scheduler whose workers run jobs, e.g. tcp://10.0.0.1:8786")
     max_jobs: int = Field(1000, ge=1, description="Most jobs that wait or run at once")
     max_jobs_per_token: int = Field(100, ge=1, description="Most jobs of one token that wait or run at once")
+    max_seconds_per_token: float | None = Field(
+        None, gt=0, description="Most solver time that one token may ask for within `WIZEN_QUOTA_HOURS` [s]; none: any"
+    )
+    max_seconds_per_client: float | None = Field(
+        None,
+        gt=0,
+        description="The same of one address, whatever its tokens [s]",
+    )
+    quota_hours: float = Field(24.0, gt=0, description="For how long solver time that was asked for counts [h]")
     max_job_seconds: float = Field(3600.0, gt=0, description="Longest expected time of one job [s]")
     max_job_bytes: float = Field(8e9, gt=0, description="Largest expected memory or result of one job [bytes]")
     max_listeners: int = Field(64, ge=1, description="Most open streams of job events")

@@ -11,11 +11,13 @@ import re
 import time
 import uuid
 
-from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from store.errors import StoreError
 
 from . import problems
 
@@ -40,8 +42,16 @@ class Metrics:
             "wizen_request_seconds", "Time to answer", ["route"], buckets=_BUCKETS, registry=self.registry
         )
 
+        self.jobs = Gauge("wizen_jobs", "Jobs in the store's ledger", ["state"], registry=self.registry)
+
     def page(self, request: Request) -> Response:
-        """Return the numbers in Prometheus' text format."""
+        """Return the numbers in Prometheus' text format; jobs are counted when they are asked for."""
+        try:
+            ledger = request.app.state.tables.store.ledger
+            for state, count in ledger.counts().items() if ledger.path.is_file() else ():
+                self.jobs.labels(state).set(count)
+        except StoreError:
+            self.jobs.clear()  # no store, or a ledger that cannot be read: /healthz says so
         return Response(generate_latest(self.registry), media_type=CONTENT_TYPE_LATEST)
 
 

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 __all__ = [
     "Advised",
+    "CorruptBackup",
     "CorruptLedger",
     "CorruptShard",
     "CorruptTable",
@@ -21,7 +22,9 @@ __all__ = [
     "NetworkFileSystem",
     "OutsideTable",
     "QueueFull",
+    "QuotaSpent",
     "ReadOnlyStore",
+    "StorageFailed",
     "StorageFull",
     "StoreError",
     "TooUncertain",
@@ -31,6 +34,8 @@ __all__ = [
     "full_disk",
 ]
 
+_BROKEN = {errno.EIO, errno.EREMOTEIO, errno.ENXIO}
+_REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS}
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
@@ -114,6 +119,12 @@ class QueueFull(StoreError):
     code = "queue-full"
 
 
+class QuotaSpent(StoreError):
+    """Somebody has asked for as much solver time as he may."""
+
+    code = "quota-spent"
+
+
 class NetworkFileSystem(StoreError):
     """The ledger would lie where the locks of two machines do not see each other."""
 
@@ -130,6 +141,18 @@ class StorageFull(StoreError):
     """The disk or a quota is full. Nothing half-written stays."""
 
     code = "storage-full"
+
+
+class CorruptBackup(StoreError):
+    """A backup is not what was copied."""
+
+    code = "corrupt-backup"
+
+
+class StorageFailed(StoreError):
+    """The disk could not read or write. Nothing half-written stays."""
+
+    code = "storage-failed"
 
 
 class UnknownJob(StoreError):
@@ -158,19 +181,30 @@ class UnknownToken(StoreError):
 
 @contextmanager
 def full_disk(path: Path) -> Iterator[None]:
-    """Turn the system's ways of saying 'no space' while writing `path` into `StorageFull`.
+    """Turn the system's ways of saying 'no space' while writing `path` into `StorageFull`, and others into sentences.
 
     Raises:
         StorageFull: no space, over quota, or over the file size limit.
+        StorageFailed: the disk does not work.
+        ReadOnlyStore: the path may not be written.
 
     """
     try:
         yield
     except OSError as error:
-        # HDF5 reports the system's error number only inside its message
-        if error.errno not in _FULL and not any(f"errno = {number}," in str(error) for number in _FULL):
+        if _met(error, _BROKEN):
+            advice = "Look at the disk (dmesg, smartctl); then run the same command again, here or on a copy."
+            raise StorageFailed(f"the disk could not write {path} ({error}).", advice) from error
+        if _met(error, _REFUSED):
+            raise ReadOnlyStore(f"{path} cannot be written.", "Name a store of your own.") from error
+        if not _met(error, _FULL):
             raise
         raise StorageFull(
             f"there is no space left to write {path}.",
             "Free space (`prune` removes old table generations) or move the store; then run the same command again.",
         ) from error
+
+
+def _met(error: OSError, numbers: set[int]) -> bool:
+    """Return whether the system gave one of these numbers; HDF5 reports them only inside its message."""
+    return error.errno in numbers or any(f"errno = {number}," in str(error) for number in numbers)

@@ -7,6 +7,7 @@ a sealed file still opens everywhere, and it is checked before HDF5 sees it.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import secrets
@@ -15,9 +16,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from . import holding
 from .errors import full_disk
 
-__all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "make_directory", "publish", "scratch", "seal"]
+__all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "make_directory", "publish", "scratch", "seal", "sync"]
 
 _MARK = b"wizen\x00\x01\n"
 #: Bytes of the seal at the end of a file.
@@ -34,31 +36,45 @@ def make_directory(path: Path) -> None:
         return
     make_directory(path.parent)
     path.mkdir(exist_ok=True)
-    _sync(path.parent)
+    sync(path.parent)
 
 
 @contextmanager
-def scratch(path: Path) -> Iterator[Path]:
-    """Yield a temporary name beside `path`, and remove what is there on leaving unless `adopt` took it.
+def scratch(path: Path, private: bool = False) -> Iterator[Path]:
+    """Yield an empty temporary file beside `path`, and remove it on leaving unless `adopt` took it.
+
+    It is held meanwhile, so that `clean` knows whose writer is alive. `private`: nobody else may ever read it.
 
     Raises:
         StorageFull: the disk is full.
 
     """
-    make_directory(path.parent)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}{_TEMPORARY}")
-    try:
-        with full_disk(path):
+    with full_disk(path):
+        make_directory(path.parent)
+        temporary, handle = _begin(path, 0o600 if private else 0o666)
+        try:
             yield temporary
-    finally:
-        temporary.unlink(missing_ok=True)
+        finally:
+            temporary.unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _begin(path: Path, mode: int) -> tuple[Path, int]:
+    """Make a temporary file that we hold; return its name and the handle that holds it."""
+    while True:
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}{_TEMPORARY}")
+        handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+        holding.hold(handle)
+        if os.fstat(handle).st_nlink:
+            return temporary, handle
+        os.close(handle)  # somebody cleaned up between the two lines above
 
 
 def adopt(temporary: Path, path: Path) -> None:
     """Make a file written under a temporary name visible as `path`, whole and on the disk when this returns."""
-    _sync(temporary)
+    sync(temporary)
     temporary.replace(path)
-    _sync(path.parent)
+    sync(path.parent)
 
 
 def publish(path: Path, data: bytes | memoryview) -> None:
@@ -105,20 +121,26 @@ def body(data: bytes) -> bytes | None:
 
 
 def clean(directory: Path) -> int:
-    """Remove temporary files that a killed process left in `directory` or one level below; return how many."""
+    """Remove temporary files that a killed process left in `directory` or one level below; return how many.
+
+    Where the file system cannot say who holds a file, only those an hour old are taken for left.
+    """
     removed = 0
     for pattern in (f".*{_TEMPORARY}", f"*/.*{_TEMPORARY}"):
         for path in directory.glob(pattern):
             try:
-                if time.time() - path.stat().st_mtime > _ABANDONED:
-                    path.unlink()
-                    removed += 1
+                removed += holding.remove_free(path, time.time() - path.stat().st_mtime > _ABANDONED)
             except FileNotFoundError:
                 continue  # its writer, or another cleaner, was faster
+            except OSError as error:
+                if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
+                    raise
+                # another user's, who cleans up after himself
     return removed
 
 
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
+    """Return once a file, or the names in a directory, are on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -18,7 +18,7 @@ from .errors import CorruptShard
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["digest", "read", "write"]
+__all__ = ["digest", "image", "parse", "read", "write"]
 
 #: Attributes of a dataset that belong to its content; others (host, date) may differ between equal results.
 _MEANING = ("solver", "solver_version", "params", "need")
@@ -59,6 +59,17 @@ def _text(item: Any) -> str:
     return item.decode() if isinstance(item, bytes) else str(item)
 
 
+def image(dataset: xr.Dataset, key: str) -> tuple[str, bytes | memoryview]:
+    """Return a result's content digest, and its file without the seal.
+
+    HDF5 writes to memory, so that a full disk is the system's clear error and not a library in a broken state.
+    """
+    content = digest(dataset)
+    stored = dataset.drop_encoding().assign_attrs(key=key, digest=content)
+    encoding = {name: _encoding(variable) for name, variable in stored.variables.items()}
+    return content, stored.to_netcdf(engine="h5netcdf", encoding=encoding)
+
+
 def write(path: Path, dataset: xr.Dataset, key: str) -> str:
     """Write a result so that it is on the disk, whole, when this returns; return its content digest.
 
@@ -66,13 +77,9 @@ def write(path: Path, dataset: xr.Dataset, key: str) -> str:
         StorageFull: the disk is full; nothing half-written stays.
 
     """
-    content = digest(dataset)
-    stored = dataset.drop_encoding().assign_attrs(key=key, digest=content)
-    # HDF5 writes to memory, so that a full disk is the system's clear error and not a library in a broken state
-    encoding = {name: _encoding(variable) for name, variable in stored.variables.items()}
-    image = stored.to_netcdf(engine="h5netcdf", encoding=encoding)
+    content, data = image(dataset, key)
     with seal.scratch(path) as temporary:
-        temporary.write_bytes(image)
+        temporary.write_bytes(data)
         seal.seal(temporary)
         seal.adopt(temporary, path)
     return content
@@ -107,6 +114,16 @@ def read(path: Path, verify: bool = True) -> xr.Dataset:
         if whole is None:
             raise CorruptShard(f"{path} is damaged or was cut short.", _ADVICE)
         data = whole
+    return parse(data, path, verify)
+
+
+def parse(data: bytes, path: Path, verify: bool = True) -> xr.Dataset:
+    """Return the result in a file's content without the seal; `path` names it in errors.
+
+    Raises:
+        CorruptShard: the content is not what was written.
+
+    """
     try:
         import xarray as xr
 

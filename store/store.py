@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 from urllib.parse import quote
 
 from . import seal, shards
-from .errors import CorruptShard, MissingStore, UnknownJob
+from .errors import CorruptShard, MissingStore, UnknownJob, full_disk
 from .keys import is_key
 from .ledger.ledger import Ledger
 
@@ -37,18 +37,20 @@ class Store:
 
         Raises:
             MissingStore: there is none, and `create` is false.
+            ReadOnlyStore: it cannot be made there.
 
         """
         store = cls(root)
         if create:
-            seal.make_directory(store._shards)
-            seal.make_directory(store.tables_dir)
+            with full_disk(store.root):
+                seal.make_directory(store._shards)
+                seal.make_directory(store.tables_dir)
         elif not store._shards.is_dir():
             raise MissingStore(
                 f"there is no store in {store.root.absolute()}.",
                 "Run a sweep with that directory to create it, or name another one.",
             )
-        for directory in (store._shards, store.tables_dir):
+        for directory in (store.root, store._shards, store.tables_dir):
             seal.clean(directory)
         return store
 

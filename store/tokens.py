@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from . import seal
-from .errors import CorruptTokens, InvalidToken, UnknownToken
+from .errors import CorruptTokens, InvalidToken, UnknownToken, full_disk
 from .starter import check_own
 
 __all__ = ["SCOPES", "Scope", "Token", "Tokens"]
@@ -143,15 +143,14 @@ class Tokens:
     @contextmanager
     def _change(self) -> Iterator[dict[str, Token]]:
         """Yield the tokens to change; they are written, whole or not at all, on leaving without an error."""
-        handle = os.open(self._root / "tokens.lock", os.O_RDWR | os.O_CREAT, 0o600)
+        with full_disk(self.path):
+            handle = os.open(self._root / "tokens.lock", os.O_RDWR | os.O_CREAT, 0o600)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX)
             found = dict(self._read())
             yield found
             data = json.dumps([asdict(token) for token in found.values()], indent=1).encode()
-            with seal.scratch(self.path) as temporary:
-                # nobody else may read it at any moment
-                temporary.touch(0o600, exist_ok=False)
+            with seal.scratch(self.path, private=True) as temporary:
                 temporary.write_bytes(data)
                 seal.adopt(temporary, self.path)
         finally:

@@ -3,14 +3,53 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from fastapi import APIRouter, Query, Request
+from starlette.responses import Response
+
+from store.store import Store
+
+from .. import problems
 from ..errors import InvalidQuery, Wrong
+from ..settings import Settings
+from ..views.shape import FieldsPage
+from .routes import JobId, check_done, stored_job
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["encode"]
+__all__ = ["encode", "router"]
+
+router = APIRouter(tags=["jobs"])
+
+
+@router.get(
+    "/v1/jobs/{id}/fields",
+    summary="Numbers of a job's result",
+    response_model=FieldsPage,
+    responses=problems.responses(404, 409, 422, 503),
+)
+def fields(
+    request: Request,
+    id: JobId,
+    names: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=1000,
+            description="Fields by name, commas between them; left out, those of one number per stage",
+        ),
+    ] = None,
+    stage: Annotated[float | None, Query(allow_inf_nan=False, description="Which stage; left out, all")] = None,
+) -> Response:
+    """Fetch named fields of what a job computed, as JSON with units."""
+    job = stored_job(request, id)
+    check_done(job)
+    store: Store = request.app.state.tables.store
+    settings: Settings = request.app.state.settings
+    body = encode(store.get(job.key), names, stage, settings.max_export_samples)
+    return Response(body, media_type="application/json")
 
 
 def encode(run: xr.Dataset, names: str | None, stage: float | None, most: int) -> bytes:

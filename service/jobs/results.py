@@ -20,12 +20,13 @@ from store.store import Store
 from sweeps.pictures import colours
 
 from .. import problems, vocabulary
-from ..errors import InvalidQuery, JobFailed, NotAcceptable, NotDone, Wrong
+from ..errors import InvalidQuery, NotAcceptable, Wrong
 from ..formats import FORMATS, About, Format
 from ..sequences import EXPORTS, STILLS, Export, Options, prepared, write
 from ..settings import Settings
+from ..views.shape import FieldsPage, ShapePage
 from . import fields as jobs_fields
-from .routes import JobId, stored_job
+from .routes import JobId, check_done, stored_job
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,17 +37,14 @@ router = APIRouter(tags=["jobs"])
 
 NETCDF = "application/x-netcdf"
 _NAMES = ("netcdf", *FORMATS, *EXPORTS)
-_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
-_CONTENT = {NETCDF: _BINARY} | {
-    f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()
-}
 
 
 def _said(name: str) -> str:
     return str(Options.model_fields[name].description)
 
 
-_CONTENT |= {e.media_type.partition(";")[0]: _BINARY for e in EXPORTS.values()}
+_KNOWN: list[Format | Export] = [*FORMATS.values(), *EXPORTS.values()]
+_CONTENT = problems.files([NETCDF, *(e.media_type.partition(";")[0] for e in _KNOWN if e.name != "json")])
 
 
 def _options(
@@ -68,7 +66,7 @@ def _options(
     summary="A job's result",
     response_class=Response,
     responses={
-        200: {"description": "The result", "content": _CONTENT},
+        200: {"model": FieldsPage | ShapePage, "description": "The result", "content": _CONTENT},
         304: {"description": "The result that the asker has is the one"},
         **problems.responses(404, 406, 409, 422, 501, 503),
     },
@@ -102,7 +100,7 @@ def result(
     """
     job = stored_job(request, id)
     chosen = _negotiate(request.headers.get("accept"), format)
-    _check_done(job)
+    check_done(job)
     store: Store = request.app.state.tables.store
     name = chosen.name if chosen else "netcdf"
     settings = request.app.state.settings
@@ -198,21 +196,6 @@ def _negotiate(accept: str | None, explicit: str | None) -> Format | Export | No
         listed = f"{NETCDF} (format=netcdf), " + ", ".join(f"{t} (format={f.name})" for t, f in known.items())
         raise NotAcceptable(f"no representation fits Accept: {accept}.", advice=f"Ask for one of {listed}.")
     return known[best]
-
-
-def _check_done(job: Job) -> None:
-    if job.state == "failed":
-        error = job.error or {}
-        raise JobFailed(
-            f"this job failed: {error.get('message', 'nobody knows why.')}", advice=str(error.get("advice", ""))
-        )
-    if job.state == "cancelled":
-        raise NotDone("this job was cancelled.", advice="Ask for it again with POST /v1/jobs.")
-    if job.state != "done":
-        raise NotDone(
-            f"this job is {job.state} ({job.progress:.0%}).",
-            advice=f"Follow /v1/jobs/{job.key}/events until it is done.",
-        )
 
 
 def _shard(store: Store, job: Job, headers: dict[str, str]) -> Response:

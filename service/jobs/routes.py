@@ -18,12 +18,13 @@ from store.store import Store
 from store.tokens import Token
 
 from .. import problems, vocabulary
-from ..errors import Forbidden, JobEnded
+from ..errors import Forbidden, JobEnded, JobFailed, NotDone
 from ..security import requires
-from .submit import submit
+from ..views.addresses import link
+from .submit import asker_of, submit
 from .views import JobList, JobRequest, JobView, view
 
-__all__ = ["JobId", "ledger_of", "reading", "stored_job", "writing"]
+__all__ = ["JobId", "check_done", "ledger_of", "reading", "stored_job", "writing"]
 
 #: Routes that need the scope read, and those that need run.
 reading, writing = APIRouter(tags=["jobs"]), APIRouter(tags=["jobs"])
@@ -56,7 +57,7 @@ def ask(request: Request, response: Response, body: JobRequest, token: Runner) -
         vocabulary.solver_named(body.solver),
         body.params,
         body.need,
-        token.id,
+        asker_of(request, token),
         preset=body.preset,
         again=body.again,
         unlimited=token.allows("admin"),
@@ -84,7 +85,7 @@ def jobs(
     following = None
     if more is not None:
         pairs = {"state": state, "limit": limit, "after": more}
-        following = f"/v1/jobs?{urlencode({k: v for k, v in pairs.items() if v is not None})}"
+        following = link(f"/v1/jobs?{urlencode({k: v for k, v in pairs.items() if v is not None})}")
     return JobList(jobs=[view(job) for job in found], next=following)
 
 
@@ -137,3 +138,25 @@ def stored_job(request: Request, key: str) -> Job:
     if ledger is None:
         raise UnknownJob(f"there is no job {key[:80]!r}.", "GET /v1/jobs lists all.")
     return ledger.get(key)
+
+
+def check_done(job: Job) -> None:
+    """Refuse a job that has no result.
+
+    Raises:
+        JobFailed: it was given up.
+        NotDone: it waits, runs or was cancelled.
+
+    """
+    if job.state == "failed":
+        error = job.error or {}
+        raise JobFailed(
+            f"this job failed: {error.get('message', 'nobody knows why.')}", advice=str(error.get("advice", ""))
+        )
+    if job.state == "cancelled":
+        raise NotDone("this job was cancelled.", advice="Ask for it again with POST /v1/jobs.")
+    if job.state != "done":
+        raise NotDone(
+            f"this job is {job.state} ({job.progress:.0%}).",
+            advice=f"Follow /v1/jobs/{job.key}/events until it is done.",
+        )

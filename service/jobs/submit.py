@@ -5,18 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from fastapi import Request
 from fastapi.datastructures import State
 
 from solver.contract import Need, Params, Quality, Solver
+from store.ledger.asks import Asker, Spending
 from store.ledger.jobs import Job, JobSpec
 from store.ledger.queue import Queue, Quota
 from store.starter import check_own
 from store.store import Store
+from store.tokens import Token
 
 from ..errors import TooCostly
+from ..limits.clients import address
 from ..settings import Settings
+from ..views.addresses import link
 
-__all__ = ["Submitted", "submit"]
+__all__ = ["Submitted", "asker_of", "submit"]
+
+
+def asker_of(request: Request, token: Token) -> Asker:
+    """Return whom a request's jobs are noted for."""
+    return Asker(token.id, token.name, address(request.client.host) if request.client else "")
 
 
 class Submitted(NamedTuple):
@@ -28,7 +38,7 @@ class Submitted(NamedTuple):
     @property
     def location(self) -> str:
         """Where the job is asked about."""
-        return f"/v1/jobs/{self.job.key}"
+        return link(f"/v1/jobs/{self.job.key}")
 
 
 def submit(
@@ -36,13 +46,13 @@ def submit(
     solver: Solver,
     params: Mapping[str, Any],
     need: Need,
-    owner: str,
+    owner: Asker,
     *,
     preset: str | None = None,
     again: bool = False,
     unlimited: bool = False,
 ) -> Submitted:
-    """Ask for a run in the name of `owner` (a token's id, checked by the caller); the same question is the same job.
+    """Ask for a run in the name of `owner` (checked by the caller); the same question is the same job.
 
     Args:
         state: the app's state: `settings` and `tables`.
@@ -58,6 +68,7 @@ def submit(
         InvalidInput: the solver refuses the parameters or the need.
         TooCostly: more than the operator allows.
         QueueFull: too many jobs wait already.
+        QuotaSpent: too much time was asked for lately.
         MissingStore, ReadOnlyStore: there is no store that could take it.
 
     """
@@ -69,8 +80,11 @@ def submit(
         _weigh(solver, values, settled, settings)
     store: Store = state.tables.store
     spec = JobSpec.of(solver, values, settled)
-    quota = None if unlimited else Quota(settings.max_jobs, settings.max_jobs_per_token)
-    job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=not store.has(spec.key))
+    spending = Spending(settings.max_seconds_per_token, settings.max_seconds_per_client, 3600 * settings.quota_hours)
+    quota = None if unlimited else Quota(settings.max_jobs, settings.max_jobs_per_token, spending)
+    expected = solver.cost(values, settled).seconds
+    lost = not store.has(spec.key)
+    job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=expected)
     return Submitted(job, new)
 
 

@@ -15,6 +15,7 @@ from store.canonical import canonical
 from store.ledger.jobs import Job, State
 
 from ..problems import URN
+from ..views.addresses import link
 
 __all__ = ["ENDED", "Expected", "Failure", "JobList", "JobRequest", "JobView", "view"]
 
@@ -86,7 +87,7 @@ class JobList(BaseModel):
 
 def view(job: Job) -> JobView:
     """Return what is said of a job."""
-    own = f"/v1/jobs/{job.key}"
+    own = link(f"/v1/jobs/{job.key}")
     links = {"self": own, "events": f"{own}/events"}
     if job.state == "done":
         links["result"] = f"{own}/result"

@@ -15,12 +15,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from solver.arrays import Array, Ints
-from sweeps.errors import installing
+from sweeps import foreign
+from sweeps.errors import SweepError
+from sweeps.foreign import KINDS
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
 from .nearest import nearest
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "Bound", "bind", "load"]
 
 
-KINDS = (".obj", ".ply", ".glb", ".stl")
 Binding = Literal["nearest", "direction"]
 Fit = Literal["box", "none"]
 
@@ -79,26 +80,26 @@ def load(path: Path) -> tuple[Array, Array]:
         Unavailable: trimesh is not installed.
 
     """
-    if path.suffix.lower() not in KINDS:
-        raise InvalidQuery.of([Wrong("mesh", f"{path.name} is no mesh", f"Known: {', '.join(KINDS)}.")])
-    if path.suffix.lower() == ".obj":
-        return _obj(path)  # trimesh splits vertices along texture seams, and a cache counts those of the file
     try:
-        import trimesh
-    except ImportError:
-        raise Unavailable("meshes need the package trimesh.", advice=installing("formats")) from None
-    try:
-        mesh: Any = trimesh.load(path, force="mesh", process=False)
-        points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
-    except Exception as error:  # readers of foreign files stumble in as many ways as there are files
-        raise _unread(path, f"{type(error).__name__}: {error}") from None
-    return _checked(path, points, faces)
+        if path.suffix.lower() == ".obj":
+            points, faces = _obj(
+                path
+            )  # trimesh splits vertices along texture seams, and a cache counts those of the file
+        else:
+            mesh = foreign.read(path)
+            points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
+        foreign.sound(path, points, faces)
+    except foreign.NoReader as error:
+        raise Unavailable(error.message, advice=error.advice) from None
+    except SweepError as error:
+        raise InvalidQuery.of([Wrong("mesh", error.message.rstrip("."), error.advice)]) from None
+    return points, faces
 
 
 def _obj(path: Path) -> tuple[Array, Array]:
     points, faces = [], []
     try:
-        for line in path.read_text(errors="replace").splitlines():
+        for line in foreign.checked(path).decode(errors="replace").splitlines():
             words = line.split()
             if words[:1] == ["v"]:
                 points.append([float(word) for word in words[1:4]])
@@ -106,21 +107,9 @@ def _obj(path: Path) -> tuple[Array, Array]:
                 corners = [int(word.split("/")[0]) for word in words[1:]]
                 corners = [c - 1 if c > 0 else len(points) + c for c in corners]
                 faces += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
-        return _checked(path, np.array(points, float), np.array(faces, np.int64).reshape(-1, 3))
-    except ValueError as error:
-        raise _unread(path, str(error)) from None
-
-
-def _checked(path: Path, points: Array, faces: Array) -> tuple[Array, Array]:
-    if points.ndim != 2 or points.shape[1:] != (3,) or not len(faces):
-        raise _unread(path, "no triangles")
-    if not np.isfinite(points).all() or faces.min() < 0 or faces.max() >= len(points):
-        raise _unread(path, "numbers that are not finite, or corners that are no vertices")
-    return points, faces
-
-
-def _unread(path: Path, why: str) -> InvalidQuery:
-    return InvalidQuery.of([Wrong("mesh", f"{path.name} cannot be read ({why})"[:300], "Export it again as OBJ.")])
+        return np.array(points, float), np.array(faces, np.int64).reshape(-1, 3)
+    except (ValueError, IndexError, OverflowError) as error:
+        raise foreign.ForeignMesh(path, str(error)[:200]) from None
 
 
 def bind(

@@ -24,7 +24,7 @@ from . import detail as level
 from .live import LiveTables
 from .query import RESERVED, ShapeQuery, Words, parse
 
-__all__ = ["Asked", "Found", "asked", "preset_of", "table_for", "words_of"]
+__all__ = ["Asked", "Found", "asked", "preset_of", "read", "table_for", "words_of"]
 
 #: Where a request keeps which table answers it, and its question, or what is wrong with it.
 _TABLE, _QUESTION = "wizen.table", "wizen.question"
@@ -116,7 +116,7 @@ def asked(request: Request, solver: str) -> Asked:
     found = request.scope.get(_QUESTION)
     if found is None:
         try:
-            found = _ask(request, solver)
+            found = read(request, solver)
         except (ServiceError, StoreError, SolverError) as error:
             found = error
         request.scope[_QUESTION] = found
@@ -126,19 +126,27 @@ def asked(request: Request, solver: str) -> Asked:
     return found
 
 
-def _ask(request: Request, solver: str) -> Asked:
+def read(request: Request, solver: str, only: Format | None = None, without: tuple[str, ...] = ()) -> Asked:
+    """Return the question of a request, in the format asked for or in the `only` one, `without` some parameters.
+
+    Raises:
+        ServiceError, StoreError, SolverError: it cannot be understood, or there is no table for it.
+
+    """
     settings: Settings = request.app.state.settings
     tables: LiveTables = request.app.state.tables
     given = request.query_params
     known = vocabulary.solver_named(solver)
-    chosen = negotiate(request.headers.get("accept"), given.get("format"))
+    chosen = only or negotiate(request.headers.get("accept"), given.get("format"))
     found = table_for(request, solver)
     table = tables.get(found.name)
     words = _kept_words.get(table)
     if words is None:
         words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
     detail = level.read(given)
-    query = parse(given.multi_items(), words, detail.refused(chosen), found.filled, beyond(found, words))
+    unknown = [Wrong(name, "means nothing here", f"Ask /v1/shapes/{solver}.") for name in without if name in given]
+    also = [*unknown, *detail.refused(chosen)]
+    query = parse(given.multi_items(), words, also, found.filled, beyond(found, words))
     resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
     return Asked(known, found, table, words, query, detail, chosen, resolution)
 

@@ -6,6 +6,7 @@ One address for all solvers, with the solver in the body, as for jobs.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import chain
 from typing import Any
 
@@ -21,9 +22,10 @@ from .. import problems, vocabulary
 from ..errors import BatchTooLarge, InvalidQuery, OutsideRanges, UncertainBatch, Wrong
 from ..formats import About
 from ..settings import Settings
-from . import batch_formats
+from . import batch_detail, batch_formats
 from . import detail as level
 from .asking import Found, beyond, choose, preset_of, words_of
+from .batch_detail import Asked
 from .batch_formats import Batch
 from .batch_request import BatchRequest, expand
 from .live import LiveTables
@@ -35,9 +37,7 @@ router = APIRouter(tags=["shapes"])
 
 #: Bytes up to which an answer is made before any of it is sent; a longer one is streamed in pieces of this size.
 _PIECE = 1 << 20
-_CONTENT: dict[str, Any] = {
-    media_type: {"schema": {"type": "string", "format": "binary"}} for media_type in batch_formats.MEDIA_TYPES
-}
+_CONTENT = problems.files(batch_formats.MEDIA_TYPES)
 
 
 @router.post(
@@ -50,10 +50,11 @@ _CONTENT: dict[str, Any] = {
     },
 )
 def batch(request: Request, body: BatchRequest) -> Response:
-    """Interpolate one table at many points and stages, at one level of detail.
+    """Interpolate one table at many points and stages, at one level of detail or at each point's own.
 
     `npz` is one archive with a leading axis over the shapes, `json` one line per shape, the others one part per shape
-    of a multipart/mixed body. Everything is checked before anything is computed, and every wrong entry named.
+    of a multipart/mixed body. Everything is checked before anything is computed, and every wrong entry named. What is
+    asked for twice is computed once, and with `once` sent once.
     """
     settings: Settings = request.app.state.settings
     tables: LiveTables = request.app.state.tables
@@ -65,12 +66,19 @@ def batch(request: Request, body: BatchRequest) -> Response:
     words = words_of(solver, table, settings.max_resolution)
     detail = level.read(body.detail)
     # what is wrong with all of them is said first, and alone: it would hide what is wrong with some
-    resolution = detail.resolution(body.resolution, table.resolution, settings.max_resolution)
-    _check_size(detail, resolution, len(entries), settings)
+    _check_count(len(entries), settings)
     wrong = [*detail.refused(chosen), *_off(body, settings)]
     if wrong:
         raise InvalidQuery.of(wrong)
-    queries = _queries(entries, words, found)
+    levels, off = batch_detail.levels(entries, body, table.resolution, settings.max_resolution)
+    asked = [Asked(q, *at) for q, at in zip(_queries(entries, words, found, off), levels, strict=True)]
+    if chosen.name == "npz" and len({one.resolution for one in asked}) > 1:
+        advice = "Ask for glb, obj, points or json, or for one batch for each lattice."
+        raise InvalidQuery.of([Wrong("points", "are of several lattices, which one npz cannot hold", advice)])
+    distinct, rows = batch_detail.distinct(asked)
+    sent = distinct if body.once else asked
+    _check_size(detail, [one.resolution for one in sent], settings)
+    queries = [one.query for one in distinct]
     # of an archive, positions: the other half of it only for those who name it
     fields = ("position",) if chosen.name == "npz" and detail.fields is None else detail.of(chosen)
     _check_shapes(table, queries, "position" in fields)
@@ -78,11 +86,12 @@ def batch(request: Request, body: BatchRequest) -> Response:
     if body.max_error is not None:
         _check_trust(table, queries, {**options, "max_error": body.max_error})
 
-    def look_up() -> Iterator[Shape]:
-        for query in queries:
-            yield table.at(
-                query.point, query.stage, resolution=resolution, fields=fields, window=detail.window, **options
-            )
+    def at(one: Asked) -> Shape:
+        point, stage = one.query.point, one.query.stage
+        return table.at(point, stage, resolution=one.resolution, fields=fields, window=detail.window, **options)
+
+    def look_up() -> Iterator[tuple[Shape, About]]:
+        yield from batch_detail.each_once(distinct, sent, at, lambda one: replace(about, detail=one.said))
 
     about = About(
         solver=body.solver,
@@ -90,10 +99,10 @@ def batch(request: Request, body: BatchRequest) -> Response:
         fixed=words.fixed,
         stage_symbol=words.stage,
         units=words.units,
-        detail=detail.said(resolution, table.resolution),
         made=words.made,
     )
-    made = Batch(table, about, queries, resolution, detail.window, fields, look_up)
+    rest = (rows if body.once else None, detail.window, fields, look_up)
+    made = Batch(table, replace(about, detail=sent[0].said), sent, *rest)
     return _answer(batch_formats.encode(chosen, made), batch_formats.media_type(chosen, made))
 
 
@@ -144,29 +153,36 @@ def _gather(parts: Iterator[bytes]) -> Iterator[bytes]:
         yield b"".join(held)
 
 
-def _check_size(detail: level.Detail, resolution: int, count: int, settings: Settings) -> None:
+def _check_count(count: int, settings: Settings) -> None:
+    """Refuse too many shapes.
+
+    Raises:
+        BatchTooLarge: naming the limit.
+
+    """
+    if count > settings.max_batch:
+        advice = f"Send at most {settings.max_batch} at once; an operator raises the limit with WIZEN_MAX_BATCH."
+        raise BatchTooLarge.of([Wrong("points", f"{count} shapes are more than {settings.max_batch}", advice)])
+
+
+def _check_size(detail: level.Detail, resolutions: list[int], settings: Settings) -> None:
     """Refuse what is too much for one answer.
 
     Raises:
         BatchTooLarge: naming the limit.
 
     """
-    patch = detail.window.on(resolution)
-    points = count * patch.height * patch.width
-    wrong = []
-    if count > settings.max_batch:
-        advice = f"Send at most {settings.max_batch} at once; an operator raises the limit with WIZEN_MAX_BATCH."
-        wrong.append(Wrong("points", f"{count} shapes are more than {settings.max_batch}", advice))
+    sizes = {n: detail.window.on(n) for n in set(resolutions)}
+    points = sum(sizes[n].height * sizes[n].width for n in resolutions)
     if points > settings.max_batch_samples:
-        most = settings.max_batch_samples // (patch.height * patch.width)
+        most = len(resolutions) * settings.max_batch_samples // points
         advice = (
             f"At this resolution send at most {most} shapes at once; "
             "an operator raises the limit with WIZEN_MAX_BATCH_SAMPLES."
         )
-        said = f"{count} shapes of {patch.height} x {patch.width} points are {points}, more than"
-        wrong.append(Wrong("points", f"{said} {settings.max_batch_samples}", advice))
-    if wrong:
-        raise BatchTooLarge.of(wrong)
+        large = sizes[max(resolutions)]
+        said = f"{len(resolutions)} shapes of up to {large.height} x {large.width} points are {points}, more than"
+        raise BatchTooLarge.of([Wrong("points", f"{said} {settings.max_batch_samples}", advice)])
 
 
 def _off(body: BatchRequest, settings: Settings) -> list[Wrong]:
@@ -176,29 +192,30 @@ def _off(body: BatchRequest, settings: Settings) -> list[Wrong]:
     return [Wrong("resolution", detail, "An operator raises the limit with WIZEN_MAX_RESOLUTION.")]
 
 
-def _queries(entries: list[Mapping[str, float]], words: Words, found: Found) -> list[ShapeQuery]:
-    """Return the questions of all entries.
+def _queries(entries: list[Mapping[str, float]], words: Words, found: Found, off: list[Wrong]) -> list[ShapeQuery]:
+    """Return the questions of all entries; `off` is what is wrong with their levels of detail.
 
     Raises:
         OutsideRanges: listing every number off its axis, where nothing else is wrong.
         InvalidQuery: listing all that is wrong with any entry.
 
     """
-    wrong: list[Wrong] = []
-    queries, only_outside = [], True
+    wrong: list[Wrong] = list(off)
+    queries, only_outside = [], not off
     for i, entry in enumerate(entries):
-        common = [Wrong(n, "is not a parameter of one shape", "Give it for all.") for n in RESERVED if n in entry]
+        own = {name: value for name, value in entry.items() if name not in batch_detail.NAMES}
+        common = [Wrong(n, "is not a parameter of one shape", "Give it for all.") for n in RESERVED if n in own]
         try:
-            items = [(name, repr(value)) for name, value in entry.items()]
+            items = [(name, repr(value)) for name, value in own.items()]
             query = parse(items, words, common, found.filled, beyond(found, words))
         except InvalidQuery as error:
             only_outside = False
-            wrong += _entry(i, error.wrong)
+            wrong += batch_detail.entry(i, error.wrong)
         else:
-            wrong += _entry(i, query.outside)
+            wrong += batch_detail.entry(i, query.outside)
             queries.append(query)
     if wrong:
-        raise _summed(OutsideRanges if only_outside else InvalidQuery, wrong)
+        raise batch_detail.summed(OutsideRanges if only_outside else InvalidQuery, wrong)
     return queries
 
 
@@ -214,9 +231,9 @@ def _check_shapes(table: ShapeTable, queries: list[ShapeQuery], wanted: bool) ->
         try:
             table.fresh(query.point)
         except SolverError as error:
-            wrong += _entry(i, [Wrong("", error.message, error.advice)])
+            wrong += batch_detail.entry(i, [Wrong("", error.message, error.advice)])
     if wrong:
-        raise _summed(InvalidQuery, wrong)
+        raise batch_detail.summed(InvalidQuery, wrong)
 
 
 def _check_trust(table: ShapeTable, queries: list[ShapeQuery], options: Mapping[str, Any]) -> None:
@@ -231,22 +248,10 @@ def _check_trust(table: ShapeTable, queries: list[ShapeQuery], options: Mapping[
         try:
             table.at(query.point, query.stage, fields=(), **options)
         except TooUncertain as error:
-            wrong += _entry(i, [Wrong("", *_said(error))])
+            wrong += batch_detail.entry(i, [Wrong("", *_said(error))])
     if wrong:
-        raise _summed(UncertainBatch, wrong)
+        raise batch_detail.summed(UncertainBatch, wrong)
 
 
 def _said(error: StoreError) -> tuple[str, str]:
     return error.message.rstrip("."), error.advice
-
-
-def _entry(i: int, wrong: tuple[Wrong, ...] | list[Wrong]) -> list[Wrong]:
-    """Return what is wrong with entry `i`, named with its number."""
-    return [Wrong(f"points[{i}]" + (f".{w.name}" if w.name else ""), w.detail, w.advice) for w in wrong]
-
-
-def _summed(kind: type[InvalidQuery], wrong: list[Wrong]) -> InvalidQuery:
-    """Return an error that lists all, with a sentence on the first few."""
-    error = kind.of(wrong[:3])
-    more = "" if len(wrong) <= 3 else f" And {len(wrong) - 3} more."
-    return kind(f"{error.message}{more}", advice=error.advice, wrong=wrong)

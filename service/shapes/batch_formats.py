@@ -2,7 +2,8 @@
 
 `npz` is one archive: `position` and `displacement` (shape, colatitude, azimuth, component) in float32, `poles` (shape,
 pole, component) of whole surfaces, one column per axis, `stage`, descriptors and what is known of the error, and
-`about`, a JSON text. `json` is one line per shape. Other formats are the parts of a multipart/mixed body.
+`about`, a JSON text; where distinct shapes are sent once, `row` (point) as well. `json` is one line per shape. Other
+formats are the parts of a multipart/mixed body.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from store.surfaces.window import Window
 
 from ..formats import FORMATS, About, Format, best
 from ..formats.about import GENERATOR, LENGTH_UNIT
-from .query import ShapeQuery
+from .batch_detail import Asked
 
 __all__ = ["MEDIA_TYPES", "Batch", "encode", "media_type", "negotiate"]
 
@@ -34,15 +35,27 @@ MEDIA_TYPES = tuple(_BY_TYPE)
 
 
 class Batch(NamedTuple):
-    """Shapes yet to be looked up, in order, each time that `look_up` is called."""
+    """Shapes yet to be looked up, in the order of `asked`, each time that `look_up` is called.
+
+    `rows` says, where each distinct shape is sent once, which of them a point has.
+    """
 
     table: ShapeTable
     about: About
-    queries: list[ShapeQuery]
-    resolution: int
+    asked: list[Asked]
+    rows: list[int] | None
     window: Window
     fields: tuple[str, ...]
-    look_up: Callable[[], Iterator[Shape]]
+    look_up: Callable[[], Iterator[tuple[Shape, About]]]
+
+    def points(self) -> list[list[int]] | None:
+        """Return for each shape that is sent the points that it is for; None where each point has its own."""
+        if self.rows is None:
+            return None
+        found: list[list[int]] = [[] for _ in self.asked]
+        for point, row in enumerate(self.rows):
+            found[row].append(point)
+        return found
 
 
 def negotiate(accept: str | None, explicit: str | None) -> Format:
@@ -70,24 +83,31 @@ def encode(chosen: Format, batch: Batch) -> Iterator[bytes]:
 
 
 def _lines(chosen: Format, batch: Batch) -> Iterator[bytes]:
-    for shape in batch.look_up():
-        yield chosen.encode(shape, batch.about) + b"\n"
+    points = batch.points()
+    for i, (shape, about) in enumerate(batch.look_up()):
+        line = chosen.encode(shape, about)
+        if points is not None:
+            line = line[:-1] + f',"points":{json.dumps(points[i])}}}'.encode()
+        yield line + b"\n"
 
 
 def _mixed(chosen: Format, batch: Batch) -> Iterator[bytes]:
     boundary = _boundary(batch)
-    for i, shape in enumerate(batch.look_up()):
-        body = chosen.encode(shape, batch.about)
+    points = batch.points()
+    for i, (shape, about) in enumerate(batch.look_up()):
+        body = chosen.encode(shape, about)
         head = (
             f"--{boundary}\r\nContent-Type: {chosen.media_type}\r\nContent-Length: {len(body)}\r\n"
-            f'Content-Disposition: attachment; filename="{i}{chosen.suffix}"\r\n\r\n'
+            f'Content-Disposition: attachment; filename="{i}{chosen.suffix}"\r\n'
         )
-        yield head.encode() + body + b"\r\n"
+        if points is not None:
+            head += f"Wizen-Points: {','.join(map(str, points[i]))}\r\n"
+        yield head.encode() + b"\r\n" + body + b"\r\n"
     yield f"--{boundary}--\r\n".encode()
 
 
 def _boundary(batch: Batch) -> str:
-    return hashlib.sha256(f"{batch.table.digest} {batch.queries}".encode()).hexdigest()
+    return hashlib.sha256(f"{batch.table.digest} {batch.asked} {batch.rows}".encode()).hexdigest()
 
 
 class _Pipe:
@@ -110,8 +130,8 @@ class _Pipe:
 
 def _npz(batch: Batch) -> Iterator[bytes]:
     """Yield an archive: the fields first, shape by shape; what is small is gathered meanwhile."""
-    patch = batch.window.on(batch.resolution)
-    size = (len(batch.queries), patch.height, patch.width, len(patch.components))
+    patch = batch.window.on(batch.asked[0].resolution)
+    size = (len(batch.asked), patch.height, patch.width, len(patch.components))
     dtype = np.dtype(batch.table.info.dtype).newbyteorder("<")
     pipe = _Pipe()
     rows = _Rows()
@@ -121,7 +141,7 @@ def _npz(batch: Batch) -> Iterator[bytes]:
         waiting: dict[str, list[bytes]] = {name: [] for name in others}
         with archive.open(zipfile.ZipInfo(f"{first}.npy"), "w", force_zip64=True) as member:
             member.write(_head(size, dtype))
-            for shape in batch.look_up():
+            for shape, _ in batch.look_up():
                 rows.add(shape)
                 for name, held in waiting.items():
                     held.append(_bytes(getattr(shape, name), dtype))
@@ -133,7 +153,8 @@ def _npz(batch: Batch) -> Iterator[bytes]:
                 while held:
                     member.write(held.pop(0))
                     yield pipe.take()
-        for name, array in {**rows.arrays(), "about": np.array(_about(batch, rows))}.items():
+        places = {} if batch.rows is None else {"row": np.array(batch.rows)}
+        for name, array in {**rows.arrays(), **places, "about": np.array(_about(batch, rows))}.items():
             file = io.BytesIO()
             np.lib.format.write_array(file, array, allow_pickle=False)
             archive.writestr(zipfile.ZipInfo(f"{name}.npy"), file.getvalue())

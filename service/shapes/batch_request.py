@@ -32,10 +32,12 @@ class BatchRequest(BaseModel):
     preset: str | None = Field(None, description="Named parameters, for what the points do not say")
     points: Annotated[list[Row], Field(min_length=1)] | Columns = Field(
         description="One object per shape with the table's axes and the stage; or one list per name, all of one "
-        "length, where a number stands for all shapes",
+        "length, where a number stands for all shapes. `resolution`, or `screen_px` with `distance` and `fov`, may be "
+        "a point's own (npz holds one lattice only)",
         examples=[
             [{"te": 0.035, "gamma": 20, "s": 0.1}, {"te": 0.035, "gamma": 20, "s": 0.2}],
             {"te": 0.035, "gamma": 20, "s": [0.1, 0.2]},
+            {"te": 0.035, "gamma": 20, "s": 0.2, "screen_px": [400, 80]},
         ],
     )
     format: Literal["npz", "json", "glb", "obj", "points"] | None = Field(
@@ -55,6 +57,11 @@ class BatchRequest(BaseModel):
         None, description="Components of an npz's fields; the others are not computed"
     )
     method: str | None = Field(None, description="Method of look-up; the table's own without it")
+    once: bool = Field(
+        False,
+        description="Send each distinct shape once: `row` of an npz, `points` of a line, the header `Wizen-Points` of "
+        "a part say which points it is for. What is asked for twice is computed once in any case",
+    )
     max_error: Positive | None = Field(None, description="Most that the roughness may be expected to be off by")
 
     @property

@@ -15,8 +15,9 @@ from store.families.stored import document
 from sweeps.commands.terminal.tables import run_command
 
 from ..errors import OutsideRanges, Uncertain
-from ..jobs.submit import submit
+from ..jobs.submit import asker_of, submit
 from ..security import authorize, bearer
+from ..views.addresses import link
 from .asking import Asked
 
 __all__ = ["RESPONSE", "offered", "redirect"]
@@ -36,7 +37,10 @@ def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain)
     kept = [(name, text) for name, text in request.query_params.multi_items() if name != "exact"]
     said = {name: value for name, value in asked.query.said.items() if name != asked.words.stage}
     command = run_command(asked.solver.name, asked.found.preset, said, asked.query.stage)
-    links = {"exact": f"{request.url.path}?{urlencode([*kept, ('exact', 'run')])}", "command": command}
+    links = {
+        "exact": f"{link(request.scope['path'].removesuffix('/info'))}?{urlencode([*kept, ('exact', 'run')])}",
+        "command": command,
+    }
     more: dict[str, Any] = {"links": links}
     if asked.found.fits:
         near = asked.found.fits[0]
@@ -63,9 +67,8 @@ def redirect(request: Request, asked: Asked) -> Response:
     token = authorize(request.app.state, bearer(request), "run")
     query, need = asked.query, Need(stages=(asked.query.stage,), quality="default")
     params, preset = _run(asked)
-    found = submit(
-        request.app.state, asked.solver, params, need, token.id, preset=preset, unlimited=token.allows("admin")
-    )
+    who, unlimited = asker_of(request, token), token.allows("admin")
+    found = submit(request.app.state, asked.solver, params, need, who, preset=preset, unlimited=unlimited)
     location = found.location
     if found.job.state == "done":
         location += f"/result?{urlencode({'format': asked.chosen.name})}"

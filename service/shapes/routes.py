@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from typing import Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Request
@@ -20,6 +19,8 @@ from .. import problems
 from ..errors import OutsideRanges
 from ..formats import FORMATS, About, Format
 from ..settings import Settings
+from ..views.addresses import link
+from ..views.shape import ShapePage
 from . import asking, exact
 from . import detail as level
 from .answers import Answer, Answers, matches
@@ -35,8 +36,7 @@ router = APIRouter(tags=["shapes"])
 _QUICK = ("points", "npz", "json")
 _SMALL = 128
 
-_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
-_CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" else _BINARY for f in FORMATS.values()}
+_CONTENT = problems.files(f.media_type for f in FORMATS.values() if f.name != "json")
 
 
 @router.get(
@@ -44,7 +44,7 @@ _CONTENT = {f.media_type: {"schema": {"type": "object"}} if f.name == "json" els
     summary="One shape, interpolated from a table",
     response_class=Response,
     responses={
-        200: {"description": "The shape", "content": _CONTENT},
+        200: {"model": ShapePage, "description": "The shape, in the format asked for", "content": _CONTENT},
         303: exact.RESPONSE,
         304: {"description": "The shape that the asker has is the current one"},
         **problems.responses(401, 403, 404, 406, 409, 413, 414, 422, 429, 500, 503, 507),
@@ -61,6 +61,20 @@ async def shape(
     """
     found = await at_once(request, solver)
     return await run_in_threadpool(_shape, request, solver) if found is None else found
+
+
+@router.get(
+    "/v1/shapes/{solver}/info",
+    summary="The numbers about one shape",
+    response_model=ShapePage,
+    responses={
+        304: {"description": "What the asker has is current"},
+        **problems.responses(404, 413, 414, 422, 500, 503),
+    },
+)
+def info(request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Response:
+    """Say what is known of a shape, as `format=json` does of the same question: always JSON, whatever is accepted."""
+    return _settle(request, asking.read(request, solver, FORMATS["json"], ("format", "exact")))
 
 
 async def at_once(request: Request, solver: str) -> Response | None:
@@ -177,7 +191,8 @@ def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str,
     kept = [(k, v) for k, v in request.query_params.multi_items() if k not in settled]
     others = [name for name, chosen in FORMATS.items() if name != "json" and not detail.refused(chosen)]
     pairs = [*kept, ("resolution", str(resolution))]
-    return {name: f"{request.url.path}?{urlencode([*pairs, ('format', name)])}" for name in others}
+    path = link(request.scope["path"].removesuffix("/info"))
+    return {name: f"{path}?{urlencode([*pairs, ('format', name)])}" for name in others}
 
 
 def _filename(solver: str, query: ShapeQuery, symbol: str, chosen: Format) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import CorruptLedger, ReadOnlyStore, StorageFull
+from ..errors import CorruptLedger, ReadOnlyStore, StorageFailed, StorageFull
 from .filesystem import refuse_network
 
 __all__ = ["Database"]
@@ -68,6 +68,7 @@ class Database:
             CorruptLedger: the file is no database, or one of another version.
             ReadOnlyStore: it may not be written.
             StorageFull: the disk is full.
+            StorageFailed: it does not work.
 
         """
         with self._transaction("IMMEDIATE") as connection:
@@ -127,6 +128,9 @@ class Database:
                 raise StorageFull(f"there is no space left to write {self._path}.", "Free space and go on.") from error
             if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")):
                 raise ReadOnlyStore(f"{self._path} cannot be written.", "Name a store of your own.") from error
+            if name.startswith("SQLITE_IOERR"):
+                advice = "Look at the disk and its free space; then run the same command again."
+                raise StorageFailed(f"the disk could not read or write {self._path} ({name}).", advice) from error
             if name in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
                 raise self._unreadable(f"is not a sound database ({error})") from error
             raise

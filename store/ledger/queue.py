@@ -7,10 +7,12 @@ of stopped sweeps alone, and one asker's change of mind takes nothing from anoth
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from sqlite3 import Connection
 
 from ..errors import QueueFull
+from . import asks
+from .asks import Asker, Spending
 from .jobs import Job, JobSpec, State, read_row
 from .ledger import Ledger
 from .rows import SELECT, enter, get
@@ -23,10 +25,11 @@ PLAN = "queue"
 
 @dataclass(frozen=True)
 class Quota:
-    """How many jobs may wait or run at once: of everybody, and of one asker."""
+    """How many jobs may wait or run at once, of everybody and of one asker, and how much time may be asked for."""
 
     total: int
     own: int
+    spending: Spending = field(default_factory=Spending)
 
 
 class Queue:
@@ -37,27 +40,40 @@ class Queue:
         self._database = ledger.database
 
     def ask(
-        self, job: JobSpec, owner: str, quota: Quota | None = None, *, again: bool = False, lost: bool = False
+        self,
+        job: JobSpec,
+        owner: str | Asker,
+        quota: Quota | None = None,
+        *,
+        again: bool = False,
+        lost: bool = False,
+        expected: float = 0.0,
     ) -> tuple[Job, bool]:
         """Ask for a job in the name of `owner`; return it, and whether it waits now and did not before.
+
+        It is expected to take so many seconds, which are noted with who asked, and count for the quota.
 
         What was cancelled waits again; what failed for good with `again`, what is done with `lost`: its shard is gone.
 
         Raises:
-            QueueFull: the quota is used up; asking for what is asked for already always works.
+            QueueFull, QuotaSpent: the quota is used up; asking for what is asked for already always works.
 
         """
         revivable: dict[State, bool] = {"cancelled": True, "failed": again, "done": lost}
         revived = [state for state, whether in revivable.items() if whether]
-        mine = _plan(owner)
+        asker = owner if isinstance(owner, Asker) else Asker(owner)
+        mine = _plan(asker.id)
         with self._database.write() as connection:
             row = connection.execute("SELECT state FROM jobs WHERE key = ?", (job.key,)).fetchone()
             state = "cancelled" if row is None else row["state"]
             adds = state in revived or (state in ("wanted", "running") and not _has(connection, mine, job.key))
             if adds and quota is not None:
                 _check(connection, mine, quota)
+                asks.check(connection, asker, expected, quota.spending)
             new = enter(connection, job, PLAN, revived)
             connection.execute("INSERT OR IGNORE INTO plans VALUES (?, ?)", (mine, job.key))
+            if adds:
+                asks.note(connection, job.key, asker, expected)
             return get(connection, job.key), new == 1
 
     def withdraw(self, key: str, owner: str) -> tuple[Job, bool]:

@@ -14,7 +14,13 @@ CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
 -- a job may belong to several plans, of which jobs.plan is the one that asked first
 CREATE TABLE IF NOT EXISTS plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) WITHOUT ROWID;
 -- what a running job says of itself
-CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) WITHOUT ROWID
+CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) WITHOUT ROWID;
+-- who asked for it over HTTP, and how long it was expected to take, without secrets
+CREATE TABLE IF NOT EXISTS asks (
+    key TEXT NOT NULL, token TEXT NOT NULL, name TEXT NOT NULL, client TEXT NOT NULL, at REAL NOT NULL,
+    expected REAL NOT NULL
+);
+CREATE INDEX IF NOT EXISTS asks_at ON asks (at)
 """
 
 #: What older files lack: by the version that they have, how they become the next.

@@ -1,4 +1,4 @@
-"""`wizen work` and `wizen token`: who works off the jobs that are asked for over HTTP, and who may ask."""
+"""`wizen work`, `wizen token` and `wizen audit`: who works off what is asked for over HTTP, who may ask, who did."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ tokens = typer.Typer(
 def add_to(app: typer.Typer) -> None:
     """Add these commands to the `wizen` command."""
     app.command()(work)
+    app.command()(audit)
     app.add_typer(tokens, name="token")
 
 
@@ -65,6 +66,42 @@ def work(
         raise typer.Exit(130)
 
 
+def audit(
+    store: StorePath,
+    since: Annotated[str | None, typer.Option("--since", metavar="SPAN", help="How far back, e.g. 7d or 12h.")] = None,
+    token: Annotated[str | None, typer.Option("--token", help="Only what this token asked for, by name or id.")] = None,
+    as_json: As_json = False,
+) -> None:
+    """List who asked for which job over HTTP, from where, and how long it took. Secrets were never noted.
+
+    [bold]Examples[/bold]
+
+    wizen audit --store demo --since 7d
+
+    wizen audit --store demo --token studio --json
+    """
+    from store.ledger.asks import asks
+    from store.store import Store
+
+    opened = Store.open(store)
+    start = 0.0 if since is None else time.time() - _span(since, "--since")
+    found = asks(opened.ledger.database, start, token) if opened.ledger.path.is_file() else []
+    rows = [{**ask._asdict(), "at": _date(ask.at)} for ask in found]
+
+    def show(console: Any) -> None:
+        cells = [
+            [r["at"], r["name"] or r["token"], r["client"], r["key"][:12], r["solver"], r["state"], _took(r)]
+            for r in rows
+        ]
+        grid(console, ("asked", "token", "from", "job", "solver", "state", "seconds"), cells)
+
+    emit({"asks": rows}, as_json, show)
+
+
+def _took(row: dict[str, Any]) -> str:
+    return f"{row['seconds']:.1f}" if row["seconds"] is not None else f"about {row['expected']:.0f}"
+
+
 @tokens.command()
 def create(
     store: StorePath,
@@ -85,7 +122,7 @@ def create(
     from store.tokens import Tokens
 
     wanted: Any = [part for part in re.split(r"[,\s]+", scopes) if part]
-    seconds = None if expires is None else _span(expires)
+    seconds = None if expires is None else _span(expires, "--expires")
     token, secret = Tokens(Store.open(store, create=True).root).create(name, wanted, seconds)
     note(f"token {token.name!r} for {', '.join(token.scopes)}; the secret is not shown again:")
     emit({**_row(token), "secret": secret}, as_json, lambda console: console.print(secret, markup=False))
@@ -145,8 +182,8 @@ def _date(seconds: float) -> str:
     return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))
 
 
-def _span(text: str) -> float:
+def _span(text: str, option: str) -> float:
     match = _SPAN.fullmatch(text.strip())
     if match is None:
-        raise InvalidOption(f"--expires {text!r} is not a span of time.", "Write for example 90d, 12h or 30m.")
+        raise InvalidOption(f"{option} {text!r} is not a span of time.", "Write for example 90d, 12h or 30m.")
     return float(match[1]) * _SECONDS[match[2]]

@@ -173,7 +173,8 @@ def dask_local(count: int) -> Iterator[Workers]:
 
 @contextmanager
 def dask_cluster(address: str) -> Iterator[Workers]:
-    """The workers of a running Dask scheduler; they must see the store under the same path.
+    """The workers of a running Dask scheduler. Those that see the store under the same path write results there; others
+    hand them back. Jobs that start from other results need the former.
 
     The workers' threads are set where they are started (`dask worker --nthreads 1`, `OMP_NUM_THREADS`).
 

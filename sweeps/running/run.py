@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from typing import Any
 
+from store import shards
 from store.ledger.jobs import Job, JobSpec
 from store.ledger.queue import Queue
 from store.store import Store
@@ -109,6 +110,8 @@ class Run:
             if future.done():
                 stop_mark(self._store.root, job).unlink(missing_ok=True)
         self.flying.clear()
+        if not self._shares_ledger:
+            (self._store.root / self._sharing()).unlink()
 
     def _free(self, jobs: Iterable[Job]) -> None:
         """Take back jobs of runners that are known to be dead."""
@@ -133,13 +136,23 @@ class Run:
             if job is None:
                 return
             ends_itself = getattr(self._executor, "ends_itself", False)
-            task = Task(self._store.root.absolute(), job, self._lease, self._shares_ledger, ends_itself)
+            root = self._store.root.absolute()
+            task = Task(root, job, self._lease, self._shares_ledger, ends_itself, self._sharing())
             try:
                 self.flying[self._executor.submit(work, task)] = job
             except BrokenExecutor:
                 self._ledger.release(job)
                 raise SweepError("the executor's processes died.", "Run the same sweep again.") from None
             self._tell("started", job)
+
+    def _sharing(self) -> str:
+        """Return the name of a file by which workers elsewhere learn whether they see this store."""
+        if self._shares_ledger:
+            return ""
+        mark = self._store.root / "stopping" / f"shared-{self.id.rpartition(':')[2]}"
+        mark.parent.mkdir(exist_ok=True)
+        mark.touch()
+        return f"stopping/{mark.name}"
 
     def _collect(self) -> None:
         """Take in the results that are there."""
@@ -174,6 +187,8 @@ class Run:
 
     def _take(self, job: Job, outcome: Outcome) -> None:
         if outcome.state == "done" and not self._shares_ledger:
+            if outcome.data:  # its worker does not see the store
+                self._store.put(job.key, shards.parse(outcome.data, self._store.shard_path(job.key)))
             ours = self._ledger.done(job, outcome.digest, outcome.seconds)
         else:
             ours = outcome.state == "done"

@@ -39,6 +39,8 @@ class Task:
 
     `shares_ledger` is false on other hosts, where SQLite's locks do not reach: there the claiming process keeps the
     books, and asks to stop by a mark beside the shards. `ends_itself`: nobody else can kill the worker's process.
+    `sharing` names a file in the store that the claiming process sees: a worker that does not see it hands its result
+    back as bytes.
     """
 
     root: Path
@@ -46,11 +48,20 @@ class Task:
     lease: float
     shares_ledger: bool = True
     ends_itself: bool = False
+    sharing: str = ""
+
+    @property
+    def apart(self) -> bool:
+        """Whether the store's files are not to be seen from here."""
+        return bool(self.sharing) and not (self.root / self.sharing).exists()
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task. `reused`: the shard was there already. `error` as in `sweeps.errors.describe`."""
+    """What became of a task. `reused`: the shard was there already. `error` as in `sweeps.errors.describe`.
+
+    `data` is the result itself where its worker could not store it.
+    """
 
     key: str
     state: Literal["done", "failed", "stopped"]
@@ -59,6 +70,7 @@ class Outcome:
     reused: bool = False
     retry: bool = False
     error: dict[str, Any] | None = None
+    data: bytes = b""
 
 
 class StaleVersion(SweepError):
@@ -100,7 +112,11 @@ def work(task: Task) -> Outcome:
         if digest is not None:
             return hold.report(Outcome(job.key, "done", digest, reused=True))
         with _Heart(task, hold) as heart:
-            digest = store.put(job.key, _solve(task, heart, store))
+            result = _solve(task, heart, store)
+            if task.apart:
+                digest, data = shards.image(result, job.key)
+                return Outcome(job.key, "done", digest, time.perf_counter() - start, data=bytes(data))
+            digest = store.put(job.key, result)
         return hold.report(Outcome(job.key, "done", digest, time.perf_counter() - start))
     except Cancelled:
         return Outcome(job.key, "stopped")
@@ -151,6 +167,8 @@ def _solve(task: Task, heart: _Heart, store: Store) -> xr.Dataset:
 
 def _quarantine(task: Task, partial: xr.Dataset, reason: str) -> str:
     """Keep the stages that converged, with the reason, where no table looks for them; return the path in the store."""
+    if task.apart:
+        return ""  # there is nowhere to keep them
     solver, path = registry.get(task.job.solver), quarantine_path(task.root, task.job.key)
     need = Need.parse(task.job.need)
     try:

@@ -250,3 +250,51 @@ def test_wrong_detail_is_named(client: httpx.Client, change: dict[str, Any], nam
     assert answer.status_code == 422
     assert [wrong["name"] for wrong in answer.json()["errors"]] == [name]
     assert words in answer.text
+
+
+def test_equal_points_are_computed_once(client: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In any order, of any format; with `once` they are sent once, too, and the answer says which is whose."""
+    asked: list[Any] = []
+    real = ShapeTable.at
+
+    def counted(self: ShapeTable, point: Any, stage: float, **options: Any) -> Any:
+        asked.append((tuple(point.items()), stage))
+        return real(self, point, stage, **options)
+
+    monkeypatch.setattr(ShapeTable, "at", counted)
+    points = [ROWS[0], ROWS[1], ROWS[0], ROWS[0], ROWS[1], ROWS[2]]
+    whole = load(ask(client, points=points))
+    assert len(asked) == 3
+    assert whole["position"].shape[0] == 6
+    assert np.array_equal(whole["position"][0], whole["position"][3])
+    once = load(ask(client, points=points, once=True))
+    assert once["row"].tolist() == [0, 1, 0, 0, 1, 2]
+    assert np.array_equal(once["position"][once["row"]], whole["position"])
+    assert once["te"].tolist() == [0.03, 0.02, 0.06]
+    lines = [json.loads(line) for line in ask(client, points=points, once=True, format="json").text.splitlines()]
+    assert [line["points"] for line in lines] == [[0, 2, 3], [1, 4], [5]]
+    answer = ask(client, points=points, once=True, format="glb")
+    head = f"Content-Type: {answer.headers['content-type']}\r\n\r\n".encode()
+    parts = email.message_from_bytes(head + answer.content).get_payload()
+    assert [part["Wizen-Points"] for part in parts] == ["0,2,3", "1,4", "5"]
+    assert "points" not in json.loads(ask(client, format="json").text.splitlines()[0])
+
+
+def test_each_point_at_its_own_level_of_detail(client: httpx.Client) -> None:
+    near, far = {**ROWS[0], "screen_px": 60}, {**ROWS[0], "screen_px": 10}
+    own = [ROWS[0], near, far, {**ROWS[0], "resolution": 16}]
+    lines = [json.loads(line) for line in ask(client, points=own, format="json").text.splitlines()]
+    assert [line["lattice"]["colatitude"] for line in lines] == [16, 24, 8, 16]
+    assert lines[1]["detail"]["chosen_by"] == "screen_px"
+    # one of each alone is the same file
+    answer = ask(client, points=own, format="points")
+    head = f"Content-Type: {answer.headers['content-type']}\r\n\r\n".encode()
+    parts = [part.get_payload(decode=True) for part in email.message_from_bytes(head + answer.content).get_payload()]
+    for part, row, more in zip(parts, own, ({"resolution": 16}, {}, {}, {}), strict=True):
+        assert part == client.get(SHAPE, params={**row, **more, "format": "points"}).content
+    refused = ask(client, points=own).json()
+    assert "several lattices" in refused["detail"]
+    assert load(ask(client, points=[far, far], resolution=None))["position"].shape[1] == 8
+    for bad in ({"resolution": 3}, {"resolution": 16.5}, {"resolution": 9999}, {"screen_px": -1}, {"fov": 20}):
+        problem = ask(client, points=[ROWS[0], {**ROWS[0], **bad}], format="glb").json()
+        assert problem["errors"][0]["name"] == f"points[1].{next(iter(bad))}", problem

@@ -99,6 +99,7 @@ def test_openapi_is_valid_and_explains_the_query(built: Path, client: httpx.Clie
     assert parameters["s"]["schema"]["maximum"] == 0.6
     assert set(get["responses"]["200"]["content"]) == {
         "application/json",
+        "application/octet-stream",
         "application/vnd.wizen.points",
         "application/x-npz",
         "model/gltf-binary",
@@ -118,8 +119,8 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     document = create_app().openapi()
     operations = {op["operationId"]: op for each in document["paths"].values() for op in each.values()}
     assert set(operations) == {
-        "index", "health", "tables", "table", "solvers", "solver", "shape", "batch", "jobs", "ask", "job", "cancel",
-        "events", "result", "results", "maps", "thumbnail", "plan",
+        "index", "health", "tables", "table", "solvers", "solver", "shape", "info", "batch", "jobs", "ask", "job",
+        "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan",
     }  # fmt: skip
     assert document["servers"]
     needs = {name: operation["security"] for name, operation in operations.items()}

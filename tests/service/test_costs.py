@@ -12,6 +12,7 @@ from service.jobs.submit import submit
 from service.settings import Settings
 from solver import registry
 from solver.contract import Need
+from store.ledger.asks import Asker
 from store.ledger.queue import Queue
 from store.store import Store
 
@@ -29,7 +30,7 @@ pytestmark = pytest.mark.usefixtures("shrinking")
 def test_a_job_costs_no_more_than_the_operator_allows(store: Store, limits: dict[str, Any], words: str | None) -> None:
     """`shrinking` expects 0.01 s and 1000 bytes, whatever it is asked."""
     state: Any = SimpleNamespace(settings=Settings(store=store.root, **limits), tables=SimpleNamespace(store=store))
-    asked = (state, registry.get("shrinking"), {"te": 0.03}, Need(stages=(0.1,), quality="preview"), "somebody")
+    asked = (state, registry.get("shrinking"), {"te": 0.03}, Need(stages=(0.1,), quality="preview"), Asker("somebody"))
     if words:
         with pytest.raises(TooCostly, match=words):
             submit(*asked, preset="sphere")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -10,7 +11,11 @@ from pathlib import Path
 import httpx
 import pytest
 
+from store.store import Store
+from store.tokens import Tokens
+
 from ._asking import ROOT, answers, until
+from ._jobs import bearer
 from .conftest import QUERY, SHAPE
 
 
@@ -36,3 +41,30 @@ def test_several_processes_answer_alike(built: Path) -> None:
         running.send_signal(signal.SIGTERM)
         running.communicate(timeout=120)
     assert running.returncode == 0
+
+
+@pytest.mark.slow
+def test_a_revoked_token_is_refused_by_all_processes(own: Store) -> None:
+    """From the next request on, whichever of four processes it meets."""
+    head = bearer(own, "leaked")
+    command = [sys.executable, "-m", "service.cli", "serve", "--store", str(own.root), "--port", "0", "--workers", "4"]
+    environment = {**os.environ, "WIZEN_JOBS_WORKERS": "0", "WIZEN_PUBLIC_READ": "0"}
+    running = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
+    try:
+        assert running.stderr is not None
+        address = running.stderr.readline().split()[-1]
+        until(lambda: _status(f"{address}/v1/tables", head) == 200)
+        # connections of their own: the system hands them to all four
+        assert {_status(f"{address}/v1/tables", head) for _ in range(40)} == {200}
+        Tokens(own.root).revoke("leaked")
+        assert [_status(f"{address}/v1/tables", head) for _ in range(40)] == [401] * 40
+    finally:
+        running.send_signal(signal.SIGTERM)
+        running.communicate(timeout=120)
+
+
+def _status(url: str, head: dict[str, str]) -> int:
+    try:
+        return httpx.get(url, headers={**head, "Connection": "close"}, timeout=60).status_code
+    except httpx.TransportError:
+        return 0

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InvalidOption, installing
+from ... import foreign
+from ...errors import InvalidOption, SweepError
+from ...foreign import KINDS
 
 __all__ = ["KINDS", "read"]
-
-KINDS = (".obj", ".ply", ".glb", ".stl")
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -21,25 +21,12 @@ def read(path: Path) -> dict[str, Any]:
         InvalidOption: no such kind of file, nothing that can be read in it, or trimesh is not installed.
 
     """
-    if path.suffix.lower() not in KINDS:
-        raise InvalidOption(f"{path.name!r} is no mesh.", f"Known: {', '.join(KINDS)}.")
-    if not path.is_file():
-        raise InvalidOption(f"there is no file {path}.", "Name a mesh file.")
     try:
-        import trimesh
-    except ImportError:
-        raise InvalidOption("meshes need the package trimesh.", installing("formats")) from None
-    try:
-        mesh: Any = trimesh.load(path, force="mesh", process=False)
+        mesh = foreign.read(path)
+        foreign.sound(path, np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64))
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
         points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
-    except OSError as error:
-        raise InvalidOption(f"{path}: {error.strerror or error}.", "Name a mesh file.") from None
-    except Exception as error:
-        raise InvalidOption(
-            f"{path} cannot be read: {error}.", f"Write it anew as one of {', '.join(KINDS)}."
-        ) from None
-    if faces.ndim != 2 or not len(faces):
-        raise InvalidOption(f"{path} holds no triangles.", "Name a mesh of triangles.")
+    except SweepError as error:
+        raise InvalidOption(error.message, error.advice) from None
     used, faces = np.unique(faces, return_inverse=True)
     return {"points": points[used].tolist(), "faces": faces.reshape(-1, 3).tolist()}

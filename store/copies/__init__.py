@@ -1,0 +1,1 @@
+"""Copies of whole stores: kept elsewhere, checked, and brought back."""

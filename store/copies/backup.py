@@ -1,0 +1,199 @@
+"""A store copied while it is in use, and brought back.
+
+A backup is a directory with results and generations of tables as a store has them, what changes (ledger, manifests,
+tokens) in a folder of its own for each copy, and a list of all files with their SHA-256 (`backup.json`). Results are
+immutable, so a later backup into the same directory copies only what is new. The list is written last: whatever is
+killed on the way, the backup before is still whole.
+
+The ledger is copied first, as SQLite sees it at one moment: what it calls done has its shard on the disk by then. A
+restored store appears at once, by a rename.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+import shutil
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from solver import __version__
+
+from .. import seal
+from ..errors import CorruptBackup, MissingStore, ReadOnlyStore, full_disk
+from ..store import Store
+
+__all__ = ["Copied", "backup", "restore"]
+
+_LIST = "backup.json"
+_LEDGER = "ledger.sqlite"
+_CHANGING = "changing"
+#: What a store is made of, besides its ledger. Quarantined stages and the marks of running jobs stay behind.
+_CHANGES = ("tables/*/scalars.nc", "tables/*/current.json", "tokens.json")
+_STAYS = ("shards/??/*.h5", "tables/*/*.h5")
+_PRIVATE = ("tokens.json",)
+#: A claim means nothing after a restore: its worker belongs to the other store.
+_FREE = "UPDATE jobs SET state = 'wanted', worker = NULL, lease_until = NULL, progress = 0 WHERE state = 'running'"
+
+
+class Copied(NamedTuple):
+    """What a copy holds, and what of it had to be copied."""
+
+    files: int
+    bytes: int
+    new: int
+    created: str
+
+
+def backup(store: Store, to: Path) -> Copied:
+    """Copy a store into the directory `to`, which an earlier backup of it may hold already.
+
+    Raises:
+        ReadOnlyStore: `to` holds something else, or may not be written.
+        StorageFull: there is no room; the backup before stays whole.
+
+    """
+    if to.resolve() == store.root.resolve() or (to.is_dir() and not (to / _LIST).exists() and _is_foreign(to)):
+        raise ReadOnlyStore(f"{to} holds something else than a backup.", "Name an empty or a new directory.")
+    with full_disk(to):
+        seal.make_directory(to)
+        known = _listed(to)["files"] if (to / _LIST).exists() else {}
+        for place in (to, to / "shards", to / "tables"):
+            seal.clean(place)
+        now = datetime.now(UTC)
+        changing = f"{_CHANGING}/{now:%Y%m%dT%H%M%S}-{secrets.token_hex(4)}"
+        files = {_LEDGER: _copy_ledger(store, to, f"{changing}/{_LEDGER}")} if store.ledger.path.is_file() else {}
+        new = 0
+        # what changes first, then what there is by now: the generation that a manifest names is among it
+        for patterns in (_CHANGES, _STAYS):
+            for name in sorted(_names(store.root, patterns)):
+                at = name if patterns is _STAYS else f"{changing}/{name}"
+                files[name], copied = _copy(store.root / name, to, at, known.get(name), private=name in _PRIVATE)
+                new += copied
+        _check_tables(to / changing, files)
+        page: dict[str, Any] = {"wizen": __version__, "created": now.isoformat(timespec="seconds"), "files": files}
+        seal.publish(to / _LIST, json.dumps(page, indent=1).encode())
+        for old in (to / _CHANGING).iterdir():
+            if old.name != Path(changing).name:
+                shutil.rmtree(old)
+    return Copied(len(files), sum(entry["bytes"] for entry in files.values()), new, page["created"])
+
+
+def restore(source: Path, root: Path) -> Copied:
+    """Make a store in `root`, where none is, of the backup in `source`, once every byte of it was found as written.
+
+    Raises:
+        MissingStore: `source` is no backup.
+        CorruptBackup: a file of it is missing or changed.
+        ReadOnlyStore: there is something in `root` already, or it may not be written.
+        StorageFull: there is no room; nothing stays.
+
+    """
+    if not (source / _LIST).is_file():
+        raise MissingStore(f"there is no backup in {source}.", "`wizen backup DIR --store STORE` makes one.")
+    if root.exists() and (not root.is_dir() or any(root.iterdir())):
+        raise ReadOnlyStore(f"{root} is not empty.", "Restore into a new directory; then put it in its place.")
+    page = _listed(source)
+    growing = root.with_name(f".{root.name}.restoring")
+    with full_disk(root):
+        shutil.rmtree(growing, ignore_errors=True)  # of a restore that was killed
+        for name, entry in page["files"].items():
+            try:
+                found, _ = _copy(source / entry["at"], growing, name, None, private=name in _PRIVATE)
+                if found["sha256"] != entry["sha256"]:
+                    raise CorruptBackup(f"{source / entry['at']} is not what was copied.", "Take another backup.")
+            except CorruptBackup:
+                shutil.rmtree(growing)
+                raise
+        for name in ("shards", "tables"):
+            seal.make_directory(growing / name)
+        if root.exists():
+            root.rmdir()
+        growing.rename(root)
+        seal.sync(root.parent)
+    sizes = [entry["bytes"] for entry in page["files"].values()]
+    return Copied(len(sizes), sum(sizes), len(sizes), page["created"])
+
+
+def _is_foreign(to: Path) -> bool:
+    """Return whether a directory holds what no interrupted backup would have left."""
+    ours = {"shards", "tables", _CHANGING}
+    return any(path.name not in ours and not path.name.startswith(f".{_LIST}") for path in to.iterdir())
+
+
+def _listed(source: Path) -> dict[str, Any]:
+    """Return what a backup says of itself.
+
+    Raises:
+        CorruptBackup: it cannot be read, or names files outside of it.
+
+    """
+    try:
+        page: dict[str, Any] = json.loads((source / _LIST).read_bytes())
+        names = [*page["files"]]
+        if not isinstance(page["created"], str) or any(
+            name.startswith("/") or ".." in Path(name).parts for name in names
+        ):
+            raise ValueError("it names files outside of it")
+        return page
+    except (ValueError, KeyError, TypeError) as error:
+        raise CorruptBackup(f"{source / _LIST} is damaged ({error}).", "Take another backup.") from error
+
+
+def _check_tables(changing: Path, files: Mapping[str, Any]) -> None:
+    """Refuse a copy in whose making a generation was pruned.
+
+    Raises:
+        CorruptBackup: it was.
+
+    """
+    for page in changing.glob("tables/*/current.json"):
+        name = f"tables/{page.parent.name}/{json.loads(page.read_bytes()).get('file')}"
+        if name not in files:
+            raise CorruptBackup(f"{name} went away while it was copied.", "Copy again.")
+
+
+def _names(root: Path, patterns: Sequence[str]) -> Iterator[str]:
+    for pattern in patterns:
+        for path in root.glob(pattern):
+            if not path.name.startswith("."):
+                yield path.relative_to(root).as_posix()
+
+
+def _copy(
+    source: Path, root: Path, at: str, known: dict[str, Any] | None, private: bool
+) -> tuple[dict[str, Any], bool]:
+    """Copy a file to `at` below `root` unless it is there; return what is listed of it, and whether it was copied.
+
+    Only results and generations are taken for the same by their size: they never change.
+    """
+    to = root / at
+    try:
+        size = source.stat().st_size
+        if known is not None and at.endswith(".h5") and to.is_file() and to.stat().st_size == size == known["bytes"]:
+            return known, False
+        data = source.read_bytes()
+    except FileNotFoundError:
+        raise CorruptBackup(f"{source} is missing.", "Copy again, or take another backup.") from None
+    with seal.scratch(to, private) as temporary:
+        temporary.write_bytes(data)
+        seal.adopt(temporary, to)
+    return {"at": at, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}, True
+
+
+def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
+    """Copy the ledger as it is at one moment, with no job claimed."""
+    source = sqlite3.connect(f"file:{store.ledger.path}?mode=ro", uri=True)
+    # in memory first: SQLite's locks would wait for ours on the file
+    with closing(source), closing(sqlite3.connect(":memory:")) as copy:
+        source.backup(copy)
+        copy.execute(_FREE)
+        copy.commit()
+        data = copy.serialize()
+    seal.publish(root / at, data)
+    return {"at": at, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}

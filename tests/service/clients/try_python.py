@@ -1,0 +1,41 @@
+"""What openapi-python-client makes of the service's page, used as a stranger would: JSON, a file, a batch and a job."""
+
+import json
+import sys
+import time
+
+from generated import AuthenticatedClient
+from generated.api.jobs import ask, fields, job
+from generated.api.shapes import batch, info, shape
+from generated.models import BatchRequest, JobRequestDehydration, Problem, ShapeFormat
+
+address, token = sys.argv[1:]
+client = AuthenticatedClient(base_url=address, token=token, raise_on_unexpected_status=True, timeout=120)
+query = {"te": 0.03, "gamma": 7.0, "s": 0.25, "resolution": "16"}
+
+said = info.sync("dehydration", client=client, **query)
+file = shape.sync("dehydration", client=client, format_=ShapeFormat.GLB, **query)
+points = [{"te": 0.03, "gamma": 7, "s": 0.1}]
+wanted = BatchRequest.from_dict({"solver": "dehydration", "points": points, "format": "npz", "resolution": 16})
+archive = batch.sync(client=client, body=wanted)
+need = {"stages": [0.05], "quality": "preview", "fields": ["volume"]}
+request = {"solver": "dehydration", "preset": "sphere", "params": {"te": 0.04}, "need": need}
+asked = ask.sync(client=client, body=JobRequestDehydration.from_dict(request))
+while asked.state in ("wanted", "running"):
+    time.sleep(0.2)
+    asked = job.sync(asked.id, client=client)
+numbers = fields.sync(asked.id, client=client)
+refused = info.sync("dehydration", client=client, **{**query, "te": 9.0})
+assert isinstance(refused, Problem)
+print(
+    json.dumps(
+        {
+            "value": said.stage.value,
+            "magic": file.payload.read(4).decode(),
+            "zip": archive.payload.read(2).decode(),
+            "state": str(asked.state),
+            "dims": numbers.fields["volume"].dims,
+            "refused": refused.title,
+        }
+    )
+)

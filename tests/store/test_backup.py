@@ -1,0 +1,131 @@
+"""Backups: a store that is copied while others write, killed at any moment, and brought back as it was."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from solver.dehydration import SOLVER
+from store import tables
+from store.copies.backup import backup, restore
+from store.errors import CorruptBackup, MissingStore, ReadOnlyStore
+from store.store import Store
+from store.tokens import Tokens
+
+from .conftest import fill, make, python, spec
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Store:
+    """A small store with something of everything in it."""
+    store = Store.open(tmp_path / "store", create=True)
+    fill(store, te=[0.03, 0.04], resolution=8)
+    tables.build(store, SOLVER)
+    Tokens(store.root).create("mine", ["run"])
+    return store
+
+
+def test_there_and_back(own: Store, tmp_path: Path) -> None:
+    own.ledger.want([spec(te=0.06, resolution=8)])
+    running = own.ledger.claim("worker", 60)
+    assert running is not None
+    copied = backup(own, tmp_path / "copy")
+    assert copied.new == copied.files - 1  # all but the ledger, which is always taken anew
+    shutil.rmtree(own.root)
+    restore(tmp_path / "copy", tmp_path / "again")
+    again = Store.open(tmp_path / "again")
+    assert len(list(again.results())) == 2
+    assert again.ledger.counts()["done"] == 2
+    assert again.ledger.get(running.key).state == "wanted", "nobody works on it here"
+    assert not again.ledger.release(running), "a claim of the other store means nothing"
+    tables.open(again).close()
+    assert [token.name for token in Tokens(again.root).all()] == ["mine"]
+    assert (again.root / "tokens.json").stat().st_mode & 0o077 == 0
+    (secrets,) = (tmp_path / "copy").rglob("tokens.json")
+    assert secrets.stat().st_mode & 0o077 == 0
+
+
+def test_a_second_backup_copies_what_is_new(own: Store, tmp_path: Path) -> None:
+    first = backup(own, tmp_path / "copy")
+    fill(own, te=[0.05], resolution=8)
+    second = backup(own, tmp_path / "copy")
+    assert second.files == first.files + 1
+    # the new shard, the manifest and the tokens
+    assert second.new == 3
+    assert len(list((tmp_path / "copy" / "changing").iterdir())) == 1
+    restore(tmp_path / "copy", tmp_path / "again")
+    assert len(list(Store.open(tmp_path / "again").results())) == 3
+
+
+def test_what_is_refused(own: Store, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.tex").touch()
+    with pytest.raises(ReadOnlyStore, match="something else"):
+        backup(own, tmp_path / "other")
+    with pytest.raises(ReadOnlyStore, match="something else"):
+        backup(own, own.root)
+    with pytest.raises(MissingStore, match="no backup"):
+        restore(tmp_path / "other", tmp_path / "new")
+    backup(own, tmp_path / "copy")
+    with pytest.raises(ReadOnlyStore, match="not empty"):
+        restore(tmp_path / "copy", own.root)
+    shard = next((tmp_path / "copy").glob("shards/*/*.h5"))
+    data = bytearray(shard.read_bytes())
+    data[100] ^= 1
+    shard.write_bytes(data)
+    with pytest.raises(CorruptBackup, match="not what was copied"):
+        restore(tmp_path / "copy", tmp_path / "new")
+    shard.unlink()
+    with pytest.raises(CorruptBackup, match="missing"):
+        restore(tmp_path / "copy", tmp_path / "new")
+    page = tmp_path / "copy" / "backup.json"
+    page.write_text(page.read_text().replace("tokens.json", "../tokens.json"))
+    with pytest.raises(CorruptBackup, match="outside"):
+        restore(tmp_path / "copy", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+    assert not list(tmp_path.glob(".*.restoring"))
+
+
+COPY = """
+import sys, time
+from pathlib import Path
+from store.copies.backup import backup, restore
+from store.store import Store
+print("go", flush=True)
+while True:
+    begun = time.monotonic()  # one clock for all processes
+    backup(Store.open(sys.argv[1]), Path(sys.argv[2]))
+    print(begun, flush=True)
+"""
+
+
+def test_killed_at_any_moment(own: Store, tmp_path: Path) -> None:
+    """While results come in: what a backup said that it had copied comes back, whenever its process dies."""
+    said: set[str] = set()
+    for i in range(4):
+        copying = python(COPY, own.root, tmp_path / "copy")
+        assert copying.stdout is not None
+        assert copying.stdout.readline() == "go\n"
+        (new,) = fill(own, te=[0.05 + 0.001 * i], resolution=8)
+        there = time.monotonic()
+        while float(copying.stdout.readline()) < there:
+            pass  # begun before the result was there
+        said.add(new)
+        time.sleep(0.01 * i)
+        copying.send_signal(signal.SIGKILL)
+        copying.wait()
+        copying.stdout.close()
+        target = tmp_path / f"again{i}"
+        restore(tmp_path / "copy", target)
+        again = Store.open(target)
+        assert said <= set(again.keys())
+        done = {job.key for job in again.ledger.jobs("done")}
+        assert done <= set(again.keys())
+        assert again.get(make(te=0.03, resolution=8)[0]) is not None
+        tables.open(again).close()
+    backup(own, tmp_path / "copy")
+    assert not list((tmp_path / "copy").rglob("*.part"))
