@@ -34,7 +34,7 @@ page: $(PAGE)
 demo: $(STAMP)
 	$(BIN)/wizen table list --picture fruits.png
 	@$(MAKE) page || echo 'the page is not built (see above); the service answers without it'
-	WIZEN_STORE= XDG_DATA_HOME=$(abspath $(VENV))/none $(BIN)/wizen serve --port $(PORT)
+	env -u WIZEN_STORE XDG_DATA_HOME=$(abspath $(VENV))/none $(BIN)/wizen serve --port $(PORT)
 
 ## demo-map: run the six fruits of Fig. 7's right part, build their table, draw it and serve it; some minutes
 demo-map: $(STAMP)

@@ -1,23 +1,13 @@
 """Each user of `solver.linalg` before and after: python -m benchmarks.linalg BEFORE [--rounds 15].
 
-BEFORE is a checkout to compare with. Both trees work in a process of their own with one thread, and take turns: before,
-after, before, after. What is timed is CPU seconds of one whole use, set up outside of the clock; the ratio is of the
-least times (other work on the machine only adds), that of the medians stands beside it. The trees' modules bear
-different names, which `_named` knows.
+BEFORE is a checkout to compare with; how is said in `benchmarks.turns`. The trees' modules bear different names, which
+`_named` knows.
 """
 
 from __future__ import annotations
 
-import argparse
-import hashlib
 import importlib
-import json
-import os
-import subprocess
-import sys
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -207,80 +197,7 @@ def decay_body() -> Use:
 USES = (shell_factor, shell_pattern, implicit, implicit_model, meridional, wood_static, decay_body)
 
 
-def _work() -> None:
-    """Answer names of uses on stdin with CPU seconds and a digest of what came out."""
-    ready: dict[str, Use] = {}
-    for line in sys.stdin:
-        name = line.strip()
-        if name not in ready:
-            ready[name] = globals()[name]()
-            ready[name]()
-        begin = time.process_time()
-        found = ready[name]()
-        spent = time.process_time() - begin
-        digest = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in found)).hexdigest()[:12]
-        size = float(np.linalg.norm(found[-1].ravel().astype(float)))
-        print(json.dumps({"seconds": spent, "digest": digest, "norm": size}), flush=True)
-
-
-class _Tree:
-    """A worker in a tree."""
-
-    def __init__(self, root: Path) -> None:
-        one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-        command = [sys.executable, str(Path(__file__).resolve()), "--worker"]
-        environment = {**os.environ, **one, "PYTHONPATH": str(root)}
-        self.child = subprocess.Popen(
-            command, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-
-    def run(self, name: str) -> dict[str, Any]:
-        assert self.child.stdin
-        assert self.child.stdout
-        self.child.stdin.write(name + "\n")
-        self.child.stdin.flush()
-        return dict(json.loads(self.child.stdout.readline()))
-
-
-def main() -> None:
-    """Let both trees take turns, and keep what came of it."""
-    from benchmarks.figures import ROOT, Sheet
-
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("before", type=Path)
-    asked.add_argument("--rounds", type=int, default=15)
-    asked.add_argument("--only", nargs="*", default=[use.__name__ for use in USES])
-    options = asked.parse_args()
-    trees = {"before": _Tree(options.before.resolve()), "after": _Tree(ROOT)}
-    sheet = Sheet("linalg", ["user", "before [ms]", "after [ms]", "after / before", "of medians", "result"])
-    for name in options.only:
-        runs: dict[str, list[dict[str, Any]]] = {"before": [], "after": []}
-        for _ in range(options.rounds):
-            for which, tree in trees.items():
-                runs[which].append(tree.run(name))
-        seconds = {which: [run["seconds"] for run in found] for which, found in runs.items()}
-        least, middle = ({w: float(f(v)) for w, v in seconds.items()} for f in (np.min, np.median))
-        before, after = runs["before"][0], runs["after"][0]
-        same = "same bytes" if before["digest"] == after["digest"] else f"{after['norm'] / before['norm'] - 1:.1e}"
-        sheet.add(
-            [
-                name,
-                f"{1e3 * least['before']:.1f}",
-                f"{1e3 * least['after']:.1f}",
-                f"{least['after'] / least['before']:.3f}",
-                f"{middle['after'] / middle['before']:.3f}",
-                same,
-            ],
-            user=name,
-            seconds=seconds,
-            digests={which: found[0]["digest"] for which, found in runs.items()},
-        )
-    told = ["git", "-C", str(options.before), "rev-parse", "--short=10", "HEAD"]
-    sheet.keep(before=subprocess.run(told, capture_output=True, text=True, check=False).stdout.strip())
-
-
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--worker"]:
-        _work()
-    else:
-        main()
+    from benchmarks.turns import main
+
+    main("linalg", __file__, __doc__, USES)

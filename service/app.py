@@ -16,7 +16,7 @@ from starlette.routing import Route
 from solver import __version__
 from store.tokens import Tokens
 
-from . import catalogue, maps, page, problems, results
+from . import catalogue, hours, maps, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import fields as jobs_fields
@@ -100,6 +100,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         jobs_results.router,
         results.router,
         maps.router,
+        hours.router,
     )
     app.include_router(catalogue.open_router, responses=problems.responses(414))
     for router in guarded:
@@ -110,7 +111,12 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)
-    # the last one added is the outermost
+    _surround(app, settings, metrics)
+    return app
+
+
+def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
+    """Put around the routes what a request passes on its way to them; the last one added is the outermost."""
     if settings.public_read:
         app.add_middleware(Shortcut, state=app.state)
     app.add_middleware(Admission, settings=settings)
@@ -130,7 +136,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Telemetry, metrics=metrics)
     if settings.root_path:
         app.add_middleware(Rooted, root=settings.root_path)
-    return app
 
 
 def __getattr__(name: str) -> Any:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import ipaddress
 import re
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette_compress import CompressMiddleware, add_compress_type
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -42,12 +42,18 @@ class Coding:
     """Compress answers to clients from elsewhere; `always` those from this machine as well, `off` none."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
-        for media_type in _TYPES:
-            add_compress_type(media_type)
         self.app = app
         self._when = settings.compress
-        self._compress = CompressMiddleware(
-            app, minimum_size=_LEAST, zstd_level=_ZSTD, brotli_quality=_BROTLI, gzip_level=_GZIP
+
+    @cached_property
+    def _compress(self) -> ASGIApp:
+        """What compresses: made for the first who takes it, for its codecs take a while to load."""
+        from starlette_compress import CompressMiddleware, add_compress_type
+
+        for media_type in _TYPES:
+            add_compress_type(media_type)
+        return CompressMiddleware(
+            self.app, minimum_size=_LEAST, zstd_level=_ZSTD, brotli_quality=_BROTLI, gzip_level=_GZIP
         )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -19,6 +19,7 @@ from store.surfaces.measures import UNITS
 
 from . import problems, vocabulary
 from .formats import FORMATS
+from .hours import UNDER
 from .settings import Settings
 from .shapes import detail
 from .shapes.live import LiveTables
@@ -174,6 +175,12 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
             {"type": "string", "pattern": "^[0-9]+(x[0-9]+)?$", "examples": ["64", "64x128"]},
         ),
         *(_query(name, text, dict(schema)) for name, (text, schema) in detail.parameters().items()),
+        _query("hours", "Hours of drying in place of the stage", {"type": "number", "minimum": 0}),
+        _query(
+            "under",
+            "Conditions of the hours as name:value, joined by commas; GET /v1/solvers/{solver}/stages explains them",
+            {"type": "string", "pattern": f"^{UNDER}$", "examples": ["kinetics:grape"]},
+        ),
         _query(
             "table",
             "Name of the table. Without it, the one that holds what is asked",

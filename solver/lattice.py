@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .arrays import Floats
+from .arrays import Floats, Ints
 
 if TYPE_CHECKING:
     from .contract import Region
 
-__all__ = ["azimuths", "colatitudes", "directions", "lattice", "window"]
+__all__ = ["azimuths", "closed_lattice", "colatitudes", "directions", "lattice", "window"]
 
 
 def colatitudes(resolution: int) -> Floats:
@@ -52,3 +52,19 @@ def directions(colatitude: Floats, azimuth: Floats) -> Floats:
     """Return points of the parametric unit sphere, shape (..., 3): y is the pole, azimuth runs from x to z."""
     s = np.sin(colatitude)
     return np.stack(np.broadcast_arrays(s * np.cos(azimuth), np.cos(colatitude), s * np.sin(azimuth)), axis=-1)
+
+
+@lru_cache(maxsize=8)
+def closed_lattice(n: int) -> Ints:
+    """Return the triangles (4 n^2, 3) of the lattice of n colatitudes; vertices 2 n^2 and 2 n^2 + 1 are the poles.
+
+    Quads are cut as the file formats cut them. Counter-clockwise as seen from outside.
+    """
+    here = np.arange(2 * n * n).reshape(n, 2 * n)
+    right = np.roll(here, -1, axis=1)
+    quads = np.stack([right[:-1], right[1:], here[1:], here[:-1]], axis=-1).reshape(-1, 4)
+    north, south = np.full(2 * n, 2 * n * n), np.full(2 * n, 2 * n * n + 1)
+    fans = np.concatenate([np.stack([north, right[0], here[0]], 1), np.stack([south, here[-1], right[-1]], 1)])
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], fans])
+    triangles.flags.writeable = False
+    return triangles

@@ -5,7 +5,9 @@ fields of its vertices are `(stage, vertex)`. A mesh that changes them is a cont
 the vertices of all stages end to end in `mesh_position(vertex, component)`, likewise `triangle(face, corner)`, whose
 numbers count from the first vertex of their own stage, with `vertex_count(stage)` and `face_count(stage)`; other
 fields of its vertices are `(vertex)`. Triangles turn counter-clockwise seen from outside. The length of a unit in
-metres stands in `attrs["metres_per_unit"]` where it is known.
+metres stands in `attrs["metres_per_unit"]` where it is known. A mesh that keeps its triangles may come with texture
+coordinates of their corners, `texture_coordinate(texture_vertex, uv)` with v upwards and `texture_triangle(face,
+corner)`, and with `face_material(face)`, numbers of the names in `attrs["materials"]`, a JSON list.
 """
 
 from __future__ import annotations

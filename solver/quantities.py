@@ -73,6 +73,7 @@ register(
     residual=Quantity(
         "1", "out-of-balance force over internal force, or the largest error of a step, relative L2", "|r|/|f|"
     ),
+    moved=Quantity("1", "how far relaxing moved a surface: rms of the radial motion over its roughness", "d/r"),
     drift=Quantity("1", "rms motion of the surface in its last 200 steps, in exocarp thicknesses", "d"),
     iterations=Quantity("1", "steps or iterations spent up to and including this stage", "n"),
     seconds=Quantity("s", "wall time spent up to and including this stage", "t", volatile=True),
@@ -131,6 +132,9 @@ register(
 register(
     mesh_position=Quantity("1", "position of a vertex, in the solver's unit of length", "x"),
     triangle=Quantity("1", "the three vertices of a triangle, from 0, counter-clockwise from outside", "-"),
+    texture_coordinate=Quantity("1", "texture coordinates of a corner, v upwards", "uv"),
+    texture_triangle=Quantity("1", "the texture coordinates of a triangle's three corners, from 0", "-"),
+    face_material=Quantity("1", "the material of a triangle, from 0, as named in the attribute materials", "-"),
     quad=Quantity("1", "the four vertices of a face as solved, whose triangles are (0, 1, 2) and (0, 2, 3)", "-"),
     vertex_count=Quantity("1", "number of vertices of this stage's mesh", "n_v"),
     face_count=Quantity("1", "number of triangles of this stage's mesh", "n_f"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
 from pathlib import Path
 
 from .contract import InvalidInput, Solver, Surface
@@ -14,12 +13,20 @@ __all__ = ["get", "names", "surface"]
 
 
 @cache
-def _places() -> dict[str, str]:
+def _ours() -> dict[str, str]:
     """Return name -> "module:attribute": of each folder beside this file that has a `run.py`, whose package offers
-    SOLVER, and of what joins through the entry-point group `wizen.solvers`.
+    SOLVER.
     """
-    ours = {path.parent.name: f"solver.{path.parent.name}:SOLVER" for path in Path(__file__).parent.glob("*/run.py")}
-    return {**{e.name: e.value for e in entry_points(group="wizen.solvers")}, **ours}
+    return {path.parent.name: f"solver.{path.parent.name}:SOLVER" for path in Path(__file__).parent.glob("*/run.py")}
+
+
+@cache
+def _places() -> dict[str, str]:
+    """Return those and what joins through the entry-point group `wizen.solvers`."""
+    # it reads a file of every installed distribution, which who asks for one of ours by name need not wait for
+    from importlib.metadata import entry_points
+
+    return {**{e.name: e.value for e in entry_points(group="wizen.solvers")}, **_ours()}
 
 
 def names() -> tuple[str, ...]:
@@ -35,7 +42,7 @@ def get(name: str) -> Solver:
         InvalidInput: there is none of that name.
 
     """
-    places = _places()
+    places = _ours() if name in _ours() else _places()
     if name not in places:
         near = difflib.get_close_matches(name, list(places), n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
@@ -50,4 +57,4 @@ def surface(name: str) -> Surface | None:
 
     A table outlives its solver: one that is no longer here has none either.
     """
-    return get(name).surface if name in _places() else None
+    return get(name).surface if name in _ours() or name in _places() else None

@@ -33,6 +33,7 @@ from .manifest import TableInfo
 from .shape import Shape
 from .store import Store
 from .surfaces import surface
+from .surfaces.apart import COARSE, Evened, even_out
 from .surfaces.measures import Measures
 from .surfaces.window import WHOLE, Patch, Window
 from .tables import info, path_of
@@ -184,10 +185,8 @@ class ShapeTable:
         expected = self._expect(near, stages, how)
         if max_error is not None:
             trust.refuse(expected, max_error, inside, self._judged)
-        fresh = self.fresh(values) if "position" in fields else None
-        found: _Fields = None, None, None
-        if fields:
-            found = _synthesize(self._blend(point, near, stages, how, n), patch, fresh, "displacement" in fields)
+        exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
+        found, crossings = self._fields(fields, patch, values, self._blend(point, near, stages, how, n), exact)
         colatitude, azimuth = _angles(n)
         return Shape(
             colatitude=colatitude[patch.rows],
@@ -201,13 +200,50 @@ class ShapeTable:
             weights={self._keys[i]: float(w) for i, w in zip(near.samples, near.weights, strict=True)},
             nearest=near.nearest,
             inside=inside,
-            exact=s == 0 or (near.nearest == 0.0 and len(stages) == 1),
+            exact=exact,
+            crossings=crossings,
             converged=self._has_converged(near, stages),
             expected_error=expected,
             method=str(how),
             table=self.digest,
             units={name: self._units[name] for name in (*fields, *self.info.descriptors)},
         )
+
+    def _fields(
+        self, fields: Sequence[str], patch: Patch, values: Mapping[str, float], blend: Callable[[], Blend], exact: bool
+    ) -> tuple[_Fields, int | None]:
+        """Return what is asked for, out of contact with itself, and the pairs of triangles that cross nevertheless.
+
+        A stored result stays as it is, and so does a displacement that is asked for alone: it is the blend. None: no
+        positions were computed, or those of a part.
+        """
+        if not fields:
+            return (None, None, None), None
+        waves, displaced = blend(), "displacement" in fields
+        if "position" not in fields:
+            return _synthesize(waves, patch, None, displaced), None
+        fresh = self.fresh(values)
+        kept: dict[int, tuple[Array, Array]] = {}
+
+        def whole(n: int) -> tuple[Array, Array]:
+            if n not in kept:
+                position, _, poles = _synthesize(waves, WHOLE.on(n), fresh, False)
+                assert position is not None
+                assert poles is not None
+                kept[n] = position, poles
+            return kept[n]
+
+        is_all = patch == WHOLE.on(patch.n)
+        if not is_all and not even_out(whole, min(patch.n, COARSE), exact).near:
+            # what does not touch as a whole does not in part: only that is computed
+            return _synthesize(waves, patch, fresh, displaced), None
+        moved = even_out(whole, patch.n, exact)
+        if is_all and not displaced:
+            position, poles = kept[patch.n]
+            found: _Fields = position, None, poles
+        else:
+            found = _synthesize(waves, patch, fresh, displaced)
+        return _shifted(found, moved, patch), moved.crossings if is_all else None
 
     def sample(self, i: int) -> dict[str, float]:
         """Return the varying parameters of a sample."""
@@ -272,10 +308,10 @@ class ShapeTable:
 
     def _blend(
         self, point: Array | None, near: Weighted, stages: Mapping[int, float], method: methods.Method, n: int
-    ) -> Blend:
+    ) -> Callable[[], Blend]:
         # waves that the lattice cannot hold are not even read
         band = min(self.resolution, n)
-        return self._blender(point, near.samples, near.weights, _stored(stages), method, band)
+        return lambda: self._blender(point, near.samples, near.weights, _stored(stages), method, band)
 
     def _describe(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
         terms = self._terms(near, stages)
@@ -334,6 +370,20 @@ def _check(fields: Sequence[str], n: int, m: int, eta: float) -> None:
 def _stored(stages: Mapping[int, float]) -> dict[int, float]:
     """Return the stored ones of stages with weights: the fresh shape adds nothing to a displacement."""
     return {j: t for j, t in stages.items() if j != _FRESH}
+
+
+def _shifted(found: _Fields, moved: Evened, patch: Patch) -> _Fields:
+    """Return positions, displacements and poles of a patch moved out of contact."""
+    if moved.points is None or moved.poles is None:
+        return found
+    shift = moved.points[patch.rows][:, patch.columns][..., list(patch.components)]
+    position, displacement = (None if one is None else (one + shift).astype(one.dtype) for one in found[:2])
+    ends = found[2]
+    return (
+        position,
+        displacement,
+        None if ends is None else (ends + moved.poles[:, list(patch.components)]).astype(ends.dtype),
+    )
 
 
 def _synthesize(blend: Blend, patch: Patch, fresh: Fresh | None, displaced: bool) -> _Fields:

@@ -25,6 +25,8 @@ class Shape:
     stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
     `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape
     may be off the true one; None where the table does not know, as for any method but the one it was built for.
+    `crossings` counts the pairs of triangles of the closed lattice that cross, on these positions; None where no
+    positions were computed, or those of a part. `tier`: whether it is from the `table` or `relaxed` by its solver.
     """
 
     colatitude: Array = field(repr=False)
@@ -44,6 +46,8 @@ class Shape:
     inside: bool = True
     expected_error: Mapping[str, float] | None = None
     method: str = ""
+    crossings: int | None = None
+    tier: str = "table"
 
     @cached_property
     def normals(self) -> Array:

@@ -18,8 +18,6 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, path_of
 
-from .pictures.sheet import Panel, sheet
-
 __all__ = ["covered", "gallery", "portrait", "thumbnail"]
 
 #: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
@@ -113,6 +111,9 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
         UnknownTable: there is none.
 
     """
+    # what draws takes a fifth of a second to import, and a service's start must not
+    from .pictures.sheet import Panel, sheet
+
     panels = []
     for name in store.table_names():
         table = ShapeTable.open(store, name, surfaces=registry.surface)

@@ -54,16 +54,21 @@ def _png(made: Made) -> bytes:
         from .pictures import section
 
         return section.picture(made.run, section.plane(made.cut), title=made.title, symbol=made.stage_symbol)
-    from .pictures import colours
+    from .pictures import colours, standing
     from .pictures.sheet import Panel, sheet
 
     if made.run is not None and "mesh_position" in made.run and "position" not in made.run:
         panels = triangles(made.run)
         labels = [f"{made.stage_symbol} = {float(stage):g}" for stage in made.run["stage"]]
         return sheet([panels], title=made.title, column_labels=labels, pixels=360)
+    skins = [None if made.run is None else colours.of_run(made.run, i) for i in range(len(made.shapes))]
+    places = [(shape.position, shape.poles) for shape in made.shapes]
+    fur = [None] * len(skins) if made.run is None else standing.on_lattices(made.run, places)
     panels = [
-        Panel(shape.position, shape.poles, colour=None if made.run is None else colours.of_run(made.run, i))
-        for i, shape in enumerate(made.shapes)
+        Panel(shape.position, shape.poles)
+        if skin is None
+        else Panel(shape.position, shape.poles, colour=skin.colour, roughness=skin.roughness, more=more)
+        for shape, skin, more in zip(made.shapes, skins, fur, strict=True)
         if shape.position is not None
     ]
     labels = [f"{made.stage_symbol} = {shape.stage:g}" for shape in made.shapes]
@@ -77,7 +82,7 @@ def triangles(run: xr.Dataset) -> list[Panel]:
     """
     from solver import meshes
 
-    from .pictures import colours
+    from .pictures import colours, standing
     from .pictures.sheet import Panel
 
     frames = [meshes.frame(run, i) for i in range(run.sizes["stage"])]
@@ -88,14 +93,18 @@ def triangles(run: xr.Dataset) -> list[Panel]:
         *middle, size = np.asarray(run.attrs["view"], float)
     up = str(run.attrs.get("up", "y"))
     found = []
-    for frame in frames:
-        skin = colours.painted(run, frame.fields)
-        paint = None if skin is None else skin.colour
+    grown = standing.on_meshes(run, frames)
+    for index, (frame, more) in enumerate(zip(frames, grown, strict=True)):
+        skin = colours.painted(run, index, frame.fields)
+        paint, rough = (None, None) if skin is None else skin
         place = (frame.vertices - np.asarray(middle)) / size
         away = np.linalg.norm(place, axis=1, keepdims=True)
         # what is far outside would only stretch the shadow
         seen = frame.triangles[(away[frame.triangles, 0] < _BEYOND).all(axis=1)]
-        found.append(Panel(place * np.minimum(1, _BEYOND / np.maximum(away, 1e-12)), None, "", paint, seen, up))
+        if more is not None:
+            more = more._replace(vertices=(more.vertices - np.asarray(middle)) / size)
+        place *= np.minimum(1, _BEYOND / np.maximum(away, 1e-12))
+        found.append(Panel(place, None, "", paint, seen, up, roughness=rough, more=more))
     return found
 
 

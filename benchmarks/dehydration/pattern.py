@@ -107,6 +107,8 @@ def pattern(data: xr.Dataset) -> Pattern:
 def name_of(params: DehydrationParams) -> str:
     """Name of the preset with these radii and stone, or nothing."""
     for name, preset in PRESETS.items():
+        if name == "passionfruit":  # a sphere without a stone need not be one
+            continue
         if tuple(preset["radii"]) == params.radii and tuple(preset["stone"]) == params.stone:
             return name
     return ""

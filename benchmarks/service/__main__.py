@@ -1,11 +1,13 @@
 """The service under load, beside xpublish in the same run: python -m benchmarks.service [--peer PYTHON].
 
-Parts: `start` (until the first answer), `load` (requests per second and latencies of 200 kB bodies at 16 clients, one
-worker each, in turns), `batch` (one request against many), `memory` (four workers over one table), `swaps` (a new
-generation 200 times under load). The peer needs a Python with xpublish below 0.5, whose zarr routes later ones lack:
+Parts: `start` (until the first answer; with --before, another checkout's in turns), `load` (requests per second and
+latencies of 200 kB bodies at 16 clients, one worker each, in turns), `batch` (one request against many), `memory` (four
+workers over one table), `swaps` (a new generation 200 times under load). The peer needs a Python with xpublish below
+0.5, whose zarr routes later ones lack:
 python -m venv peers/xpublish && peers/xpublish/bin/pip install 'xpublish<0.5' 'fastapi<0.120' zarr uvicorn.
 
-The table is the synthetic one of `benchmarks.service.lookup`: 30 samples, 5 stages, 96 waves, 34 MB.
+`start` serves the table in the package; the others the synthetic one of `benchmarks.service.lookup`: 30 samples, 5
+stages, 96 waves, 34 MB.
 """
 
 from __future__ import annotations
@@ -39,6 +41,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("start", "load", "batch", "memory", "swaps")
 #: Its points take as many bytes as the peer's chunk of 50000 numbers.
 RESOLUTION = 90
+#: A shape of the table in the package, as long as there has been one.
+STARTER = "/v1/shapes/dehydration?te=0.035&gamma=20&s=0.2&resolution=64&format=points"
 QUERY = "/v1/shapes/dehydration?te={te:.6f}&gamma={gamma:.4f}&s=0.17&resolution={n}&format=points"
 
 PEER = """
@@ -83,14 +87,16 @@ def free_port() -> int:
 
 
 @contextmanager
-def running(command: list[str], path: str, **environment: str) -> Iterator[tuple[subprocess.Popen[bytes], int, float]]:
+def running(
+    command: list[str], path: str, tree: Path = ROOT, **environment: str
+) -> Iterator[tuple[subprocess.Popen[bytes], int, float]]:
     """Run a server ({port} in its command) until left; yield it, its port and the seconds until its first answer."""
     port = free_port()
     start = time.perf_counter()
     process = subprocess.Popen(
         [word.replace("{port}", str(port)) for word in command],
-        cwd=ROOT,
-        env={**os.environ, **environment},
+        cwd=tree,
+        env={**os.environ, "PYTHONPATH": str(tree), **environment},
         stdout=subprocess.DEVNULL,
         start_new_session=True,
     )
@@ -131,13 +137,23 @@ def family(pid: int) -> float:
     return cpu(pid) + sum(cpu(int(child)) for child in children)
 
 
-def start(root: Path, times: int = 5) -> dict[str, Any]:
-    walls, busy = [], []
+def start(before: Path | None, times: int = 7) -> list[dict[str, Any]]:
+    """Time the start over the table in the package, until it answers; beside it, in turns, that of another checkout."""
+    trees = {"this checkout": ROOT} | ({"before": before.resolve()} if before else {})
+    walls: dict[str, list[float]] = {name: [] for name in trees}
+    busy: dict[str, list[float]] = {name: [] for name in trees}
+    command = [sys.executable, "-m", "uvicorn", "service.app:app", "--port", "{port}", "--log-level", "warning"]
     for _ in range(times):
-        with service(root) as (process, _, seconds):
-            walls.append(seconds)
-            busy.append(cpu(process.pid))
-    return {"first_answer_s": min(walls), "of_it_processor_s": min(busy), "all_s": walls}
+        for name, tree in trees.items():
+            own = str(tree / "store" / "starter")
+            with running(command, STARTER, tree, WIZEN_STORE=own, WIZEN_JOBS_WORKERS="0") as (process, _, seconds):
+                walls[name].append(seconds)
+                busy[name].append(cpu(process.pid))
+    return [
+        {"tree": name, "first_answer_s": min(walls[name]), "of_it_processor_s": min(busy[name])}
+        | {"all_s": walls[name], "all_processor_s": busy[name]}
+        for name in trees
+    ]
 
 
 def load(root: Path, peer: str | None, seconds: float, rounds: int) -> list[dict[str, Any]]:
@@ -262,8 +278,11 @@ def swaps(root: Path, times: int, resolution: int = 48) -> dict[str, Any]:
 #: Of each part: the head of its table, and what it says of a run.
 _TABLES: dict[str, tuple[list[str], Callable[[dict[str, Any]], list[str]]]] = {
     "start": (
-        ["from the start to the first answer", "of it processor"],
-        lambda run: [f"{run['first_answer_s']:.2f} s", f"{run['of_it_processor_s']:.2f} s"],
+        ["", "from the start to the first answer", "of it processor, least", "median"],
+        lambda run: [
+            run["tree"], f"{run['first_answer_s']:.2f} s", f"{run['of_it_processor_s']:.2f} s",
+            f"{statistics.median(run['all_processor_s']):.2f} s",
+        ],
     ),
     "load": (
         ["server, 16 clients", "requests/s", "p50", "p99", "processor", "body", "failed"],
@@ -296,6 +315,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all without")
     parser.add_argument("--peer", help="a Python that has xpublish")
+    parser.add_argument("--before", type=Path, help="another checkout, whose start is timed in turns with this one's")
     parser.add_argument("--store", type=Path, help="keep the synthetic table there, and use it if it is")
     parser.add_argument("--seconds", type=float, default=4.0, help="of load per server and round")
     parser.add_argument("--rounds", type=int, default=3)
@@ -307,13 +327,16 @@ def main() -> None:
     found: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as directory:
         root = options.store or Path(directory) / "store"
-        if not (root / "tables" / "default").is_dir():
+        if not (root / "tables" / "default").is_dir() and set(parts) != {"start"}:
             store = Store.open(root, create=True)
             fill(store)
             tables.build(store, SOLVER)
         if "start" in parts:
-            found["start"] = row = start(root)
-            print(f"first answer after {row['first_answer_s']:.2f} s, {row['of_it_processor_s']:.2f} s of processor")
+            found["start"] = start(options.before)
+            for row in found["start"]:
+                print(
+                    "{tree}: first answer after {first_answer_s:.2f} s, processor {of_it_processor_s:.2f}".format(**row)
+                )
         if "load" in parts:
             found["load"] = load(root, options.peer, options.seconds, options.rounds)
             for row in found["load"]:

@@ -44,6 +44,9 @@ class _Asked:
         str | None, typer.Option("--colour", help="auto (skin, rot, mould), none, or a field's name.")
     ] = None
     textures: Annotated[int | None, typer.Option("--textures", help="GLB: colours as pictures of N pixels.")] = None
+    threads: Annotated[
+        int | None, typer.Option("--threads", help="GLB, USD: N threads of mould at most, as cards or curves.")
+    ] = None
     map_: Annotated[str | None, typer.Option("--map", help="PNG, EXR: which field.")] = None
     size: Annotated[int | None, typer.Option("--size", help="PNG, EXR: pixels along and down (512).")] = None
     low: Annotated[float | None, typer.Option("--low", help="PNG: value shown as 0.")] = None
@@ -65,7 +68,7 @@ class _Asked:
 
 
 #: Options that the formats know by the same names.
-_SHARED = ("colour", "textures", "size", "low", "high", "scale", "fps", "step")
+_SHARED = ("colour", "textures", "threads", "size", "low", "high", "scale", "fps", "step")
 
 
 @grouped(_Asked)

@@ -50,6 +50,8 @@ def extras(shape: Shape, about: About) -> dict[str, Any]:
         "stage": {"symbol": about.stage_symbol, "value": shape.stage},
         "exact": shape.exact,
         "converged": shape.converged,
+        "crossings": shape.crossings,
+        "tier": shape.tier,
         "nearest": shape.nearest,
         "inside": shape.inside,
         "expected_error": None if shape.expected_error is None else dict(shape.expected_error),

@@ -39,6 +39,10 @@ NETCDF = "application/x-netcdf"
 _NAMES = ("netcdf", *FORMATS, *EXPORTS)
 
 
+#: Vertices that stand for a thread, its head among them.
+_CORNERS = 14
+
+
 def _said(name: str) -> str:
     return str(Options.model_fields[name].description)
 
@@ -53,6 +57,7 @@ def _options(
     fps: Annotated[float | None, Query(ge=1, le=240, allow_inf_nan=False, description=_said("fps"))] = None,
     step: Annotated[float | None, Query(gt=0, le=1000, allow_inf_nan=False, description=_said("step"))] = None,
     textures: Annotated[int | None, Query(ge=0, le=4096, description=_said("textures"))] = None,
+    threads: Annotated[int | None, Query(ge=0, le=200_000, description=_said("threads"))] = None,
     map: Annotated[str | None, Query(max_length=100, description=_said("map"))] = None,
     size: Annotated[int | None, Query(ge=2, le=8192, description=_said("size"))] = None,
     low: Annotated[float | None, Query(allow_inf_nan=False, description=_said("low"))] = None,
@@ -154,7 +159,10 @@ def _scene(
     pixels = max(options.size if chosen.name in ("png", "exr") else 0, options.textures)
     if pixels > settings.max_map:
         raise InvalidQuery.of([Wrong("size", f"{pixels} pixels are more than {settings.max_map}", "Ask for fewer.")])
-    if sequence.samples + len(sequence) * options.textures**2 > settings.max_export_samples:
+    if (
+        sequence.samples + len(sequence) * (options.textures**2 + _CORNERS * options.threads)
+        > settings.max_export_samples
+    ):
         raise InvalidQuery.of(
             [
                 Wrong(

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweeps.pictures import colours
+from sweeps.pictures.fur import ribbons
 
 from ..errors import UnfitFormat
 from ..formats.about import GENERATOR
 from ..formats.gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack
-from .bake import baked
 from .options import Options
 
 if TYPE_CHECKING:
@@ -40,12 +40,14 @@ def animation(sequence: Sequence, options: Options) -> bytes:
     """Return a sequence as a GLB file; a single stage has no animation.
 
     Raises:
-        UnfitFormat: textures of a surface without texture coordinates, or without colours.
+        UnfitFormat: textures of a surface without colours, or whose triangles change.
+        Unavailable: textures of a surface without texture coordinates need a package that is not installed.
 
     """
-    if options.textures and (sequence.seam is None or not sequence.coloured):
-        lacks = "texture coordinates" if sequence.seam is None else "colours"
-        raise UnfitFormat(f"textures need {lacks}, and this result has none.", advice="Leave textures out.")
+    if options.textures:
+        sequence = sequence.unwrapped()
+        if not sequence.coloured:
+            raise UnfitFormat("textures need colours, and this result has none.", advice="Leave textures out.")
     file = _File(sequence, options)
     if sequence.kept and not sequence.coloured and len(sequence) > 1:
         file.morph()
@@ -64,13 +66,14 @@ class _File:
         self.animations: list[Json] = []
         textured = bool(options.textures)
         white = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
-        self.materials: list[Json] = (
-            [] if textured else [{"name": "skin", "pbrMetallicRoughness": white if sequence.coloured else _PLAIN}]
-        )
+        plain = white if sequence.coloured else _PLAIN
+        names = [name or "skin" for name, _ in sequence.materials]
+        self.materials: list[Json] = [] if textured else [{"name": n, "pbrMetallicRoughness": plain} for n in names]
+        self.felt: int | None = None
         seam = sequence.seam
         self.copies = slice(None) if seam is None else seam.copies
-        self.uv = None if seam is None else self.buffer.add(seam.uv, FLOAT, "VEC2", VERTICES)
-        self.shared = self._indices(seam.triangles, len(seam.uv)) if seam is not None else None
+        self.uv = None if seam is None else self.buffer.add(seam.uv.astype("f4"), FLOAT, "VEC2", VERTICES)
+        self.shared = self._parts(seam.triangles, len(seam.uv)) if seam is not None else None
 
     @property
     def _name(self) -> str:
@@ -84,6 +87,13 @@ class _File:
         small = count < _SHORT
         array = triangles.ravel().astype("<u2" if small else "<u4")
         return self.buffer.add(array, USHORT if small else UINT, "SCALAR", INDICES)
+
+    def _parts(self, triangles: np.ndarray, count: int) -> list[int]:
+        """Return the indices of each material's triangles."""
+        parts = self.sequence.materials
+        if len(parts) == 1:
+            return [self._indices(triangles, count)]
+        return [self._indices(triangles[of], count) for _, of in parts]
 
     def _attributes(self, surface: Surface) -> Json:
         points = surface.vertices[self.copies]
@@ -100,38 +110,62 @@ class _File:
             found[word] = self.buffer.add(values[self.copies], FLOAT, "SCALAR", VERTICES)
         return found
 
-    def _primitive(self, surface: Surface) -> Json:
+    def _primitives(self, surface: Surface) -> list[Json]:
+        """Return a primitive for each material, which all have the same vertices."""
         if self.shared is None or not self.sequence.kept:
-            indices = self._indices(surface.triangles, len(surface.vertices))
+            indices = self._parts(surface.triangles, len(surface.vertices))
             if self.sequence.kept:
                 self.shared = indices
         else:
             indices = self.shared
-        material = self._textured(surface) if self.options.textures else 0
-        return {"attributes": self._attributes(surface), "indices": indices, "material": material}
+        first = self._textured(surface) if self.options.textures else 0
+        attributes = self._attributes(surface)
+        found = [{"attributes": attributes, "indices": at, "material": first + i} for i, at in enumerate(indices)]
+        return found + self._cards(surface)
+
+    def _cards(self, surface: Surface) -> list[Json]:
+        """Return the threads on a surface as ribbons of a material of their own, seen from both sides."""
+        threads = self.sequence.threads(surface, self.options.threads)
+        if threads is None or not len(threads.points):
+            return []
+        points, faces, colour, normals = ribbons(threads)
+        points, colour, normals = (part.astype("f4") for part in (points, colour, normals))
+        if self.felt is None:
+            self.felt = len(self.materials)
+            rough = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
+            self.materials.append({"name": "hyphae", "doubleSided": True, "pbrMetallicRoughness": rough})
+        attributes = {
+            "POSITION": self.buffer.add(points, FLOAT, "VEC3", VERTICES, bounds(points)),
+            "NORMAL": self.buffer.add(normals, FLOAT, "VEC3", VERTICES),
+            "COLOR_0": self.buffer.add(np.clip(colour, 0, 1), FLOAT, "VEC3", VERTICES),
+        }
+        indices = self._indices(faces.astype("u4"), len(points))
+        return [{"attributes": attributes, "indices": indices, "material": self.felt}]
 
     def morph(self) -> None:
         """Add one mesh with a target per further stage, and weights that fade from each to the next."""
         surfaces = iter(self.sequence)
         first = next(surfaces)
         # fields belong to stages, and a target has none
-        primitive = self._primitive(first._replace(fields={}))
+        primitives = self._primitives(first._replace(fields={}))
         base, straight = first.vertices[self.copies], first.normals()[self.copies]
-        primitive["targets"] = []
+        targets: list[Json] = []
         for surface in surfaces:
             moved, turned = surface.vertices[self.copies] - base, surface.normals()[self.copies] - straight
-            primitive["targets"].append(
+            targets.append(
                 {
                     "POSITION": self.buffer.add(moved, FLOAT, "VEC3", VERTICES, bounds(moved)),
                     "NORMAL": self.buffer.add(turned, FLOAT, "VEC3", VERTICES),
                 }
             )
-        count = len(primitive["targets"])
+        count = len(targets)
+        for primitive in primitives:
+            primitive["targets"] = targets
         names = [f"{stage:g}" for stage in self.sequence.stages[1:]]
         self.meshes.append(
             {
                 "name": self._name,
-                "primitives": [primitive],
+                "primitives": primitives,
                 "weights": [0.0] * count,
                 "extras": {"targetNames": names},
             }
@@ -151,7 +185,7 @@ class _File:
         channels = []
         for number, surface in enumerate(self.sequence):
             name = f"{self._name} {surface.stage:g}"
-            self.meshes.append({"name": name, "primitives": [self._primitive(surface)]})
+            self.meshes.append({"name": name, "primitives": self._primitives(surface)})
             if count == 1:
                 root["mesh"] = 0
                 return
@@ -173,19 +207,20 @@ class _File:
         self.animations.append({"name": "stages", "samplers": samplers, "channels": targets})
 
     def _textured(self, surface: Surface) -> int:
-        """Add the colours and the roughness of a stage as pictures, and return the number of the material."""
-        n, size = self.sequence.lattice, self.options.textures
+        """Add a stage's colours and roughness as pictures, a material of each name, and return the first's number."""
+        size = self.options.textures
         assert surface.colour is not None
-        inner = slice(0, 2 * n * n)  # the poles are no samples of their own
-        base = colours.encoded(baked(surface.colour[inner].reshape(n, 2 * n, 3), size))
+        base = colours.encoded(self.sequence.baked(surface.colour, size))
         pbr: Json = {"baseColorTexture": {"index": self._image(base)}, "metallicFactor": 0.0, "roughnessFactor": 0.6}
         if surface.roughness is not None:
             rough = np.zeros((size, size, 3), np.uint8)  # green is roughness, blue is metal
-            share = baked(surface.roughness[inner].reshape(n, 2 * n), size)
+            share = self.sequence.baked(surface.roughness, size)
             rough[..., 1] = np.clip(255 * share + 0.5, 0, 255).astype(np.uint8)
             pbr |= {"metallicRoughnessTexture": {"index": self._image(rough)}, "roughnessFactor": 1.0}
-        self.materials.append({"name": f"skin {surface.stage:g}", "pbrMetallicRoughness": pbr})
-        return len(self.materials) - 1
+        first = len(self.materials)
+        for name, _ in self.sequence.materials:
+            self.materials.append({"name": f"{name or 'skin'} {surface.stage:g}", "pbrMetallicRoughness": pbr})
+        return first
 
     def _image(self, pixels: np.ndarray) -> int:
         from PIL import Image

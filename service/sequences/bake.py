@@ -1,6 +1,6 @@
 """Fields on the fruit's own texture coordinates, as pictures: u = azimuth / 2 pi, v = colatitude / pi, v = 0 on top.
 
-A texel is worth the field at its middle, bilinear between the lattice's samples: waves would ring at a front of rot.
+A texel is worth the field at its middle, bilinear between the lattice's samples: waves would ring where colours end.
 Rows beyond a pole are those of the other side, so nothing is clamped there, and u runs around.
 """
 

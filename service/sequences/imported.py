@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from solver.arrays import Array, Ints
+from solver.geometry.nearest import nearest
 from sweeps import foreign
 from sweeps.errors import SweepError
 from sweeps.foreign import KINDS
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
-from .nearest import nearest
 
 if TYPE_CHECKING:
     from .view import Sequence, Surface

@@ -19,7 +19,6 @@ from solver.quantities import QUANTITIES
 from sweeps.errors import installing
 
 from ..errors import InvalidQuery, Unavailable, UnfitFormat, Wrong
-from .bake import baked
 from .options import Options
 from .view import lattice_fields
 
@@ -29,19 +28,16 @@ if TYPE_CHECKING:
 __all__ = ["exr", "png"]
 
 
-def _fields(sequence: Sequence, format: str) -> dict[str, np.ndarray]:
-    """Return the fields (n, 2n) of the sequence's one stage.
+def _fields(sequence: Sequence) -> dict[str, np.ndarray]:
+    """Return the fields (v) of the sequence's one stage.
 
     Raises:
-        UnfitFormat: there are none, or no texture coordinates to draw them on.
+        UnfitFormat: there are none.
 
     """
-    if not sequence.lattice:
-        raise UnfitFormat(
-            f"{format} maps need texture coordinates, and this result's meshes have none.",
-            advice="Ask for ply-zip or usdc: they hold fields by vertex.",
-        )
-    found = lattice_fields(sequence.run, sequence.indices[0])
+    # on the lattice a map needs no shape
+    on_lattice = lattice_fields(sequence.run, sequence.indices[0]) if sequence.lattice else {}
+    found = {name: values.ravel() for name, values in on_lattice.items()} or dict(next(iter(sequence)).fields)
     if not found:
         raise UnfitFormat("this result holds no field on its surface.", advice="Solve again with the field you want.")
     return found
@@ -51,18 +47,19 @@ def png(sequence: Sequence, options: Options) -> bytes:
     """Return one field of one stage as a 16-bit grey PNG.
 
     Raises:
-        UnfitFormat: no lattice, or no field on it.
+        UnfitFormat: no field, or triangles that change.
         InvalidQuery: there is no such field, or the range is empty.
 
     """
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
-    fields = _fields(sequence, "PNG")
+    sequence = sequence.unwrapped()
+    fields = _fields(sequence)
     name = options.map or next(iter(fields))
     if name not in fields:
         raise InvalidQuery.of([Wrong("map", f"there is no field {name[:40]!r}", f"Fields: {', '.join(fields)}.")])
-    values = baked(fields[name], options.size)
+    values = sequence.baked(fields[name], options.size)
     known = QUANTITIES.get(name)
     low, high = (0.0, 1.0) if known and known.share else (float(fields[name].min()), float(fields[name].max()))
     low, high = (low if options.low is None else options.low), (high if options.high is None else options.high)
@@ -83,12 +80,13 @@ def exr(sequence: Sequence, options: Options) -> bytes:
     """Return the fields of one stage as an OpenEXR picture, one channel each; `map` asks for one of them.
 
     Raises:
-        UnfitFormat: no lattice, or no field on it.
+        UnfitFormat: no field, or triangles that change.
         InvalidQuery: there is no such field.
         Unavailable: OpenEXR is not installed.
 
     """
-    fields = _fields(sequence, "EXR")
+    sequence = sequence.unwrapped()
+    fields = _fields(sequence)
     if options.map is not None:
         if options.map not in fields:
             advice = f"Fields: {', '.join(fields)}."
@@ -98,7 +96,7 @@ def exr(sequence: Sequence, options: Options) -> bytes:
         import OpenEXR
     except ImportError:
         raise Unavailable("EXR needs the package OpenEXR.", advice=installing("formats")) from None
-    channels = {name: baked(field, options.size) for name, field in fields.items()}
+    channels = {name: sequence.baked(field, options.size) for name, field in fields.items()}
     head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     head["wizen"] = json.dumps({"stage": sequence.stages[0], "solver": sequence.about["solver"]})
     with tempfile.TemporaryDirectory(prefix="wizen-") as folder:

@@ -21,6 +21,7 @@ class Options(BaseModel):
     fps: float = Field(24.0, ge=1, le=240, description="Frames per second")
     step: float = Field(12.0, gt=0, le=1000, description="Frames from one stage to the next")
     textures: int = Field(0, ge=0, le=4096, description="Pixels of baked textures in place of vertex colours; 0: none")
+    threads: int = Field(0, ge=0, le=200_000, description="Most threads of mould, as curves or cards; 0: none")
     map: str | None = Field(None, description="Field of a baked map; the first one if left out")
     size: int = Field(512, ge=2, le=8192, description="Pixels of a map, along and down")
     low: float | None = Field(None, description="Value that a 16-bit map shows as 0")

@@ -19,7 +19,10 @@ from ..errors import Unavailable
 from .options import Options
 
 if TYPE_CHECKING:
-    from .view import Seam, Sequence, Surface
+    from sweeps.pictures.fur import Threads
+
+    from .seam import Seam
+    from .view import Sequence, Surface
 
 __all__ = ["usda", "usdc"]
 
@@ -54,12 +57,14 @@ def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
     mesh.GetPrim().SetCustomDataByKey("stages", _doubles(about["stages"]["values"]))
     if sequence.seam is not None:
         _texture(mesh, sequence.seam)
+    _materials(stage, mesh, sequence)
     for number, surface in enumerate(sequence):
         at = 1 + number * options.step
         if number == 0 or not sequence.kept:
             # triangles that stay have no time of their own
             _triangles(mesh, surface, None if sequence.kept else at)
         _sample(mesh, surface, at)
+        _threads(stage, mesh, sequence.threads(surface, options.threads), at)
     with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
         path = Path(folder) / f"result.{suffix}"
         stage.GetRootLayer().Export(str(path))
@@ -97,9 +102,37 @@ def _sample(mesh: Any, surface: Surface, at: float) -> None:
         colour = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
         colour.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(surface.colour)), at)
     primvars = UsdGeom.PrimvarsAPI(mesh)
-    for name, values in surface.fields.items():
+    more = {} if surface.roughness is None else {"roughness": surface.roughness}
+    for name, values in {**surface.fields, **more}.items():
         own = primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
         own.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(values)), at)
+
+
+def _threads(stage: Any, mesh: Any, threads: Threads | None, at: float) -> None:
+    """Write the threads of a stage as curves below the mesh, and their heads as points."""
+    from pxr import Gf, UsdGeom, Vt
+
+    if threads is None:
+        return
+    curves = UsdGeom.BasisCurves.Define(stage, mesh.GetPath().AppendChild("hyphae"))
+    curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+    count, steps = threads.points.shape[:2]
+    points = np.ascontiguousarray(threads.points.reshape(-1, 3), np.float32)
+    curves.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, steps, np.int32)), at)
+    curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), at)
+    narrow = np.tile(np.linspace(1, 0.35, steps) * threads.width, count).astype(np.float32)
+    curves.CreateWidthsAttr().Set(Vt.FloatArray.FromNumpy(narrow), at)
+    curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+    share = np.linspace(0, 1, steps)[None, :, None]
+    colour = (threads.low[:, None] * (1 - share) + threads.high[:, None] * share).reshape(-1, 3)
+    paint = curves.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    paint.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(colour, np.float32)), at)
+    headed = threads.heads > 0
+    heads = UsdGeom.Points.Define(stage, mesh.GetPath().AppendChild("heads"))
+    tips = np.ascontiguousarray(threads.points[headed, -1], np.float32)
+    heads.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(tips), at)
+    heads.CreateWidthsAttr().Set(Vt.FloatArray.FromNumpy((2 * threads.heads[headed]).astype(np.float32)), at)
+    heads.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(0.03, 0.03, 0.03)])
 
 
 def _texture(mesh: Any, seam: Seam) -> None:
@@ -109,3 +142,38 @@ def _texture(mesh: Any, seam: Seam) -> None:
     st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
     st.Set(Vt.Vec2fArray.FromNumpy(np.column_stack([seam.uv[:, 0], 1 - seam.uv[:, 1]]).astype("f4")))
     st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(seam.triangles.ravel(), np.int32)))
+
+
+def _materials(stage: Any, mesh: Any, sequence: Sequence) -> None:
+    """Bind materials under the mesh's own names, which take colour and roughness from the vertices."""
+    from pxr import Gf, Sdf, UsdGeom, UsdShade, Vt
+
+    if not sequence.coloured:
+        return
+    parts = sequence.materials
+    api = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
+    for number, (name, faces) in enumerate(parts):
+        path = mesh.GetPath().AppendChild(f"material{number}")
+        material = UsdShade.Material.Define(stage, path)
+        material.GetPrim().SetDisplayName(name or "skin")
+        shader = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
+        shader.CreateIdAttr("UsdPreviewSurface")
+        for what, kind, output in (
+            ("diffuseColor", Sdf.ValueTypeNames.Color3f, "UsdPrimvarReader_float3"),
+            ("roughness", Sdf.ValueTypeNames.Float, "UsdPrimvarReader_float"),
+        ):
+            reader = UsdShade.Shader.Define(stage, path.AppendChild(what))
+            reader.CreateIdAttr(output)
+            varname = "displayColor" if what == "diffuseColor" else what
+            reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(varname)
+            fallback = Gf.Vec3f(0.5) if what == "diffuseColor" else 0.5
+            reader.CreateInput("fallback", kind if what == "roughness" else Sdf.ValueTypeNames.Float3).Set(fallback)
+            result = reader.CreateOutput("result", kind if what == "roughness" else Sdf.ValueTypeNames.Float3)
+            shader.CreateInput(what, kind).ConnectToSource(result)
+        material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+        if len(parts) == 1:
+            api.Bind(material)
+            continue
+        indices = Vt.IntArray.FromNumpy(faces.astype(np.int32))
+        subset = api.CreateMaterialBindSubset(f"part{number}", indices, UsdGeom.Tokens.face)
+        UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)

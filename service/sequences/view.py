@@ -19,12 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Singles, Words32
+from solver.contract import Fur
 from solver.lattice import lattice as angles
 from store.surfaces import spectra
 from sweeps.pictures import colours
+from sweeps.pictures.fur import Feet, Threads, feet, grown
 
 from ..errors import InvalidQuery, UnfitFormat, Wrong
 from ..formats import mesh
+from . import charts
+from .bake import baked
+from .seam import Seam
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +40,8 @@ __all__ = ["Seam", "Sequence", "Surface", "of_run"]
 class Surface(NamedTuple):
     """One stage: vertices (v, 3), triangles (f, 3) counter-clockwise from outside, fields of the vertices (v).
 
-    colour: (v, 3), linear light. roughness: (v). Both None where nothing says what the surface looks like.
+    colour: (v, 3), linear light. roughness: (v). Both None where nothing says what the surface looks like. fur: what
+    stands on it, None where nothing does.
     """
 
     stage: float
@@ -44,6 +50,7 @@ class Surface(NamedTuple):
     fields: Mapping[str, Singles]
     colour: Singles | None = None
     roughness: Singles | None = None
+    fur: Fur | None = None
 
     def normals(self) -> Singles:
         """Return outward unit normals (v, 3), weighted by area; (0, 1, 0) where no triangle has any."""
@@ -55,17 +62,6 @@ class Surface(NamedTuple):
                 total[:, axis] += np.bincount(self.triangles[:, corner], areas[:, axis], len(total))
         length = np.linalg.norm(total, axis=1, keepdims=True)
         return np.where(length > 1e-30, total / np.maximum(length, 1e-30), [0.0, 1.0, 0.0]).astype(np.float32)
-
-
-class Seam(NamedTuple):
-    """Texture coordinates (w, 2), v down, of a mesh cut open: `copies` (w) says which vertex each one repeats.
-
-    triangles: (f, 3), the mesh's own in the same order, as indices into the w copies.
-    """
-
-    uv: Singles
-    copies: NDArray[np.intp]
-    triangles: Words32
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +102,72 @@ class Sequence:
             return len(self) * self.run.sizes["vertex"]
         return int(self.run["vertex_count"].values[list(self.indices)].sum())
 
-    @property
+    @cached_property
     def seam(self) -> Seam | None:
         """Texture coordinates, where the surface has some."""
         n = self.lattice
-        return Seam(mesh.texture(n), mesh.seam(n), mesh.seam_triangles(n)) if n else None
+        return Seam(mesh.texture(n), mesh.seam(n), mesh.seam_triangles(n)) if n else charts.own(self.run)
+
+    @property
+    def materials(self) -> tuple[tuple[str, NDArray[np.intp]], ...]:
+        """The mesh's own materials: names, and the triangles of each; one without a name where it has none."""
+        if "face_material" not in self.run:
+            return (("", np.arange(self.run.sizes.get("face", 0))),) if not self.lattice else (("", np.empty(0, int)),)
+        names, owned = json.loads(self.run.attrs["materials"]), self.run["face_material"].values
+        return tuple((name, np.flatnonzero(owned == i)) for i, name in enumerate(names) if (owned == i).any())
+
+    def threads(self, surface: Surface, most: int) -> Threads | None:
+        """Return the threads, at most so many, of a stage's surface; None where none grow, or triangles change."""
+        if surface.fur is None or not self.kept or not most:
+            return None
+        fur = surface.fur._replace(
+            length=surface.fur.length * self.scale,
+            width=surface.fur.width * self.scale,
+            head=surface.fur.head * self.scale,
+        )
+        return grown(self._feet(fur, most), surface.vertices.astype(float), surface.normals().astype(float), fur)
+
+    def _feet(self, fur: Fur, most: int) -> Feet:
+        if most not in self._stood:
+            first = self._bare(0)
+            self._stood[most] = feet(first.vertices, first.triangles, fur.peak, most)
+        return self._stood[most]
+
+    @cached_property
+    def _stood(self) -> dict[int, Feet]:
+        return {}
+
+    def unwrapped(self) -> Sequence:
+        """Return the sequence with texture coordinates: its own, or else such as xatlas lays out.
+
+        Raises:
+            UnfitFormat: its triangles change.
+            Unavailable: it has none, and xatlas is not installed.
+
+        """
+        if self.seam is not None:
+            return self
+        if not self.kept:
+            raise UnfitFormat(
+                "textures need triangles that stay, and this result's change from stage to stage.",
+                advice="Leave textures out: colours are those of the vertices.",
+            )
+        return replace(self, run=charts.laid(self.run))
+
+    def baked(self, values: Array, size: int) -> Array:
+        """Return a field of the vertices (v) or (v, c) as a picture (size, size) or (size, size, c), top row first."""
+        n = self.lattice
+        if n:
+            # the poles are no samples of their own
+            return baked(values[: 2 * n * n].reshape(n, 2 * n, *values.shape[1:]), size)
+        assert self.seam is not None
+        if size not in self._texels:
+            self._texels[size] = charts.texels(self.seam, size)
+        return charts.drawn(self.seam, self._texels[size], values, size)
+
+    @cached_property
+    def _texels(self) -> dict[int, charts.Texels]:
+        return {}
 
     @cached_property
     def params(self) -> Mapping[str, Any]:
@@ -124,7 +181,8 @@ class Sequence:
         stage = self.run["stage"].attrs
         return {
             "solver": str(self.run.attrs.get("solver", "")),
-            "params": dict(self.params),
+            # a mesh of one's own is what the file is made of, and no parameter to be read
+            "params": {name: value for name, value in self.params.items() if name != "mesh"},
             "stages": {"values": list(self.stages), "units": stage.get("units", "1"), "of": stage.get("long_name", "")},
             "units": {"length": self.length},
         }
@@ -168,10 +226,11 @@ class Sequence:
         if self.colour == "none":
             return bare
         if self.colour == "auto":
-            skin = colours.painted(self.run, bare.fields)
+            skin = colours.painted(self.run, index, bare.fields)
             if skin is None:
                 return bare
-            return bare._replace(colour=skin.colour.astype("f4"), roughness=skin.roughness.astype("f4"))
+            fur = colours.furred(self.run, bare.fields)
+            return bare._replace(colour=skin.colour.astype("f4"), roughness=skin.roughness.astype("f4"), fur=fur)
         if self.colour not in bare.fields:
             known = ", ".join(bare.fields) or "none in this result"
             raise InvalidQuery.of([Wrong("colour", f"there is no field {self.colour[:40]!r}", f"Fields: {known}.")])

@@ -19,6 +19,7 @@ from store.lookup import ShapeTable
 from .. import vocabulary
 from ..errors import InvalidQuery, ServiceError, Wrong
 from ..formats import Format, negotiate
+from ..hours import timed
 from ..settings import Settings
 from . import detail as level
 from .live import LiveTables
@@ -71,7 +72,8 @@ def table_for(request: Request, solver: str) -> Found:
             tables.belongs(name, solver)
             found = Found(name, preset, {} if preset is None else tables.families(known).values({}, preset))
         else:
-            said = {k: number for k, v in given.items() if k not in RESERVED and (number := _number(v)) is not None}
+            items = timed(given.multi_items(), known, preset)
+            said = {k: number for k, v in items if k not in RESERVED and (number := _number(v)) is not None}
             found = choose(tables.families(known), said, known.stages.symbol, preset)
         request.scope[_TABLE] = found
     assert isinstance(found, Found)
@@ -146,7 +148,8 @@ def read(request: Request, solver: str, only: Format | None = None, without: tup
     detail = level.read(given)
     unknown = [Wrong(name, "means nothing here", f"Ask /v1/shapes/{solver}.") for name in without if name in given]
     also = [*unknown, *detail.refused(chosen)]
-    query = parse(given.multi_items(), words, also, found.filled, beyond(found, words))
+    items = timed(given.multi_items(), known, found.preset)
+    query = parse(items, words, also, found.filled, beyond(found, words))
     resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
     return Asked(known, found, table, words, query, detail, chosen, resolution)
 

@@ -11,7 +11,7 @@ from starlette.responses import Response
 
 from solver.contract import Need
 from store.errors import TooUncertain
-from store.families.stored import document
+from store.families.stored import document, refusal
 from sweeps.commands.terminal.tables import run_command
 
 from ..errors import OutsideRanges, Uncertain
@@ -30,6 +30,9 @@ RESPONSE: dict[str, Any] = {
 
 _OFFER = "With exact=run and a token of the scope run, the service runs exactly this."
 
+#: Parameters that a refusal tells one by one.
+_MANY = 3
+
 
 def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain) -> OutsideRanges | Uncertain:
     """Return a refusal that says which table is the nearest, and how the shape can be run."""
@@ -42,12 +45,18 @@ def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain)
         "command": command,
     }
     more: dict[str, Any] = {"links": links}
+    message = error.message
     if asked.found.fits:
         near = asked.found.fits[0]
         more["nearest"] = document(near)
-        advice = f"The nearest table is {near.info.name!r}, {near.distance:.3g} away. {advice}"
+        if len(near.misses) + len(near.unusual) > _MANY:
+            # refusals one by one would lead, together, to another fruit
+            whole = refusal(asked.found.fits)
+            message, advice = whole.message, f"{whole.advice} {_OFFER}"
+        else:
+            advice = f"The nearest table is {near.info.name!r}, {near.distance:.3g} away. {advice}"
     if isinstance(error, OutsideRanges):
-        return OutsideRanges(error.message, advice=advice, wrong=error.wrong, more=more)
+        return OutsideRanges(message, advice=advice, wrong=error.wrong, more=more)
     return Uncertain(error.message, advice=advice, more=more)
 
 

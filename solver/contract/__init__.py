@@ -4,9 +4,10 @@
 progress, cancellation and randomness, and every failure is a `SolverError` that says what to change.
 """
 
+from .clock import Clock
 from .context import Context
-from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, SolverError, Unstable
-from .looks import Label, Looks, Place, Shade, Skin
+from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
+from .looks import Fur, Label, Looks, Place, Shade, Skin
 from .need import Need, Quality, Region
 from .params import Params
 from .solver import Cost, Solver, StageAxis, finish
@@ -14,15 +15,18 @@ from .surface import Fresh, Surface
 
 __all__ = [
     "Cancelled",
+    "Clock",
     "Context",
     "Cost",
     "Fresh",
+    "Fur",
     "InvalidGeometry",
     "InvalidInput",
     "Label",
     "Looks",
     "Need",
     "NotConverged",
+    "OverBudget",
     "Params",
     "Place",
     "Quality",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Cancelled", "InvalidGeometry", "InvalidInput", "NotConverged", "SolverError", "Unstable"]
+__all__ = ["Cancelled", "InvalidGeometry", "InvalidInput", "NotConverged", "OverBudget", "SolverError", "Unstable"]
 
 
 class SolverError(Exception):
@@ -64,6 +64,12 @@ class InvalidGeometry(InvalidInput):
     """Parameters that are valid one by one but describe an impossible shape."""
 
     code = "invalid-geometry"
+
+
+class OverBudget(InvalidInput):
+    """A run that is expected to take more time or memory than it may; raised before any work."""
+
+    code = "over-budget"
 
 
 class NotConverged(SolverError):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ..arrays import Array
 
-__all__ = ["Label", "Looks", "Place", "Shade", "Skin"]
+__all__ = ["Fur", "Label", "Looks", "Place", "Shade", "Skin"]
 
 
 class Skin(NamedTuple):
@@ -16,6 +16,24 @@ class Skin(NamedTuple):
 
     colour: Array
     roughness: Array
+
+
+class Fur(NamedTuple):
+    """Threads that stand on a surface, by vertex (v): how many on a unit of area, how long, and their colours.
+
+    foot, tip: (v, 3), linear light. ripe: share of the threads that carry a head. peak: the largest density that there
+    may be. width, head: of a thread's foot, and radius of a head, 0 for none. lean: how far it leans, over its length.
+    """
+
+    density: Array
+    length: Array
+    foot: Array
+    tip: Array
+    ripe: Array
+    peak: float
+    width: float
+    head: float
+    lean: float
 
 
 class Label(NamedTuple):
@@ -51,12 +69,15 @@ class Looks:
     """Colours by field, and words.
 
     layers: fields that `paint` makes colours of, given any of them by name (...) and the run's parameters; it returns
-    None where these say no colours. labels: by axis or stage symbol. advance: the word for going along the stage axis.
-    shades and places: by their names on pages.
+    None where these say no colours. scalars: of a stage, which `paint` is given too where a result has them. fur: what
+    stands on it, by the same fields; None where nothing grows. labels: by axis or stage symbol. advance: the word for
+    going along the stage axis. shades and places: by their names on pages.
     """
 
     layers: tuple[str, ...] = ()
     paint: Callable[[Mapping[str, Array], Mapping[str, Any]], Skin | None] | None = None
+    scalars: tuple[str, ...] = ()
+    fur: Callable[[Mapping[str, Array], Mapping[str, Any]], Fur | None] | None = None
     labels: Mapping[str, Label] = field(default_factory=dict)
     advance: str = "Play"
     shades: Mapping[str, Shade] = field(default_factory=dict)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .. import __version__, quantities
+from ..arrays import Floats
+from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
 from .looks import Looks
@@ -57,8 +59,11 @@ class Solver:
     presets that the default ones do not suit; `onset(params, method=, kappa_ratio=, quality=, context=)`, where it
     can say at which stage its shape begins to lose its symmetry; `incidental`, parameters that say how a run is done
     and not what of: tables that differ in them hold the same shapes; `error(params, quality, last stage)`, the relative
-    error to expect of these parameters, which refuses what was never measured. `tolerances` are the worst of each
-    quality over all that was.
+    error to expect of these parameters, which refuses what was never measured; `relax(params, position, stage, need,
+    context)`, which brings a surface on the lattice into the equilibrium next to it and returns what `run` returns of
+    one stage, and how far it `moved`. `tolerances` are the worst of each
+    quality over all that was. `clock` turns hours under given conditions into
+    stages.
     """
 
     name: str
@@ -79,6 +84,8 @@ class Solver:
     onset: Callable[..., Any] | None = None
     incidental: tuple[str, ...] = ("seed",)
     error: Callable[[Any, Quality, float], float] | None = None
+    relax: Callable[[Any, Floats, float, Need, Context], xr.Dataset] | None = None
+    clock: Clock | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.
@@ -99,6 +106,22 @@ class Solver:
             base = self.presets[preset]
         # a whole field given by hand replaces the preset's; a scalar axis replaces one entry of it
         return self.params.parse({**base, **named(values)})
+
+    def stages_after(
+        self, hours: Iterable[float], under: Mapping[str, Any], preset: str | None = None
+    ) -> tuple[float, ...]:
+        """Return the stages after hours under conditions, those of a preset if one is named.
+
+        Raises:
+            InvalidInput: this solver knows no hours, or not under these conditions.
+
+        """
+        if self.clock is None:
+            raise InvalidInput(
+                f"{self.name} does not turn hours into stages.",
+                advice=f"Name stages: {self.stages.long_name} [{self.stages.units}].",
+            )
+        return self.clock.stages(hours, under, preset)
 
     def axis_units(self) -> dict[str, str]:
         """Return the units of the scalar axes, from the parameters' schema."""
@@ -182,6 +205,23 @@ class Solver:
         """
         settled = self.settle(need or Need(), of=(params,))
         result = self.run(params, settled, context or Context())
+        return finish(result, self, params, settled)
+
+    def relaxed(
+        self, params: Params, position: Floats, stage: float, need: Need | None = None, context: Context | None = None
+    ) -> xr.Dataset:
+        """Relax a surface (n, 2n, 3) at a stage, and check what leaves as `solve` does.
+
+        Raises:
+            InvalidInput: this solver relaxes nothing, or the need cannot be met.
+            SolverError: typed.
+
+        """
+        if self.relax is None:
+            raise InvalidInput(f"{self.name} relaxes no surfaces.", advice="Run it: it finds its own.")
+        asked = (need or Need()).model_copy(update={"stages": (stage,)})
+        settled = self.settle(asked, of=(params,))
+        result = self.relax(params, position, stage, settled, context or Context())
         return finish(result, self, params, settled)
 
 

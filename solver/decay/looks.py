@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..contract import Label, Looks, Skin
+from ..contract import Fur, Label, Looks, Skin
 
 __all__ = ["LOOKS"]
 
@@ -17,7 +17,10 @@ _LAYERS = ("rot", "mould", "mould_active")
 _ROT = np.array([0.16, 0.075, 0.03])
 _RIM = np.array([0.86, 0.86, 0.82])
 #: Roughness of waxy skin, of wet rot and of felt: chosen by eye, measured by nobody.
-_WAX, _WET, _FELT = 0.35, 0.6, 1.0
+_WAX, _WET, _FELT, _DULL = 0.35, 0.6, 1.0, 0.65
+#: Share of the weight lost as water at which skin is as brown as it gets, and that brown over the skin's brightness.
+_DRIED = 0.6
+_BROWN = np.array([0.60, 0.29, 0.11])
 
 
 def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | None:
@@ -30,6 +33,10 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
 
     rot, mould, active = (layer(name) for name in _LAYERS)
     colour = np.broadcast_to(np.array(params["skin_colour"], float), (*known[0].shape, 3))
+    # what dries darkens and turns brown, and its wax goes dull
+    dry = float(_smooth(np.asarray(fields.get("water_lost", 0.0)) / _DRIED))
+    colour = colour * (1 - 0.35 * dry)
+    colour = colour + (_BROWN * colour.sum(axis=-1, keepdims=True) - colour) * (0.6 * dry)
     # rot shows long before it is complete, mould hides what is below it
     rotten, felted = 0.9 * _smooth(rot / 0.2), 0.95 * _smooth(mould / 0.25)
     colour = _over(colour, _ROT, rotten)
@@ -37,8 +44,33 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1) * (1 - _smooth((mould - 0.2) / 0.3))
     centre = np.array(params["mould_colour"], float)
     colour = _over(colour, centre + (_RIM - centre) * growing[..., None], felted)
-    roughness = _WAX + (_WET - _WAX) * rotten
+    wax = _WAX + (_DULL - _WAX) * dry
+    roughness = wax + (_WET - wax) * rotten
     return Skin(colour, roughness + (_FELT - roughness) * felted)
+
+
+def _fur(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Fur | None:
+    if "mould" not in fields or not {"hyphae", "mould_colour"} <= set(params):
+        return None
+    given, mould = params["hyphae"], np.asarray(fields["mould"], float)
+    active = np.asarray(fields.get("mould_active", np.zeros_like(mould)), float)
+    there, grown = _smooth(mould / 0.15), _smooth((mould - 0.02) / 0.6)
+    growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1)
+    # the rim is young: white, without spores; what rests or is dense has its spores' colour
+    young = _smooth(1 - (mould / max(given["margin"], 1e-9)) * (1 - 0.5 * growing))
+    centre = np.array(params["mould_colour"], float)
+    tip = centre + (_RIM - centre) * young[..., None]
+    return Fur(
+        given["density"] * there,
+        given["length"] * (0.25 + 0.75 * grown) * (there > 0),
+        0.5 * (_RIM + tip),
+        tip,
+        _smooth((mould - 0.15) / 0.4) * (1 - 0.6 * young),
+        float(given["density"]),
+        float(given["width"]),
+        float(given["head"]),
+        float(given["lean"]),
+    )
 
 
 def _over(below: Array, above: Array, cover: Array) -> Array:
@@ -55,6 +87,8 @@ def _smooth(x: Array) -> Array:
 LOOKS = Looks(
     layers=_LAYERS,
     paint=_paint,
+    scalars=("water_lost",),
+    fur=_fur,
     advance="Rot",
     labels={
         "t": Label("t", "Days"),

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from ..fruit import Fruit
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
+from .hyphae import FURS, Hyphae
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Painted, Pressure, PressureMap, Wound
 
@@ -144,6 +145,11 @@ class DecayParams(Fruit):
         description="Kinetics of the rot in the flesh: a mould's own lesion, or bacteria",
         json_schema_extra={"units": "1"},
     )
+    hyphae: Hyphae = Field(
+        FURS["penicillium-expansum"],
+        description="Threads and spore heads of the mould in files and pictures; no field depends on them",
+        json_schema_extra={"units": "1"},
+    )
     wounds: tuple[Wound, ...] = Field(
         (Wound(colatitude=0), Wound(colatitude=180)),
         max_length=64,
@@ -231,8 +237,8 @@ class DecayParams(Fruit):
                     else "only an imported mesh has numbered vertices"
                 )
                 raise ValueError(f"a wound names vertex {wound.vertex}: {where}")
-        if self.mesh is not None and self.body != "none":
-            raise ValueError(f"an imported mesh has no flesh under it: take body=none, not {self.body}")
+        if self.mesh is not None and self.body == "table":
+            raise ValueError("the table of dried fruits knows no imported mesh: take body=quasi-static, not table")
         if self.mesh is not None and self.seeds == "contacts":
             raise ValueError("an imported mesh has neither stem nor floor: take seeds=wounds")
         return self

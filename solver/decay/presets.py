@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .fields.colony import MOULDS, PAPER_MOULDS, PAPER_ROT, ROTS
+from .hyphae import FURS
 
 __all__ = ["ENVIRONMENTS", "PRESETS"]
 
@@ -41,6 +42,7 @@ def _fruit(
         "propagation_rate": rates[1],
         "mould": PAPER_MOULDS[mould].model_dump(),
         "rot": PAPER_ROT.model_dump(),
+        "hyphae": FURS[mould].model_dump(),
         "skin_colour": skin,
         "mould_colour": mould_colour,
         **shape,

@@ -141,7 +141,11 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
 
 def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shape: Shape) -> xr.Dataset:
     assert need.resolution is not None
-    data: dict[str, Any] = {"triangle": (("face", "corner"), shape.triangles)} if "triangle" in need.fields else {}
+    data: dict[str, Any] = {}
+    if "triangle" in need.fields:
+        data["triangle"] = (("face", "corner"), shape.triangles)
+        data |= shape.textured
+        attrs = {**attrs, **shape.materials}
     for name in rows[0]:
         values = np.array([row[name] for row in rows])
         if name == "mesh_position":

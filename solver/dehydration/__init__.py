@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 from ..contract import Context, Cost, Need, Quality, Solver, StageAxis
 from ..fresh import SURFACE
 from ..fruit import PRESETS
+from .drying import CLOCK
 from .looks import LOOKS
 from .params import DehydrationParams
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..arrays import Floats
     from .bifurcation import Onset
 
 __all__ = ["SOLVER", "DehydrationParams", "onset"]
@@ -51,6 +53,13 @@ def _run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     return run(params, need, context)
 
 
+def _relax(params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context) -> xr.Dataset:
+    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+    from .relax import relax
+
+    return relax(params, position, stage, need, context)
+
+
 def _cost(params: DehydrationParams, need: Need) -> Cost:
     from .settings import expected_cost
 
@@ -81,7 +90,7 @@ SOLVER = Solver(
     ),
     default_resolution={"preview": 64, "default": 96, "fine": 128},
     # the worst of what was measured: te = 0.04, gamma = 50
-    tolerances={"preview": 0.5, "default": 0.31, "fine": 0.17},
+    tolerances={"preview": 0.45, "default": 0.36, "fine": 0.3},
     error=_error,
     presets=PRESETS,
     run=_run,
@@ -89,5 +98,7 @@ SOLVER = Solver(
     surface=SURFACE,
     looks=LOOKS,
     onset=onset,
+    clock=CLOCK,
+    relax=_relax,
     incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )

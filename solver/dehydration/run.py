@@ -12,14 +12,15 @@ from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
 from ..geometry.crossings import split_quads
 from .fresh.loading import Loading
+from .fresh.mesh import FruitMesh
 from .measures.delivery import Delivery
 from .measures.descriptors import Descriptors, Surface
 from .measures.penetration import of_quads
 from .params import DehydrationParams
 from .path import Path, State
-from .settings import Settings, choose
+from .settings import choose
 
-__all__ = ["run"]
+__all__ = ["Record", "run"]
 
 _FIELDS = ("position", "displacement")
 
@@ -27,28 +28,29 @@ _FIELDS = ("position", "displacement")
 _DELIVERED = ("lattice_crossings", "lattice_penetration", "lattice_evened")
 
 
-class _Record:
+class Record:
     """Collects what the need asks for, stage by stage, and nothing else."""
 
-    def __init__(self, params: DehydrationParams, need: Need, path: Path) -> None:
-        self._need, self._path = need, path
+    def __init__(self, params: DehydrationParams, need: Need, mesh: FruitMesh, start: float | None = None) -> None:
+        self._need, self._mesh = need, mesh
         self._wants_fields = any(f in need.fields for f in _FIELDS)
         self._measures_delivered = any(f in need.fields for f in _DELIVERED)
         self._descriptors = [f for f in need.fields if f in Descriptors._fields]
-        self._surface = Surface(params, path.mesh) if self._descriptors else None
+        self._surface = Surface(params, mesh) if self._descriptors else None
         assert need.resolution is not None  # settled
         self._inside = window(need.resolution, need.region)
         if self._wants_fields or self._measures_delivered:
-            self._delivered = Delivery(params, path.mesh, need.resolution, need.dtype)
-        self._start = time.perf_counter()
+            self._delivered = Delivery(params, mesh, need.resolution, need.dtype)
+        self._start = time.perf_counter() if start is None else start
         self.rows: list[dict[str, Any]] = []
 
-    def add(self, state: State, settings: Settings) -> None:
+    def add(self, state: State, converged: bool) -> None:
+        """Keep what is asked for of a stage."""
         row: dict[str, Any] = {
             "stage": state.shrinkage,
             "residual": state.residual,
             "drift": state.drift,
-            "converged": state.residual <= settings.residual and state.drift <= settings.drift,
+            "converged": converged,
             "iterations": state.steps,
             "seconds": time.perf_counter() - self._start,
         }
@@ -65,7 +67,7 @@ class _Record:
             described = self._surface.describe(nodes)
             row.update({name: getattr(described, name) for name in self._descriptors})
         if "penetration" in self._need.fields or "crossings" in self._need.fields:
-            found = of_quads(nodes, self._path.mesh.sphere.quads)
+            found = of_quads(nodes, self._mesh.sphere.quads)
             row.update(_told((found.count, found.depth), ("crossings", "penetration"), self._need))
         for name, value in (
             ("least_jacobian", state.least_ratio),
@@ -77,6 +79,7 @@ class _Record:
         self.rows.append(row)
 
     def dataset(self, attrs: dict[str, Any]) -> xr.Dataset:
+        """Return all stages kept so far."""
         need = self._need
         assert need.resolution is not None
         data: dict[str, Any] = {}
@@ -88,7 +91,7 @@ class _Record:
                 data[name] = (("stage", "colatitude", "azimuth", "component"), values)
             elif name == "mesh_position":
                 data[name] = (("stage", "vertex", "component"), values)
-                quads = self._path.mesh.sphere.quads
+                quads = self._mesh.sphere.quads
                 # each triangle beside the other half of its quad
                 halves = split_quads(quads).reshape(2, -1, 3).transpose(1, 0, 2).reshape(-1, 3)
                 data["triangle"] = (("face", "corner"), halves.astype(np.int32))
@@ -127,7 +130,7 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     settings = choose(params, need.quality, need.stages[-1])
     context.report(0.0, f"meshing {settings.elements} elements")
     path = Path(params, settings, context, with_release="released_energy" in need.fields)
-    record = _Record(params, need, path)
+    record = Record(params, need, path.mesh)
     last = need.stages[-1]
     attrs = {
         "path": "march" if last > settings.start else "base-state",
@@ -139,7 +142,8 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     }
     try:
         for done, shrinkage in enumerate(need.stages, 1):
-            record.add(path.stage(shrinkage, last), settings)
+            state = path.stage(shrinkage, last)
+            record.add(state, state.residual <= settings.residual and state.drift <= settings.drift)
             context.report(
                 shrinkage / last if last > 0 else done / len(need.stages), f"shrinkage s = {shrinkage:.3f} settled"
             )

@@ -29,7 +29,7 @@ def _cost(params: GrowthParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="growth",
-    version="3",
+    version="4",
     title="Growth of thin shells",
     params=GrowthParams,
     fields=("mesh_position", "elastic_strain", "mesh_area", "stored_energy", "rest_area"),

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from .. import shell
-from ..contract import Context
+from ..contract import Context, InvalidGeometry
+from ..geometry.crossings import crossings
 from .fresh import fresh
 from .params import GrowthParams
 from .plastic import forgotten
@@ -44,12 +45,15 @@ class Engine:
     def __init__(
         self, params: GrowthParams, vertices: int, tolerance: float = 1e-3, most: int = 4000, history: bool = True
     ) -> None:
-        """Start from the parameters' shape with about `vertices`; tolerance: residual; most: steps to an equilibrium.
+        """Start from the parameters' shape with about `vertices`, or from their mesh.
+
+        tolerance: residual; most: steps to an equilibrium.
 
         history: whether states are kept for `undo`.
 
         Raises:
             InvalidInput: a tool or an attachment that the shape cannot have.
+            InvalidGeometry: a shape that passes through itself, unless it may.
 
         """
         self.params, self.tolerance, self._most = params, tolerance, most
@@ -58,7 +62,14 @@ class Engine:
         self._keeps = history
         self._history: list[tuple[State, int, Tangent, Habit]] = []
         self._work: Generator[None, None, None] | None = None
-        self.state = fresh(params, start(params.shape, vertices, params.aspect))
+        begun = params.mesh.shape() if params.mesh else start(params.shape, vertices, params.aspect)
+        self.state = fresh(params, begun)
+        through = crossings(self.state.x, self.state.mesh.triangles).count if params.contact else 0
+        if through:
+            raise InvalidGeometry(
+                f"the start shape passes through itself in {through} pairs of triangles.",
+                advice="Mend the shape, or grow it with contact = 0.",
+            )
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
         self._tangent, self._habit = Tangent(self.state.mesh), Habit()
@@ -188,7 +199,7 @@ class Engine:
             state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
         if not self.params.remesh:
             return state
-        finer, changes = yield from remesh(state, self._longest, self._largest)
+        finer, changes = yield from remesh(state, self._longest, self._largest, apart=self.params.contact > 0)
         tangent = self._tangent
         for pairs in changes:
             tangent = tangent.remeshed(finer.mesh, pairs)

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from ..contract import Params
+from .imported import OwnMesh
 from .shapes import Shape
 from .tooling.places import Place
 from .tooling.tools import HotSurface, Tool
@@ -61,11 +62,14 @@ class GrowthParams(Params):
     }
 
     shape: Shape = Field("sphere", description="Start shape", json_schema_extra=_units("1"))
+    mesh: OwnMesh | None = Field(
+        None, description="A triangle mesh to start from in place of `shape`", json_schema_extra=_units("1")
+    )
     aspect: float = Field(
         4.0,
         ge=0.2,
         le=50,
-        description="Length over width of a strip, height over radius of a tube",
+        description="Length over width of a strip or triangle, height over radius of what is round, radii of a torus",
         json_schema_extra=_units("1"),
     )
     tools: tuple[Tool, ...] = Field(
@@ -129,7 +133,7 @@ class GrowthParams(Params):
         0.0,
         ge=0,
         le=1,
-        description="Distance that parts keep from each other, about an edge of the mesh; 0: they pass through",
+        description="Distance that parts keep from each other, the thickness, say; 0: they pass through",
         json_schema_extra=_units("start shape's unit"),
     )
     step: float = Field(

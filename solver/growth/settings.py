@@ -34,7 +34,7 @@ def choose(quality: Quality) -> Settings:
 
 def expected_cost(params: GrowthParams, need: Need) -> Cost:
     """Return what a run is expected to take, without the vertices that remeshing adds."""
-    vertices = choose(need.quality).vertices
+    vertices = len(params.mesh.points) if params.mesh else choose(need.quality).vertices
     steps = need.stages[-1] / params.step + len(need.stages)
     width = 8 if need.dtype == "float64" else 4
     return Cost(steps * vertices * _SECONDS, vertices * (_BYTES + len(need.stages) * (3 * width + 24)))

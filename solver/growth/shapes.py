@@ -1,4 +1,4 @@
-"""Start shapes, in units of their own size: sphere, disc, half-disc, strip, square, tube."""
+"""Start shapes, in units of their own size, flat ones here; solids of revolution are `revolved`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
 from ..arrays import Floats, Ints
+from . import revolved
 
 __all__ = ["Mesh", "Shape", "start"]
 
-Shape = Literal["sphere", "disc", "half_disc", "strip", "square", "tube"]
+Shape = Literal[
+    "sphere", "disc", "half_disc", "strip", "square", "triangle", "tube", "stem", "capsule", "cone", "torus"
+]
 
 
 class Mesh(NamedTuple):
@@ -25,8 +28,14 @@ def start(shape: Shape, vertices: int, aspect: float) -> Mesh:
     """Return a start shape of about `vertices` points.
 
     Sphere, disc and half-disc have radius 1; strip (along x) and square width 1; the tube (about z, standing on z = 0)
-    radius 1. aspect: length over width of the strip, height over radius of the tube.
+    radius 1. aspect: length over width of the strip, height over radius of the tube. The triangle has a base of width 1
+    at x = -aspect / 2 and its tip at aspect / 2; stem, capsule, cone and torus are in `revolved`, `aspect` being
+    their height, length, height, and the torus' radius over its tube's.
     """
+    if shape in ("stem", "capsule", "cone", "torus"):
+        return _ordered(*getattr(revolved, shape)(vertices, aspect))
+    if shape == "triangle":
+        return _triangle(vertices, aspect)
     if shape == "sphere":
         return _sphere(vertices)
     if shape in ("disc", "half_disc"):
@@ -87,6 +96,23 @@ def _sheet(count: int, aspect: float) -> Mesh:
     shift = np.where(np.arange(rows) % 2 == 0, 0.25, -0.25)[:, None] * aspect / (columns - 1)
     shift = np.where((np.arange(columns) == 0) | (np.arange(columns) == columns - 1), 0.0, shift)
     return _flat(np.stack([x + shift, y], -1).reshape(-1, 2), h)
+
+
+def _triangle(count: int, aspect: float) -> Mesh:
+    """Return a lattice cut to a triangle with a base of 1 and a height, with points along its sides."""
+    h = np.sqrt(aspect / 2 / (count * np.sqrt(0.75)))
+    tip, base = np.array([aspect / 2, 0.0]), np.array([[-aspect / 2, -0.5], [-aspect / 2, 0.5]])
+    corners = np.array([base[0], tip, base[1]])
+    reach = int(max(aspect, 1) / h) + 2
+    i, j = np.meshgrid(np.arange(-2 * reach, 2 * reach + 1), np.arange(-2 * reach, 2 * reach + 1))
+    plane = np.stack([(i + 0.5 * j) * h, j * h * np.sqrt(0.75)], -1).reshape(-1, 2)
+    inside, sides = np.ones(len(plane), bool), []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        way = b - a
+        size = float(np.linalg.norm(way))
+        inside &= (way[0] * (plane[:, 1] - a[1]) - way[1] * (plane[:, 0] - a[0])) / size > 0.45 * h
+        sides.append(a + np.linspace(0, 1, max(1, round(size / h)), endpoint=False)[:, None] * way)
+    return _flat(np.concatenate([plane[inside], *sides]), h)
 
 
 def _flat(plane: Floats, h: float) -> Mesh:

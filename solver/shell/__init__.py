@@ -5,7 +5,7 @@ solver's unit of length), forces in mu l. Every kernel takes arrays and returns 
 """
 
 from .bending import angles, bending, bending_tangent, hinge_stiffness
-from .contact import candidates, contact, contact_diagonal
+from .contact import Near, Pairs, barrier, barrier_diagonal, barrier_hessian, free_step, near_of, search, within
 from .curvature import added_angles, from_angles, to_angles
 from .hessian import bending_hessian, membrane_hessian, volume_hessian
 from .material import Material
@@ -16,17 +16,20 @@ from .topology import Topology, part_of, topology
 
 __all__ = [
     "Material",
+    "Near",
+    "Pairs",
     "Pattern",
     "Topology",
     "added_angles",
     "angles",
     "areas",
+    "barrier",
+    "barrier_diagonal",
+    "barrier_hessian",
     "bending",
     "bending_hessian",
     "bending_tangent",
-    "candidates",
-    "contact",
-    "contact_diagonal",
+    "free_step",
     "from_angles",
     "hinge_stiffness",
     "mean_bending",
@@ -36,9 +39,12 @@ __all__ = [
     "membrane_tangent",
     "metric",
     "metric_of_lengths",
+    "near_of",
     "part_of",
     "pattern",
+    "search",
     "to_angles",
     "topology",
     "volume_hessian",
+    "within",
 ]

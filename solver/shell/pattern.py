@@ -28,12 +28,20 @@ class Pattern:
         """Number of blocks."""
         return len(self.indices)
 
+    def of(self, cliques: Ints) -> Ints:
+        """Return where the blocks of vertices (m, c) that are coupled with each other are, (m, c c)."""
+        found = places(np.ascontiguousarray(cliques), self.indptr, self.indices)
+        return found.reshape(len(cliques), cliques.shape[1] ** 2)
 
-def pattern(mesh: Topology) -> Pattern:
-    """Return the pattern of a mesh's tangent; vertices of no triangle have their diagonal block."""
+
+def pattern(mesh: Topology, more: Ints | None = None) -> Pattern:
+    """Return the pattern of a mesh's tangent, and of `more` coupled vertices (m, 2).
+
+    Vertices of no triangle have their diagonal block.
+    """
     n = mesh.vertices
     # corners share a triangle where there is an edge; those of a hinge else are the opposite ones
-    both = np.concatenate([mesh.edges, mesh.hinges[:, 2:]])
+    both = np.concatenate([mesh.edges, mesh.hinges[:, 2:], *([] if more is None else [more])])
     indptr, indices, diagonal = of_pairs(both, n)
     return Pattern(
         indptr=indptr,

@@ -46,7 +46,7 @@ _NUMBERS = (
 
 SOLVER = Solver(
     name="wood",
-    version="4",
+    version="5",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),

@@ -17,6 +17,7 @@ from numba import njit
 
 from .model.arrays import Bonds, Rods
 from .model.bundle import SAMPLES
+from .model.joining import sloped
 from .model.motion import Motion
 from .model.sawing import crossed
 from .model.state import Wood
@@ -204,8 +205,10 @@ def _sever(wood: Wood, e: int, place: float) -> int:
 def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float) -> Breaks:
     """Break what rods are most overstressed, until they have released `allowed` [J]; the worst breaks in any case.
 
-    ratio (e,) and place (e,) as from `overstress`.
+    ratio (e,) and place (e,) as from `overstress`. Beside a break a rod's slope is one-sided: by this alone a bond
+    would be sheared, at a strong bend by many times what it bears. What bonds hold in shear stays what it was.
     """
+    wood.bonds.cosine[:] -= sloped(wood.motion.x, wood.rods, wood.bonds)
     edges = np.flatnonzero(ratio > 1)
     rods = wood.rods
     spent, broken, gone = 0.0, 0, 0
@@ -229,6 +232,7 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float
             # the vertex beyond is already split or a clamp's: cut as close to it as a stub allows
             gone += _sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
             broken += 1
+    wood.bonds.cosine[:] += sloped(wood.motion.x, rods, wood.bonds)
     return Breaks(wood, broken, gone)
 
 

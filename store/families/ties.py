@@ -15,6 +15,10 @@ from typing import Any, Self
 __all__ = ["Tie", "find"]
 
 
+#: Samples and parameters on one line that are no accident, where no pair of values comes back.
+_FEWEST, _LINE = 4, 3
+
+
 @dataclass(frozen=True)
 class Tie:
     """A parameter that follows another: its `values` where the leader's are `at`, both strictly monotone."""
@@ -62,8 +66,8 @@ def find(columns: Mapping[str, Sequence[float]]) -> dict[str, Tie]:
     """Return who follows whom among the varying parameters (name -> value of each sample).
 
     Two are tied where each value of the one belongs to one value of the other, strictly monotone, and that is no
-    accident of few samples: some of these pairs come back in several samples, or the two are equal. The one with the
-    widest range leads, the first of equals.
+    accident of few samples: some of these pairs come back in several samples, the two are equal, or there are at least
+    four samples and three such parameters. The one with the widest range leads, the first of equals.
     """
     tied: dict[str, Tie] = {}
     leaders: list[str] = []
@@ -73,12 +77,26 @@ def find(columns: Mapping[str, Sequence[float]]) -> dict[str, Tie]:
             leaders.append(name)
         else:
             tied[name] = found
+    for leader in leaders if len(leaders) >= _LINE else ():
+        group = {n: tie for n in leaders if n != leader and (tie := _tie(leader, columns[leader], columns[n], _FEWEST))}
+        if len(group) + 1 >= _LINE:
+            tied |= group
+            break
+    # whoever follows a follower follows its leader
+    for name, tie in tied.items():
+        if tie.leader in tied:
+            again = _tie(tied[tie.leader].leader, columns[tied[tie.leader].leader], columns[name], 2)
+            assert again is not None  # monotone functions of monotone functions are monotone
+            tied[name] = again
     return {name: tied[name] for name in columns if name in tied}
 
 
-def _tie(leader: str, at: Sequence[float], values: Sequence[float]) -> Tie | None:
+def _tie(leader: str, at: Sequence[float], values: Sequence[float], fewest: int | None = None) -> Tie | None:
+    """Return the tie of two parameters; where no pair comes back, of equal ones, or of `fewest` samples or more."""
     pairs = sorted(set(zip(at, values, strict=True)))
-    if len(pairs) < 2 or (len(pairs) == len(at) and any(x != y for x, y in pairs)):
+    if len(pairs) < 2:
+        return None
+    if len(pairs) == len(at) and not (fewest is not None and len(at) >= fewest) and any(x != y for x, y in pairs):
         return None
     steps = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(pairs)]
     if not (all(x > 0 and y > 0 for x, y in steps) or all(x > 0 > y for x, y in steps)):

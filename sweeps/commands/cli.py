@@ -23,6 +23,7 @@ from . import tables as cli_tables
 from .terminal.console import Root, emit, grid, note
 from .terminal.options import (
     As_json,
+    Most_seconds,
     StorePath,
 )
 
@@ -107,6 +108,7 @@ def sweep(
         str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler.")
     ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try again what was given up.")] = False,
+    max_seconds: Most_seconds = None,
     as_json: As_json = False,
 ) -> None:
     """Run all jobs of a plan. Stop it at any time: the same command goes on where it stopped.
@@ -121,6 +123,7 @@ def sweep(
     """
     from store.store import Store
 
+    from ..planning.afford import afford
     from ..planning.plan import Plan
     from ..running import executors
     from ..running.runner import run_plan
@@ -128,6 +131,8 @@ def sweep(
     from .terminal.words import readers, report_document, show_report
 
     read = Plan.load(plan)
+    if max_seconds is not None:
+        afford(read, store, max_seconds, scheduler)
     with executors.choose(workers, dask, scheduler) as pool:
         opened = Store.open(store, create=True)
         opened.keep_plan(read.name, plan.read_text(encoding="utf-8"))

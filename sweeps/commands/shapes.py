@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,8 +10,20 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid
-from .terminal.options import As_json, Out, Preset, Set, Stages, StoreToRead, assignments, numbers
-from .terminal.tables import asked_table, open_store
+from .terminal.options import (
+    As_json,
+    Hours,
+    Out,
+    Preset,
+    Set,
+    Stages,
+    StoreToRead,
+    Under,
+    assignments,
+    numbers,
+    stages_asked,
+)
+from .terminal.tables import asked_table, open_store, solver_of
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -73,6 +86,8 @@ def query(
     store: StoreToRead = None,
     set_: Set = None,
     stages: Stages = None,
+    hours: Hours = None,
+    under: Under = None,
     preset: Preset = None,
     name: Annotated[
         str | None, typer.Option("--name", help="The table; without, the one of --solver that holds this.")
@@ -84,6 +99,9 @@ def query(
         str | None,
         typer.Option("--max-error", metavar="X|M:X,...", help="Refuse worse: 0.05 (roughness), rgh:0.05,dB:1.5."),
     ] = None,
+    relax: Annotated[
+        bool, typer.Option("--relax", help="Let the solver relax what was looked up: an equilibrium, in seconds.")
+    ] = False,
     out: Out = None,
     as_json: As_json = False,
 ) -> None:
@@ -102,7 +120,11 @@ def query(
 
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --method idw --out paper.glb
 
+    wizen query --set te=0.034 --set gamma=22 --hours 48 --under kinetics=grape --out sunny.glb
+
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --max-error rgh:0.1,dB:3
+
+    wizen query --set te=0.034 --set gamma=22 --stages 0.2 --relax --out balanced.glb
 
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
@@ -112,7 +134,8 @@ def query(
     from .. import outputs
     from ..formats import Made
 
-    wanted, said = numbers(stages), assignments(set_)
+    said = assignments(set_)
+    wanted = stages_asked(solver_of(open_store(store), name, solver), stages, hours, under, preset)
     table, values = asked_table(store, name, solver, said, max(wanted, key=abs, default=None), preset)
     name = table.info.name
     if not wanted:
@@ -121,18 +144,25 @@ def query(
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
     fields = outputs.fields_for(out, False)
+    if relax:
+        fields = tuple(sorted({*fields, "position"}))
     how, limits = method or methods.DEFAULT, _limits(max_error)
     told: dict[str, Any] = {"resolution": resolution, "fields": fields, "method": how, "max_error": limits}
     shapes = [table.at(values, stage, **told) for stage in wanted]
+    known = registry.get(table.info.solver)
+    notes: list[Mapping[str, Any]] = [{} for _ in shapes]
+    if relax:
+        from ..relaxing import relaxed
+
+        shapes, notes = map(list, zip(*(relaxed(known, table, shape) for shape in shapes), strict=True))
     document = {
         "table": name,
         "digest": table.digest,
         "method": shapes[0].method,
         "parameters": {**table.fixed, **shapes[0].parameters},
         "path": None if out is None else str(out),
-        "stages": [_document(shape) for shape in shapes],
+        "stages": [{**_document(shape), **note} for shape, note in zip(shapes, notes, strict=True)],
     }
-    known = registry.get(table.info.solver)
     if out is not None:
         title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
         outputs.save(out, Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units()))
@@ -148,6 +178,7 @@ def _show(console: Any, shapes: list[Shape], symbol: str, out: Path | None) -> N
     if len(errors) == len(shapes):
         rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
     rows += [["exact", *(str(shape.exact) for shape in shapes)]]
+    rows += [["crossings", *("unknown" if one.crossings is None else str(one.crossings) for one in shapes)]]
     grid(console, ["", *(f"{symbol} = {shape.stage:g}" for shape in shapes)], rows)
     if out is not None:
         console.print(f"written to {out}", markup=False)
@@ -174,6 +205,8 @@ def _document(shape: Any) -> dict[str, Any]:
         "stage": shape.stage,
         "exact": shape.exact,
         "converged": shape.converged,
+        "crossings": shape.crossings,
+        "tier": shape.tier,
         "nearest": shape.nearest,
         "inside": shape.inside,
         "expected_error": None if shape.expected_error is None else dict(shape.expected_error),

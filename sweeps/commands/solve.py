@@ -12,6 +12,8 @@ from ..errors import InvalidOption
 from .terminal.console import emit
 from .terminal.options import (
     As_json,
+    Hours,
+    Most_seconds,
     Out,
     Params,
     Preset,
@@ -19,9 +21,11 @@ from .terminal.options import (
     Seed,
     Set,
     Stages,
+    Under,
     assignments,
     numbers,
     parameters,
+    stages_asked,
 )
 
 if TYPE_CHECKING:
@@ -44,6 +48,8 @@ def solve(
     params_file: Params = None,
     set_: Set = None,
     stages: Stages = None,
+    hours: Hours = None,
+    under: Under = None,
     quality: Quality = None,
     tolerance: Annotated[
         float | None, typer.Option("--tolerance", metavar="E", help="Relative error in place of a quality, e.g. 0.1.")
@@ -60,6 +66,7 @@ def solve(
     ] = None,
     dtype: Annotated[str | None, typer.Option("--dtype", help="float32 or float64, of surface fields.")] = None,
     seed: Seed = None,
+    max_seconds: Most_seconds = None,
     out: Out = None,
     cut: Annotated[
         str | None, typer.Option("--cut", metavar="PLANE", help=".png: cut open along an azimuth (degree), or equator.")
@@ -81,10 +88,12 @@ def solve(
 
     wizen solve dehydration --fields mesh_position --stages 0.2 --out as-solved.glb
 
+    wizen solve dehydration --preset raisin --quality preview --hours 24,48,96 --out sunny.glb
+
     wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
     """
     from solver import registry
-    from solver.contract import Need
+    from solver.contract import Need, budget
     from store import shards
 
     from ..planning.plan import job
@@ -95,24 +104,14 @@ def solve(
     chosen = registry.get(solver)
     own = {} if seed is None else {"seed": seed}
     params = chosen.parse(parameters(params_file) | assignments(set_) | own, preset)
-    asked = Need.parse(
-        {
-            "stages": numbers(stages),
-            "fields": [name.strip() for name in fields.split(",")] if fields else (),
-            "region": _region(region),
-        }
-        | {
-            name: value
-            for name, value in (
-                ("quality", quality),
-                ("tolerance", tolerance),
-                ("resolution", resolution),
-                ("dtype", dtype),
-            )
-            if value is not None
-        }
-    )
+    said: dict[str, Any] = {"quality": quality, "tolerance": tolerance, "resolution": resolution, "dtype": dtype}
+    said["region"] = _region(region)
+    wanted = stages_asked(chosen, stages, hours, under, preset)
+    kept = {"stages": wanted, "fields": [name.strip() for name in fields.split(",")] if fields else ()}
+    asked = Need.parse(kept | {name: value for name, value in said.items() if value is not None})
     need = _for_file(out, chosen, chosen.settle(asked, preset, (params,)))
+    if max_seconds is not None:
+        budget.within(chosen, (params,), need, max_seconds)
     spec = job(chosen, params, need)
     result, seconds = _run(chosen, params, need)
     document = {

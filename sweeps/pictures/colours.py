@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver import registry
 from solver.arrays import Array, Bytes
-from solver.contract import Looks, Skin
+from solver.contract import Fur, Looks, Skin
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["by_field", "encoded", "looks", "of_run", "painted"]
+__all__ = ["by_field", "encoded", "furred", "looks", "maps_of", "of_run", "painted"]
 
 
 def looks(run: xr.Dataset) -> Looks:
@@ -27,18 +27,33 @@ def looks(run: xr.Dataset) -> Looks:
     return registry.get(name).looks if name in registry.names() else Looks()
 
 
-def painted(run: xr.Dataset, fields: Mapping[str, Array]) -> Skin | None:
-    """Return the look of a surface of `run` with these fields (...); None where they give it none."""
-    paint = looks(run).paint
-    return None if paint is None else paint(fields, json.loads(run.attrs.get("params", "{}")))
+def painted(run: xr.Dataset, index: int, fields: Mapping[str, Array]) -> Skin | None:
+    """Return the look of a stage's surface with these fields (...); None where they give it none."""
+    known = looks(run)
+    stage = {name: run[name].values[index] for name in known.scalars if name in run}
+    return None if known.paint is None else known.paint({**stage, **fields}, _params(run))
 
 
-def of_run(run: xr.Dataset, index: int) -> Array | None:
-    """Return the colours (n, 2n, 3), linear light, of one stage of a run with maps that give it some; else None."""
+def furred(run: xr.Dataset, fields: Mapping[str, Array]) -> Fur | None:
+    """Return the threads on a surface of `run` with these fields (...); None where nothing grows."""
+    fur = looks(run).fur
+    return None if fur is None else fur(fields, _params(run))
+
+
+def of_run(run: xr.Dataset, index: int) -> Skin | None:
+    """Return colours (n, 2n, 3) and roughness (n, 2n) of one stage of a run with maps that give it some; else None."""
+    return painted(run, index, maps_of(run, index))
+
+
+def maps_of(run: xr.Dataset, index: int) -> dict[str, Array]:
+    """Return the fields (n, 2n) of one stage that colours are made of."""
     layers = looks(run).layers
-    maps = {name: run[name][index].values for name in layers if name in run and "colatitude" in run[name].dims}
-    skin = painted(run, maps)
-    return None if skin is None else skin.colour
+    return {name: run[name][index].values for name in layers if name in run and "colatitude" in run[name].dims}
+
+
+def _params(run: xr.Dataset) -> Mapping[str, Any]:
+    found: Mapping[str, Any] = json.loads(run.attrs.get("params", "{}"))
+    return found
 
 
 def by_field(values: Array, low: float, high: float) -> Array:

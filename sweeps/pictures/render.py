@@ -6,6 +6,7 @@ Lattices are resampled through their spectrum, other triangles are cut in four u
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -16,7 +17,7 @@ from store.surfaces import spectra
 from .raster import finer, normals, rasterise
 from .shading import floor_shadow, relief, shade
 
-__all__ = ["View", "mesh", "render", "render_triangles"]
+__all__ = ["More", "View", "mesh", "render", "render_triangles"]
 
 
 _SUPERSAMPLES = 2
@@ -25,6 +26,17 @@ _FINEST = 256
 #: Longest side of a triangle's box when it is drawn [sub-pixels]; and the colour of surfaces that have none.
 _COARSEST = 16
 _CLAY = np.array([0.42, 0.50, 0.20])
+#: Roughness of surfaces that say none.
+_PLAIN = 0.55
+
+
+class More(NamedTuple):
+    """Triangles that stand on a surface: vertices, colours, normals (v, 3) and triangles (f, 3); as rough as can be."""
+
+    vertices: Array
+    triangles: Array
+    colour: Array
+    normals: Array
 
 
 @dataclass(frozen=True)
@@ -67,17 +79,23 @@ def render(
     pixels: int = 320,
     view: View | None = None,
     colour: Array | None = None,
+    roughness: Array | None = None,
+    more: More | None = None,
 ) -> Array:
     """Return a picture (pixels, pixels, 3), uint8, of a surface (n, 2n, 3) [r1].
 
-    colour: (n, 2n, 3) of the same lattice, linear light, in place of a dried jujube's.
+    colour: (n, 2n, 3) of the same lattice, linear light, in place of a dried jujube's; roughness: (n, 2n). more: what
+    stands on it.
     """
     view = view or View()
     side = pixels * _SUPERSAMPLES
     resolution = int(np.clip(side // 3, len(position), max(_FINEST, len(position))))
     vertices, faces = mesh(position, poles, resolution)
-    paint = None if colour is None else _paint(colour, resolution)
-    return _draw(vertices, faces, paint, pixels, view, _frame(view), open_=False)
+    if colour is not None:
+        matt = np.full(colour.shape[:2], _PLAIN) if roughness is None else roughness
+        paint = _paint(np.concatenate([colour, matt[..., None]], axis=-1), resolution)
+        return _draw(vertices, faces, paint, pixels, view, _frame(view), open_=False, more=more)
+    return _draw(vertices, faces, None, pixels, view, _frame(view), open_=False)
 
 
 def render_triangles(
@@ -87,22 +105,36 @@ def render_triangles(
     view: View | None = None,
     colour: Array | None = None,
     up: str = "y",
+    roughness: Array | None = None,
+    more: More | None = None,
 ) -> Array:
     """Return a picture (pixels, pixels, 3), uint8, of vertices (v, 3) and triangles (f, 3), seen from both sides.
 
-    The view's middle is the origin. colour: (v, 3), linear light; up: the axis that points up, y or z.
+    The view's middle is the origin. colour: (v, 3), linear light; roughness: (v); up: the axis that points up, y or z.
+    more: what stands on it.
     """
     view = view or View()
     frame = _frame(view)
     if up == "z":
         frame = frame[:, [2, 0, 1]]
     paint = np.broadcast_to(_CLAY, np.shape(vertices)) if colour is None else colour
-    return _draw(np.asarray(vertices, float), np.asarray(triangles, np.int64), paint, pixels, view, frame, open_=True)
+    matt = np.full(len(paint), _PLAIN) if roughness is None else roughness
+    paint = np.concatenate([paint, matt[:, None]], axis=1)
+    shown = np.asarray(vertices, float), np.asarray(triangles, np.int64)
+    return _draw(*shown, paint, pixels, view, frame, open_=True, more=more)
 
 
 def _draw(
-    vertices: Array, faces: Array, paint: Array | None, pixels: int, view: View, frame: Array, open_: bool
+    vertices: Array,
+    faces: Array,
+    paint: Array | None,
+    pixels: int,
+    view: View,
+    frame: Array,
+    open_: bool,
+    more: More | None = None,
 ) -> Array:
+    """Return the picture; paint (v, 4): colours and roughness."""
     side = pixels * _SUPERSAMPLES
     scale = side / 2 / view.extent
     upright = normals(vertices, faces)
@@ -110,6 +142,11 @@ def _draw(
         values = np.concatenate([vertices, upright, np.asarray(paint, float)], axis=1)
         values, faces = finer(values, faces, _COARSEST / scale)
         vertices, upright, paint = values[:, :3], values[:, 3:6], values[:, 6:]
+    if more is not None and paint is not None:
+        faces = np.concatenate([faces, len(vertices) + more.triangles])
+        vertices, upright = np.concatenate([vertices, more.vertices]), np.concatenate([upright, more.normals])
+        paint = np.concatenate([paint, np.column_stack([more.colour, np.ones(len(more.colour))])])
+        open_ = True  # threads are seen from both sides
     seen, turned = vertices @ frame.T, upright @ frame.T
     points = np.stack([side / 2 + scale * seen[:, 0], side / 2 - scale * seen[:, 1]], axis=-1)
     index, face, weights, back = rasterise(points, seen[:, 2], faces, side, open_)
@@ -121,7 +158,11 @@ def _draw(
     normal[back] *= -1
     image = floor_shadow(side, view.elevation, seen, scale)
     skin = None if paint is None else np.einsum("fk,fkc->fc", weights, paint[corners])
-    image.reshape(-1, 3)[index] = shade(normal, relief(depth.reshape(side, side)).ravel()[index], skin)
+    behind = relief(depth.reshape(side, side)).ravel()[index]
+    if skin is None:
+        image.reshape(-1, 3)[index] = shade(normal, behind)
+    else:
+        image.reshape(-1, 3)[index] = shade(normal, behind, skin[:, :3], skin[:, 3])
     small = image.reshape(pixels, _SUPERSAMPLES, pixels, _SUPERSAMPLES, 3).mean(axis=(1, 3))
     found: Array = (255 * np.clip(small, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
     return found
@@ -136,14 +177,13 @@ def _frame(view: View) -> Array:
 
 
 def _paint(colour: Array, resolution: int) -> Array:
-    """Return the colours of the vertices of `mesh` at a resolution, bilinear: waves would ring at fronts."""
+    """Return values (n, 2n, c) at the vertices of `mesh` of a resolution, bilinear: waves would ring at fronts."""
     n, m = colour.shape[:2]
     # rows beyond the poles are those of the other side
     rows = np.concatenate([np.roll(colour[:1], m // 2, axis=1), colour, np.roll(colour[-1:], m // 2, axis=1)])
     down = (np.arange(resolution) + 0.5) * n / resolution + 0.5
     along = np.arange(2 * resolution) * m / (2 * resolution)
     grid = np.meshgrid(down, along, indexing="ij")
-    fine = np.stack(
-        [ndimage.map_coordinates(rows[..., k], grid, order=1, mode="grid-wrap").ravel() for k in range(3)], axis=-1
-    )
-    return np.concatenate([fine, colour[:1].mean(axis=1), colour[-1:].mean(axis=1)])
+    fine = [ndimage.map_coordinates(rows[..., k], grid, order=1, mode="grid-wrap") for k in range(rows.shape[-1])]
+    ends = [colour[:1].mean(axis=1), colour[-1:].mean(axis=1)]
+    return np.concatenate([np.stack([field.ravel() for field in fine], axis=-1), *ends])

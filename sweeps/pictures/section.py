@@ -122,14 +122,15 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
 def _section(run: xr.Dataset, index: int, where: Plane) -> tuple[Array, Array | None]:
     if "mesh_position" in run:
         frame = meshes.frame(run, index)
-        skin = colours.painted(run, frame.fields)
+        skin = colours.painted(run, index, frame.fields)
         return cut(frame.vertices.astype(float), frame.triangles, where, None if skin is None else skin.colour)
     if "position" not in run or "colatitude" not in run.dims:
         raise InvalidOption("there is no surface to cut.", "Ask for the field 'position' and no region.")
     vertices, triangles = mesh(run["position"].values[index])
-    paint = colours.of_run(run, index)
-    if paint is None:
+    skin = colours.of_run(run, index)
+    if skin is None:
         return cut(vertices, triangles, where)
+    paint = skin.colour
     ends = np.stack([paint[0].mean(axis=0), paint[-1].mean(axis=0)])
     return cut(vertices, triangles, where, np.concatenate([paint.reshape(-1, 3), ends]))
 

@@ -23,6 +23,8 @@ _FILL = np.array([0.85, 0.10, 0.52])
 _TO_EYE = np.array([0.0, 0.0, 1.0])
 _KEY_COLOUR = np.array([1.25, 1.18, 1.08])
 _FILL_COLOUR = np.array([0.20, 0.24, 0.32])
+#: What a smooth skin of a refractive index of 1.45 throws back straight on.
+_SPECULAR = 0.034
 _AMBIENT = np.array([0.20, 0.19, 0.19])
 
 
@@ -43,10 +45,11 @@ def relief(depth: Array) -> Array:
     return np.where(inside, found, 0.0)
 
 
-def shade(normal: Array, behind: Array, paint: Array | None = None) -> Array:
+def shade(normal: Array, behind: Array, paint: Array | None = None, rough: Array | None = None) -> Array:
     """Return linear light (f, 3) of fragments with unit normals (f, 3) in the camera's frame.
 
-    behind: `relief` (f,). paint: their colours (f, 3) in place of a dried jujube's.
+    behind: `relief` (f,). paint: their colours (f, 3) in place of a dried jujube's. rough: their roughness (f,), which
+    spreads the highlight (Blinn's exponent 2 / roughness^4 - 2); without it all shine alike.
     """
     key, fill = _KEY / np.linalg.norm(_KEY), _FILL / np.linalg.norm(_FILL)
     depth = np.clip(0.5 + 0.5 * behind, 0, 1)[:, None]
@@ -54,11 +57,16 @@ def shade(normal: Array, behind: Array, paint: Array | None = None) -> Array:
     open_sky = 1 - 0.62 * np.clip(behind, 0, 1)[:, None]
     lit = np.clip(normal @ key, 0, None)[:, None]
     half = key + _TO_EYE
-    shine = np.clip(normal @ (half / np.linalg.norm(half)), 0, None)[:, None] ** 28
+    shine = np.clip(normal @ (half / np.linalg.norm(half)), 0, None)[:, None]
+    if rough is None:
+        gloss = 0.22 * shine**28
+    else:
+        sharp = 2 / np.clip(rough[:, None], 0.15, 1) ** 4 - 2
+        gloss = _SPECULAR * (sharp + 2) / 8 * shine**sharp
     rim = (1 - np.clip(normal[:, 2:], 0, 1)) ** 3
     light = lit * _KEY_COLOUR + np.clip(normal @ fill, 0, None)[:, None] * _FILL_COLOUR
     light = light + _AMBIENT * (0.6 + 0.4 * normal[:, 1:2])
-    found: Array = open_sky * (colour * light + 0.22 * shine * lit * (1 - 0.7 * depth)) + 0.05 * rim * _FILL_COLOUR
+    found: Array = open_sky * (colour * light + gloss * lit * (1 - 0.7 * depth)) + 0.05 * rim * _FILL_COLOUR
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.arrays import Array
 
-from .render import View, render, render_triangles
+from .render import More, View, render, render_triangles
 from .shading import BACKGROUND
 
 __all__ = ["Panel", "sheet"]
@@ -26,7 +26,7 @@ class Panel:
     """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], a note to write below it, and colours (n, 2n, 3).
 
     With triangles (f, 3), positions and colours are those of vertices (v, 3), and `up` is the axis that points up.
-    view: where it is seen from in place of the sheet's direction.
+    view: where it is seen from in place of the sheet's direction. roughness: (n, 2n), or (v); more: what stands on it.
     """
 
     position: Array
@@ -36,12 +36,15 @@ class Panel:
     triangles: Array | None = None
     up: str = "y"
     view: View | None = None
+    roughness: Array | None = None
+    more: More | None = None
 
     def image(self, pixels: int, view: View) -> Array:
         """Return the picture (pixels, pixels, 3)."""
         if self.triangles is None:
-            return render(self.position, self.poles, pixels, view, self.colour)
-        return render_triangles(self.position, self.triangles, pixels, view, self.colour, self.up)
+            return render(self.position, self.poles, pixels, view, self.colour, self.roughness, self.more)
+        looks = (self.colour, self.up, self.roughness, self.more)
+        return render_triangles(self.position, self.triangles, pixels, view, *looks)
 
 
 def sheet(

@@ -74,32 +74,7 @@ class Plan:
         except InvalidInput as error:
             raise PlanError(error.message, error.advice) from None
         _check_names(written, solver)
-        samples: dict[str, Params] = {}
-        skipped = repeated = tried = 0
-        wanted = written.sampling.count if written.sampling.skip_invalid else None
-        for values in points(written):
-            tried += 1
-            try:
-                params = solver.parse({**written.set, **values}, written.preset)
-            except InvalidGeometry as error:
-                if not written.sampling.skip_invalid:
-                    advice = f"{error.advice} Change it, or set skip_invalid = true under [sampling]."
-                    raise PlanError(f"sample {_show(values)}: {error.message}", advice.strip()) from None
-                skipped += 1
-            except InvalidInput as error:
-                where = f"sample {_show(values)}: " if values else ""
-                raise PlanError(f"{where}{error.message}", error.advice) from None
-            else:
-                repeated += samples.setdefault(params.model_dump_json(), params) is not params
-            if len(samples) == wanted:
-                break
-        if wanted is not None and 0 < len(samples) < wanted:
-            raise PlanError(
-                f"of {tried} points only {len(samples)} are possible, fewer than the {wanted} asked for.",
-                "Change the ranges under [axes], or ask for fewer.",
-            )
-        if not samples:
-            raise PlanError(f"none of the {skipped} combinations is possible.", "Change the ranges under [axes].")
+        samples, skipped, repeated = _samples(written, solver)
         try:
             # a tolerance holds for every sample
             need = solver.settle(Need.parse(written.need), written.preset, samples.values())
@@ -134,6 +109,37 @@ class Plan:
 def job(solver: Solver, params: Params, need: Need) -> JobSpec:
     """Return the job that computes `need` (settled) of `params`; its key is the same whoever asks."""
     return JobSpec.of(solver, params, need)
+
+
+def _samples(written: PlanFile, solver: Solver) -> tuple[dict[str, Params], int, int]:
+    """Return the samples by what they say, how many were impossible and skipped, and how many said the same again."""
+    samples: dict[str, Params] = {}
+    skipped = repeated = tried = 0
+    wanted = written.sampling.count if written.sampling.skip_invalid else None
+    for values in points(written):
+        tried += 1
+        try:
+            params = solver.parse({**written.set, **values}, written.preset)
+        except InvalidGeometry as error:
+            if not written.sampling.skip_invalid:
+                advice = f"{error.advice} Change it, or set skip_invalid = true under [sampling]."
+                raise PlanError(f"sample {_show(values)}: {error.message}", advice.strip()) from None
+            skipped += 1
+        except InvalidInput as error:
+            where = f"sample {_show(values)}: " if values else ""
+            raise PlanError(f"{where}{error.message}", error.advice) from None
+        else:
+            repeated += samples.setdefault(params.model_dump_json(), params) is not params
+        if len(samples) == wanted:
+            break
+    if wanted is not None and 0 < len(samples) < wanted:
+        raise PlanError(
+            f"of {tried} points only {len(samples)} are possible, fewer than the {wanted} asked for.",
+            "Change the ranges under [axes], or ask for fewer.",
+        )
+    if not samples:
+        raise PlanError(f"none of the {skipped} combinations is possible.", "Change the ranges under [axes].")
+    return samples, skipped, repeated
 
 
 def _from_pattern(

@@ -174,7 +174,7 @@ def dask_local(count: int) -> Iterator[Workers]:
 @contextmanager
 def dask_cluster(address: str) -> Iterator[Workers]:
     """The workers of a running Dask scheduler. Those that see the store under the same path write results there; others
-    hand them back. Jobs that start from other results need the former.
+    hand them back. Jobs that start from other results need the former; only those stop when they are cancelled.
 
     The workers' threads are set where they are started (`dask worker --nthreads 1`, `OMP_NUM_THREADS`).
 

@@ -125,7 +125,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
     shutil.copytree(at / "demo", at / "held")
     for name in ("orange.h5", "run.h5"):
         shards.write(at / name, rotting(), "0" * 64)
-    for name in ("patch.obj", "my.obj"):
+    for name in ("patch.obj", "my.obj", "banana.glb"):
         trimesh.creation.icosphere(3).export(at / name)
     with _served(at) as port:
         yield Workshop(at, port, next(iter(store.keys())))

@@ -91,6 +91,8 @@ def test_a_fruit_that_no_table_has_is_run_whole(client: httpx.Client, house: Pat
     problem = client.get(SHAPE, params={"preset": "plum2", "s": 0.2}).json()
     assert problem["nearest"]["table"] == "sphere"
     assert {"r8", "rs1"} <= set(problem["nearest"]["parameters"])
+    assert problem["detail"].startswith("no table holds this; the nearest is 'sphere'")
+    assert "Leave r8 out" not in problem["advice"]
     store = Store.open(house)
     run = client.get(problem["links"]["exact"], headers=allowed, follow_redirects=False)
     job = next(job for job in store.ledger.jobs() if run.headers["location"].endswith(job.key))
@@ -135,6 +137,22 @@ def test_maps_say_what_is_covered(client: httpx.Client) -> None:
     again = client.get(raisin["links"]["thumbnail"], headers={"If-None-Match": answer.headers["etag"]})
     assert again.status_code == 304
     assert client.get("/v1/maps/rasin/thumbnail.png").status_code == 404
+
+
+def test_a_family_of_a_single_fruit(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "store", create=True)
+    fruit = SOLVER.presets["wolfberry"]
+    keys = fill(store, te=[0.005], gamma=[10.0], radii=fruit["radii"], stone=fruit["stone"])
+    tables.build(store, SOLVER, "wolfberry", keys=keys, dtype="int16")
+    tables.build(store, SOLVER, "sphere", keys=fill(store, te=[0.03, 0.04], gamma=[10.0]))
+    with client_of(store.root) as client:
+        answer = client.get(SHAPE, params={"preset": "wolfberry", "s": 0.25, "format": "json"}).json()
+        assert (answer["table"], answer["params"]["te"]) == ("wolfberry", 0.005)
+        refused = client.get(SHAPE, params={"preset": "wolfberry", "te": 0.01, "s": 0.25}).json()
+        assert refused["nearest"]["parameters"]["te"] == {"asked": 0.01, "nearest": 0.005, "distance": 0.693147}
+        berry = client.get("/v1/maps").json()["maps"][1]
+        assert (berry["name"], berry["axes"], berry["presets"]) == ("wolfberry", {}, ["wolfberry"])
+        assert client.get(berry["links"]["thumbnail"]).status_code == 200
 
 
 def test_an_answer_kept_is_not_given_once_another_family_is_nearer(house: Path, tmp_path: Path) -> None:

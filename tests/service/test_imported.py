@@ -12,9 +12,9 @@ import xarray as xr
 from service.errors import InvalidQuery, UnfitFormat
 from service.sequences import of_run
 from service.sequences.imported import bind, load
-from service.sequences.nearest import nearest
 from solver import meshes
 from solver.fruit import directions, lattice
+from solver.geometry.nearest import nearest
 
 
 def moving(n: int) -> xr.Dataset:

@@ -26,6 +26,7 @@ EXPECTED: dict[type[Exception], int] = {
     contract.SolverError: 500,
     contract.InvalidInput: 422,
     contract.InvalidGeometry: 422,
+    contract.OverBudget: 422,
     contract.NotConverged: 422,
     contract.Unstable: 422,
     contract.Cancelled: 409,

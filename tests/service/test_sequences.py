@@ -163,7 +163,7 @@ def test_textures_hold_what_the_vertices_do() -> None:
     assert picture.shape == (64, 64, 3)
     run = rotting(32)
     skin = colours.of_run(run, 2)
-    assert np.abs(picture[1::2, 0].astype(int) - colours.encoded(skin[:, 0])).max() <= 12
+    assert np.abs(picture[1::2, 0].astype(int) - colours.encoded(skin.colour[:, 0])).max() <= 12
     # the rotten and mouldy pole on top is rougher than the fresh one below
     rough = np.asarray(material.metallicRoughnessTexture.convert("RGB"))
     assert rough[0, 0, 1] > rough[-1, 0, 1] + 50

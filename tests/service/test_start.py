@@ -6,7 +6,10 @@ import subprocess
 import sys
 
 #: Each takes a tenth of a second to a second to import.
-HEAVY = {"xarray", "pandas", "dask", "numba", "distributed", "matplotlib", "sweeps.running.runner"}
+HEAVY = {
+    "dask", "distributed", "matplotlib", "numba", "pandas", "scipy", "skfem", "starlette_compress",
+    "sweeps.running.runner", "xarray",
+}  # fmt: skip
 
 CODE = """
 import sys

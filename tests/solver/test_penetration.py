@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from service.formats import mesh as drawn
-from solver.dehydration.measures.penetration import closed_lattice, of_lattice, of_quads
+from solver.dehydration.measures.penetration import of_lattice, of_quads
 from solver.fruit import directions, lattice
+from solver.lattice import closed_lattice
 
 from ._skins import cubed_sphere
 

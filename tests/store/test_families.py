@@ -125,6 +125,10 @@ def test_parameters_that_go_together_are_one_axis() -> None:
     assert [tie(x) for x in r4] == columns["r2"][:4]
     assert max(abs(tie(x) - ellipse(x)) for x in np.linspace(0.6, 0.9, 61)) < 3e-4
     assert (tie(0.1), tie(2.0)) == (columns["r2"][0], columns["r2"][3])
+    line = {"r2": [ellipse(x) for x in r4], "r4": r4, "r6": [ellipse(x) for x in r4], "r8": r4}
+    assert {name: tie.leader for name, tie in ties.find(line).items()} == {"r6": "r2", "r8": "r4"}
+    line["r3"] = [x**2 for x in r4]
+    assert {name: tie.leader for name, tie in ties.find(line).items()} == dict.fromkeys(("r2", "r4", "r6", "r8"), "r3")
     # equal ones lead in their order, and two that merely rise together in few samples are two axes
     assert ties.find({"rs1": [0.3, 0.4], "rs2": [0.3, 0.4]})["rs2"].leader == "rs1"
     assert ties.find({"te": [0.03, 0.04], "gamma": [10.0, 30.0]}) == {}

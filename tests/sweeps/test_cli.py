@@ -20,6 +20,7 @@ from _command import ROOT, Write, document, wizen
 from conftest import Solves
 
 from solver import registry
+from solver.contract import Need
 from store import seal
 from store.store import Store
 from sweeps.commands.terminal.options import assignments
@@ -308,3 +309,40 @@ def test_a_reader_that_leaves_early() -> None:
         )
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
+
+
+def test_hours_stand_in_for_stages(shrinking: Solves) -> None:
+    """As the solver's clock has it: `shrinking` is one of its own, which has none, and dehydration has."""
+    refused = wizen("solve", "shrinking", "--hours", "24")
+    assert refused.exit_code == 2
+    assert "does not turn hours into stages" in refused.stderr
+    both = wizen("solve", "dehydration", "--hours", "24", "--stages", "0.1")
+    assert both.exit_code == 2
+    assert "exclude each other" in both.stderr
+    alone = wizen("solve", "dehydration", "--under", "temperature=60")
+    assert alone.exit_code == 2
+    assert "there are none" in alone.stderr
+    unmeasured = wizen("solve", "dehydration", "--preset", "raisin", "--hours", "30", "--under", "temperature=60")
+    assert unmeasured.exit_code == 2
+    assert "open sun" in unmeasured.stderr
+
+
+def test_what_takes_too_long_is_refused_before_it_begins(shrinking: Solves, tmp_path: Path, write_plan: Write) -> None:
+    """What is stored takes no time."""
+    cost = registry.get("shrinking").cost
+    one = cost(registry.get("shrinking").parse({}), registry.get("shrinking").settle(Need(stages=(0.1,)))).seconds
+    alone = ["solve", "shrinking", "--stages", "0.1", "--max-seconds"]
+    refused = wizen(*alone, one / 2)
+    assert refused.exit_code == 2
+    assert "longer than" in refused.stderr
+    assert len(shrinking) == 0
+    assert wizen(*alone, one * 2).exit_code == 0
+    store, before = tmp_path / "store", len(shrinking)
+    refused = wizen("sweep", write_plan(), "--store", store, "--max-seconds", one / 2)
+    assert refused.exit_code == 2
+    assert len(shrinking) == before
+    assert wizen("sweep", write_plan(), "--store", store).exit_code == 0
+    assert wizen("sweep", write_plan(), "--store", store, "--max-seconds", one / 2).exit_code == 0
+    far = wizen("sweep", write_plan(), "--store", store, "--max-seconds", 1, "--scheduler", "tcp://127.0.0.1:1")
+    assert far.exit_code == 2
+    assert "this machine alone" in far.stderr

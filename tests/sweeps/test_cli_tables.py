@@ -117,3 +117,20 @@ def test_maps(table: Path, tmp_path: Path) -> None:
     assert out.read_bytes().startswith(b"\x89PNG")
     result = wizen("map", "--store", table, "--out", out, "--stages", "0.1,0.2", "--set", "te=0.03", "--pixels", 48)
     assert "4 shapes" in result.stdout
+
+
+def test_presets_and_what_the_package_covers(tmp_path: Path) -> None:
+    listed = document(wizen("table", "list", "--picture", tmp_path / "fruits.png", "--json"))["tables"]
+    assert "sphere" in {preset for one in listed for preset in one["presets"]}
+    assert (tmp_path / "fruits.png").stat().st_size > 10_000
+    said = document(wizen("query", "--preset", "sphere", "--set", "te=0.035", "--stages", "0.2", "--json"))
+    assert (said["parameters"]["te"], said["parameters"]["gamma"]) == (0.035, 10.0)
+    wrong = wizen("query", "--preset", "raisn", "--stages", "0.2")
+    assert wrong.exit_code == 2
+    assert "did you mean 'raisin'?" in wrong.stderr
+    far = wizen("query", "--preset", "raisin", "--set", "te=0.1", "--stages", "0.2")
+    assert far.exit_code != 0
+    assert "no table holds this; the nearest is" in far.stderr
+    assert "wizen solve dehydration --preset raisin --set te=0.1 --stages 0.2" in far.stderr
+    unknown = wizen("table", "plan", "nowhere")
+    assert "there is no table 'nowhere'" in unknown.stderr

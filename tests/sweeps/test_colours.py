@@ -30,10 +30,10 @@ def layered(rot: float, mould: float, active: float) -> np.ndarray:
     params = registry.get("decay").parse({}, "orange")
     maps = {"rot": rot, "mould": mould, "mould_active": active}
     fields = {name: (("stage", "colatitude", "azimuth"), np.full((1, 4, 8), value)) for name, value in maps.items()}
-    colour = colours.of_run(xr.Dataset(fields, attrs={"solver": "decay", "params": params.model_dump_json()}), 0)
-    assert colour is not None
-    assert colour.shape == (4, 8, 3)
-    return colour[0, 0]
+    skin = colours.of_run(xr.Dataset(fields, attrs={"solver": "decay", "params": params.model_dump_json()}), 0)
+    assert skin is not None
+    assert skin.colour.shape == (4, 8, 3)
+    return skin.colour[0, 0]
 
 
 def test_fresh_skin_rot_rim_and_spores() -> None:

@@ -5,12 +5,15 @@ import json
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from benchmarks.dehydration import refining
 from service.cli import app
+from solver import registry
 from store import tables
 from store.errors import MixedSamples
 from store.store import Store
@@ -151,3 +154,27 @@ def test_plan_and_table_must_fit(site: None, tmp_path: Path) -> None:
     done = CliRunner().invoke(app, [*words, "--count", "2"])
     assert json.loads(done.stdout)["added"] == 2
     assert len(store.ledger.jobs("done", refine.name_of(plan).replace("plan", "grid"))) == 2
+
+
+def test_the_benchmark_on_dried_fruits_works(site: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its command, on a solver with a closed form: every row that the document shows comes out of it."""
+    kept: dict[str, Any] = {}
+
+    def plan(name: str, count: int | None = None) -> Plan:
+        inside = {"te": {"from": 0.03, "to": 0.05}, "gamma": {"from": 20, "to": 100, "scale": "log"}}
+        box = {"axes": inside, "sampling": {"kind": "sobol", "count": count, "seed": 5}} if "held" in name else {}
+        return Plan.parse({**SCATTERED, "sampling": {"kind": "sobol", "count": count}, **box}, name)
+
+    def keep(name: str, runs: list[Any], solver: str, **more: Any) -> None:
+        kept.update(more, name=name, runs=runs)
+
+    for what, value in (("_plan", plan), ("keep", keep), ("SOLVER", registry.get("ridged"))):
+        monkeypatch.setattr(refining, what, value)
+    monkeypatch.setattr("sys.argv", ["refining", "--store", str(tmp_path), "--begun=6", "--more=2", "--held=2"])
+    refining.main()
+    assert kept["name"] == "dehydration-refine"
+    assert [(run["way"], run["runs"]) for run in kept["runs"]] == [
+        *(("refined", runs) for runs in (6, 7, 8)), *(("Sobol alone", runs) for runs in (6, 7, 8)),
+    ]  # fmt: skip
+    assert kept["runs"][0]["held_out"] == kept["runs"][3]["held_out"] > 0
+    assert all(kept["table"]["rows"][0][1:])

@@ -71,7 +71,7 @@ def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
     from solver.dehydration import SOLVER
     from solver.dehydration.params import DehydrationParams
     from solver.dehydration.path import Path
-    from solver.dehydration.run import _Record
+    from solver.dehydration.run import Record
     from solver.dehydration.settings import choose
     from store.surfaces.spectra import spectrum, synthesize
 
@@ -84,8 +84,8 @@ def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
         need = SOLVER.settle(Need(**{"stages": (shrinkage,), "quality": quality, "resolution": 96, **asked}))
 
         def once() -> Any:
-            record = _Record(params, need, path)
-            record.add(state, settings)
+            record = Record(params, need, path.mesh)
+            record.add(state, state.residual <= settings.residual)
             return record.dataset({})
 
         once()

@@ -6,25 +6,24 @@ Every stage is settled from the evenly shrunk fresh shape, so that it does not d
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 from scipy import sparse
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from ...contract import InvalidInput
-from ...fruit import directions, lattice
+from ...fruit import lattice
 from ..environment import reference_radius
 from ..params import DecayParams
-from ..surfaces.seeds import carried, gap
-from ..surfaces.surface import Surface, extent, geodesic, shares_at
+from ..surfaces.surface import Surface
+from .embedded import Embedded
 from .equilibrium import Balance, rested, settle
+from .filling import Filling, Round
 from .flesh import Softened, softened
 from .loads import Loads
 from .material import blocks
 from .obstacles import Obstacles
 from .pressure import pressed
-from .solid import ball, fill
 from .springs import knit, swung
 
 __all__ = ["Body"]
@@ -34,8 +33,8 @@ __all__ = ["Body"]
 _DENSITY = 1000.0
 #: Stiffness of the floor per area, over the fresh modulus and an edge: it gives way by a thousandth of r1.
 _FLOOR = 30.0
-#: Stiffness per volume of the springs that keep the core from sliding, over the fresh modulus; how far the core goes.
-_TETHER, _CORE = 0.1, 0.5
+#: Stiffness per volume of the springs that keep the core from sliding, over the fresh modulus.
+_TETHER = 0.1
 #: Neighbours farther from the fresh skin than this are never met; one may stand so deep in it [r1].
 _REACH, _DEEP = 1.0, 0.3
 #: Radius of a ball that stands for a plane [r1].
@@ -51,14 +50,15 @@ class Body:
     """
 
     def __init__(self, params: DecayParams, surface: Surface, cells: int, layers: int, tolerance: float) -> None:
-        self._params = params
-        self.solid = fill(params, layers)
-        self._surface = surface
-        self._cells, self._layers = cells, layers
+        self._params, self._surface = params, surface
+        own = params.mesh is not None
+        self._filling: Filling = Embedded(params, surface, layers) if own else Round(params, cells, layers)
+        self.solid = self._filling.solid
+        self._cells = cells
         self._tolerance = tolerance
         self._pattern = blocks(self.solid.tets, len(self.solid.points))
-        r1 = reference_radius(params, extent(params))
-        self._balls, self._carried = _balls(params), carried(params)
+        r1 = reference_radius(params, self._filling.extent)
+        self._balls = _balls(params, self._filling)
         self._pressure, self._inertia = _DENSITY * params.flesh.gravity * r1, _DENSITY * r1**2
 
     def state(self, water: float, rot: Floats | None) -> Softened:
@@ -66,7 +66,7 @@ class Body:
         solid, flesh = self.solid, self._params.flesh
         inside = np.zeros(len(solid.tets))
         if rot is not None:
-            at = _inwards(self._cells, self._layers) @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
+            at = self._filling.inwards @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
             inside = at[solid.tets].mean(axis=1)
         fleshy = float(solid.volume[~solid.stone].sum() / solid.volume.sum())
         wet = self._params.water_content / 100 / fleshy
@@ -102,7 +102,7 @@ class Body:
         """What it rests on: the floor, unless a neighbour carries it, and the neighbours; nothing without a weight."""
         if self._pressure == 0:
             return Obstacles(None, np.empty((0, 4)))
-        return Obstacles(None if self._carried else float(self.solid.points[:, 1].min()), self._balls)
+        return Obstacles(None if self._filling.carried else self._filling.floor, self._balls)
 
     def _loads(self, state: Softened, start: Floats, fresh: float) -> Loads:
         solid, count = self.solid, len(self.solid.points)
@@ -116,17 +116,18 @@ class Body:
         contact = zero.copy()
         contact[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(areas / 3, 3), len(solid.skin))
         contact *= _FLOOR * fresh / float(np.cbrt(solid.volume.mean()))
-        core = np.linalg.norm(solid.points, axis=1) < _CORE
         volume = np.bincount(solid.tets.ravel(), shared, count)
-        tether = np.where(core, _TETHER * fresh * volume, 0.0)
+        tether = np.where(self._filling.core, _TETHER * fresh * volume, 0.0)
         # a fruit that lies on another one does not reach the floor
-        return Loads(self._pressure * mass, self.obstacles.floor, contact, tether, start, self._balls)
+        floor = self.obstacles.floor
+        heights = None if floor is None else floor - self._filling.hanging
+        return Loads(self._pressure * mass, heights, contact, tether, start, self._balls)
 
     def on_lattice(self, balance: Balance, resolution: int) -> Floats:
         """Return the displacement of the outer surface (n, 2 n, 3) on the common lattice."""
         even, rest = self.parted(balance)
         fresh = self._params.surface(*lattice(resolution))
-        found: Floats = even * fresh + (_outwards(self._layers, resolution) @ rest).reshape(fresh.shape)
+        found: Floats = even * fresh + (self._filling.outwards(resolution) @ rest).reshape(fresh.shape)
         return found
 
     def on_surface(self, balance: Balance) -> Floats:
@@ -136,8 +137,8 @@ class Body:
         return found
 
     def onto(self, cells: int) -> sparse.csr_array:
-        """Return the matrix that takes a field (s) of the body's skin to the vertices of a sphere of so many cells."""
-        return _onto(cells, self._layers)
+        """Return the matrix that takes a field (s) of the body's skin to a sphere of so many cells, or to the mesh."""
+        return self._filling.onto(cells)
 
     def parted(self, balance: Balance) -> tuple[float, Floats]:
         """Return the even part of the skin's displacement, over its place, and the rest (s, 3), which is interpolated.
@@ -151,11 +152,11 @@ class Body:
         return even, moved - even * fresh
 
 
-def _balls(params: DecayParams) -> Floats:
+def _balls(params: DecayParams, filling: Filling) -> Floats:
     """Return centres and radii (b, 4) of the balls that the fruit can meet in place of its neighbours."""
     found = []
     for number, other in enumerate(params.neighbours):
-        away = gap(params, other)
+        away = filling.gap(other)
         if away < -_DEEP:
             raise InvalidInput(
                 f"neighbour {number} stands {-away:.2f} r1 deep in the fruit.",
@@ -169,26 +170,3 @@ def _balls(params: DecayParams) -> Floats:
         elif away < _REACH:
             found.append((*other.position, other.radius))
     return np.array(found).reshape(-1, 4)
-
-
-def _skin(layers: int) -> tuple[Floats, Ints]:
-    rays, _, _, skin, faces = ball(layers)
-    return rays[skin], faces
-
-
-@lru_cache(maxsize=4)
-def _inwards(cells: int, layers: int) -> sparse.csr_array:
-    """Return the matrix that takes a field of the surface to the body's points, along rays."""
-    rays = ball(layers)[0].copy()
-    rays[~rays.any(axis=1)] = (0.0, 1.0, 0.0)  # the centre has no ray, and lies too deep for one
-    return shares_at(*geodesic(cells), rays)
-
-
-@lru_cache(maxsize=4)
-def _outwards(layers: int, resolution: int) -> sparse.csr_array:
-    return shares_at(*_skin(layers), directions(*lattice(resolution)).reshape(-1, 3))
-
-
-@lru_cache(maxsize=4)
-def _onto(cells: int, layers: int) -> sparse.csr_array:
-    return shares_at(*_skin(layers), geodesic(cells)[0])

@@ -52,7 +52,7 @@ class Skin(BaseModel):
 
     stiffness: float = Field(50.0, gt=0, le=10000, description="Young's modulus of the skin, over the flesh's [1]")
     shrinkage: float = Field(
-        0.0, ge=0, le=1, description="Share of the drying body's shrinkage that the skin joins [1]"
+        0.5, ge=0, le=1, description="Share of the drying body's shrinkage that the skin joins [1]"
     )
     joining: float = Field(
         0.7, ge=0, le=1, description="Share that it joins of what its place shrinks beyond that: rot takes skin too [1]"

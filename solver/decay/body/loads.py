@@ -24,14 +24,16 @@ _SMALL = 1e-6
 
 
 class Loads(NamedTuple):
-    """What acts on the points: weight (p) [Pa r1^2]; a floor at a height with the contact's stiffness (p) [Pa r1].
+    """What acts on the points: weight (p) [Pa r1^2]; a floor with the contact's stiffness (p) [Pa r1].
+
+    floor (p): height at which each point meets the floor [r1]: points may stand for what hangs below them.
 
     tether (p) [Pa r1]: springs that hold points sideways to the places `held` (p, 3). Without a floor: None.
     balls (b, 4) [r1]: centres and radii of the neighbours, which push with the contact's stiffness too.
     """
 
     weight: Floats
-    floor: float | None
+    floor: Floats | None
     contact: Floats
     tether: Floats
     held: Floats
@@ -117,7 +119,7 @@ def _onto_floor(x: Floats, loads: Loads) -> float:
     """Return the lift at which the floor alone carries the body."""
     assert loads.floor is not None
     weight = float(loads.weight.sum())
-    high = loads.floor - float(x[loads.contact > 0, 1].min())
+    high = float((loads.floor - x[:, 1])[loads.contact > 0].max())
     low = high - weight / float(loads.contact[loads.contact > 0].min())
     for _ in range(60):
         middle = (low + high) / 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...fruit import directions
 from ..params import DecayParams
 from ..surfaces.places import painted
 from .flesh import Softened
@@ -18,7 +19,11 @@ def pressed(state: Softened, params: DecayParams, solid: Solid) -> Softened:
         return state
     stiffness, length = np.ones(len(solid.tets)), np.ones(len(solid.tets))
     for point in params.pressure:
-        centre = params.surface(*np.radians([point.colatitude, point.azimuth]))
+        angles = np.radians([point.colatitude, point.azimuth])
+        if params.mesh is None:
+            centre = params.surface(*angles)
+        else:
+            centre = solid.points[solid.skin[np.argmax(solid.rays[solid.skin] @ directions(*angles))]]
         far = ((solid.points - centre) ** 2).sum(axis=1)
         share = np.clip(1 - far / point.radius**2, 0, None)[solid.tets].mean(axis=1)
         stiffness *= point.stiffness**share

@@ -128,8 +128,8 @@ def swing(x: Floats, v: Floats, network: Network, loads: Loads, step: float, dam
 
 def _arrays(
     network: Network, loads: Loads
-) -> tuple[Ints, Floats, Floats, Floats, float, Floats, Floats, Floats, Floats]:
-    floor = -np.inf if loads.floor is None else loads.floor
+) -> tuple[Ints, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]:
+    floor = np.full(len(loads.weight), -np.inf) if loads.floor is None else loads.floor
     return (
         *(network.ends, network.length, network.stiffness),
         *(loads.weight, floor, loads.contact, loads.tether, loads.held, loads.balls),
@@ -143,7 +143,7 @@ def _pull(
     length: Floats,
     stiffness: Floats,
     weight: Floats,
-    floor: float,
+    floor: Floats,
     contact: Floats,
     tether: Floats,
     held: Floats,
@@ -154,7 +154,7 @@ def _pull(
     """Write the forces on points x to pull (p, 3), add the sizes of their shares to size (p); return what carries."""
     total = 0.0
     for i in range(len(x)):
-        up = contact[i] * (floor - x[i, 1]) if x[i, 1] < floor else 0.0
+        up = contact[i] * (floor[i] - x[i, 1]) if x[i, 1] < floor[i] else 0.0
         pull[i, 0] = -tether[i] * (x[i, 0] - held[i, 0])
         pull[i, 1] = up - weight[i]
         pull[i, 2] = -tether[i] * (x[i, 2] - held[i, 2])
@@ -198,7 +198,7 @@ def _march(
     length: Floats,
     stiffness: Floats,
     weight: Floats,
-    floor: float,
+    floor: Floats,
     contact: Floats,
     tether: Floats,
     held: Floats,

@@ -11,9 +11,11 @@ from scipy import sparse
 from ...arrays import Floats
 from ...contract import Context
 from ...shell import metric
+from ...shell.normals import normals
+from ..fields.system import laid
 from ..params import DecayParams
 from ..settings import Settings
-from ..surfaces.surface import geodesic, lay, sampler, shares_at
+from ..surfaces.surface import geodesic, sampler, shares_at
 from .body import Body
 from .equilibrium import Balance
 from .flesh import Skin
@@ -23,14 +25,18 @@ __all__ = ["Wrinkles"]
 
 
 class Wrinkles:
-    """The skin of one fruit on a geodesic sphere of its own, between the body's and the fields'."""
+    """The skin of one fruit on a geodesic sphere of its own, between the body's and the fields', or on its own mesh."""
 
     def __init__(self, params: DecayParams, skin: Skin, body: Body, settings: Settings) -> None:
         self._body, self._skin, self._seed = body, skin, params.seed
         self._cells, self._fields, self._tolerance = settings.skin, settings.cells, settings.smooth
-        surface = lay(params, settings.skin)
+        self._own = params.mesh is not None
+        surface = laid(params, settings.skin)
         self._points = surface.points
-        self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
+        if self._own:
+            self._normals = normals(surface.points, surface.faces)
+        else:
+            self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
         fresh = metric(surface.points, surface.faces)
         self._faces, self._square = surface.faces, fresh[:, 0] * fresh[:, 2] - fresh[:, 1] ** 2
         self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness)
@@ -66,7 +72,7 @@ class Wrinkles:
 
     def on_surface(self, folds: Floats) -> Floats:
         """Return what `at` found on the vertices of the fields' surface (v, 3)."""
-        return np.asarray(_between(self._cells, self._fields) @ folds)
+        return folds if self._own else np.asarray(_between(self._cells, self._fields) @ folds)
 
 
 @lru_cache(maxsize=4)

@@ -28,6 +28,14 @@ class Mesh(BaseModel):
     faces: tuple[tuple[int, int, int], ...] = Field(
         min_length=1, max_length=800_000, description="Triangles, as numbers of vertices from 0"
     )
+    uv: tuple[tuple[float, float], ...] = Field(
+        (), max_length=2_400_000, description="Texture coordinates, v upwards; files that are made of it keep them [1]"
+    )
+    uv_faces: tuple[tuple[int, int, int], ...] = Field(
+        (), max_length=800_000, description="The triangles' corners, as numbers of texture coordinates from 0"
+    )
+    materials: tuple[str, ...] = Field((), max_length=256, description="Names of materials, for files made of it")
+    face_materials: tuple[int, ...] = Field((), max_length=800_000, description="The material of each triangle, from 0")
 
     @model_validator(mode="before")
     @classmethod
@@ -43,6 +51,15 @@ class Mesh(BaseModel):
             raise ValueError(
                 f"a triangle names a vertex that is not there: they are numbered 0 to {len(self.points) - 1}"
             )
+        for name, given, known in (
+            ("uv_faces", self.uv_faces, len(self.uv)),
+            ("face_materials", self.face_materials, len(self.materials)),
+        ):
+            if given and (len(given) != len(self.faces) or np.min(given) < 0 or np.max(given) >= known):
+                count = len(self.faces)
+                raise ValueError(f"{name} has a row for each of the {count} triangles, of numbers below {known}")
+        if self.uv and not self.uv_faces:
+            raise ValueError("uv without uv_faces belongs to no triangle")
         return self
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -83,6 +84,24 @@ class Shape:
             dried.displaced(self._params, self.lost(self._need.stages[-1]), 4, context)
 
     @property
+    def textured(self) -> dict[str, Any]:
+        """Texture coordinates and materials of an imported mesh, as variables; none of one that has none."""
+        mesh = self._params.mesh
+        found: dict[str, Any] = {}
+        if mesh is not None and mesh.uv:
+            found["texture_coordinate"] = (("texture_vertex", "uv"), np.array(mesh.uv, float))
+            found["texture_triangle"] = (("face", "corner"), np.array(mesh.uv_faces, np.int32))
+        if mesh is not None and mesh.face_materials:
+            found["face_material"] = (("face",), np.array(mesh.face_materials, np.int32))
+        return found
+
+    @property
+    def materials(self) -> dict[str, str]:
+        """Names of an imported mesh's materials, as an attribute."""
+        mesh = self._params.mesh
+        return {"materials": json.dumps(mesh.materials)} if mesh is not None and mesh.materials else {}
+
+    @property
     def triangles(self) -> Ints32:
         """Faces (f, 3) of the surface whose vertices are `mesh_position`."""
         assert self.surface is not None
@@ -137,13 +156,12 @@ class Shape:
                 points = points + dried.at_rays(self._dried(water, dried.ROWS, context), self._rays)
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
-            # an imported mesh may be wound either way, and an open one has none
-            own = self._extent if self._params.mesh is not None else None
             if "volume" in wanted:
-                row["volume"] = own.volume if own else _volume(points, self.surface)
+                row["volume"] = _volume(points, self.surface)
             if "density" in wanted:
-                fresh_volume = _volume(self.surface.points, self.surface)
-                row["density"] = booked.mass * (1.0 if own else fresh_volume / _volume(points, self.surface))
+                # an open mesh closes nothing whose volume could change
+                swells = _volume(points, self.surface) / _volume(self.surface.points, self.surface)
+                row["density"] = booked.mass / (swells if self._closed else 1.0)
         return row
 
     def follow(self, water: float, rot: Floats | None, context: Context) -> None:
@@ -177,5 +195,6 @@ class Shape:
 
 
 def _volume(points: Floats, surface: Surface) -> float:
+    # an imported mesh may be wound either way
     a, b, c = (points[surface.faces[:, k]] for k in range(3))
-    return float(np.sum(a * np.cross(b, c))) / 6
+    return abs(float(np.sum(a * np.cross(b, c)))) / 6

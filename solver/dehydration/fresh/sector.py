@@ -90,8 +90,11 @@ def cut(mesh: FruitMesh, mirrors: str) -> Sector:
 
 
 def evened(heights: Floats, sector: Sector) -> Floats:
-    """Return random heights (nc,) made equal on all images of a column, as rough as before: sums over root of copies."""
-    return _mean(heights, sector) * np.sqrt(sector.copies)
+    """Return random heights (nc,) made equal on all images of a column, as rough as before: sums over root of
+    copies.
+    """
+    found: Floats = _mean(heights, sector) * np.sqrt(sector.copies)
+    return found
 
 
 def mirrored(heights: Floats, sector: Sector) -> Floats:

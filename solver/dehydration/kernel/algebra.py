@@ -48,10 +48,11 @@ FULL_SHARE = 0.1
 (full integration locks in shear, none at all leaves hourglass modes)."""
 LINE = (29 / 27) ** 0.5
 """Places of these two points, zeta = -LINE and +LINE. An element has one pressure, so that what bends within a layer is
-borne by the deviatoric stress alone, which is a third of what a plate that keeps its volume has (2/3 mu e^2 of 2 mu e^2 where it
-bends along one direction). The mean of zeta^2 over all points is therefore 1 in place of 1/3: FULL_SHARE / 3 +
-(1 - FULL_SHARE) LINE^2 = 1. Then a skin of two layers bends with its full stiffness, at Gauss points with 5/6 of it. Every plane
-wave bends a plate along one direction, and the rest of a bending energy, its Gaussian curvature, integrates to nothing."""
+borne by the deviatoric stress alone, which is a third of what a plate that keeps its volume has (2/3 mu e^2 of 2 mu e^2
+where it bends along one direction). The mean of zeta^2 over all points is therefore 1 in place of 1/3: FULL_SHARE / 3 +
+(1 - FULL_SHARE) LINE^2 = 1. Then a skin of two layers bends with its full stiffness, at Gauss points with 5/6 of it.
+Every plane wave bends a plate along one direction, and the rest of a bending energy, its Gaussian curvature, integrates
+to nothing."""
 BARRIER_BELOW, BARRIER_STIFFNESS, TANGENT_BELOW = 0.6, 8.0, 0.25
 
 MU, KAPPA, INVERSE_VOLUME, GEOMETRY = 0, 1, 2, 3

@@ -17,8 +17,9 @@ from scipy.sparse import coo_array, csr_array
 from ...arrays import Bools, Floats
 from ...fruit import Fruit, lattice
 from ...geometry.crossings import Crossings
+from ...lattice import closed_lattice
 from ..fresh.mesh import CubedSphere, FruitMesh, Sampler
-from .penetration import closed_lattice, of_lattice
+from .penetration import of_lattice
 
 __all__ = ["Delivered", "Delivery", "even_out", "on_triangles"]
 

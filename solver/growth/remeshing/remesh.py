@@ -7,6 +7,7 @@ from collections.abc import Generator
 import numpy as np
 
 from ...arrays import Ints
+from ...geometry.crossings import crossings
 from ..state import State
 from .collapses import collapse
 from .cuts import cut
@@ -19,16 +20,19 @@ __all__ = ["remesh"]
 _SHORT = 0.25
 
 
-def remesh(state: State, longest: float, most: int) -> Generator[None, None, tuple[State, list[Ints]]]:
+def remesh(
+    state: State, longest: float, most: int, apart: bool = False
+) -> Generator[None, None, tuple[State, list[Ints]]]:
     """Find the state without rest edges above `longest` or far below it, edges turned over where that helps.
 
     Yields after pieces of the work; the generator's value is the state and, with it, the changes: for each vertex
     (n', 2) the two before in the middle of which it lies, twice the same where it was there. Beyond `most` vertices
-    nothing is cut.
+    nothing is cut. apart: whether nothing may pass through the sheet: what would, when triangles change where it is not
+    flat, is left for another time.
     """
     changes: list[Ints] = []
     coarser, left = collapse(state, longest * _SHORT)
-    if coarser is not state:
+    if coarser is not state and not (apart and _crossed(coarser)):
         state = coarser
         changes.append(np.stack([left, left], -1))
     yield
@@ -41,4 +45,9 @@ def remesh(state: State, longest: float, most: int) -> Generator[None, None, tup
         state = finer
         yield
     yield
-    return flip(state), changes
+    turned = flip(state)
+    return (state if apart and turned is not state and _crossed(turned) else turned), changes
+
+
+def _crossed(state: State) -> bool:
+    return crossings(state.x, state.mesh.triangles).count > 0

@@ -19,7 +19,8 @@ from ...shell.normals import normals
 from ..params import Bending, Plane, SolidBall
 from ..state import State
 from .loads import area_vectors, depth_in
-from .tangent import Tangent
+from .tangent import LEAF, Tangent
+from .touching import Touching
 
 __all__ = ["StepEnergy", "ahead", "elastic"]
 
@@ -27,8 +28,6 @@ __all__ = ["StepEnergy", "ahead", "elastic"]
 _SHIFT = 1e-5
 #: Stiffness of a membrane's vertex [mu]: about the diagonal of six equilateral triangles.
 _STIFFEST = 10.0
-#: How far vertices move before contact looks for its pairs again, over the distance.
-_SLACK = 0.5
 #: Penalty of solids per area and depth [mu / l^2].
 _HARDNESS = 30.0
 
@@ -42,9 +41,7 @@ def ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
     """Return where the shape comes to if it moves on as in the last step, or where it is if that costs less."""
     if state.drift is None:
         return state.x
-    x = state.x + dt * state.drift
-    if float(np.abs(x - state.x).max()) > energy.longest:
-        return state.x
+    x = state.x + energy.allowed(state.x, state.drift, dt) * state.drift
     least = energy(state.x)[0]
     return x if energy(x)[0] < least else state.x
 
@@ -72,11 +69,15 @@ class StepEnergy:
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         self.load: Floats | None = None
         self.free = ~state.held
+        #: Which blocks of the last `hessian` are on the diagonal (n,).
+        self.diagonal: Ints = np.empty(0, np.int64)
         self._last: tuple[Floats, float, Floats] | None = None
-        self._distance, self._looked = distance, state.x
-        self._pairs = self._look(state.x) if distance else np.empty((0, 2), np.int64)
+        #: Whether the last step asked for was not allowed whole.
+        self.cut = False
         thirds = np.repeat(shell.areas(state.g) / 3, 3)
         self.areas = np.bincount(state.mesh.triangles.ravel(), thirds, len(state.x)).astype(np.float64)
+        unit = state.length * min(1.0, material.flexural / state.length**2)
+        self.touching = Touching(state, distance, unit, self.areas) if distance else None
         self.follow(state.x)
 
     def follow(self, x: Floats) -> None:
@@ -108,11 +109,8 @@ class StepEnergy:
             outward = area_vectors(x, state.mesh.triangles)
             energy -= self._pressure * float(np.vdot(outward, x)) / 3
             gradient -= self._pressure * outward
-        if self._distance:
-            if float(np.abs(x - self._looked).max()) > _SLACK * self._distance:
-                self._pairs, self._looked = self._look(x), x
-            hard = _HARDNESS * self.areas / self._distance
-            energy += shell.contact(x, state.mesh.triangles, self._pairs, self._distance, hard, gradient)
+        if self.touching:
+            energy += self.touching.energy(x, gradient)
         for solid in self.solids:
             depth, normal = depth_in(solid, x)
             energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
@@ -140,14 +138,11 @@ class StepEnergy:
         digits = np.finfo(float).eps
         return float(np.abs(moved - gradient).max() + np.sqrt(2 * _STIFFEST * digits * terms))
 
-    @property
-    def longest(self) -> float:
-        """Longest move of a vertex in one step that contact can follow."""
-        return 0.4 * self._distance if self._distance else np.inf
-
-    def _look(self, x: Floats) -> Ints:
-        # moves of up to the slack by either side, per axis
-        return shell.candidates(x, self.state.mesh, self._distance * (1 + 2 * np.sqrt(3) * _SLACK))
+    def allowed(self, x: Floats, way: Floats, wanted: float) -> float:
+        """Return how much of `way` (n, 3), at most `wanted`, may be gone from x in one step."""
+        found = self.touching.allowed(x, way, wanted) if self.touching else wanted
+        self.cut = found < wanted
+        return found
 
     @property
     def ready(self) -> bool:
@@ -160,11 +155,10 @@ class StepEnergy:
         return self._mean is None
 
     def hessian(self, x: Floats) -> bsr_array:
-        """Return the second derivative (3n, 3n) of positions (n, 3) in blocks; unit rows and columns where held.
-
-        Exact but for contact of the sheet with itself, which counts by its stiffness at each vertex.
-        """
-        state, pattern = self.state, self.tangent.pattern
+        """Return the second derivative (3n, 3n) of positions (n, 3) in blocks; unit rows and columns where held."""
+        state = self.state
+        coupled = self.touching.coupled(x, LEAF) if self.touching else None
+        pattern = coupled[0] if coupled else self.tangent.pattern
         mesh, lame = state.mesh, self.material.lame
         blocks = np.zeros((pattern.blocks, 3, 3))
         shell.membrane_hessian(x, mesh.triangles, state.g, lame, pattern.of_triangles, blocks)
@@ -172,21 +166,20 @@ class StepEnergy:
         shell.bending_hessian(x, mesh.hinges, angles, state.rest, self.stiffness, pattern.of_hinges, blocks)
         if self.following:
             shell.volume_hessian(x, mesh.triangles, -self._pressure, pattern.of_triangles, blocks)
-        self._add_obstacles(x, blocks)
+        self._add_solids(x, pattern.diagonal, blocks)
+        if self.touching and coupled:
+            self.touching.add_hessian(x, pattern, blocks)
         free = ~state.held
         rows = np.repeat(np.arange(len(x)), np.diff(pattern.indptr))
         blocks *= free[rows][:, :, None] & free[pattern.indices][:, None, :]
         blocks[pattern.diagonal] += np.eye(3) * state.held[:, None, :]
+        self.diagonal = pattern.diagonal
         return bsr_array((blocks, pattern.indices, pattern.indptr))
-
-    @property
-    def diagonal(self) -> Ints:
-        """Which blocks of `hessian` are on the diagonal (n,)."""
-        return self.tangent.pattern.diagonal
 
     def analysis(self, x: Floats) -> Analysis:
         """Return the order in which to eliminate `hessian`."""
-        return self.tangent.analysis(x)
+        coupled = self.touching.coupled(x, LEAF) if self.touching else None
+        return coupled[1] if coupled else self.tangent.analysis(x)
 
     def rigid(self, x: Floats) -> Floats:
         """Return motions (3n, k), orthonormal, that no force is felt along: turns and shifts that no held vertex stops.
@@ -207,17 +200,12 @@ class StepEnergy:
             motions = motions @ ways[size < 1e-9].T
         return np.linalg.qr(motions)[0]
 
-    def _add_obstacles(self, x: Floats, blocks: Floats) -> None:
-        """Add the stiffness of solids, and of contact, at each vertex to the diagonal `blocks` (nnz, 3, 3)."""
-        diagonal = self.tangent.pattern.diagonal
+    def _add_solids(self, x: Floats, diagonal: Ints, blocks: Floats) -> None:
+        """Add the stiffness of solids at each vertex to the diagonal of `blocks` (nnz, 3, 3)."""
         for solid in self.solids:
             depth, normal = depth_in(solid, x)
             weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
             blocks[diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
-        if self._distance:
-            hard = _HARDNESS * self.areas / self._distance
-            t = self.state.mesh.triangles
-            shell.contact_diagonal(x, t, self._pairs, self._distance, hard, diagonal, blocks)
 
     def refactor(self, x: Floats) -> Iterator[None]:
         """Take the inverse of the positive semidefinite tangent at x, shifted; yields after pieces of the work."""
@@ -232,7 +220,9 @@ class StepEnergy:
         shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
         shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
         blocks[pattern.diagonal] += _SHIFT * np.eye(3)
-        self._add_obstacles(x, blocks)
+        self._add_solids(x, pattern.diagonal, blocks)
+        if self.touching:
+            self.touching.add_diagonal(x, pattern.diagonal, blocks)
         yield
         n = normals(x, state.mesh.triangles)
         tangent.inverse = yield from inverse_of(tangent.fronts, pattern, blocks, n, np.asarray(state.held.all(axis=1)))

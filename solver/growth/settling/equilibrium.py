@@ -108,7 +108,8 @@ def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
     for waves in _WAVES:
         ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(x, axis=0).max()))
         height = np.cos(x @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
-        trial = x + (_NUDGE * energy.material.thickness * height)[:, None] * normal
+        way = (_NUDGE * energy.material.thickness * height)[:, None] * normal
+        trial = x + energy.allowed(x, way, 1.0) * way
         value = energy(trial)[0]
         if value < least:
             found, least = trial, value

@@ -31,9 +31,12 @@ class Energy(Protocol):
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient."""
 
+    def allowed(self, x: Floats, way: Floats, wanted: float) -> float:
+        """Return how much of a way, at most `wanted`, may be gone from x in one step."""
+
     @property
-    def longest(self) -> float:
-        """Longest move of a point in one step."""
+    def cut(self) -> bool:
+        """Whether the last step that was asked for was not allowed whole."""
 
     def refactor(self, x: Floats) -> Iterator[None]:
         """Take the inverse at x for `precondition`; yields after pieces of the work."""
@@ -62,7 +65,7 @@ def descend(
 
     A step that fails is followed by the least of the cubic through both ends, within a tenth and a half of it.
     """
-    t = min(t, energy.longest / max(float(np.abs(d).max()), 1e-300))
+    t = energy.allowed(x, d, t)
     while t > _SHORTEST:
         value, gradient = energy(x + t * d)
         if value <= f + _ARMIJO * t * slope:
@@ -185,7 +188,7 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
             model, found = -t * t * slope, t * (float(np.vdot(d, gradient)) - slope)
             share = 1.0 if found >= _DAMPED * model else (1 - _DAMPED) * model / (model - found)
             memory.add(t * d, share * (gradient - g) - (1 - share) * t * g)
-            if t < _SHORT and t * float(np.abs(d).max()) < 0.9 * energy.longest:
+            if t < _SHORT and not energy.cut:
                 memory.clear()
         else:
             memory.add(t * d, gradient - g)
@@ -221,6 +224,7 @@ def conjugate_gradients(energy: Energy, x: Floats) -> Iterator[Point]:
         if slope == 0:
             yield Point(x, f, size, stuck=True)
             return
+        trial = energy.allowed(x, d, trial)
         _, ahead = energy(x + trial * d)
         bend = float(np.vdot(ahead, d)) - slope
         t, value, gradient = descend(

@@ -31,9 +31,8 @@ class Curved(Energy, Protocol):
     def hessian(self, x: Floats) -> bsr_array:
         """Return the second derivative (3n, 3n), rows and columns of what is held those of the unit matrix."""
 
-    @property
-    def diagonal(self) -> Ints:
-        """Which of its blocks are on the diagonal (n,)."""
+    #: Which blocks of the last second derivative are on the diagonal (n,).
+    diagonal: Ints
 
     def analysis(self, x: Floats) -> Analysis:
         """Return the order in which to eliminate it."""

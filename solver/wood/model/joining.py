@@ -14,7 +14,7 @@ from .grain import Field
 from .outline import area, corners
 from .slopes import leaning
 
-__all__ = ["bodied", "bonded"]
+__all__ = ["bodied", "bonded", "sloped"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
@@ -74,6 +74,23 @@ def bodied(params: WoodParams, k: float, ease: float, rest: np.ndarray) -> Bodie
     )
 
 
+def _lying(x: np.ndarray, rods: Rods, i: np.ndarray, j: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the middles (b, 3) [m], lengths (b,) [m] and slopes along themselves (b,) of bonds from vertices to edges.
+
+    x (v, 3) [m]; the slope is the mean of both rods', i (b,) vertices, j (b,) edges, share (b,) of these.
+    """
+    on_curve, slope = held(x, rods, j, share)
+    d = x[i] - on_curve
+    length = np.linalg.norm(d, axis=1)
+    slope = (slope + leaning(x, rods)[i]) / 2
+    return x[i] - d / 2, length, (slope * d).sum(1) / np.maximum(length, 1e-300)
+
+
+def sloped(x: np.ndarray, rods: Rods, bonds: Bonds) -> np.ndarray:
+    """Return the slope (b,) along each bond, of the mean of the rods that it joins, vertices at x (v, 3) [m]."""
+    return _lying(x, rods, bonds.i, bonds.j, bonds.share)[2]
+
+
 def bonded(
     params: WoodParams,
     points: np.ndarray,
@@ -107,13 +124,9 @@ def bonded(
         on.append(edge[q][j])
         share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
     i, e, u = np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
-    on_curve, slope = held(rest, rods, e, u)
-    d = rest[i] - on_curve
-    length = np.linalg.norm(d, axis=1)
+    middle, length, cosine = _lying(rest, rods, i, e, u)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    slope = (slope + leaning(rest, rods)[i]) / 2
-    cosine = (slope * d).sum(1) / length if len(i) else np.zeros(0)
     # the wood of a bond: by the length that its vertex stands for
     gap = np.diff(s, axis=1)
     own = np.zeros_like(s)
@@ -121,7 +134,6 @@ def bonded(
     own[:, 1:] += gap / 2
     part = own.ravel()[np.searchsorted(grid.ravel(), i)]
     volume = area(outline) * params.length * part / max(float(part.sum()), 1e-300)
-    middle = rest[i] - d / 2
     stiff = grain.factor(middle, params.grain.stiffness)
     strength = strong.factor(middle, params.grain.strength)
     return Bonds(

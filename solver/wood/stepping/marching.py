@@ -53,7 +53,9 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
         return state
     before = state.books[: CONTACT + 1].sum() + real(state)
     allowed = params.cascade * float(state.books[[STRETCH, BENDING, BONDS]].sum())
-    wood, rods, bonds = break_worst(wood, ratio, place, allowed)
+    rods = bonds = 0
+    if top > 1:
+        wood, rods, bonds = break_worst(wood, ratio, place, allowed)
     # damage stands in the plan already; what falls apart needs another, and other fragments
     if rods or parted or gone:
         scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)

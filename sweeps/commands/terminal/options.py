@@ -7,14 +7,19 @@ import math
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ...errors import InvalidOption
 
+if TYPE_CHECKING:
+    from solver.contract import Solver
+
 __all__ = [
     "As_json",
+    "Hours",
+    "Most_seconds",
     "Out",
     "Params",
     "Preset",
@@ -25,9 +30,11 @@ __all__ = [
     "StorePath",
     "StoreToRead",
     "TableName",
+    "Under",
     "assignments",
     "numbers",
     "parameters",
+    "stages_asked",
 ]
 
 Preset = Annotated[str | None, typer.Option("--preset", help="Named parameters to start from (`wizen presets`).")]
@@ -42,7 +49,20 @@ Params = Annotated[
     ),
 ]
 Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]
+Hours = Annotated[
+    str | None, typer.Option("--hours", metavar="H,H,...", help="Hours of drying in place of --stages, e.g. 24,48.")
+]
+Under = Annotated[
+    list[str] | None,
+    typer.Option("--under", metavar="NAME=VALUE", help="A condition of --hours, e.g. temperature=60. Repeatable."),
+]
 Quality = Annotated[str | None, typer.Option("--quality", help="preview, default or fine.")]
+Most_seconds = Annotated[
+    float | None,
+    typer.Option(
+        "--max-seconds", min=0, help="Refuse, before any work, what is expected to take longer on this machine."
+    ),
+]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of everything random in the run.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Where the result goes; the suffix says how.")]
 As_json = Annotated[bool, typer.Option("--json", help="Print one JSON document; everything else goes to stderr.")]
@@ -59,8 +79,8 @@ StoreToRead = Annotated[
 TableName = Annotated[str, typer.Option("--name", help="Name of the table.")]
 
 
-def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
-    """Return the values of `--set NAME=VALUE` options.
+def assignments(pairs: Sequence[str] | None, option: str = "--set") -> dict[str, Any]:
+    """Return the values of `--set NAME=VALUE` options, or of another option of that grammar.
 
     VALUE is TOML or JSON, a list without brackets, @ and a mesh file, or plain text.
 
@@ -72,9 +92,9 @@ def assignments(pairs: Sequence[str] | None) -> dict[str, Any]:
     for pair in pairs or ():
         name, equals, text = (part.strip() for part in pair.partition("="))
         if not (name and equals and text):
-            raise InvalidOption(f"--set {pair!r} is not NAME=VALUE.", "Write for example --set te=0.04.")
+            raise InvalidOption(f"{option} {pair!r} is not NAME=VALUE.", "Write for example --set te=0.04.")
         if name in values:
-            raise InvalidOption(f"--set {name} is given twice.", "Keep one of them.")
+            raise InvalidOption(f"{option} {name} is given twice.", "Keep one of them.")
         values[name] = _value(text)
     return values
 
@@ -137,3 +157,22 @@ def numbers(text: str | None, option: str = "--stages") -> tuple[float, ...]:
             )
         values.append(value)
     return tuple(values)
+
+
+def stages_asked(
+    solver: Solver, stages: str | None, hours: str | None, under: Sequence[str] | None, preset: str | None
+) -> tuple[float, ...]:
+    """Return the stages that --stages names, or --hours under the conditions of --under.
+
+    Raises:
+        InvalidOption: both, or conditions without hours.
+        InvalidInput: the solver knows no hours, or not under these conditions.
+
+    """
+    if hours is None:
+        if under:
+            raise InvalidOption("--under says how --hours are spent, and there are none.", "Write --hours 24,48.")
+        return numbers(stages)
+    if stages is not None:
+        raise InvalidOption("--hours and --stages exclude each other.", "Keep one of them.")
+    return solver.stages_after(numbers(hours, "--hours"), assignments(under, "--under"), preset)

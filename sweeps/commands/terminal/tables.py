@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 from ...errors import InvalidOption
 
 if TYPE_CHECKING:
+    from solver.contract import Solver
     from store.lookup import ShapeTable
     from store.store import Store
 
-__all__ = ["asked_table", "open_store", "run_command"]
+__all__ = ["asked_table", "open_store", "run_command", "solver_of"]
 
 
 def open_store(root: Path | None) -> Store:
@@ -50,10 +51,9 @@ def asked_table(
     from store.errors import OutsideTable
     from store.families import stored
     from store.lookup import ShapeTable
-    from store.tables import info
 
     opened = open_store(root)
-    chosen = registry.get(solver or (_only_solver(opened) if name is None else info(opened, name).solver))
+    chosen = solver_of(opened, name, solver)
     if preset is not None and preset not in chosen.presets:
         chosen.parse({}, preset)  # says which there are
     families = stored.families(opened, chosen)
@@ -72,6 +72,20 @@ def asked_table(
     # entries that no axis reaches are no names to ask by
     quiet = {key for key in asked if key not in said and (key in chosen.incidental or not key.isidentifier())}
     return table, {key: value for key, value in asked.items() if key not in quiet}
+
+
+def solver_of(store: Store, name: str | None, solver: str | None) -> Solver:
+    """Return the solver that is named, or that of the table that is, or the only one with tables.
+
+    Raises:
+        InvalidOption: tables of several solvers are there, and none is chosen.
+        InvalidInput, UnknownTable: there is no such solver or table.
+
+    """
+    from solver import registry
+    from store.tables import info
+
+    return registry.get(solver or (_only_solver(store) if name is None else info(store, name).solver))
 
 
 def run_command(solver: str, preset: str | None, said: Mapping[str, Any], stage: float | None) -> str:

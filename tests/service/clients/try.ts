@@ -20,13 +20,13 @@ const file = await client.GET("/v1/shapes/{solver}", {
   params: { path, query: { ...query, format: "glb" } },
   parseAs: "arrayBuffer",
 });
-const magic = new TextDecoder().decode(new Uint8Array(sure(file.data, file.error), 0, 4));
+const magic = new TextDecoder().decode(new Uint8Array(sure(file.data, file.error) as unknown as ArrayBuffer, 0, 4));
 
 const batch = await client.POST("/v1/shapes:batch", {
   body: { solver: "dehydration", points: [{ te: 0.03, gamma: 7, s: 0.1 }], format: "npz", resolution: 16 },
   parseAs: "arrayBuffer",
 });
-const zip = new TextDecoder().decode(new Uint8Array(sure(batch.data, batch.error), 0, 2));
+const zip = new TextDecoder().decode(new Uint8Array(sure(batch.data, batch.error) as unknown as ArrayBuffer, 0, 2));
 
 const asked = await client.POST("/v1/jobs", {
   body: {

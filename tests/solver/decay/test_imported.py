@@ -87,7 +87,7 @@ def test_area_and_volume_of_a_box():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"body": "quasi-static"}, "no flesh"),
+        ({"body": "table"}, "knows no imported mesh"),
         ({"seeds": "contacts"}, "neither stem nor floor"),
         ({"wounds": [{"vertex": 10**6}]}, "vertices 0 to"),
         ({"mesh": {"points": [[0, 0, 0]] * 3, "faces": [[0, 1, 3]]}}, "not there"),

@@ -74,7 +74,7 @@ def test_neighbours_on_both_sides_push_alike_and_flatten():
     balls = np.array([(2.0, 0.0, 0.0, 1.0), (-2.0, 0.0, 0.0, 1.0)])
     tether = np.full(count, 1e-2)
     weight = np.full(count, 0.02 / count)
-    loads = Loads(weight, -1.04, contact, tether, solid.points, balls)
+    loads = Loads(weight, np.full(len(weight), -1.04), contact, tether, solid.points, balls)
     balance = settle(solid.points, rest, loads, blocks(solid.tets, count), 1e-6)
     assert balance.pushes[0, 0] < -1e-3
     assert balance.pushes[0, 0] == pytest.approx(-balance.pushes[1, 0], rel=1e-3)

@@ -88,7 +88,14 @@ def test_what_frames_learnt_saves_the_next_ones_steps_and_changes_no_balance(sph
 
 
 def test_a_march_settles_each_stage_alike_whatever_else_is_asked_for():
-    values = {"body": "quasi-static", "wounds": (), "te": 0.04, "skin": {}, "march": 1.0, "transpiration": 8.48}
+    values = {
+        "body": "quasi-static",
+        "wounds": (),
+        "te": 0.04,
+        "skin": {"shrinkage": 0.0},
+        "march": 1.0,
+        "transpiration": 8.48,
+    }
 
     def at(*days):
         need = Need(fields=("displacement",), stages=days, quality="preview", resolution=64)
@@ -108,19 +115,19 @@ def test_wrinkles_come_on_top_of_the_body_and_only_with_a_skin():
     need = Need(fields=("displacement",), stages=(3.0,), quality="preview", resolution=64)
     values = {"body": "quasi-static", "wounds": (), "te": 0.04, "flesh": {"gravity": 0}, "transpiration": 8.48}
     bare = SOLVER.solve(SOLVER.parse(values, "orange"), need)
-    skinned = SOLVER.solve(SOLVER.parse({**values, "skin": {}}, "orange"), need)
+    skinned = SOLVER.solve(SOLVER.parse({**values, "skin": {"shrinkage": 0.0}}, "orange"), need)
     assert "skin_residual" not in bare
     assert (skinned.skin_residual <= 1e-3).all()
     apart = (skinned.displacement - bare.displacement).values
     assert 0.01 < np.abs(apart).max() < 0.3
-    again = SOLVER.solve(SOLVER.parse({**values, "skin": {}}, "orange"), need)
+    again = SOLVER.solve(SOLVER.parse({**values, "skin": {"shrinkage": 0.0}}, "orange"), need)
     assert np.array_equal(again.displacement, skinned.displacement)
 
 
 def test_a_skin_rests_on_the_floor_and_on_its_neighbours():
     """Measured on what is handed over: the lattice and the vertices, against plane and balls as they were given."""
     beside = [{"position": (1.95, 0.1, 0.0), "radius": 0.95}]
-    values = {"body": "quasi-static", "skin": {}, "te": 0.03, "firmness": 5.0, "neighbours": beside}
+    values = {"body": "quasi-static", "skin": {"shrinkage": 0.0}, "te": 0.03, "firmness": 5.0, "neighbours": beside}
     params = SOLVER.parse({**values, "stone": (0, 0), "temperature": 24.0}, "tomato")
     need = Need(fields=("position", "mesh_position", "mean_rot"), stages=(0.0, 3.0, 5.0), quality="preview")
     run = SOLVER.solve(params, need)
@@ -160,7 +167,12 @@ def test_skin_over_collapsed_rot_shrinks_with_it():
     """Rot that takes a quarter of its lengths: a skin that joins has no more area than the flesh below by a little."""
 
     def excess(joining):
-        values = {"body": "quasi-static", "skin": {"joining": joining}, "te": 0.03, "flesh": {"gravity": 0}}
+        values = {
+            "body": "quasi-static",
+            "skin": {"joining": joining, "shrinkage": 0.0},
+            "te": 0.03,
+            "flesh": {"gravity": 0},
+        }
         params = SOLVER.parse({**values, "temperature": 24.0, "stone": (0, 0)}, "tomato")
         need = Need(fields=("mesh_position", "triangle"), stages=(4.0,), quality="preview")
         run = SOLVER.solve(params, need)

@@ -6,6 +6,7 @@ import pytest
 from solver.wood import SOLVER
 from solver.wood.fracture import break_worst, overstress
 from solver.wood.model.bundle import lay
+from solver.wood.model.joining import sloped
 from solver.wood.model.state import Wood
 
 
@@ -53,6 +54,30 @@ def test_halves_of_a_split_vertex_share_bonds_mass_and_load(which):
     others = np.flatnonzero(before.bonds.i != old)
     for name in ("k", "s", "opens", "slides", "torn", "shorn", "area", "damage", "rest", "share"):
         assert np.array_equal(getattr(b, name)[others], getattr(before.bonds, name)[others])
+
+
+def sheared(wood: Wood) -> float:
+    """Return the energy [J] that bonds hold in shear."""
+    b = wood.bonds
+    return float(((sloped(wood.motion.x, wood.rods, b) - b.cosine) ** 2 * b.s)[b.on > 0].sum())
+
+
+@pytest.mark.parametrize("place", [0.0, 0.5])
+def test_a_break_of_bent_rods_shears_no_bond(place):
+    """By the slopes of what is left, bonds of a strongly bent bundle would hold several times as much."""
+    wood = laid()
+    x = wood.motion.x
+    s = x[:, 0] - x[:, 0].min()
+    x[:, 2] += 0.3 * np.sin(12 * s / s.max()) * s.max()
+    ratio, where = np.zeros(len(wood.rods.a)), np.full(len(wood.rods.a), place)
+    ratio[wood.rods.after[[7, 40]]] = 2.0
+    before, cosine = sheared(wood), wood.bonds.cosine.copy()
+    found = break_worst(wood, ratio, where, np.inf)
+    assert (found.rods, found.bonds) == (2, 0)
+    assert sheared(found.wood) == pytest.approx(before, rel=1e-9)
+    # as bonds were laid, it would be otherwise
+    found.wood.bonds.cosine[: len(cosine)] = cosine
+    assert abs(sheared(found.wood) / before - 1) > 0.01
 
 
 def bent(circle: float, stretch: float = 0.0, **values) -> tuple[Wood, np.ndarray, np.ndarray]:

@@ -1,0 +1,94 @@
+"""Hours in place of a stage: `hours=48&under=kinetics:grape`, by the solver's own clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query
+from pydantic import BaseModel, Field
+
+from solver.contract import InvalidInput, Solver
+
+from . import problems, vocabulary
+from .errors import InvalidQuery, Wrong
+
+__all__ = ["NAMES", "UNDER", "router", "timed"]
+
+router = APIRouter(tags=["catalogue"])
+
+#: Names in a query that say when.
+NAMES = ("hours", "under")
+#: How conditions are written.
+UNDER = "[a-z_]+:[A-Za-z0-9.+-]+(,[a-z_]+:[A-Za-z0-9.+-]+)*"
+_HOURS = r"[0-9]+(\.[0-9]+)?(,[0-9]+(\.[0-9]+)?)*"
+
+
+class Stages(BaseModel):
+    """Where on a solver's stage axis hours of drying lead."""
+
+    hours: list[float] = Field(description="Hours, as asked")
+    stages: list[float] = Field(description="Stages after them")
+    symbol: str = Field(description="The stage axis")
+    under: dict[str, str] = Field(description="Conditions, as asked")
+    conditions: dict[str, Any] = Field(description="All conditions that may be set, with units and meaning")
+
+
+@router.get("/v1/solvers/{name}/stages", summary="Stages after hours", responses=problems.responses(404, 422))
+def stages(
+    name: Annotated[str, Path(description="Name of a solver; GET /v1/solvers lists them")],
+    hours: Annotated[
+        str, Query(pattern=f"^{_HOURS}$", max_length=2000, description="Hours, with commas between", examples=["24,48"])
+    ],
+    under: Annotated[
+        str,
+        Query(
+            pattern=f"^({UNDER})?$",
+            max_length=2000,
+            description="Conditions as name:value, with commas between",
+            examples=["temperature:60,air_speed:1,diameter:22"],
+        ),
+    ] = "",
+    preset: Annotated[str | None, Query(description="Named parameters whose fruit dries")] = None,
+) -> Stages:
+    """Turn hours of drying into stages, for presets and conditions that were measured; others are refused by name."""
+    solver = vocabulary.solver_named(name)
+    asked, conditions = [float(text) for text in hours.split(",")], _conditions(under)
+    return Stages(
+        hours=asked,
+        stages=list(solver.stages_after(asked, conditions, preset)),
+        symbol=solver.stages.symbol,
+        under=conditions,
+        conditions=solver.clock.conditions.model_json_schema()["properties"] if solver.clock else {},
+    )
+
+
+def timed(items: Sequence[tuple[str, str]], solver: Solver, preset: str | None = None) -> list[tuple[str, str]]:
+    """Return the items of a query with the stage in place of hours and conditions.
+
+    Raises:
+        InvalidQuery: no hours, several of them, the stage beside them, or conditions that nobody measured.
+
+    """
+    said = [(name, value) for name, value in items if name in NAMES]
+    kept = [(name, value) for name, value in items if name not in NAMES]
+    if not said:
+        return kept
+    given, symbol = dict(said), solver.stages.symbol
+    if len(given) < len(said) or any(name == symbol for name, _ in kept):
+        raise InvalidQuery.of([Wrong("hours", f"stand beside {symbol}, or twice", f"Keep one of hours and {symbol}.")])
+    try:
+        hours = float(given.get("hours", ""))
+    except ValueError:
+        raise InvalidQuery.of([Wrong("hours", "is not a number of hours", "Write it like hours=48.")]) from None
+    try:
+        (stage,) = solver.stages_after([hours], _conditions(given.get("under", "")), preset)
+    except InvalidInput as error:
+        raise InvalidQuery.of([Wrong("under", error.message, error.advice or "")]) from None
+    return [*kept, (symbol, repr(stage))]
+
+
+def _conditions(text: str) -> dict[str, str]:
+    """Return conditions by name; numbers stay text, which their model reads."""
+    pairs = (part.partition(":") for part in text.split(",") if part)
+    return {name: value for name, _, value in pairs}

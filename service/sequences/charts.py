@@ -1,0 +1,96 @@
+"""Texture coordinates of meshes: those that a mesh came with, or such as xatlas lays out; and fields drawn on them.
+
+A texel has the value at its middle, linear on the triangle that covers it. What lies between the charts takes the
+nearest texel's, so that nothing of the background bleeds in where a picture is filtered or made smaller.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from solver.arrays import Array
+from sweeps.errors import installing
+
+from ..errors import Unavailable
+from .seam import Seam
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Texels", "drawn", "laid", "own", "texels"]
+
+
+def own(run: xr.Dataset) -> Seam | None:
+    """Return the texture coordinates that a result's mesh came with; None if it has none."""
+    if "texture_coordinate" not in run:
+        return None
+    uv, corners = run["texture_coordinate"].values.astype(float), run["texture_triangle"].values.astype(np.int64)
+    triangles = run["triangle"].values.astype(np.int64)
+    copies = np.full(len(uv), -1)
+    copies[corners] = triangles
+    if (copies[corners] == triangles).all() and (copies >= 0).all():
+        return Seam(uv * [1, -1] + [0, 1], copies, corners.astype("u4"))
+    # a pair of numbers that several vertices share is one for each of them
+    pairs, back = np.unique(np.stack([corners.ravel(), triangles.ravel()], axis=1), axis=0, return_inverse=True)
+    return Seam(uv[pairs[:, 0]] * [1, -1] + [0, 1], pairs[:, 1], back.reshape(-1, 3).astype("u4"))
+
+
+def laid(run: xr.Dataset) -> xr.Dataset:
+    """Return a result with texture coordinates laid out by xatlas on its first stage.
+
+    Raises:
+        Unavailable: xatlas is not installed.
+
+    """
+    try:
+        import xatlas
+    except ImportError:
+        raise Unavailable(
+            "this mesh has no texture coordinates, and laying them out needs the package xatlas.",
+            advice=installing("unwrap"),
+        ) from None
+    points = np.ascontiguousarray(run["mesh_position"].values[0], np.float32)
+    copies, corners, uv = xatlas.parametrize(points, np.ascontiguousarray(run["triangle"].values, np.uint32))
+    same = np.array_equal(copies[corners], run["triangle"].values)
+    assert same, "xatlas keeps the order of triangles and of their corners"
+    return run.assign(
+        texture_coordinate=(("texture_vertex", "uv"), uv.astype(float)),
+        texture_triangle=(("face", "corner"), corners.astype(np.int32)),
+    )
+
+
+class Texels(NamedTuple):
+    """What covers a picture: numbers of pixels (p), triangles (p), shares of their corners (p, 3), and of each pixel
+    the row and the column of the nearest covered one.
+    """
+
+    pixel: Array
+    face: Array
+    shares: Array
+    near: tuple[Array, Array]
+
+
+def texels(seam: Seam, size: int) -> Texels:
+    """Return what covers a picture (size, size)."""
+    from scipy import ndimage
+
+    from sweeps.pictures.raster import rasterise
+
+    # textures repeat: what lies beyond the unit square is drawn in it
+    uv = seam.uv - np.floor(seam.uv[seam.triangles].mean(axis=(0, 1)))
+    faces = seam.triangles.astype(np.int64)
+    pixel, face, shares, _ = rasterise(uv * size, np.zeros(len(uv)), faces, size, both=True)
+    bare = np.ones(size * size, np.bool_)
+    bare[pixel] = False
+    near = ndimage.distance_transform_edt(bare.reshape(size, size), return_distances=False, return_indices=True)
+    return Texels(pixel, face, shares.astype(np.float32), (near[0], near[1]))
+
+
+def drawn(seam: Seam, where: Texels, values: Array, size: int) -> Array:
+    """Return a field of the vertices (v) or (v, c) as a picture (size, size) or (size, size, c), float32."""
+    corners = np.asarray(values, np.float32)[seam.copies[seam.triangles[where.face]]]
+    flat = np.zeros((size * size, *np.shape(values)[1:]), np.float32)
+    flat[where.pixel] = np.einsum("pk,pk...->p...", where.shares, corners)
+    return np.asarray(flat.reshape(size, size, *flat.shape[1:])[where.near])

@@ -1,0 +1,135 @@
+"""Flesh in a closed mesh of the user's own: stuffed tetrahedra that carry its surface, whatever its shape.
+
+The mesh need not be fit for anything but to say what is inside: each of its vertices goes with the nearest place on the
+skin of the tetrahedra, and keeps its distance from there, so that detail finer than the flesh stays as it was drawn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from ...arrays import Floats, Ints
+from ...contract import InvalidGeometry
+from ...geometry.nearest import Nearest, nearest
+from ..params import DecayParams
+from ..surfaces.imported import extent_of, rays_from
+from ..surfaces.places import Neighbour
+from ..surfaces.surface import Surface
+from .solid import Solid, volumes
+from .stuffing import Stuffed, boundary, pieces, stuffed
+
+__all__ = ["Embedded"]
+
+#: Tetrahedra of a cube of the lattice, and of a round fruit in k shells over k^3: a mesh gets about as many.
+_PER_CUBE, _PER_SHELLS = 12.0, 20.0
+#: No vertex may lie farther from the flesh than this share of the lattice's edge: there it would be missing.
+_FAR = 0.75
+#: Refinements of a lattice that is too coarse for a thin part, and the most tetrahedra that one may have.
+_TRIES, _MOST = 5, 150_000
+_FINER = 1.5
+
+
+class Embedded:
+    """Flesh in a mesh of the user's own, of about as many tetrahedra as a round fruit of so many layers.
+
+    Raises:
+        InvalidGeometry: the mesh is not closed, or too thin somewhere to hold flesh.
+
+    """
+
+    def __init__(self, params: DecayParams, surface: Surface, layers: int) -> None:
+        closed = extent_of(surface)
+        if closed is None or closed.volume <= 0:
+            raise InvalidGeometry(
+                "the mesh is open: nothing says what is inside of it.", advice="Close its borders, or take body=none."
+            )
+        self._surface, self.extent = surface, closed
+        filled = _filled(surface, closed.volume, layers)
+        skin_faces = boundary(filled.tets)
+        skin, faces = np.unique(skin_faces, return_inverse=True)
+        below = nearest(filled.points, surface.points, surface.faces)
+        depth = below.distance.copy()
+        depth[skin] = 0.0
+        self.solid = Solid(
+            filled.points,
+            filled.tets,
+            volumes(filled.points, filled.tets),
+            np.zeros(len(filled.tets), np.bool_),
+            rays_from(filled.points),
+            depth,
+            skin,
+            faces.reshape(-1, 3),
+        )
+        self.inwards = _matrix(below, surface.faces, len(surface.points))
+        held = nearest(surface.points, filled.points[skin], self.solid.faces)
+        self._onto = _matrix(held, self.solid.faces, len(skin))
+        self.core = depth >= np.median(depth)
+        self.carried = False
+        self.floor = float(surface.points[:, 1].min())
+        self.hanging = np.zeros(len(filled.points))
+        # each point of the skin stands for the vertices that go with it, down to the lowest
+        most = self.solid.faces[held.face, np.argmax(held.shares, axis=1)]
+        np.minimum.at(self.hanging, skin[most], surface.points[:, 1] - filled.points[skin[most], 1])
+
+    def onto(self, cells: int) -> sparse.csr_array:
+        """See `Filling`: the mesh has no cells, and its vertices are meant."""
+        return self._onto
+
+    def outwards(self, resolution: int) -> sparse.csr_array:
+        """See `Filling`.
+
+        Raises:
+            InvalidGeometry: always: a mesh has no lattice.
+
+        """
+        raise InvalidGeometry("a mesh has no lattice of colatitudes.", advice="Ask for mesh_position.")
+
+    def gap(self, other: Neighbour) -> float:
+        """See `Filling`."""
+        far = np.linalg.norm(self._surface.points - np.array(other.position), axis=1)
+        return float(far.min()) - other.radius
+
+
+def _filled(surface: Surface, volume: float, layers: int) -> Stuffed:
+    """Return flesh that hangs together and comes near every vertex."""
+    edge = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
+    why = ""
+    for _ in range(_TRIES):
+        found = stuffed(surface.points, surface.faces, edge)
+        why = _lacking(found, surface, edge)
+        if not why:
+            return found
+        edge /= _FINER
+        if len(found.tets) * _FINER**3 > _MOST:
+            break
+    raise InvalidGeometry(
+        f"the mesh cannot be filled with flesh: {why}.",
+        advice="Thicken it there, close what is open, or take body=none.",
+    )
+
+
+def _lacking(found: Stuffed, surface: Surface, edge: float) -> str:
+    """Return what is wrong with flesh, and where; nothing if it is whole."""
+    if not len(found.tets):
+        return "it is thinner than the lattice everywhere"
+    count, of = pieces(found.tets, len(found.points))
+    if count > 1:
+        least = int(np.argmin(np.bincount(of)))
+        return f"a part about {_place(found.points[of == least].mean(axis=0))} does not hang together with the rest"
+    skin, faces = np.unique(boundary(found.tets), return_inverse=True)
+    away = nearest(surface.points, found.points[skin], faces.reshape(-1, 3)).distance
+    worst = int(np.argmax(away))
+    if away[worst] > _FAR * edge:
+        return f"it is too thin at {_place(surface.points[worst])}"
+    return ""
+
+
+def _place(point: Floats) -> str:
+    return "(" + ", ".join(f"{x:.3g}" for x in point) + ")"
+
+
+def _matrix(found: Nearest, faces: Ints, count: int) -> sparse.csr_array:
+    """Return the matrix that takes a field (count) of a mesh's vertices to the bound points."""
+    index = (np.repeat(np.arange(len(found.face)), 3), faces[found.face].ravel())
+    return sparse.csr_array((found.shares.ravel(), index), shape=(len(found.face), count))

@@ -1,0 +1,6 @@
+"""Drying kinetics: from hours in the sun or in an air dryer to the shrinkage s of the flesh."""
+
+from .clock import CLOCK
+from .conditions import Drying
+
+__all__ = ["CLOCK", "Drying"]

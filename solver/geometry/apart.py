@@ -1,0 +1,205 @@
+"""Put a closed surface out of contact with itself, where it crosses and nowhere else, without a jump.
+
+What crosses, or nearly does, is evened out: its corners, and theirs, move towards the mean of their neighbours, as
+far as they overlap and some gap more. So what moves grows from nothing as a gap closes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .crossings import cross
+from .inward import candidates, pairs
+
+__all__ = ["GAP", "Apart", "Topology", "put_apart"]
+
+Doubles = NDArray[np.float64]
+Words = NDArray[np.int32]
+
+#: Gap, as a share of the smaller triangle's size (root of its area), at which evening out begins.
+GAP = 0.01
+#: Share of it that is enough, in the first rounds and when they were not.
+_ENOUGH, _AT_LAST = 0.5, 0.02
+#: Way of a corner in each round, in overlaps with the gap added.
+_WAY = 2.0
+#: Most rounds, and rounds between two looks at the whole surface.
+_ROUNDS, _STEPS = 60, 12
+
+
+class Topology(NamedTuple):
+    """Triangles (nt, 3), counter-clockwise from outside, and the neighbours of each vertex: those of vertex v are
+    near[first[v] : first[v + 1]].
+    """
+
+    triangles: Words
+    first: Words
+    near: Words
+
+    @classmethod
+    def of(cls, triangles: NDArray[np.integer], vertices: int) -> Topology:
+        """Return the topology of closed triangles on so many vertices."""
+        faces = np.ascontiguousarray(triangles, np.int32)
+        # on a closed surface every neighbour is the next corner of exactly one triangle
+        ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        ends = ends[np.argsort(ends[:, 0], kind="stable")]
+        first = np.concatenate([[0], np.cumsum(np.bincount(ends[:, 0], minlength=vertices))])
+        return cls(faces, first.astype(np.int32), np.ascontiguousarray(ends[:, 1]))
+
+
+class Apart(NamedTuple):
+    """What was done: pairs that crossed or nearly did at first, rounds, and the pairs that still cross."""
+
+    near: int
+    rounds: int
+    crossings: int
+
+
+def put_apart(x: Doubles, topology: Topology, rounds: int = _ROUNDS) -> Apart:
+    """Even out, in place, where the surface of vertices x (nv, 3) crosses itself; with no rounds, only count.
+
+    What is counted are pairs of triangles without a common corner that cross after rounding to single precision.
+    """
+    return Apart(*_put_apart(x, *topology, rounds))
+
+
+@njit(cache=True, error_model="numpy")
+def _put_apart(x: Doubles, faces: Words, first: Words, near: Words, rounds: int) -> tuple[int, int, int]:
+    began, spent = -1, 0
+    size, weight, way = np.empty(len(faces)), np.empty(0), np.empty(0)
+    while True:
+        some = candidates(x, faces, size)
+        if len(some) == 0:
+            return max(began, 0), spent, 0
+        if began < 0:
+            weight, way = np.empty(len(x)), np.empty(len(x))
+        found = pairs(x, faces, some, size)
+        axes = np.zeros(len(found), np.int8)
+        active = _weigh(x, faces, found, axes, size, weight, _ENOUGH if spent < _STEPS else _AT_LAST)
+        began = active if began < 0 else began
+        if active == 0 or spent >= rounds:
+            return began, spent, _count(x, faces, found) if active else 0
+        last = min(spent + _STEPS, rounds)
+        while active > 0 and spent < last:
+            _spread(weight, way, first, near)
+            _step(x, way, first, near)
+            spent += 1
+            active = _weigh(x, faces, found, axes, size, weight, _ENOUGH if spent < _STEPS else _AT_LAST)
+
+
+@njit(cache=True, error_model="numpy")
+def _along(x: Doubles, faces: Words, a: int, b: int, axis: int) -> float:
+    """By how much two triangles overlap along one of the eleven axes that can tell them apart; less than 0: a gap.
+
+    The normals of both, then the products of an edge of each. Infinite where the axis has no length.
+    """
+    if axis < 2:
+        t = a if axis == 0 else b
+        p, q, r = faces[t, 0], faces[t, 1], faces[t, 2]
+        s, u = p, r
+    else:
+        i, j = (axis - 2) // 3, (axis - 2) % 3
+        p, q = faces[a, i], faces[a, (i + 1) % 3]
+        s, u = faces[b, j], faces[b, (j + 1) % 3]
+    ux, uy, uz = x[q, 0] - x[p, 0], x[q, 1] - x[p, 1], x[q, 2] - x[p, 2]
+    vx, vy, vz = x[u, 0] - x[s, 0], x[u, 1] - x[s, 1], x[u, 2] - x[s, 2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    square = nx * nx + ny * ny + nz * nz
+    if square <= 1e-8 * (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz):
+        return math.inf
+    low_a = low_b = math.inf
+    high_a = high_b = -math.inf
+    for k in range(3):
+        v, w = faces[a, k], faces[b, k]
+        y = nx * x[v, 0] + ny * x[v, 1] + nz * x[v, 2]
+        z = nx * x[w, 0] + ny * x[w, 1] + nz * x[w, 2]
+        low_a, high_a, low_b, high_b = min(low_a, y), max(high_a, y), min(low_b, z), max(high_b, z)
+    return min(high_a - low_b, high_b - low_a) / math.sqrt(square)
+
+
+@njit(cache=True, error_model="numpy")
+def _weigh(
+    x: Doubles, faces: Words, pairs: Words, axes: NDArray[np.int8], size: Doubles, weight: Doubles, enough: float
+) -> int:
+    """Fill the way (nv,) that each vertex may go, and return the number of pairs that ask for it; 0 if `enough` of
+    the gap stays everywhere.
+    """
+    weight[:] = 0
+    active, is_enough = 0, True
+    for n in range(len(pairs)):
+        a, b = pairs[n, 0], pairs[n, 1]
+        gap = GAP * min(size[a], size[b])
+        # what told them apart last does so again, mostly
+        overlap = _along(x, faces, a, b, axes[n])
+        if overlap <= -gap:
+            continue
+        for axis in range(11):
+            here = _along(x, faces, a, b, axis)
+            if here < overlap:
+                overlap, axes[n] = here, axis
+                if overlap <= -gap:
+                    break
+        if overlap <= -gap:
+            continue
+        active += 1
+        way = _WAY * (overlap + gap)
+        is_enough = is_enough and overlap <= -enough * gap
+        for k in range(3):
+            weight[faces[a, k]] = max(weight[faces[a, k]], way)
+            weight[faces[b, k]] = max(weight[faces[b, k]], way)
+    return 0 if is_enough else active
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(weight: Doubles, way: Doubles, first: Words, near: Words) -> None:
+    """Give every vertex the longest way among its own and its neighbours'."""
+    way[:] = weight
+    for v in range(len(weight)):
+        if weight[v] > 0:
+            for place in range(first[v], first[v + 1]):
+                way[near[place]] = max(way[near[place]], weight[v])
+
+
+@njit(cache=True, error_model="numpy")
+def _step(x: Doubles, way: Doubles, first: Words, near: Words) -> None:
+    """Move vertices halfway to the mean of their neighbours, but no farther than their way."""
+    count = 0
+    for v in range(len(x)):
+        count += way[v] > 0
+    goal, who, place = np.empty((count, 3)), np.empty(count, np.int32), 0
+    for v in range(len(x)):
+        if way[v] <= 0:
+            continue
+        square = 0.0
+        for k in range(3):
+            total = 0.0
+            for n in range(first[v], first[v + 1]):
+                total += x[near[n], k]
+            goal[place, k] = (total / (first[v + 1] - first[v]) - x[v, k]) / 2
+            square += goal[place, k] ** 2
+        part = min(way[v] / math.sqrt(square), 1.0) if square > 0 else 0.0
+        for k in range(3):
+            goal[place, k] = x[v, k] + part * goal[place, k]
+        who[place] = v
+        place += 1
+    for n in range(count):
+        for k in range(3):
+            x[who[n], k] = goal[n, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _count(x: Doubles, faces: Words, pairs: Words) -> int:
+    """Return how many pairs cross after rounding to single precision."""
+    count = 0
+    p, q = np.empty((3, 3)), np.empty((3, 3))
+    for n in range(len(pairs)):
+        for i in range(3):
+            for k in range(3):
+                p[i, k] = np.float64(np.float32(x[faces[pairs[n, 0], i], k]))
+                q[i, k] = np.float64(np.float32(x[faces[pairs[n, 1], i], k]))
+        count += cross(p, q)
+    return count

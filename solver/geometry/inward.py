@@ -1,0 +1,195 @@
+"""Where a surface may cross itself: which of its triangles lie before or behind one that faces inwards.
+
+A surface around the origin whose triangles all face away from it is seen whole from there: it covers every direction
+once and crosses nowhere. Where it covers a direction more than once, one of those triangles faces the origin, for their
+signs add up to one. So two triangles that cross lie before or behind one that faces inwards: those few are looked for
+first, and where there is none that is all. Surfaces that do not enclose the origin, or enclose it twice, are not meant.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["candidates", "pairs"]
+
+Doubles = NDArray[np.float64]
+Words = NDArray[np.int32]
+
+#: How far around a triangle others are looked for, as a share of its size (root of its area).
+_AROUND = 0.1
+#: Cosine between a triangle's normal and the direction to it below which it counts as facing inwards.
+_STEEP = 0.03
+#: Sides of the cube around the origin reach to this, so that triangles over an edge are whole on one; and their cells.
+_WIDE, _CELLS = 1.3, 96
+
+
+@njit(cache=True, error_model="numpy")
+def _look(x: Doubles, faces: Words, t: int, size: Doubles) -> bool:
+    """Note a triangle's size, and return whether it faces the origin, or hardly away from it."""
+    a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+    ux, uy, uz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+    vx, vy, vz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    volume = nx * x[a, 0] + ny * x[a, 1] + nz * x[a, 2]
+    square = nx * nx + ny * ny + nz * nz
+    size[t] = math.sqrt(math.sqrt(square) / 2)
+    if volume <= 0:
+        return True
+    square *= x[a, 0] ** 2 + x[a, 1] ** 2 + x[a, 2] ** 2
+    is_steep: bool = volume * volume <= _STEEP**2 * square
+    return is_steep
+
+
+@njit(cache=True, error_model="numpy")
+def _project(x: Doubles, faces: Words, t: int, side: int, box: NDArray[np.int64]) -> bool:
+    """Fill `box` (2, 2) with the first and last cell that a triangle covers on a side of the cube around the origin, as
+    seen from there; return False where it is not seen whole.
+    """
+    axis, sign = side // 2, 1 - 2 * (side % 2)
+    low_u = low_v = math.inf
+    high_u = high_v = -math.inf
+    for i in range(3):
+        v = faces[t, i]
+        depth = sign * x[v, axis]
+        if depth <= 1e-9:
+            return False
+        u, w = x[v, (axis + 1) % 3] / depth, x[v, (axis + 2) % 3] / depth
+        low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, w), max(high_v, w)
+    if low_u < -_WIDE or high_u > _WIDE or low_v < -_WIDE or high_v > _WIDE:
+        return False
+    # and the cells around, for what only comes near
+    scale = _CELLS / (2 * _WIDE)
+    box[0, 0] = max(int((low_u + _WIDE) * scale) - 1, 0)
+    box[0, 1] = min(int((high_u + _WIDE) * scale) + 1, _CELLS - 1)
+    box[1, 0] = max(int((low_v + _WIDE) * scale) - 1, 0)
+    box[1, 1] = min(int((high_v + _WIDE) * scale) + 1, _CELLS - 1)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _has_corner(x: Doubles, faces: Words, t: int, side: int) -> bool:
+    """Whether a corner of a triangle is on a side of the cube."""
+    axis, sign = side // 2, 1 - 2 * (side % 2)
+    for i in range(3):
+        v = faces[t, i]
+        depth = sign * x[v, axis]
+        if depth >= abs(x[v, (axis + 1) % 3]) and depth >= abs(x[v, (axis + 2) % 3]):
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def candidates(x: Doubles, faces: Words, size: Doubles) -> Words:
+    """Return the triangles that lie before or behind one that faces inwards; `size` (nt,) is filled."""
+    inward, count = np.empty(len(faces), np.int32), 0
+    for t in range(len(faces)):
+        if _look(x, faces, t, size):
+            inward[count] = t
+            count += 1
+    if count == 0:
+        return inward[:0]
+    marked = np.zeros((6, _CELLS, _CELLS), np.bool_)
+    box = np.empty((2, 2), np.int64)
+    for n in range(count):
+        for side in range(6):
+            if _project(x, faces, inward[n], side, box):
+                for i in range(box[0, 0], box[0, 1] + 1):
+                    for j in range(box[1, 0], box[1, 1] + 1):
+                        marked[side, i, j] = True
+            elif _has_corner(x, faces, inward[n], side):  # too large: all are looked at
+                return np.arange(len(faces)).astype(np.int32)
+    # the cell of each vertex on its own side
+    sides, rows, columns = np.empty(len(x), np.int8), np.empty(len(x), np.int16), np.empty(len(x), np.int16)
+    scale = _CELLS / (2 * _WIDE)
+    for v in range(len(x)):
+        side = 0
+        for k in range(1, 3):
+            if abs(x[v, k]) > abs(x[v, side]):
+                side = k
+        depth = max(abs(x[v, side]), 1e-12)
+        rows[v] = int((x[v, (side + 1) % 3] / depth + _WIDE) * scale)
+        columns[v] = int((x[v, (side + 2) % 3] / depth + _WIDE) * scale)
+        sides[v] = 2 * side + (x[v, side] < 0)
+    some, count = np.empty(len(faces), np.int32), 0
+    for t in range(len(faces)):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        side = sides[a]
+        if sides[b] == side and sides[c] == side:
+            box[0, 0], box[0, 1] = min(rows[a], rows[b], rows[c]), max(rows[a], rows[b], rows[c])
+            box[1, 0], box[1, 1] = min(columns[a], columns[b], columns[c]), max(columns[a], columns[b], columns[c])
+            is_one = False
+        else:
+            is_one = not _project(x, faces, t, side, box)
+        for i in range(box[0, 0], box[0, 1] + 1):
+            for j in range(box[1, 0], box[1, 1] + 1):
+                is_one = is_one or marked[side, i, j]
+        if is_one:
+            some[count] = t
+            count += 1
+    return some[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
+    """Return the pairs (np, 2) among some triangles without a common corner whose boxes touch or nearly do."""
+    count = len(some)
+    box = np.empty((count, 6), np.float32)
+    for n in range(count):
+        t = some[n]
+        more = _AROUND * size[t] + 1e-6
+        for k in range(3):
+            a, b, c = x[faces[t, 0], k], x[faces[t, 1], k], x[faces[t, 2], k]
+            box[n, k], box[n, 3 + k] = min(a, b, c) - more, max(a, b, c) + more
+    # in strips across y, each swept along x
+    first_y, last_y = box[:, 1].min(), box[:, 4].max()
+    strips = min(max(int(math.sqrt(count)) // 4, 1), 64)
+    scale = strips / max(last_y - first_y, 1e-6)
+    order = np.argsort(box[:, 0])
+    found, room = np.empty((1024, 2), np.int32), 0
+    place, sorted_box = np.empty(count, np.int32), np.empty((count, 6), np.float32)
+    for strip in range(strips):
+        low, high = first_y + strip / scale, first_y + (strip + 1) / scale
+        held = 0
+        for m in range(count):
+            n = order[m]
+            if box[n, 1] <= high and box[n, 4] >= low:
+                place[held] = n
+                for k in range(6):
+                    sorted_box[held, k] = box[n, k]
+                held += 1
+        for m in range(held):
+            x1, y0, y1, z0, z1 = (
+                sorted_box[m, 3],
+                sorted_box[m, 1],
+                sorted_box[m, 4],
+                sorted_box[m, 2],
+                sorted_box[m, 5],
+            )
+            for o in range(m + 1, held):
+                if sorted_box[o, 0] > x1:
+                    break
+                if sorted_box[o, 1] > y1 or y0 > sorted_box[o, 4] or sorted_box[o, 2] > z1 or z0 > sorted_box[o, 5]:
+                    continue
+                # a pair belongs to the strip in which both are met first
+                if strip > 0 and max(y0, sorted_box[o, 1]) < low:
+                    continue
+                if _neighbours(faces, some[place[m]], some[place[o]]):
+                    continue
+                if room == len(found):
+                    found = np.concatenate((found, found))
+                found[room, 0], found[room, 1] = some[place[m]], some[place[o]]
+                room += 1
+    return found[:room]
+
+
+@njit(cache=True, error_model="numpy")
+def _neighbours(faces: Words, a: int, b: int) -> bool:
+    for i in range(3):
+        for j in range(3):
+            if faces[a, i] == faces[b, j]:
+                return True
+    return False

@@ -1,0 +1,73 @@
+"""A start shape of the user's own: any triangle mesh that is a surface, closed or open."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from .. import shell
+from ..contract import InvalidGeometry
+from .shapes import Mesh
+
+__all__ = ["OwnMesh"]
+
+#: Least area of a triangle over the square of its longest side.
+_THIN = 1e-6
+
+
+class OwnMesh(BaseModel):
+    """Points and triangles; triangles that share an edge share its two points."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    points: tuple[tuple[float, float, float], ...] = Field(
+        min_length=3, max_length=100_000, description="Vertices [start shape's unit]"
+    )
+    faces: tuple[tuple[int, int, int], ...] = Field(
+        min_length=1, max_length=200_000, description="Triangles, counter-clockwise from outside, vertices from 0"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, values: object) -> object:
+        if isinstance(values, str):
+            raise ValueError("expected points and faces; on the command line, --set mesh=@FILE reads them from a file")
+        return values
+
+    @model_validator(mode="after")
+    def _is_a_surface(self) -> Self:
+        points, faces = np.array(self.points), np.array(self.faces, np.int64)
+        try:
+            top = shell.topology(faces, len(points))
+        except InvalidGeometry as error:
+            raise ValueError(str(error)) from None
+        sides = points[faces] - np.roll(points[faces], 1, axis=1)
+        areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+        thin = int((areas <= _THIN * (sides**2).sum(-1).max(axis=1)).sum())
+        if thin:
+            raise ValueError(f"{thin} triangles have no area to speak of. Collapse their shortest edges.")
+        pinched = _pinched(top)
+        if pinched:
+            raise ValueError(f"{pinched} vertices hold parts together that share no edge there. Split them.")
+        return self
+
+    def shape(self) -> Mesh:
+        """Return it as a start shape, without the points that no triangle has."""
+        used, faces = np.unique(np.array(self.faces, np.int64), return_inverse=True)
+        return Mesh(np.array(self.points)[used], faces.reshape(-1, 3))
+
+
+def _pinched(mesh: shell.Topology) -> int:
+    """Return how many more fans of triangles there are than vertices that have triangles."""
+    faces, corners = mesh.hinge_faces, mesh.hinge_corners
+    # both triangles of a hinge have the edge's ends at the corners after their opposite one, in turn
+    ends = [3 * faces[:, 0] + (corners[:, 0] + k) % 3 for k in (1, 2)]
+    others = [3 * faces[:, 1] + (corners[:, 1] + k) % 3 for k in (2, 1)]
+    count = mesh.triangles.size
+    i, j = np.concatenate(ends), np.concatenate(others)
+    fans, _ = connected_components(coo_array((np.ones(len(i)), (i, j)), shape=(count, count)), directed=False)
+    return int(fans - len(np.unique(mesh.triangles)))

@@ -1,0 +1,152 @@
+"""What lies near each other along the sheet at rest, and how flat the sheet is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ...arrays import Bools, Floats, Ints
+from ..topology import Topology
+
+__all__ = ["Near", "flat", "near_of"]
+
+#: Ways along edges are longer than those across triangles by at most about this.
+_DETOUR = 1.2
+#: Least cosine of a near normal, and of a triangle's normal at its corner, where a sheet cannot meet what is near it.
+_COSINE, _SPREAD = 0.4, 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Vertices near each vertex along the rest state, in CSR, and what each vertex owns.
+
+    start (n + 1,), other, way: near vertices and ways to them. altitudes (n,): least altitude of a rest triangle there.
+    faces, edges: (start, which) of what a vertex is the lowest of. areas (n,). edge_start, edge_end: all edges (e,).
+    """
+
+    start: Ints
+    other: Ints
+    way: Floats
+    altitudes: Floats
+    face_start: Ints
+    edge_start: Ints
+    faces: Ints
+    edges: Ints
+    areas: Floats
+
+
+def near_of(metrics: tuple[Floats, ...], mesh: Topology, lengths: Floats, areas: Floats, distance: float) -> Near:
+    """Return what is near: by metrics (f, 3), the least altitude of which counts, lengths of edges (e,), areas (n,).
+
+    What is not near is at least `distance` away at rest.
+    """
+    n = mesh.vertices
+    limit = _DETOUR * (distance + 2 * float(lengths.max()))
+    ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
+    order = np.argsort(ends[:, 0], kind="stable")
+    indptr = np.searchsorted(ends[order, 0], np.arange(n + 1))
+    start, other, way = _ways(indptr, ends[order, 1], np.concatenate([lengths, lengths])[order], limit)
+    altitudes = np.full(n, np.inf)
+    for g in metrics:
+        squares = np.maximum(np.maximum(g[:, 0], g[:, 2]), g[:, 0] + g[:, 2] - 2 * g[:, 1])
+        heights = np.sqrt((g[:, 0] * g[:, 2] - g[:, 1] ** 2) / squares)
+        for corner in range(3):
+            np.minimum.at(altitudes, mesh.triangles[:, corner], heights)
+    owners = mesh.triangles.min(axis=1)
+    faces = np.argsort(owners, kind="stable")
+    return Near(
+        start,
+        other,
+        way,
+        altitudes,
+        np.searchsorted(owners[faces], np.arange(n + 1)),
+        # edges are sorted by their lower vertex
+        np.searchsorted(mesh.edges[:, 0], np.arange(n + 1)),
+        mesh.triangles[faces],
+        mesh.edges,
+        areas,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _ways(indptr: Ints, indices: Ints, lengths: Floats, limit: float) -> tuple[Ints, Ints, Floats]:
+    """Return the shortest ways along edges up to a limit, from each vertex, in CSR: a queue until nothing gains."""
+    n = len(indptr) - 1
+    start = np.zeros(n + 1, np.int64)
+    room = 64 * n
+    other, way = np.empty(room, np.int64), np.empty(room)
+    found = np.full(n, np.inf)
+    queue, waits, seen = np.empty(n, np.int64), np.zeros(n, np.bool_), np.empty(n, np.int64)
+    count = 0
+    for v in range(n):
+        found[v] = 0.0
+        queue[0] = v
+        first, waiting, known = 0, 1, 1
+        seen[0] = v
+        while waiting:
+            i = queue[first]
+            first = (first + 1) % n
+            waiting -= 1
+            waits[i] = False
+            for e in range(indptr[i], indptr[i + 1]):
+                j, length = indices[e], found[i] + lengths[e]
+                if length < found[j] and length <= limit:
+                    if found[j] == np.inf:
+                        seen[known] = j
+                        known += 1
+                    found[j] = length
+                    if not waits[j]:
+                        waits[j] = True
+                        queue[(first + waiting) % n] = j
+                        waiting += 1
+        if count + known > room:
+            room = 2 * room + known
+            more, further = np.empty(room, np.int64), np.empty(room)
+            more[:count], further[:count] = other[:count], way[:count]
+            other, way = more, further
+        for k in range(known):
+            j = seen[k]
+            if j != v:
+                other[count], way[count] = j, found[j]
+                count += 1
+            found[j] = np.inf
+        start[v + 1] = count
+    return start, other[:count].copy(), way[:count].copy()
+
+
+@njit(cache=True, error_model="numpy")
+def flat(x: Floats, triangles: Ints, start: Ints, other: Ints) -> Bools:
+    """Return about which vertices (n,) the sheet is flat enough not to meet itself within what is near."""
+    n = len(start) - 1
+    normals, units = np.zeros((n, 3)), np.empty((len(triangles), 3))
+    for t in range(len(triangles)):
+        i, j, k = triangles[t]
+        a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        c0, c1, c2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+        size = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2) + 1e-300
+        units[t, 0], units[t, 1], units[t, 2] = c0 / size, c1 / size, c2 / size
+        for v in (i, j, k):
+            normals[v, 0] += c0
+            normals[v, 1] += c1
+            normals[v, 2] += c2
+    for v in range(n):
+        normals[v] /= np.sqrt(normals[v, 0] ** 2 + normals[v, 1] ** 2 + normals[v, 2] ** 2) + 1e-300
+    even = np.ones(n, np.bool_)
+    for t in range(len(triangles)):
+        for v in triangles[t]:
+            if units[t, 0] * normals[v, 0] + units[t, 1] * normals[v, 1] + units[t, 2] * normals[v, 2] < _SPREAD:
+                even[v] = False
+    found = even.copy()
+    for v in range(n):
+        if not found[v]:
+            continue
+        for at in range(start[v], start[v + 1]):
+            w = other[at]
+            dot = normals[v, 0] * normals[w, 0] + normals[v, 1] * normals[w, 1] + normals[v, 2] * normals[w, 2]
+            if dot < _COSINE or not even[w]:
+                found[v] = False
+                break
+    return found

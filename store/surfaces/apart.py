@@ -1,0 +1,79 @@
+"""A looked-up surface out of contact with itself: between samples that fold, a blend of them folds into itself.
+
+What crosses on the lattice that is handed over is evened out there (`solver.geometry.apart`), without a jump as a
+parameter moves. A fine lattice first takes over what that did on the one of `COARSE` colatitudes: rounds of evening out
+reach from point to point, and points of a fine lattice lie close.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.arrays import Array
+from solver.geometry.apart import Topology, put_apart
+from solver.lattice import closed_lattice
+
+__all__ = ["COARSE", "Evened", "even_out"]
+
+#: Lattice on which most of the evening out is done: what tables are asked for mostly.
+COARSE = 64
+
+
+class Evened(NamedTuple):
+    """How points (n, 2n, 3) and the two poles (2, 3) have to move, None where none has, and the pairs of triangles that
+    cross afterwards; `near` of them crossed before, or nearly did.
+    """
+
+    points: Array | None
+    poles: Array | None
+    crossings: int
+    near: int
+
+
+def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = False) -> Evened:
+    """Return how the surface `whole(n)`, points and poles of the lattice of n colatitudes, comes out of contact.
+
+    `keep` moves nothing: then crossings are only counted.
+    """
+    points, poles = whole(n)
+    given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
+    topology, moved = _topology(n), given.copy()
+    # of a fine lattice only whether it has to be, at first
+    found = put_apart(moved, topology, 0) if keep or n > COARSE else put_apart(moved, topology)
+    near = found.near
+    if keep or not near:
+        return Evened(None, None, found.crossings, near)
+    if n > COARSE:
+        coarse = even_out(whole, COARSE)
+        if coarse.points is not None and coarse.poles is not None:
+            moved[:-2] += _refine(coarse.points, coarse.poles, n).reshape(-1, 3)
+            moved[-2:] += coarse.poles
+        found = put_apart(moved, topology)
+    shift = moved - given
+    return Evened(shift[:-2].reshape(n, 2 * n, 3), shift[-2:], found.crossings, near)
+
+
+@lru_cache(maxsize=8)
+def _topology(n: int) -> Topology:
+    return Topology.of(closed_lattice(n), 2 * n * n + 2)
+
+
+def _refine(coarse: Array, poles: Array, n: int) -> Array:
+    """Return a field (m, 2m, 3) with its values (2, 3) at the poles on the finer lattice of n, linear in between."""
+    m = len(coarse)
+    ends = [np.broadcast_to(pole, (1, 2 * m, 3)) for pole in poles]
+    lines = np.concatenate([ends[0], coarse, ends[1]])
+    places = np.concatenate([[0.0], (np.arange(m) + 0.5) / m, [1.0]])
+    row = np.interp((np.arange(n) + 0.5) / n, places, np.arange(m + 2.0))
+    upper = np.minimum(row.astype(int), m)
+    part = (row - upper)[:, None, None]
+    down = lines[upper] * (1 - part) + lines[upper + 1] * part
+    column = np.arange(2 * n) * (m / n)
+    left = column.astype(int)
+    part = (column - left)[:, None]
+    found: Array = down[:, left % (2 * m)] * (1 - part) + down[:, (left + 1) % (2 * m)] * part
+    return found

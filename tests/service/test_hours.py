@@ -1,0 +1,64 @@
+"""Hours over HTTP: the solver's own stages, and a shape that is the one of its stage."""
+
+from __future__ import annotations
+
+import httpx
+import pytest
+
+from solver.dehydration import SOLVER
+
+from ._asking import checked
+from .conftest import SHAPE
+
+POINT = {"te": 0.03, "gamma": 7.0, "resolution": 16, "format": "points"}
+
+
+def test_hours_become_stages(client: httpx.Client) -> None:
+    said = client.get("/v1/solvers/dehydration/stages", params={"hours": "24,48", "preset": "raisin"}).json()
+    assert said["stages"] == list(SOLVER.stages_after([24, 48], {}, "raisin"))
+    assert (said["hours"], said["symbol"]) == ([24, 48], "s")
+    assert said["conditions"]["temperature"]["units"] == "degC"
+    under = "temperature:60,air_speed:1,diameter:22"
+    hot = client.get(
+        "/v1/solvers/dehydration/stages", params={"hours": "8", "under": under, "preset": "jujube1"}
+    ).json()
+    conditions = {"temperature": 60, "air_speed": 1, "diameter": 22}
+    assert hot["stages"] == list(SOLVER.stages_after([8], conditions, "jujube1"))
+
+
+@pytest.mark.parametrize(
+    ("solver", "query", "status", "code"),
+    [
+        ("dehydration", {"hours": "30", "preset": "raisin", "under": "temperature:60"}, 422, "invalid-input"),
+        ("dehydration", {"hours": "30"}, 422, "invalid-input"),
+        ("growth", {"hours": "30"}, 422, "invalid-input"),
+        ("dehydration", {"hours": "soon"}, 422, "invalid-query"),
+        ("nothing", {"hours": "30"}, 404, "unknown-solver"),
+    ],
+)
+def test_what_has_no_stage_is_refused(
+    client: httpx.Client, solver: str, query: dict[str, str], status: int, code: str
+) -> None:
+    checked(client.get(f"/v1/solvers/{solver}/stages", params=query), status, code)
+
+
+def test_a_shape_after_hours_is_the_shape_of_its_stage(client: httpx.Client) -> None:
+    (stage,) = SOLVER.stages_after([48], {"kinetics": "grape"})
+    after = client.get(SHAPE, params={**POINT, "hours": 48, "under": "kinetics:grape"})
+    assert after.status_code == 200, after.text
+    assert after.content == client.get(SHAPE, params={**POINT, "s": repr(stage)}).content
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        {"hours": 48},
+        {"hours": 48, "under": "kinetics:grape", "s": 0.2},
+        {"hours": "soon", "under": "kinetics:grape"},
+        {"under": "kinetics:grape"},
+        {"hours": 48, "under": "kinetics:grape,temperature:60"},
+    ],
+)
+def test_a_shape_after_hours_that_nobody_measured_is_refused(client: httpx.Client, query: dict[str, object]) -> None:
+    problem = checked(client.get(SHAPE, params={**POINT, **query}), 422, "invalid-query")
+    assert {wrong["name"] for wrong in problem["errors"]} <= {"hours", "under"}

@@ -1,0 +1,143 @@
+"""Flesh in meshes of one's own: tetrahedra that are whole, near the surface, and move as a fruit's do."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from solver.contract import InvalidGeometry, Need
+from solver.decay import SOLVER, DecayParams
+from solver.decay.body import embedded
+from solver.decay.body.solid import volumes
+from solver.decay.body.stuffing import boundary, pieces, stuffed
+from solver.decay.surfaces.surface import lay
+from solver.geometry.inside import inside
+from solver.geometry.nearest import nearest
+
+BODY = ("mesh_position", "triangle", "volume", "density", "mass", "water_lost", "least_jacobian")
+STILL = {"rot_collapse": 0.0, "rot_softness": 0.0, "rot_respired": 0.0}
+
+
+def given(mesh: trimesh.Trimesh) -> dict:
+    return {"points": np.asarray(mesh.vertices).tolist(), "faces": np.asarray(mesh.faces).tolist()}
+
+
+def torus(around: int = 48, across: int = 24) -> trimesh.Trimesh:
+    """A ring of tube 0.4 that lies on the floor."""
+    found = trimesh.creation.torus(1, 0.4, major_sections=around, minor_sections=across)
+    found.vertices = found.vertices[:, [0, 2, 1]] * [1, 1, -1]
+    return found
+
+
+def bent() -> trimesh.Trimesh:
+    """A banana: a tapering tube along an arc, closed at both ends."""
+    found = trimesh.creation.icosphere(subdivisions=4)
+    x, y, z = np.asarray(found.vertices).T
+    along, thick = 1.2 * x, 0.45 * (0.35 + 0.65 * np.sqrt(np.maximum(1 - x**4, 0)))
+    found.vertices = np.stack(
+        [(1.5 + thick * y) * np.sin(along), (1.5 + thick * y) * -np.cos(along), -thick * z], axis=1
+    )
+    return found
+
+
+def run(mesh: trimesh.Trimesh, stages=(0.0, 10.0), fields=BODY, **values):
+    params = SOLVER.parse({"mesh": given(mesh), "body": "quasi-static", **values}, preset="apple")
+    return SOLVER.solve(params, Need(fields=fields, stages=stages, quality="preview"))
+
+
+@pytest.mark.parametrize(("mesh", "euler"), [(torus(96, 48), 0), (bent(), 2), (trimesh.creation.box(), 2)])
+def test_flesh_is_whole_and_of_second_order(mesh: trimesh.Trimesh, euler: int) -> None:
+    points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
+    errors, size = [], float(mesh.volume ** (1 / 3))
+    for edge in (0.16, 0.08):
+        found = stuffed(points, faces, edge * size)
+        own = volumes(found.points, found.tets)
+        outside = trimesh.Trimesh(found.points, boundary(found.tets), process=False)
+        assert own.min() > 0.02 * own.mean()  # no sliver
+        assert outside.is_watertight
+        assert outside.is_winding_consistent
+        assert outside.euler_number == euler
+        assert outside.volume == pytest.approx(own.sum())
+        assert pieces(found.tets, len(found.points))[0] == 1
+        errors.append(abs(own.sum() / mesh.volume - 1))
+    assert errors[1] < 0.012
+    assert errors[0] / errors[1] > 2.5
+
+
+def test_what_is_inside_does_not_hang_on_winding_or_overlaps() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    points, faces = np.asarray(ball.vertices, float), np.asarray(ball.faces, np.int64)
+    nodes = np.stack(np.meshgrid(*[np.linspace(-1.6, 1.6, 17)] * 3, indexing="ij"), axis=-1)
+    far = np.linalg.norm(nodes, axis=-1)
+    low, step = np.full(3, -1.6), 0.2
+    for wound in (faces, faces[:, ::-1]):
+        found = inside(low, step, (17, 17, 17), points, np.ascontiguousarray(wound))
+        assert found[far < 0.97].all()
+        assert not found[far > 1.001].any()
+    two = np.concatenate([points, points + np.array([0.5, 0, 0])])
+    found = inside(low, step, (17, 17, 17), two, np.concatenate([faces, faces + len(points)]))
+    assert found[(far < 0.97) | (np.linalg.norm(nodes - [0.5, 0, 0], axis=-1) < 0.97)].all()
+
+
+def test_nearest_is_what_trying_all_triangles_finds() -> None:
+    rng = np.random.default_rng(2)
+    mesh = torus(20, 10)
+    vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
+    points = rng.uniform(-1.5, 1.5, (40, 3))
+    found = nearest(points, vertices, faces)
+    for point, face, shares, far in zip(points, *found, strict=True):
+        places = trimesh.triangles.closest_point(vertices[faces], np.repeat(point[None], len(faces), axis=0))
+        assert far == pytest.approx(np.linalg.norm(places - point, axis=1).min(), abs=1e-12)
+        assert np.linalg.norm(shares @ vertices[faces[face]] - point) == pytest.approx(far, abs=1e-12)
+
+
+def test_a_floating_ring_shrinks_evenly_and_keeps_its_water_books() -> None:
+    found = run(torus(32, 16), flesh={**STILL, "gravity": 0.0}, wounds=[])
+    fresh, dry = found.mesh_position.values.astype(float)
+    share = float(found.water_lost[1])
+    assert share > 0.01
+    assert float(found.mass[1]) == pytest.approx(1 - share, abs=1e-9)
+    scale = (1 - share) ** (1 / 3)
+    middle = fresh.mean(axis=0)
+    assert np.abs(dry - dry.mean(axis=0) - scale * (fresh - middle)).max() < 1e-5
+    assert float(found.density[1]) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_the_fruit_s_own_mesh_settles_as_the_fruit_does() -> None:
+    fresh = lay(DecayParams.model_validate({"stone": (0, 0)}), 24)
+    soft = {"stone": (0, 0), "firmness": 4.0, "wounds": [], "humidity": 20.0}
+    own = run(trimesh.Trimesh(fresh.points, fresh.faces, process=False), (15.0,), **soft)
+    params = SOLVER.parse({"body": "quasi-static", "radii": (1.0,) * 8, **soft}, preset="apple")
+    fruit = SOLVER.solve(params, Need(fields=BODY, stages=(15.0,), quality="preview"))
+    for name in ("volume", "mass", "water_lost", "density"):
+        assert float(own[name][0]) == pytest.approx(float(fruit[name][0]), rel=0.01), name
+    heights = [np.ptp(x.mesh_position[0].values[:, 1]) for x in (own, fruit)]
+    assert heights[0] == pytest.approx(heights[1], rel=0.02)
+
+
+def test_a_rotten_banana_rests_on_its_floor() -> None:
+    mesh = bent()
+    found = run(mesh, (0.0, 12.0), wounds=[{"vertex": 5}])
+    fresh, rotten = found.mesh_position.values
+    assert np.abs(fresh - mesh.vertices).max() < 0.02  # its ends sag: as a beam of that length and thickness 0.005
+    assert rotten[:, 1].min() > float(np.asarray(mesh.vertices)[:, 1].min()) - 1e-3
+    assert np.abs(rotten - fresh).max() > 0.05
+    assert float(found.least_jacobian.min()) > 0
+    assert 0.8 < float(found.density[1]) < 1.15
+    assert np.array_equal(found.triangle.values, mesh.faces)
+
+
+def test_what_cannot_hold_flesh_says_so_and_where(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(embedded, "_MOST", 10_000)
+    sheet = trimesh.creation.box((1.0, 1.0, 1.0))
+    sheet.update_faces(np.arange(len(sheet.faces)) > 1)
+    with pytest.raises(InvalidGeometry, match="open"):
+        run(sheet)
+    far = trimesh.creation.icosphere(subdivisions=2)
+    other = far.copy()
+    other.apply_scale(0.2).apply_translation([3.0, 0, 0])
+    with pytest.raises(InvalidGeometry, match=r"about \((2.9|3).*does not hang together"):
+        run(trimesh.util.concatenate([far, other]))
+    needle = trimesh.creation.icosphere(subdivisions=2)
+    needle.vertices = np.where(needle.vertices[:, :1] > 0.999, [[3.0, 0, 0]], needle.vertices)
+    with pytest.raises(InvalidGeometry, match=r"(too thin at|about) \((2|3)"):
+        run(needle)

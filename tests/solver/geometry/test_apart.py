@@ -1,0 +1,74 @@
+"""A surface is put out of contact where it crosses, nowhere else, and without a jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.arrays import Floats
+from solver.geometry.apart import Topology, put_apart
+from solver.geometry.crossings import crossings
+from solver.lattice import closed_lattice, directions, lattice
+
+N = 24
+
+
+@pytest.fixture(scope="module")
+def topology() -> Topology:
+    return Topology.of(closed_lattice(N), 2 * N * N + 2)
+
+
+def sphere(fold: float) -> Floats:
+    """Return the points and poles (2 n^2 + 2, 3) of a sphere whose azimuths run back and forth by `fold`."""
+    theta, phi = lattice(N)
+    bulge = np.sin(theta) ** 4
+    points = directions(theta, phi + fold * bulge * np.sin(6 * phi)) * (1 + 0.08 * bulge * np.cos(6 * phi))[..., None]
+    return np.concatenate([points.reshape(-1, 3), [[0, 1, 0], [0, -1, 0]]])
+
+
+def test_every_vertex_has_all_its_neighbours(topology: Topology) -> None:
+    counts = np.diff(topology.first)
+    assert (counts[2 * N : -2 - 2 * N] == 6).all()
+    assert counts[-2:].tolist() == [2 * N, 2 * N]
+
+
+@pytest.mark.parametrize("fold", [0.15, 0.2, 0.3, 0.5])
+def test_what_crosses_is_counted_as_by_all_pairs_and_put_apart(topology: Topology, fold: float) -> None:
+    x = sphere(fold)
+    before = crossings(x.astype(np.float32), closed_lattice(N)).count
+    counted = x.copy()
+    assert put_apart(counted, topology, 0).crossings == before
+    assert np.array_equal(counted, x)
+    found = put_apart(x, topology)
+    assert found.crossings == 0
+    assert crossings(x.astype(np.float32), closed_lattice(N)).count == 0
+    assert (before > 0) == (fold > 0.18)
+
+
+def test_a_surface_that_folds_freely_stays_as_it_is(topology: Topology) -> None:
+    for fold in (0.0, 0.1):
+        x = sphere(fold)
+        kept = x.copy()
+        assert put_apart(x, topology).near == 0
+        assert np.array_equal(x, kept)
+
+
+def test_only_what_crosses_moves(topology: Topology) -> None:
+    x = sphere(0.4)
+    given = x.copy()
+    put_apart(x, topology)
+    moved = np.linalg.norm(x - given, axis=1)[:-2].reshape(N, 2 * N)
+    assert moved.max() > 0
+    # folds stand at every sixth of the way around; poles do not fold
+    assert moved[:3].max() == moved[-3:].max() == 0
+
+
+def test_no_jump_where_contact_begins(topology: Topology) -> None:
+    """Evening out grows from nothing: the surface moves no farther than three times what it was made from."""
+    given = np.array([sphere(fold) for fold in np.linspace(0.15, 0.24, 37)])
+    after = given.copy()
+    for x in after:
+        put_apart(x, topology)
+    before, steps = (np.linalg.norm(np.diff(found, axis=0), axis=2).max(axis=1) for found in (given, after))
+    assert np.abs(after - given).max() > 0.01
+    assert steps.max() < 3 * before.max()

@@ -1,0 +1,55 @@
+"""Shapes between samples, as they are handed over: out of contact, the same in parts, and stored ones untouched."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import registry
+from solver.geometry.crossings import crossings
+from solver.lattice import closed_lattice
+from store.lookup import ShapeTable
+from store.starter import ROOT
+from store.surfaces.window import Window
+
+#: Questions to the table in the package whose blends cross themselves.
+ASKED = ({"te": 0.0375, "gamma": 13.0}, {"te": 0.0325, "gamma": 13.0})
+
+
+@pytest.fixture(scope="module")
+def table() -> ShapeTable:
+    return ShapeTable.open(ROOT, surfaces=registry.surface)
+
+
+@pytest.mark.parametrize("n", [32, 64, 96])
+@pytest.mark.parametrize("point", ASKED)
+def test_no_shape_between_samples_crosses_itself(table: ShapeTable, point: dict[str, float], n: int) -> None:
+    shape = table.at(point, 0.295, resolution=n, fields=("position", "displacement"))
+    assert shape.position is not None
+    assert shape.poles is not None
+    assert shape.displacement is not None
+    counted = crossings(np.concatenate([shape.position.reshape(-1, 3), shape.poles]), closed_lattice(n)).count
+    assert counted == shape.crossings == 0
+    fresh = table.at(point, 0.0, resolution=n).position
+    assert np.abs(shape.position - fresh - shape.displacement).max() < 1e-6
+    if n == 64:
+        blend = table.at(point, 0.295, resolution=n, fields=("displacement",)).displacement
+        assert 0 < np.abs(shape.displacement - blend).max() < 0.1
+
+
+def test_a_part_is_that_of_the_whole_out_of_contact(table: ShapeTable) -> None:
+    part = Window((1.0, 2.0), (0.5, 4.0), (0, 2))
+    whole = table.at(ASKED[0], 0.295, resolution=64).position
+    found = table.at(ASKED[0], 0.295, resolution=64, window=part).position
+    patch = part.on(64)
+    assert whole is not None
+    assert found is not None
+    assert np.abs(found - whole[patch.rows][:, patch.columns][..., [0, 2]]).max() < 2e-6
+
+
+def test_a_stored_result_stays_as_it_is(table: ShapeTable) -> None:
+    stored = table.at({"te": 0.04, "gamma": 17.0}, 0.3, resolution=64, fields=("position", "displacement"))
+    blend = table.at({"te": 0.04, "gamma": 17.0}, 0.3, resolution=64, fields=("displacement",))
+    assert stored.exact
+    assert stored.crossings == 0
+    assert np.array_equal(stored.displacement, blend.displacement)
