@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -70,13 +70,9 @@ class Body(_Part):
         return self
 
 
-Box = TypeVar("Box", "Cut", "Grip")
-
-
-def _ordered(box: Box) -> Box:
+def _ordered(box: Cut | Grip) -> None:
     if any(a > b for a, b in zip(box.low, box.high, strict=True)):
         raise ValueError("the corner `low` must not be above `high` in any direction")
-    return box
 
 
 class Cut(_Part):
@@ -87,7 +83,8 @@ class Cut(_Part):
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        return _ordered(self)
+        _ordered(self)
+        return self
 
 
 class GripPoint(_Part):
@@ -115,4 +112,5 @@ class Grip(_Part):
     def _sound(self) -> Self:
         if any(a.time >= b.time for a, b in pairwise(self.path)):
             raise ValueError("the times of the path must rise: sort them, and give each once")
-        return _ordered(self)
+        _ordered(self)
+        return self

@@ -26,7 +26,7 @@ def widths(points: np.ndarray, pairs: np.ndarray, outline: np.ndarray) -> np.nda
     if not len(pairs):
         return np.zeros(0)
     first, second = points[pairs[:, 0]], points[pairs[:, 1]]
-    found = np.pi / 2 * area(outline) / (len(pairs) * np.linalg.norm(second - first, axis=1))
+    found: np.ndarray = np.pi / 2 * area(outline) / (len(pairs) * np.linalg.norm(second - first, axis=1))
     # the same lines for all, or the last digits would hang on a generator
     angle = np.pi * (np.arange(_WAYS) + 0.5) / _WAYS
     count = int(np.ceil(_LINES * np.sqrt(len(points))))

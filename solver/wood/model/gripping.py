@@ -33,8 +33,7 @@ class Course(NamedTuple):
 
 def within(points: np.ndarray, box: Grip | Cut) -> np.ndarray:
     """Return whether points (..., 3) are in a box."""
-    found: np.ndarray = ((points >= np.array(box.low)) & (points <= np.array(box.high))).all(-1)
-    return found
+    return np.asarray(((points >= np.array(box.low)) & (points <= np.array(box.high))).all(-1))
 
 
 def courses(params: WoodParams, straight: np.ndarray, x: np.ndarray, free: np.ndarray) -> tuple[Course, ...]:

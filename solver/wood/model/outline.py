@@ -38,13 +38,15 @@ def corners(params: WoodParams) -> np.ndarray:
     if not params.outline:
         turn = 2 * np.pi * np.arange(_DISK) / _DISK
         reach = params.radius * np.sqrt(2 * np.pi / (_DISK * np.sin(2 * np.pi / _DISK)))
-        return reach * np.column_stack([np.cos(turn), np.sin(turn)])
+        disk: np.ndarray = reach * np.column_stack([np.cos(turn), np.sin(turn)])
+        return disk
     found = np.array(params.outline, float)
     if area(found) < 0:
         found = found[::-1].copy()
     following = np.roll(found, -1, 0)
     cross = found[:, 0] * following[:, 1] - found[:, 1] * following[:, 0]
-    return found - ((found + following) * cross[:, None]).sum(0) / (3 * cross.sum())
+    centred: np.ndarray = found - ((found + following) * cross[:, None]).sum(0) / (3 * cross.sum())
+    return centred
 
 
 def inside(outline: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -106,6 +108,6 @@ def _even(outline: np.ndarray, rods: int, generator: np.random.Generator) -> Sta
     size = np.bincount(owner, minlength=rods)
     if size.min() == 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a larger outline.")
-    least = float(cKDTree(points).query(points, 2)[0][:, 1].min()) if rods > 1 else float(wide.min())
+    least = float(np.asarray(cKDTree(points).query(points, 2)[0])[:, 1].min()) if rods > 1 else float(wide.min())
     own = size * (area(outline) / len(fine))
     return Standing(points - own @ points / own.sum(), own, least)

@@ -64,7 +64,7 @@ def sheared(wood: Wood) -> float:
 
 @pytest.mark.parametrize("place", [0.0, 0.5])
 def test_a_break_of_bent_rods_shears_no_bond(place):
-    """By the slopes of what is left, bonds of a strongly bent bundle would hold several times as much."""
+    """The slopes of what is left are others, and all that bonds hold in shear is kept."""
     wood = laid()
     x = wood.motion.x
     s = x[:, 0] - x[:, 0].min()
@@ -75,9 +75,8 @@ def test_a_break_of_bent_rods_shears_no_bond(place):
     found = break_worst(wood, ratio, where, np.inf)
     assert (found.rods, found.bonds) == (2, 0)
     assert sheared(found.wood) == pytest.approx(before, rel=1e-9)
-    # as bonds were laid, it would be otherwise
-    found.wood.bonds.cosine[: len(cosine)] = cosine
-    assert abs(sheared(found.wood) / before - 1) > 0.01
+    # as bonds were laid, those beside the breaks would be sheared by this
+    assert np.abs(found.wood.bonds.cosine[: len(cosine)] - cosine).max() > 0.05
 
 
 def bent(circle: float, stretch: float = 0.0, **values) -> tuple[Wood, np.ndarray, np.ndarray]:
