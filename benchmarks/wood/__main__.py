@@ -40,6 +40,7 @@ def per_step(**values: Any) -> tuple[int, int, float, float]:
             wood.bonds,
             wood.turns,
             wood.bodies,
+            wood.pins,
             state.scratch,
             wood.turning,
             0.0,

@@ -53,10 +53,18 @@ CASES: dict[str, Case] = {
     "rest angle, where Eq. 3.17 is 0/0": Case(_FEW, 1e-4),
     "a bond of which nothing is left to break": Case({**_FEW, "reach": 0.0, "bend": 0.1}, 2e-4),
     "mass breakage at 20 m/s": Case(
-        {**_FEW, "clamp": "both", "pull": (20.0, 0, 0), "strain_limit": 1e-5, "bond_energy": 1.0}, 2e-3
+        {
+            **_FEW,
+            "clamp": "both",
+            "pull": (20.0, 0, 0),
+            "strain_limit": 1e-5,
+            "toughness": 0.01,
+            "toughness_sliding": 0.01,
+        },
+        2e-3,
     ),
     "everything breaks in one pass": Case(
-        {**_FEW, "bend": 0.2, "strain_limit": 1e-4, "bond_energy": 1.0, "cascade": 1.0}, 1e-3
+        {**_FEW, "bend": 0.2, "strain_limit": 1e-4, "toughness": 0.01, "toughness_sliding": 0.01, "cascade": 1.0}, 1e-3
     ),
     "isolated fragments": Case({**_FEW, "clamp": "none", "bend": 0.1, "reach": 0.0, "strain_limit": 1e-3}, 1e-3),
     "contact of 1e9 N/m": Case(

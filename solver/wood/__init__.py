@@ -36,12 +36,17 @@ _NUMBERS = (
     "broken_rods",
     "broken_bonds",
     "impulse",
+    "body_impulse",
+    "grip_impulse",
+    "grip_moment",
+    "fracture_energy",
+    "crack_area",
     "tip_position",
 )
 
 SOLVER = Solver(
     name="wood",
-    version="4",
+    version="5",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),

@@ -1,4 +1,4 @@
-"""Where rods and bonds break, and what a break does to the arrays.
+"""Where rods break, and what a break does to the arrays; bonds give way in `cohesion`.
 
 By `vertex` a rod breaks where mean edge ratio x bending ratio (Sutherland 2012, Eq. 3.24; h is the diameter) exceeds
 1 + the strain limit. By `stress` it breaks anywhere: axial strain is even between the middles of edges, curvature
@@ -17,10 +17,13 @@ from numba import njit
 
 from .model.arrays import Bonds, Rods
 from .model.bundle import SAMPLES
+from .model.joining import sloped
 from .model.motion import Motion
+from .model.sawing import crossed
 from .model.state import Wood
+from .params import WoodParams
 
-__all__ = ["Breaks", "break_worst", "overstress"]
+__all__ = ["Breaks", "break_worst", "overstress", "sawed"]
 
 #: A break closer to a vertex than this, over the edge, is one at the vertex.
 _NEAR = 0.25
@@ -31,7 +34,7 @@ class Breaks(NamedTuple):
 
     wood: Wood
     rods: int
-    bonds: int
+    bonds: int  # left without a rod
 
 
 @njit(cache=True, error_model="numpy")
@@ -149,10 +152,10 @@ def _split(wood: Wood, h: int) -> Wood:
     }
     grown["mass"][i] *= 1 - part
     grown["load"][i] *= 1 - part
-    mine = np.flatnonzero((bonds.i == i) & (bonds.on == 1))
+    mine = np.flatnonzero((bonds.i == i) & (bonds.on > 0))
     more = {name: getattr(bonds, name)[mine] for name in Bonds._fields}
     more["i"] = np.full(len(mine), new, np.int32)
-    for name in ("k", "s", "limit"):
+    for name in ("k", "s", "opens", "slides", "torn", "shorn", "area"):
         more[name] = more[name] * part
         getattr(bonds, name)[mine] *= 1 - part
     return replace(
@@ -163,6 +166,13 @@ def _split(wood: Wood, h: int) -> Wood:
     )
 
 
+def _left(bonds: Bonds, mine: np.ndarray) -> int:
+    """Drop bonds that are left without a rod; return how many of them were whole."""
+    whole = int((bonds.on[mine] == 1).sum())
+    bonds.on[mine] = 0
+    return whole
+
+
 def _sever(wood: Wood, e: int, place: float) -> int:
     """Cut edge e at `place`; its bonds go to the neighbours that carry the stubs. Return how many bonds had none."""
     rods, bonds = wood.rods, wood.bonds
@@ -170,7 +180,7 @@ def _sever(wood: Wood, e: int, place: float) -> int:
         np.flatnonzero((rods.after == e) & (rods.whole == 1)),
         np.flatnonzero((rods.before == e) & (rods.whole == 1)),
     )
-    mine = np.flatnonzero((bonds.j == e) & (bonds.on == 1))
+    mine = np.flatnonzero((bonds.j == e) & (bonds.on > 0))
     first = bonds.share[mine] < place
     dropped = 0
     if len(ends[0]):
@@ -178,15 +188,13 @@ def _sever(wood: Wood, e: int, place: float) -> int:
         bonds.j[mine[first]] = p
         bonds.share[mine[first]] = 1 + bonds.share[mine[first]] * rods.rest[e] / rods.rest[p]
     else:
-        bonds.on[mine[first]] = 0
-        dropped += int(first.sum())
+        dropped += _left(bonds, mine[first])
     if len(ends[1]):
         q = rods.after[ends[1][0]]
         bonds.j[mine[~first]] = q
         bonds.share[mine[~first]] = (bonds.share[mine[~first]] - 1) * rods.rest[e] / rods.rest[q]
     else:
-        bonds.on[mine[~first]] = 0
-        dropped += int((~first).sum())
+        dropped += _left(bonds, mine[~first])
     rods.alive[e] = 0
     for found in ends:
         rods.whole[found] = 0
@@ -194,33 +202,22 @@ def _sever(wood: Wood, e: int, place: float) -> int:
     return dropped
 
 
-def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, each: np.ndarray, allowed: float) -> Breaks:
-    """Break what is most overstressed, until it has released `allowed` [J]; the worst breaks in any case.
+def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float) -> Breaks:
+    """Break what rods are most overstressed, until they have released `allowed` [J]; the worst breaks in any case.
 
-    ratio (e,) and place (e,) as from `overstress`, each (b,) energies of the bonds [J].
+    ratio (e,) and place (e,) as from `overstress`. Beside a break a rod's slope is one-sided: by this alone a bond
+    would be sheared, at a strong bend by many times what it bears. What bonds hold in shear stays what it was.
     """
-    over = np.where(wood.bonds.on == 1, each / wood.bonds.limit, 0.0)
-    edges, bonds = np.flatnonzero(ratio > 1), np.flatnonzero(over > 1)
-    what = np.concatenate([ratio[edges], over[bonds]])
-    order = np.argsort(-what, kind="stable")
+    wood.bonds.cosine[:] -= sloped(wood.motion.x, wood.rods, wood.bonds)
+    edges = np.flatnonzero(ratio > 1)
     rods = wood.rods
     spent, broken, gone = 0.0, 0, 0
-    for n in order:
-        if n >= len(edges):
-            b = int(bonds[n - len(edges)])
-            cost = float(each[b])
-        else:
-            e = int(edges[n])
-            strain = float(wood.strength[e, round(float(place[e]) * (len(SAMPLES) - 1))]) * float(ratio[e])
-            cost = 0.5 * float(rods.k[e] * rods.rest[e]) * strain**2
+    for e in map(int, edges[np.argsort(-ratio[edges], kind="stable")]):
+        strain = float(wood.strength[e, round(float(place[e]) * (len(SAMPLES) - 1))]) * float(ratio[e])
+        cost = 0.5 * float(rods.k[e] * rods.rest[e]) * strain**2
         if spent > 0 and spent + cost > allowed:
             break
         spent += cost
-        if n >= len(edges):
-            if wood.bonds.on[b]:
-                wood.bonds.on[b] = 0
-                gone += 1
-            continue
         if not rods.alive[e]:
             continue
         hinge = _hinge_near(rods, e, float(place[e]))
@@ -235,6 +232,7 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, each: np.ndarr
             # the vertex beyond is already split or a clamp's: cut as close to it as a stub allows
             gone += _sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
             broken += 1
+    wood.bonds.cosine[:] += sloped(wood.motion.x, rods, wood.bonds)
     return Breaks(wood, broken, gone)
 
 
@@ -247,3 +245,9 @@ def _hinge_near(rods: Rods, e: int, place: float) -> int:
     if not len(found) or rods.k[other[found[0]]] == 0:
         return -1
     return int(found[0])
+
+
+def sawed(wood: Wood, params: WoodParams) -> Wood:
+    """Return a bundle as laid with the rods parted that saw cuts pass."""
+    hit, place = crossed(params, wood.straight, wood.rods)
+    return break_worst(wood, np.where(hit, 2.0, 0.0), place, np.inf).wood if hit.any() else wood

@@ -2,73 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from itertools import pairwise
-from typing import Annotated, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..contract import Params
+from .outlines import check_outline, polygon_area
+from .parts import Body, Corner, Cut, Grain, Grip, GripPoint, Newtons, Notch, Rate, Waypoint
 
-__all__ = ["Body", "Grain", "Notch", "Waypoint", "WoodParams"]
-
-Metres = Annotated[float, Field(ge=-10, le=10)]
-Vector = tuple[Metres, Metres, Metres]
-Rate = tuple[
-    Annotated[float, Field(ge=-100, le=100)],
-    Annotated[float, Field(ge=-100, le=100)],
-    Annotated[float, Field(ge=-100, le=100)],
-]
-Newtons = Annotated[float, Field(ge=-1e7, le=1e7)]
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Grain(_Part):
-    """How stiffness and strength vary over the section and along the rods: a smooth field from the run's seed."""
-
-    stiffness: float = Field(0.0, ge=0, le=0.5, description="Relative deviation of the stiffness [1]")
-    strength: float = Field(0.1, ge=0, le=0.5, description="Relative deviation of the strength [1]")
-    along: float = Field(0.02, gt=1e-5, le=10, description="Correlation length along the rods [m]")
-    across: float = Field(0.003, gt=1e-6, le=1, description="Correlation length across them [m]")
-
-
-class Notch(_Part):
-    """A place where all rods are weaker, as if cut in from all sides."""
-
-    position: float = Field(ge=0, le=10, description="Along the bundle [m]")
-    depth: float = Field(ge=0, lt=1, description="Depth over the rod's radius [1]")
-    width: float = Field(1e-3, gt=0, le=1, description="Length of the bundle that it weakens [m]")
-
-
-class Waypoint(_Part):
-    """Where a body's centre is at a time; between two of them it moves evenly."""
-
-    time: float = Field(ge=0, le=1000, description="Time [s]")
-    position: Vector = Field(description="Centre [m]")
-
-
-class Body(_Part):
-    """A rigid body on a given path."""
-
-    shape: Literal["box", "cylinder"] = Field("box", description="Shape; it does not turn")
-    size: tuple[float, float, float] = Field(
-        description="Sides of a box along x, y, z; diameter, length and 0 of a cylinder [m]"
-    )
-    axis: Literal["x", "y", "z"] = Field("y", description="Axis of a cylinder")
-    path: tuple[Waypoint, ...] = Field(min_length=1, max_length=64, description="Its way; it rests before and after")
-    friction: float = Field(0.3, ge=0, le=2, description="Coulomb friction with the rods [1]")
-
-    @model_validator(mode="after")
-    def _sound(self) -> Self:
-        wanted = self.size if self.shape == "box" else self.size[:2]
-        if min(wanted) <= 0:
-            raise ValueError("sides, diameter and length must be positive")
-        if any(a.time >= b.time for a, b in pairwise(self.path)):
-            raise ValueError("the times of the path must rise: sort them, and give each once")
-        return self
+__all__ = ["Body", "Cut", "Grain", "Grip", "GripPoint", "Notch", "Waypoint", "WoodParams"]
 
 
 class WoodParams(Params):
@@ -79,12 +23,19 @@ class WoodParams(Params):
         "radius": ("radius", None),
         "stiffness": ("stiffness", None),
         "strength": ("strain_limit", None),
-        "toughness": ("bond_energy", None),
+        "toughness": ("toughness", None),
         "gravity": ("gravity", None),
     }
 
     length: float = Field(0.15, ge=1e-3, le=10, description="Length of the rods", json_schema_extra={"units": "m"})
     radius: float = Field(0.01, ge=1e-5, le=1, description="Radius of the bundle", json_schema_extra={"units": "m"})
+    outline: tuple[Corner, ...] = Field(
+        (),
+        max_length=200,
+        description="Corners y, z of the section, in order, instead of the round one of `radius`; its centroid becomes "
+        "the axis",
+        json_schema_extra={"units": "m"},
+    )
     rods: int = Field(
         200,
         ge=1,
@@ -148,12 +99,40 @@ class WoodParams(Params):
     strain_limit: float = Field(
         0.01, gt=0, le=10, description="Tensile strain at which a rod breaks", json_schema_extra={"units": "1"}
     )
-    bond_energy: float = Field(
-        4.6e4,
+    toughness: float = Field(
+        250.0,
+        gt=0,
+        le=1e9,
+        description="Energy of a crack along the grain that opens, G_Ic, per crack area",
+        json_schema_extra={"units": "J m-2"},
+    )
+    toughness_sliding: float = Field(
+        700.0,
+        gt=0,
+        le=1e9,
+        description="Energy of a crack along the grain that slides, G_IIc, per crack area; at least the toughness",
+        json_schema_extra={"units": "J m-2"},
+    )
+    mixing: float = Field(
+        2.0,
+        ge=0.5,
+        le=10,
+        description="Exponent between both (Benzeggagh and Kenane)",
+        json_schema_extra={"units": "1"},
+    )
+    cleavage: float = Field(
+        4e6,
         gt=0,
         le=1e12,
-        description="Energy at which a bond breaks, per volume of wood",
-        json_schema_extra={"units": "J m-3"},
+        description="Tensile stress across the grain at which wood begins to split",
+        json_schema_extra={"units": "Pa"},
+    )
+    shear_strength: float = Field(
+        8e6,
+        gt=0,
+        le=1e12,
+        description="Shear stress along the grain at which it does",
+        json_schema_extra={"units": "Pa"},
     )
     cascade: float = Field(
         0.02,
@@ -188,6 +167,15 @@ class WoodParams(Params):
     )
     bodies: tuple[Body, ...] = Field(
         (), max_length=32, description="Rigid bodies on given paths", json_schema_extra={"units": "1"}
+    )
+    cuts: tuple[Cut, ...] = Field(
+        (), max_length=64, description="Saw cuts through rods and bonds", json_schema_extra={"units": "1"}
+    )
+    grips: tuple[Grip, ...] = Field(
+        (),
+        max_length=32,
+        description="Jaws that move and turn parts of it (explicit only)",
+        json_schema_extra={"units": "1"},
     )
     contact_stiffness: float | None = Field(
         None,
@@ -226,6 +214,11 @@ class WoodParams(Params):
         json_schema_extra={"units": "s"},
     )
 
+    @property
+    def wide(self) -> float:
+        """Radius of the disk of the section's area [m]."""
+        return (abs(polygon_area(self.outline)) / math.pi) ** 0.5 if self.outline else self.radius
+
     @field_validator("mode", mode="before")
     @classmethod
     def _known(cls, value: object) -> object:
@@ -235,9 +228,11 @@ class WoodParams(Params):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        if self.radius > self.length:
-            raise ValueError("the bundle is wider than long: take a smaller radius or a longer length")
-        if abs(self.curvature) * self.radius > 0.5:
+        if self.outline:
+            check_outline(self.outline)
+        if self.wide > self.length:
+            raise ValueError("the bundle is wider than long: take a smaller radius or outline, or a longer length")
+        if abs(self.curvature) * self.wide > 0.5:
             raise ValueError("the axis is curved more sharply than the bundle is thick: take a smaller curvature")
         if abs(self.curvature) * self.length > 6.28:
             raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
@@ -247,12 +242,18 @@ class WoodParams(Params):
             raise ValueError("mass scaling is for the explicit mode: set mode explicit, or mass_scaling 1")
         if self.mode == "static" and self.rod_contact:
             raise ValueError("equilibria know no contact of rods: set rod_contact false, or another mode")
-        if self.mode == "static" and (self.clamp == "none" or self.bodies or any(self.pull)):
-            raise ValueError("equilibria need a clamped end, no bodies and no pull: set clamp start, or another mode")
+        if self.mode == "static" and (self.clamp == "none" or self.bodies or self.grips or any(self.pull)):
+            raise ValueError(
+                "equilibria need a clamped end, no bodies, no grips and no pull: set clamp start, or another mode"
+            )
         if any(self.pull) and self.clamp != "both":
             raise ValueError("a pull needs both ends clamped: set clamp both")
         if any(self.tip_load) and self.clamp == "both":
             raise ValueError("the far end is clamped and carries no load: set clamp start, or pull")
+        if self.toughness_sliding < self.toughness:
+            raise ValueError(
+                "cracks that slide cost less than those that open: give toughness_sliding at least toughness"
+            )
         if self.bend and self.curvature:
             raise ValueError("a bent start of a curved bundle is not defined: set one of them to 0")
         if any(n.position > self.length for n in self.notches):

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
 from .contact.listing import law
+from .fracture import sawed
 from .model.bundle import lay
 from .model.state import Wood
 from .params import WoodParams
@@ -57,6 +58,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
     }
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
+    laid, wood = wood, sawed(wood, params)
     frames: list[Frame] = []
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]
@@ -78,7 +80,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
             for reached in marching:
                 if skin is not None:
                     frames.append(among(skin.frame(reached.state.wood), params, reached.time))
-                rows.append(_row(reached, wood, need, time.perf_counter() - begun))
+                rows.append(_row(reached, laid, need, time.perf_counter() - begun))
                 context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
@@ -103,6 +105,11 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
         "broken_rods": state.rods,
         "broken_bonds": state.bonds,
         "impulse": state.impulse.sum(0),
+        "fracture_energy": state.spent,
+        "crack_area": float(wood.bonds.area @ wood.bonds.damage),
+        "body_impulse": state.impulse.copy(),
+        "grip_impulse": state.gripped[:, :3].copy(),
+        "grip_moment": state.gripped[:, 3:].copy(),
         "tip_position": weight @ wood.motion.x[ends] / weight.sum(),
     }
     real = laid.rods.k > 0
@@ -126,6 +133,9 @@ def _dataset(
 ) -> xr.Dataset:
     dims = {
         "impulse": ("stage", "component"),
+        "body_impulse": ("stage", "body", "component"),
+        "grip_impulse": ("stage", "grip", "component"),
+        "grip_moment": ("stage", "grip", "component"),
         "tip_position": ("stage", "component"),
         "rod_position": ("stage", "rod_edge", "end", "component"),
         "rod_cut": ("stage", "rod_edge"),

@@ -1,10 +1,10 @@
 """Forces of the bonds: a transverse spring and a shear term, both balanced.
 
 A bond joins a vertex x to the point c of a curve through another rod's vertices (`model.curves`). With d = x - c and t
-the curve's slope by arc length at rest: E = k/2 (|d|/rest - 1)^2 rest + S (t.d/|d| - C0)^2. Sutherland 2012 has chords
-for curves, and the cosine for t.d/|d|, which is the same but for the edge's stretch (Eqs. 3.11-3.23). Put right: Eq.
-3.15 has a wrong sign, 3.17 squares the energy, and 3.19-3.23 hold c fixed, which loses momentum. Here nothing is 0/0 at
-the rest angle.
+the mean of the curve's slope there and of that at the vertex, by arc length at rest: E = k/2 (|d|/rest - 1)^2 rest + S
+(t.d/|d| - C0)^2, both times 1 - damage, but for pressure. Sutherland 2012 has chords for curves, one rod's slope, and
+the cosine for t.d/|d|, which is the same but for the edge's stretch (Eqs. 3.11-3.23). Put right: Eq. 3.15 has a wrong
+sign, 3.17 squares the energy, and 3.19-3.23 hold c fixed, which loses momentum. Nothing is 0/0 at the rest angle.
 
 The bonds of a part are rows of numbers, one lane a bond: what they read is copied to rows, the forces are computed from
 rows to rows, which is vectorised, and the rows are added up. What did not help: one loop with gathers in it (it is not
@@ -17,14 +17,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..model.plan import COSINE, RATE, SHARE, SHEAR, SPRING
+from ..model.plan import COSINE, KEEP, LONG, RATE, SHARE, SHEAR, SPRING
 
 __all__ = ["FORCES", "READS", "bind", "bound", "gather"]
 
 _TINY = 1e-30
-#: Rows that a bond reads: its vertex, its edge's first end, the edge, p and q; and rows of its forces: on the vertex,
-#: the edge, p and q.
-READS, FORCES = 15, 12
+#: Rows that a bond reads: its vertex, its edge's first end, the edge, p and q, the slope at the vertex; and rows of its
+#: forces: on the vertex, the edge, p, q and the slope.
+READS, FORCES = 18, 15
 #: Lanes that an edge's numbers are written to at once; rows have as many to spare.
 _WIDE = 8
 
@@ -36,16 +36,23 @@ def _spread(row: np.ndarray, value: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def gather(x: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray, row: np.ndarray) -> None:
-    """Fill the rows (15, w + 8) of bonds: their vertices' places, first ends, edges, p and q.
+def gather(
+    x: np.ndarray, lean: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray, row: np.ndarray
+) -> None:
+    """Fill the rows (18, w + 8) of bonds: their vertices' places, first ends, edges, p, q and slopes at the vertices.
 
-    vertex (w,), lane (m + 1,): as in `Plan`; edge: rows of the part's edges.
+    lean (v, 3): slopes at vertices; vertex (w,), lane (m + 1,): as in `Plan`; edge: rows of the part's edges.
     """
     for n in range(lane[-1]):
         i = vertex[n]
         row[0, n] = x[i, 0]
         row[1, n] = x[i, 1]
         row[2, n] = x[i, 2]
+    for n in range(lane[-1]):
+        i = vertex[n]
+        row[15, n] = lean[i, 0]
+        row[16, n] = lean[i, 1]
+        row[17, n] = lean[i, 2]
     _over(lane, edge, 0, row[3], row[4], row[5])
     _over(lane, edge, 20, row[6], row[7], row[8])
     _over(lane, edge, 23, row[9], row[10], row[11])
@@ -85,9 +92,11 @@ def _reach(count: int, law: np.ndarray, row: np.ndarray) -> None:
         row[0, n] = row[0, n] - row[3, n] - u * ex - a * px - b * qx
         row[1, n] = row[1, n] - row[4, n] - u * ey - a * py - b * qy
         row[2, n] = row[2, n] - row[5, n] - u * ez - a * pz - b * qz
-        row[3, n] = ex + a1 * px + b1 * qx
-        row[4, n] = ey + a1 * py + b1 * qy
-        row[5, n] = ez + a1 * pz + b1 * qz
+        # both rods' slopes, each times the edge's length
+        h = law[LONG, n]
+        row[3, n] = ex + a1 * px + b1 * qx + h * row[15, n]
+        row[4, n] = ey + a1 * py + b1 * qy + h * row[16, n]
+        row[5, n] = ez + a1 * pz + b1 * qz + h * row[17, n]
 
 
 @njit(cache=True, error_model="numpy")
@@ -102,15 +111,28 @@ def _pull(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> No
         dy *= away
         dz *= away
         slope = tx * dx + ty * dy + tz * dz
-        turn = law[SHEAR, n] * (slope - law[COSINE, n])
+        turn = law[KEEP, n] * law[SHEAR, n] * (slope - law[COSINE, n])
         shear = turn * away
-        pull = -law[SPRING, n] * (d * law[RATE, n] - 1.0) - shear * slope
+        strain = d * law[RATE, n] - 1.0
+        # what is damaged resists pressure as before
+        stiff = law[KEEP, n] if strain > 0.0 else 1.0
+        pull = -law[SPRING, n] * stiff * strain - shear * slope
         force[0, n] = pull * dx + shear * tx
         force[1, n] = pull * dy + shear * ty
         force[2, n] = pull * dz + shear * tz
         force[3, n] = turn * dx
         force[4, n] = turn * dy
         force[5, n] = turn * dz
+
+
+@njit(cache=True, error_model="numpy")
+def _lean(count: int, law: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces on the slopes at the vertices [N m] to the rows 12 to 14."""
+    for n in range(count):
+        h = law[LONG, n]
+        force[12, n] = h * force[3, n]
+        force[13, n] = h * force[4, n]
+        force[14, n] = h * force[5, n]
 
 
 @njit(cache=True, error_model="numpy")
@@ -134,23 +156,31 @@ def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces (12, w) [N] of `count` bonds on their vertices, and on edges, p and q; first ends bear the rest.
+    """Write the forces (15, w) [N] of `count` bonds on their vertices, and on edges, p and q; first ends bear the rest.
 
-    law (5, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In three loops: where
+    law (7, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In four loops: where
     more rows are written than six, LLVM gives up asking which overlap, and nothing is vectorised. For the same reason
     no two arguments may be slices with steps.
     """
     _reach(count, law, row)
     _pull(count, law, row, force)
+    _lean(count, law, force)
     _share(count, law, force)
 
 
 @njit(cache=True, error_model="numpy")
 def bound(count: int, law: np.ndarray, row: np.ndarray, own: np.ndarray) -> None:
-    """Write the energy (w,) [J] of each of `count` bonds; arguments as of `bind`, which must have been called."""
+    """Write the energies of `count` bonds to own (15, w) [J]: 0 what each has, 1 of opening and 2 of shear if whole.
+
+    Other arguments as of `bind`, which must have been called.
+    """
     for n in range(count):
         dx, dy, dz = row[0, n], row[1, n], row[2, n]
         d = np.sqrt(max(dx * dx + dy * dy + dz * dz, _TINY))
         strain = d * law[RATE, n] - 1.0
         off = (row[3, n] * dx + row[4, n] * dy + row[5, n] * dz) / d - law[COSINE, n]
-        own[n] = 0.5 * law[SPRING, n] * strain * strain / law[RATE, n] - 0.5 * law[SHEAR, n] * off * off
+        keep = law[KEEP, n]
+        straight = 0.5 * law[SPRING, n] * strain * strain / law[RATE, n]
+        own[2, n] = -0.5 * law[SHEAR, n] * off * off
+        own[1, n] = straight if strain > 0.0 else 0.0
+        own[0, n] = straight * (keep if strain > 0.0 else 1.0) + keep * own[2, n]

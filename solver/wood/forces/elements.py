@@ -96,28 +96,31 @@ def _rods(x: np.ndarray, rods: Rods, vertex: np.ndarray, h: np.ndarray, weight: 
 
 @njit(cache=True, error_model="numpy")
 def _bonds(d: np.ndarray, t: np.ndarray, rest: np.ndarray, bonds: Bonds, h: np.ndarray) -> None:
-    """Write second derivatives (b, 6, 6) by bonds d (b, 3) [m] and slopes t (b, 3) times lengths rest (b,) [m]."""
+    """Write second derivatives (b, 6, 6) by bonds d (b, 3) [m] and mean slopes t (b, 3) times lengths rest (b,) [m]."""
     u = np.zeros(3)
     a = np.zeros(3)
     for n in range(len(d)):
+        length = np.sqrt(max(d[n, 0] ** 2 + d[n, 1] ** 2 + d[n, 2] ** 2, _TINY))
+        keep = 1.0 - bonds.damage[n]
+        # what is damaged resists pressure as before
+        spring = bonds.k[n] if length < bonds.rest[n] else keep * bonds.k[n]
         if bonds.on[n] == 0:
             continue
-        length = np.sqrt(max(d[n, 0] ** 2 + d[n, 1] ** 2 + d[n, 2] ** 2, _TINY))
         slope = 0.0
         for c in range(3):
             u[c] = d[n, c] / length
             slope += t[n, c] * u[c]
         for c in range(3):
             a[c] = (t[n, c] - slope * u[c]) / length
-        stiff = 2.0 * bonds.s[n] / rest[n] ** 2
+        stiff = 2.0 * keep * bonds.s[n] / rest[n] ** 2
         turn = stiff * (slope - bonds.cosine[n] * rest[n]) / length
-        pull = bonds.k[n] * (length / bonds.rest[n] - 1.0) / length
+        pull = spring * (length / bonds.rest[n] - 1.0) / length
         for r in range(3):
             for c in range(3):
                 one = 1.0 if r == c else 0.0
                 both = t[n, r] * u[c] + u[r] * t[n, c]
                 h[n, r, c] = (
-                    (bonds.k[n] / bonds.rest[n] - pull) * u[r] * u[c]
+                    (spring / bonds.rest[n] - pull) * u[r] * u[c]
                     + pull * one
                     + stiff * a[r] * a[c]
                     + turn * (3.0 * slope * u[r] * u[c] - slope * one - both) / length
@@ -136,13 +139,13 @@ def edges(x: np.ndarray, rods: Rods, vertex: np.ndarray) -> Elements:
 
 
 def joints(x: np.ndarray, rods: Rods, bonds: Bonds, vertex: np.ndarray, made: Elements) -> Elements:
-    """Return the bonds at x (v, 3), of vertices (b, 5), in the frame of `made`, whose h is not read."""
+    """Return the bonds at x (v, 3), of vertices (b, 9), in the frame of `made`, whose h is not read."""
     y = x[vertex]
     both = np.einsum("bpw,bwc->bpc", made.weight, y)
     reach = np.einsum("bpw,bwc,bc->bp", made.along, y, made.clamp)
     both += reach[:, :, None] * made.clamp[:, None, :]
     h = np.zeros((len(bonds.i), 6, 6))
-    _bonds(both[:, 0], both[:, 1], rods.rest[bonds.j], bonds, h)
+    _bonds(both[:, 0], both[:, 1], 2 * rods.rest[bonds.j], bonds, h)
     return made._replace(h=h)
 
 

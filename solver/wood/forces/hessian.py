@@ -7,20 +7,26 @@ import scipy.sparse as sp
 
 from ..model.arrays import Bonds, Rods
 from ..model.curves import slopes, weights
+from ..model.slopes import parabolas
 from .elements import Elements, edges, joints, spread
 
 __all__ = ["Stiffness"]
 
 
 def _frame(x: np.ndarray, rods: Rods, bonds: Bonds) -> tuple[np.ndarray, Elements]:
-    """Return the vertices (b, 5) of each bond, its own and those about its edge, and what they count; h is empty."""
+    """Return the vertices (b, 9) of each bond and what they count; h is empty.
+
+    They are its own, four about its edge, and the ends of two edges that make up the slope at its own.
+    """
     count, j = len(rods.a), bonds.j
     beside = np.full((2, count), -1)
     whole = rods.whole == 1
     beside[0, rods.after[whole]] = rods.before[whole]
     beside[1, rods.before[whole]] = rods.after[whole]
     before, behind = (np.where(n[j] < 0, j, n[j]) for n in beside)
-    vertex = np.column_stack([bonds.i, rods.a[before], rods.a[j], rods.b[j], rods.b[behind]])
+    lean, factor = (n[bonds.i] for n in parabolas(rods, len(x)))
+    ends = [rods.a[lean[:, 0]], rods.b[lean[:, 0]], rods.a[lean[:, 1]], rods.b[lean[:, 1]]]
+    vertex = np.column_stack([bonds.i, rods.a[before], rods.a[j], rods.b[j], rods.b[behind], *ends])
     made = slopes(rods)[:, j]
     # p and q by the edges before, of and behind the bond, and by the edge along the clamp's direction
     zero = np.zeros(len(j))
@@ -33,10 +39,14 @@ def _frame(x: np.ndarray, rods: Rods, bonds: Bonds) -> tuple[np.ndarray, Element
     parts[0, 1] -= bonds.share
     parts[1] = slope[0] * p + slope[1] * q
     parts[1, 1] += 1
-    weight, reach = np.zeros((len(j), 2, 5)), np.zeros((len(j), 2, 5))
+    weight, reach = np.zeros((len(j), 2, 9)), np.zeros((len(j), 2, 9))
     for n in range(3):
         weight[:, :, 1 + n] -= parts[:, n].T
         weight[:, :, 2 + n] += parts[:, n].T
+    for n in range(2):
+        # the curve's slope is times the edge's length
+        weight[:, 1, 5 + 2 * n] = -factor[:, n] * rods.rest[j]
+        weight[:, 1, 6 + 2 * n] = factor[:, n] * rods.rest[j]
     weight[:, 0, 0] += 1
     weight[:, 0, 2] -= 1
     for n, part in enumerate((-(place * along).sum(0), (slope * along).sum(0))):

@@ -14,8 +14,10 @@ __all__ = ["internal"]
 
 
 @njit(cache=True, error_model="numpy")
-def _gathered(f: np.ndarray, vertex: np.ndarray, lane: np.ndarray, force: np.ndarray, edge: np.ndarray) -> None:
-    """Add the forces of bonds to their vertices in f (v, 3) [N], and to the rows of their edges."""
+def _gathered(
+    f: np.ndarray, lean: np.ndarray, vertex: np.ndarray, lane: np.ndarray, force: np.ndarray, edge: np.ndarray
+) -> None:
+    """Add forces of bonds to their vertices in f (v, 3) [N], slopes in lean (v, 3) [N m], and the rows of edges."""
     n = 0
     for q in range(len(lane) - 1):
         sx, sy, sz = 0.0, 0.0, 0.0
@@ -29,6 +31,9 @@ def _gathered(f: np.ndarray, vertex: np.ndarray, lane: np.ndarray, force: np.nda
             f[i, 0] += gx
             f[i, 1] += gy
             f[i, 2] += gz
+            lean[i, 0] += force[12, n]
+            lean[i, 1] += force[13, n]
+            lean[i, 2] += force[14, n]
             sx += gx
             sy += gy
             sz += gz
@@ -68,6 +73,31 @@ def _add(f: np.ndarray, a: np.ndarray, b: np.ndarray, edge: np.ndarray) -> None:
             f[i, c] -= edge[11 + c, q] + edge[c, q]
 
 
+@njit(cache=True, error_model="numpy")
+def _slopes(x: np.ndarray, plan: Plan, lean: np.ndarray) -> None:
+    """Fill lean[0] with slopes, and lean[1] with nothing."""
+    for i in range(len(x)):
+        e = plan.leans[i, 0]
+        g = plan.leans[i, 1]
+        p = plan.factor[i, 0]
+        q = plan.factor[i, 1]
+        for c in range(3):
+            lean[0, i, c] = p * (x[plan.b[e], c] - x[plan.a[e], c]) + q * (x[plan.b[g], c] - x[plan.a[g], c])
+            lean[1, i, c] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _unslope(f: np.ndarray, plan: Plan, lean: np.ndarray) -> None:
+    """Add what pulls on slopes, lean[1] [N m], to the vertices f (v, 3) [N] that make them up."""
+    for i in range(len(f)):
+        for n in range(2):
+            e = plan.leans[i, n]
+            for c in range(3):
+                pull = plan.factor[i, n] * lean[1, i, c]
+                f[plan.b[e], c] += pull
+                f[plan.a[e], c] -= pull
+
+
 @njit(cache=True, error_model="numpy", fastmath={"reassoc"})
 def _sum(count: int, row: np.ndarray) -> float:
     # in lanes: one after the other costs half of a look
@@ -81,6 +111,7 @@ def _sum(count: int, row: np.ndarray) -> float:
 def internal(
     x: np.ndarray,
     f: np.ndarray,
+    lean: np.ndarray,
     plan: Plan,
     first: int,
     last: int,
@@ -94,9 +125,13 @@ def internal(
     """Add the forces of the parts from `first` to `last` to f (v, 3) [N]; fill tangents t (e, 3) and 1/|e| (e,).
 
     With `turning`, bending is left to `twist.turn`. With `look`, each part's energies [J] of stretching, bending and
-    bonds and its bound of `rods.strain` are written (p, 4), and the energy of each bond (b,) [J].
+    bonds and its bound of `rods.strain` are written (p, 4), and what each bond would have by opening and by shear if it
+    were whole, each (2, b) [J].
     """
     wide = plan.vertex.shape[1]
+    bonded = plan.lane[-1] > 0 or len(plan.part) > 2
+    if bonded:
+        _slopes(x, plan, lean)
     edge = np.empty((ROWS, plan.edge.shape[2]))
     bond = np.empty((READS, wide + 8))
     force = np.empty((FORCES, wide))
@@ -129,15 +164,17 @@ def internal(
             _add(f, a, b, edge)
             continue
         curve(count, plan.edge[p], edge)
-        gather(x, plan.vertex[p], lane, edge, bond)
+        gather(x, lean[0], plan.vertex[p], lane, edge, bond)
         bind(bonds, plan.law[p], bond, force)
-        _gathered(f, plan.vertex[p], lane, force, edge)
+        _gathered(f, lean[1], plan.vertex[p], lane, force, edge)
         uncurve(count, plan.edge[p], edge)
         _add(f, a, b, edge)
         if look:
-            row = force[0]
-            bound(bonds, plan.law[p], bond, row)
-            found[p, 2] = _sum(bonds, row)
+            bound(bonds, plan.law[p], bond, force)
+            found[p, 2] = _sum(bonds, force[0])
             origin = plan.origin[p]
             for n in range(bonds):
-                each[origin[n]] = row[n]
+                each[0, origin[n]] = force[1, n]
+                each[1, origin[n]] = force[2, n]
+    if bonded:
+        _unslope(f, plan, lean)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Bodies", "Bonds", "Rods", "Rubbing", "Turns"]
+__all__ = ["Bodies", "Bonds", "Pins", "Rods", "Rubbing", "Turns"]
 
 
 class Rods(NamedTuple):
@@ -40,8 +40,13 @@ class Bonds(NamedTuple):
     k: np.ndarray  # (b,) transverse stiffness [N]: energy k s^2 rest / 2
     s: np.ndarray  # (b,) shear stiffness S of Eq. 3.12 [J]
     cosine: np.ndarray  # (b,) slope along the bond's unit vector, by arc length, at rest
-    limit: np.ndarray  # (b,) energy at which it breaks [J]
-    on: np.ndarray  # (b,) uint8
+    opens: np.ndarray  # (b,) energy of pure opening at which it begins to give way [J]
+    slides: np.ndarray  # (b,) energy of pure shear at which it does [J]
+    torn: np.ndarray  # (b,) energy that takes it apart by opening alone: G_Ic times its crack area [J]
+    shorn: np.ndarray  # (b,) by shear alone: G_IIc times it [J]
+    area: np.ndarray  # (b,) of the crack that it stands for [m2]
+    damage: np.ndarray  # (b,) 0 whole, 1 broken
+    on: np.ndarray  # (b,) uint8: 1 whole, 2 broken, but still in the way of what it joined, 0 gone
 
 
 class Turns(NamedTuple):
@@ -66,6 +71,16 @@ class Bodies(NamedTuple):
     k: np.ndarray  # (r,) contact stiffness per length of rod [N/m2]
     ease: np.ndarray  # (r,) depth over which it grows to this [m]
     first: np.ndarray  # (e + 1,) int32: where the numbers of each edge's points begin
+
+
+class Pins(NamedTuple):
+    """Components (m,) of vertices that grips move, whatever the force."""
+
+    vertex: np.ndarray  # (m,) int32
+    component: np.ndarray  # (m,) int32
+    grip: np.ndarray  # (m,) int32
+    pace: np.ndarray  # (m,) speed [m/s]
+    taken: np.ndarray  # (m,) impulse that the grip took since it was last asked [N s]
 
 
 class Rubbing(NamedTuple):

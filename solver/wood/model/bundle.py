@@ -6,14 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contract import Context, InvalidGeometry
+from ...contract import Context
 from ..params import WoodParams
 from .arrays import Rods, Turns
 from .axis import along, curved, started
 from .grain import Field
+from .gripping import courses, pins_of
 from .joining import bodied, bonded
 from .motion import Motion
-from .section import areas, balanced, place
+from .outline import stand
+from .sawing import sawn
 from .state import Wood
 
 __all__ = ["SAMPLES", "lay"]
@@ -182,11 +184,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
 
     """
     generator = Context.generator(params.seed)
-    points, least = place(params.rods, params.radius, generator)
-    if not least > 0:
-        raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    area = areas(points, params.radius)
-    points = balanced(points, area, params.radius)
+    points, area, _ = stand(params, generator)
     s = along(len(points), vertices, params, generator)
     grain = Field(params.grain.along, params.grain.across, generator)
     strong = Field(params.grain.along, params.grain.across, generator)
@@ -198,17 +196,23 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     bonds = bonded(
         params, points, s, at.grid, edge[:, int(at.ghosts[0]) :], at.rest.reshape(-1, 3), rods, grain, strong
     )
+    straight = at.straight.reshape(-1, 3)
+    motion = _motion(at, rods, params)
+    sawn(params, straight, rods, bonds)
     return Wood(
-        _motion(at, rods, params),
+        motion,
         rods,
         bonds,
         _turns(at, rods, grain, params),
         bodied(params, k, _EASE * float(np.median(rods.radius)), rods.rest),
+        pins_of(params, grips := courses(params, straight, motion.x, motion.held == 0)),
         params.twist or params.curvature != 0,
         _strengths(at, strong, params),
         np.repeat(np.arange(len(points), dtype=np.int32), at.number.shape[1] - 1),
         at.grid,
         np.full(len(real), -1.0),
         at.number.ravel(),
+        straight,
+        grips,
         params.mass_scaling,
     )

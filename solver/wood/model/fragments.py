@@ -58,7 +58,8 @@ def fragments(rods: Rods, bonds: Bonds, held: np.ndarray, mass: np.ndarray, scal
         if rods.alive[e] == 1 and rods.k[e] > 0.0:
             _join(up, rods.a[e], rods.b[e])
     for b in range(len(bonds.i)):
-        if bonds.on[b] == 1:
+        # what is broken but in the way pushes: with its real mass alone, a chip could not bear that at long steps
+        if bonds.on[b] > 0:
             _join(up, bonds.i[b], rods.a[bonds.j[b]])
     number = 0
     name = np.full(count, -1, np.int32)

@@ -8,14 +8,19 @@ from scipy.spatial import cKDTree
 from ...contract import InvalidGeometry
 from ..params import Body, WoodParams
 from .arrays import Bodies, Bonds, Rods
+from .cracks import widths
 from .curves import held
 from .grain import Field
+from .outline import area, corners
+from .slopes import leaning
 
-__all__ = ["bodied", "bonded"]
+__all__ = ["bodied", "bonded", "sloped"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
 _NET = 3.0
+#: Modulus [Pa] that stands for none.
+_NONE = 1e-9
 #: Points of contact on what is as long as the narrowest body is wide; the fewest and the most on an edge. Under a
 #: cylinder pressed in by a sixth of its radius, 8 make the force uneven by 1 %, 4 by 5 %.
 _POINTS, _FEWEST, _MOST = 8, 4, 256
@@ -69,6 +74,23 @@ def bodied(params: WoodParams, k: float, ease: float, rest: np.ndarray) -> Bodie
     )
 
 
+def _lying(x: np.ndarray, rods: Rods, i: np.ndarray, j: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the middles (b, 3) [m], lengths (b,) [m] and slopes along themselves (b,) of bonds from vertices to edges.
+
+    x (v, 3) [m]; the slope is the mean of both rods', i (b,) vertices, j (b,) edges, share (b,) of these.
+    """
+    on_curve, slope = held(x, rods, j, share)
+    d = x[i] - on_curve
+    length = np.linalg.norm(d, axis=1)
+    slope = (slope + leaning(x, rods)[i]) / 2
+    return x[i] - d / 2, length, (slope * d).sum(1) / np.maximum(length, 1e-300)
+
+
+def sloped(x: np.ndarray, rods: Rods, bonds: Bonds) -> np.ndarray:
+    """Return the slope (b,) along each bond, of the mean of the rods that it joins, vertices at x (v, 3) [m]."""
+    return _lying(x, rods, bonds.i, bonds.j, bonds.share)[2]
+
+
 def bonded(
     params: WoodParams,
     points: np.ndarray,
@@ -82,14 +104,19 @@ def bonded(
 ) -> Bonds:
     """Bond every vertex to the closest point of each rod within reach.
 
+    A bond along the stress begins to give way at the strain of the strength, in tension and in shear.
+
     points (k, 2) in the section, s (k, n) places along, grid (k, n) vertex numbers, edge (k, n - 1) edge numbers,
     rest (v, 3) places at rest.
     """
-    near = params.reach * float(np.sqrt(np.pi * params.radius**2 / len(points)))
+    outline = corners(params)
+    near = params.reach * float(np.sqrt(area(outline) / len(points)))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T)] if len(pairs) else np.zeros((0, 2), int)
     vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
     n = s.shape[1]
+    # each pair is bonded from both sides: half of its crack each
+    crack = np.repeat(np.tile(widths(points, pairs, outline) / 2, 2), n)
     for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
         # rods are parallel at rest: the closest point lies at the same place along
         j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, n - 2)
@@ -97,20 +124,16 @@ def bonded(
         on.append(edge[q][j])
         share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
     i, e, u = np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
-    on_curve, slope = held(rest, rods, e, u)
-    d = rest[i] - on_curve
-    length = np.linalg.norm(d, axis=1)
+    middle, length, cosine = _lying(rest, rods, i, e, u)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    cosine = (slope * d).sum(1) / length if len(i) else np.zeros(0)
     # the wood of a bond: by the length that its vertex stands for
     gap = np.diff(s, axis=1)
     own = np.zeros_like(s)
     own[:, :-1] += gap / 2
     own[:, 1:] += gap / 2
     part = own.ravel()[np.searchsorted(grid.ravel(), i)]
-    volume = np.pi * params.radius**2 * params.length * part / max(float(part.sum()), 1e-300)
-    middle = rest[i] - d / 2
+    volume = area(outline) * params.length * part / max(float(part.sum()), 1e-300)
     stiff = grain.factor(middle, params.grain.stiffness)
     strength = strong.factor(middle, params.grain.strength)
     return Bonds(
@@ -121,6 +144,11 @@ def bonded(
         _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff,
         params.shear * volume * stiff,
         cosine,
-        params.bond_energy * volume * strength**2,
+        _NET / 2 * params.cleavage**2 / max(params.transverse, _NONE) * volume * strength**2,
+        params.shear_strength**2 / max(params.shear, _NONE) * volume * strength**2,
+        params.toughness * crack * part * strength**2,
+        params.toughness_sliding * crack * part * strength**2,
+        crack * part,
+        np.zeros(len(i)),
         np.ones(len(i), np.uint8),
     )

@@ -35,6 +35,7 @@ class Scratch(NamedTuple):
     """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3); pairs of edges."""
 
     f: np.ndarray
+    lean: np.ndarray  # (2, v, 3) slopes at vertices, and forces on them [N m]
     t: np.ndarray
     inverse: np.ndarray
     torque: np.ndarray

@@ -14,11 +14,14 @@ from numba import njit
 
 from .arrays import Bonds, Rods
 from .curves import slopes
+from .slopes import parabolas
 
 __all__ = [
     "BOW",
     "COSINE",
     "CURVE",
+    "KEEP",
+    "LONG",
     "RADIUS",
     "RATE",
     "REST",
@@ -37,9 +40,11 @@ __all__ = [
 REST, TENSION, STIFF, BOW, RADIUS, WEAK, CURVE = range(7)
 _EDGE = CURVE + 8
 
-#: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S over the squared length of the bond's edge [N/m];
-#: slope at rest times this length [m].
-SHARE, RATE, SPRING, SHEAR, COSINE = range(5)
+#: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S over the square of twice the length of the bond's
+#: edge [N/m]; slope at rest times twice this length [m]; 1 less its damage, which a fracture pass writes anew; this
+#: length [m].
+SHARE, RATE, SPRING, SHEAR, COSINE, KEEP, LONG = range(7)
+_BOND = LONG + 1
 #: The fewest edges of a part, but for the last: 64 cost a tenth more, 256 as much.
 _PART = 128
 #: Numbers in a line of the cache: rows of parts begin on one.
@@ -55,8 +60,10 @@ class Plan(NamedTuple):
     edge: np.ndarray  # (p, 14, m) what an edge is made of, in the rows above
     lane: np.ndarray  # (e + p,) uint32 first lane of an edge's bonds; a part has one entry more, its end
     vertex: np.ndarray  # (p, w) uint32 vertex of a bond
-    law: np.ndarray  # (p, 5, w) what a bond is made of, in the rows above
+    law: np.ndarray  # (p, 7, w) what a bond is made of, in the rows above
     origin: np.ndarray  # (p, w) uint32 the bond's number
+    leans: np.ndarray  # (v, 2) int32 edges that make up the slope at each vertex
+    factor: np.ndarray  # (v, 2) and how much of each [1/m]
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,15 +118,15 @@ def _edges(rods: Rods, strength: np.ndarray, part: np.ndarray, first: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
-def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
-    """Return the plan of what is whole; strength (e, samples): strain that each place bears."""
+def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray, count: int) -> Plan:
+    """Return the plan of what is whole of `count` vertices; strength (e, samples): strain that each place bears."""
     edges = len(rods.a)
     part = _parts(rods)
     parts = len(part) - 1
     # a counting sort: stable, so that the order does not depend on what was broken before
     first = np.zeros(edges + 1, np.int64)
     for n in range(len(bonds.j)):
-        if bonds.on[n] == 1:
+        if bonds.on[n] > 0:
             first[bonds.j[n] + 1] += 1
     for e in range(edges):
         first[e + 1] += first[e]
@@ -130,7 +137,7 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
     wide = (wide + _LINE - 1) // _LINE * _LINE
     vertex = np.zeros((parts, wide), np.uint32)
     origin = np.zeros((parts, wide), np.uint32)
-    law = np.zeros((parts, 5, wide))
+    law = np.zeros((parts, _BOND, wide))
     free = first[:edges].copy()
     for n in range(len(bonds.j)):
         if bonds.on[n] == 0:
@@ -144,8 +151,11 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
         law[p, SHARE, m] = bonds.share[n]
         law[p, RATE, m] = 1.0 / bonds.rest[n]
         law[p, SPRING, m] = bonds.k[n]
-        law[p, SHEAR, m] = -2.0 * bonds.s[n] / rods.rest[j] ** 2
-        law[p, COSINE, m] = bonds.cosine[n] * rods.rest[j]
+        law[p, SHEAR, m] = -0.5 * bonds.s[n] / rods.rest[j] ** 2
+        law[p, COSINE, m] = 2.0 * bonds.cosine[n] * rods.rest[j]
+        law[p, LONG, m] = rods.rest[j]
+        law[p, KEEP, m] = 1.0 - bonds.damage[n]
+    leans, factor = parabolas(rods, count)
     return Plan(
         part.astype(np.uint32),
         rods.a.astype(np.uint32),
@@ -155,4 +165,6 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
         vertex,
         law,
         origin,
+        leans,
+        factor,
     )

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arrays import Bodies, Bonds, Rods, Rubbing, Turns
+from .arrays import Bodies, Bonds, Pins, Rods, Rubbing, Turns
 from .fragments import fragments
+from .gripping import Course
 from .motion import Motion, Scratch
 from .plan import plan_for
 
@@ -24,12 +25,15 @@ class Wood:
     bonds: Bonds
     turns: Turns
     bodies: Bodies
+    pins: Pins
     turning: bool
     strength: np.ndarray  # (e, samples) tensile strain that each place bears
     rod: np.ndarray  # (e,) int32 rod of an edge, ghosts too
     grid: np.ndarray  # (rods, vertices) int32: vertex numbers as laid
     cut: np.ndarray  # (e,) where an edge is cut, 0 to 1; -1: it is not
     parent: np.ndarray  # (v,) int32 vertex that one was split from; itself as laid
+    straight: np.ndarray  # (v, 3) places in the straight bundle, as laid [m]
+    grips: tuple[Course, ...] = ()
     scaling: float = 1.0  # masses over real ones, see `scaling`
     least: float = 0.0  # real mass that an edge in contact needs to be stable [kg]
 
@@ -40,20 +44,24 @@ class Wood:
             motion=Motion(*(a.copy() for a in self.motion)),
             rods=Rods(*(a.copy() for a in self.rods)),
             bonds=Bonds(*(a.copy() for a in self.bonds)),
+            pins=Pins(*(a.copy() for a in self.pins)),
             cut=self.cut.copy(),
         )
 
 
 def scratch_for(wood: Wood) -> Scratch:
     """Return work arrays that fit, and the plan of what is whole."""
-    plan = plan_for(wood.rods, wood.bonds, wood.strength)
+    plan = plan_for(wood.rods, wood.bonds, wood.strength, len(wood.motion.x))
+    held = wood.motion.held.copy()
+    held[wood.pins.vertex] = 1
     v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
     return Scratch(
         np.zeros((v, 3)),
+        np.zeros((2, v, 3)),
         wood.motion.old.copy(),
         1.0 / wood.rods.rest,
         np.zeros(e),
-        np.zeros(len(wood.bonds.i)),
+        np.zeros((2, len(wood.bonds.i))),
         np.zeros((r, 3)),
         np.zeros((r, 3)),
         np.zeros((r, 3)),
@@ -62,17 +70,23 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((len(plan.part) - 1, 4)),
         Rubbing(np.zeros((0, 2), np.int32), np.zeros(4)),
         plan,
-        fragments(wood.rods, wood.bonds, wood.motion.held, wood.motion.mass, wood.scaling, wood.least),
+        fragments(wood.rods, wood.bonds, held, wood.motion.mass, wood.scaling, wood.least),
     )
 
 
 class State(NamedTuple):
-    """A moment of a run. books (6,) [J] as `motion` numbers them; impulse (r, 3) [N s]; steps taken."""
+    """A moment of a run. books (6,) [J] as `motion` numbers them; impulse (r, 3) [N s] of the bodies; steps taken.
+
+    gripped (g, 6): impulse [N s] and moment of it about the pivot [N m s] that each grip put in; spent [J]: energy that
+    breaks took so far.
+    """
 
     wood: Wood
     scratch: Scratch
     books: np.ndarray
     impulse: np.ndarray
+    gripped: np.ndarray
+    spent: float
     rods: int
     bonds: int
     steps: int
@@ -93,4 +107,5 @@ def copied(state: State) -> State:
         scratch=_again(state.scratch),
         books=state.books.copy(),
         impulse=state.impulse.copy(),
+        gripped=state.gripped.copy(),
     )

@@ -13,11 +13,11 @@ from ..contact.bodies import pose, press
 from ..contact.rubbing import rub
 from ..forces.internal import internal
 from ..forces.twist import carry, turn, twists
-from ..model.arrays import Bodies, Bonds, Rods, Turns
+from ..model.arrays import Bodies, Bonds, Pins, Rods, Turns
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH, WORK, Motion, Scratch
 from .scaling import push, rigid
 from .touching import steady
-from .verlet import drift, grip, kick, slowed
+from .verlet import drift, grip, kick, pin, pinned, slowed
 
 __all__ = ["forces", "march"]
 
@@ -64,6 +64,7 @@ def _fill(
     internal(
         motion.x,
         f,
+        scratch.lean,
         plan,
         0,
         len(plan.part) - 1,
@@ -120,6 +121,7 @@ def march(
     bonds: Bonds,
     turns: Turns,
     bodies: Bodies,
+    pins: Pins,
     scratch: Scratch,
     turning: bool,
     time: float,
@@ -160,10 +162,11 @@ def march(
     )
     books[LOST] += rigid(x, v, f, motion.mass, whole, 0.0)
     for n in range(steps):
-        power = grip(held, v, f) + scratch.power[0]
+        power = grip(held, v, f) + pinned(f, pins, half) + scratch.power[0]
         rubbed = scratch.power[1]
         kick(v, f, weight)
         push(x, v, whole, half)
+        pin(v, motion.mass, pins)
         work = drift(x, v, motion.load, dt)
         if turning:
             for e in range(len(motion.theta)):
@@ -178,6 +181,7 @@ def march(
         less = rigid(x, v, f, motion.mass, whole, half)
         kick(v, f, weight)
         push(x, v, whole, half)
+        pin(v, motion.mass, pins)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -185,11 +189,12 @@ def march(
         for r in range(len(bodies.kind)):
             for c in range(3):
                 impulse[r, c] += half * scratch.push[r, c]
-        books[WORK] += work + half * (power + grip(held, v, f) + scratch.power[0])
+        books[WORK] += work + half * (power + grip(held, v, f) + pinned(f, pins, half) + scratch.power[0])
         books[LOST] += half * (rubbed + scratch.power[1])
         if damping > 0.0:
             books[LOST] -= less * (1.0 - slow * slow)
             books[LOST] += slowed(v, keep, motion.mass)
+            books[WORK] += pin(v, motion.mass, pins)
             if turning:
                 for e in range(len(motion.spin)):
                     books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)

@@ -7,12 +7,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...contract import Context, Unstable
+from ..cohesion import soften
 from ..contact.listing import Listing
 from ..fracture import break_worst, overstress
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH
 from ..model.state import State, Wood, copied, scratch_for
 from ..params import WoodParams
 from .explicit import forces, march
+from .gripping import steer, take
 from .moment import Reached, balanced, begin, floor, largest, real
 
 __all__ = ["broken", "explicit"]
@@ -29,9 +31,9 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost."""
     wood, scratch = state.wood, state.scratch
     anywhere = params.fracture == "stress"
-    hard = (scratch.each > wood.bonds.limit).any()
+    damaged, parted, gone = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
     # most looks find nothing: a bound says so for less
-    if anywhere and not wood.turning and not hard and float(scratch.found[:, 3].max()) < _BELOW:
+    if not (damaged or gone) and anywhere and not wood.turning and float(scratch.found[:, 3].max()) < _BELOW:
         return state
     ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
     m = wood.motion
@@ -47,18 +49,23 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
         ratio,
         place,
     )
-    if top <= 1 and not hard:
+    if top <= 1 and not (damaged or gone):
         return state
     before = state.books[: CONTACT + 1].sum() + real(state)
     allowed = params.cascade * float(state.books[[STRETCH, BENDING, BONDS]].sum())
-    wood, rods, bonds = break_worst(wood, ratio, place, scratch.each, allowed)
-    scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
+    rods = bonds = 0
+    if top > 1:
+        wood, rods, bonds = break_worst(wood, ratio, place, allowed)
+    # damage stands in the plan already; what falls apart needs another, and other fragments
+    if rods or parted or gone:
+        scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
-    found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds)
+    found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds + parted)
     # what fragments that come off no longer have by their scaled mass is lost, too
-    books[LOST] += before - books[: CONTACT + 1].sum() - real(found)
-    return found
+    released = float(before - books[: CONTACT + 1].sum() - real(found))
+    books[LOST] += released
+    return found._replace(spent=state.spent + released)
 
 
 def _advance(state: State, params: WoodParams, time: float, dt: float, steps: int) -> State:
@@ -69,12 +76,14 @@ def _advance(state: State, params: WoodParams, time: float, dt: float, steps: in
 
     """
     w = state.wood
+    steer(state, time, steps * dt)
     fine = march(
         w.motion,
         w.rods,
         w.bonds,
         w.turns,
         w.bodies,
+        w.pins,
         state.scratch,
         w.turning,
         time,
@@ -89,6 +98,7 @@ def _advance(state: State, params: WoodParams, time: float, dt: float, steps: in
             f"the rods blew up before t = {time + steps * dt:.4g} s.",
             advice="Give a shorter step, a lower contact_stiffness, or slower bodies.",
         )
+    take(state, time + steps * dt)
     return state._replace(steps=state.steps + steps)
 
 
@@ -122,7 +132,7 @@ def explicit(
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking = params.fracture != "none"
     # scaled masses follow what touches, at times that do not depend on which are wanted
-    often = breaking or params.rod_contact or wood.scaling > 1
+    often = breaking or params.rod_contact or bool(wood.grips) or wood.scaling > 1
     chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
     scale, since, listing = floor(wood, params), 0, Listing(wood, params)
     for wanted in times:

@@ -78,7 +78,9 @@ def begin(wood: Wood) -> State:
     scratch = scratch_for(wood)
     books = np.zeros(6)
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, books)
-    return State(wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), 0, 0, 0)
+    return State(
+        wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), np.zeros((len(wood.grips), 6)), 0.0, 0, 0, 0
+    )
 
 
 def largest(energy: Energy, scale: float) -> float:

@@ -96,7 +96,9 @@ def _bears(state: State, params: WoodParams, time: float) -> None:
         ratio,
         place,
     )
-    bonds = float(np.sqrt((scratch.each / wood.bonds.limit).max(initial=0.0)))
+    b = wood.bonds
+    loaded = scratch.each[0] / b.opens + scratch.each[1] / b.slides
+    bonds = float(np.sqrt(loaded[b.on == 1].max(initial=0.0)))
     if max(rods, bonds) <= 1:
         return
     what = f"a rod is strained to {rods:.2g} times" if rods >= bonds else f"a bond is loaded to {bonds:.2g} times"

@@ -8,7 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["drift", "grip", "kick", "slowed"]
+from ..model.arrays import Pins
+
+__all__ = ["drift", "grip", "kick", "pin", "pinned", "slowed"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -19,6 +21,29 @@ def grip(held: np.ndarray, v: np.ndarray, f: np.ndarray) -> float:
         i = held[n]
         for c in range(3):
             power -= f[i, c] * v[i, c]
+    return power
+
+
+@njit(cache=True, error_model="numpy")
+def pin(v: np.ndarray, mass: np.ndarray, pins: Pins) -> float:
+    """Give what grips move its speed again; return the energy [J] that this takes."""
+    put = 0.0
+    for n in range(len(pins.vertex)):
+        i = pins.vertex[n]
+        c = pins.component[n]
+        put += 0.5 * mass[i] * (pins.pace[n] ** 2 - v[i, c] ** 2)
+        v[i, c] = pins.pace[n]
+    return put
+
+
+@njit(cache=True, error_model="numpy")
+def pinned(f: np.ndarray, pins: Pins, dt: float) -> float:
+    """Book the grips' impulse in dt [s]; return the power [W] that they put in."""
+    power = 0.0
+    for n in range(len(pins.vertex)):
+        pull = f[pins.vertex[n], pins.component[n]]
+        pins.taken[n] -= dt * pull
+        power -= pull * pins.pace[n]
     return power
 
 

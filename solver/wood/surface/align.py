@@ -93,7 +93,7 @@ def bonded(wood: Wood, span: Spans, pairs: Pairs) -> np.ndarray:
     gap = 4 * span.length
     value = number[mine] * gap + places[holder[mine], column[mine]]
     # of bonds at the same place, one that holds comes first
-    order = np.lexsort((wood.bonds.on[mine] == 0, value))
+    order = np.lexsort((wood.bonds.on[mine] != 1, value))
     value, on = value[order], wood.bonds.on[mine][order] == 1
     asked = np.arange(len(known))[:, None] * gap + np.linspace(0, span.length, span.stations)
     right = np.searchsorted(value, asked)

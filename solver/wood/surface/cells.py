@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
 from ...contract import Context
-from ..model.section import areas, balanced, place
+from ..model.outline import corners, stand
 from ..params import WoodParams
 
 __all__ = ["Section", "divided", "section"]
@@ -44,16 +44,29 @@ class Section(NamedTuple):
 
 def section(params: WoodParams) -> Section:
     """Return the cells of the rods that `bundle.lay` lays: the same draws, in the same order."""
-    points, _ = place(params.rods, params.radius, Context.generator(params.seed))
-    return divided(balanced(points, areas(points, params.radius), params.radius), params.radius)
+    points = stand(params, Context.generator(params.seed)).points
+    if params.outline:
+        return divided(points, params.wide, corners(params))
+    return divided(points, params.wide)
 
 
-def divided(points: np.ndarray, radius: float) -> Section:
-    """Return the cells of points (k, 2) within a hull of the area of the disk of `radius`; all in metres."""
+def divided(points: np.ndarray, radius: float, outline: np.ndarray | None = None) -> Section:
+    """Return the cells of points (k, 2) within a hull of the area of the disk of `radius`; all in metres.
+
+    outline (m, 2): another hull of this area, convex or not, corners counter-clockwise.
+    """
     turn = 2 * np.pi * np.arange(_HULL) / _HULL
     reach = radius * np.sqrt(2 * np.pi / (_HULL * np.sin(2 * np.pi / _HULL)))
     hull = reach * np.column_stack([np.cos(turn), np.sin(turn)])
-    cells = [hull] if len(points) == 1 else [_clipped(cell, hull) for cell in _cells(points, reach)]
+    if outline is not None:
+        hull = outline
+        reach = float(np.hypot(*outline.T).max())
+    cells = [hull]
+    if len(points) > 1:
+        raw = _cells(points, reach)
+        # a clip must be convex, what is clipped need not be: cells are, an outline may not
+        inner = np.linalg.norm(hull[0] + hull[1]) / 2 if outline is None else 0.0
+        cells = [c if np.hypot(*c.T).max() < inner else _clipped(hull, c) for c in raw]
     mean = radius / np.sqrt(len(points))
     places, numbers = _merged(np.concatenate(cells), _CLOSE * mean)
     rings = []
@@ -86,10 +99,7 @@ def _cells(points: np.ndarray, reach: float) -> list[np.ndarray]:
 
 
 def _clipped(cell: np.ndarray, hull: np.ndarray) -> np.ndarray:
-    """Return the common part (m, 2) of two convex polygons (Sutherland and Hodgman 1974)."""
-    inner = np.linalg.norm(hull[0] + hull[1]) / 2
-    if np.hypot(*cell.T).max() < inner:
-        return cell
+    """Return the common part (m, 2) of a polygon and a convex hull (Sutherland and Hodgman 1974)."""
     for first, second in zip(hull, np.roll(hull, -1, 0), strict=True):
         along = second - first
         side = along[0] * (cell[:, 1] - first[1]) - along[1] * (cell[:, 0] - first[0])

@@ -53,6 +53,20 @@ def curves(wood: Wood, x: np.ndarray) -> dict[int, tuple[np.ndarray, ...]]:
 def bond_energies(wood: Wood, x: np.ndarray) -> np.ndarray:
     """Return the energy (b,) [J] of each bond with vertices at x (v, 3), which may be complex."""
     b, at = wood.bonds, curves(wood, x)
+    lean = {}
+    for e, (_, _, _, m0, m1) in at.items():
+        if wood.rods.k[e] > 0 and wood.rods.alive[e]:
+            lean |= {int(wood.rods.a[e]): m0, int(wood.rods.b[e]): m1}
+    for chain in pieces(wood):
+        # one edge alone has no parabola
+        real = [e for e in chain if wood.rods.k[e] > 0 and wood.rods.alive[e]]
+        if len(real) == 1:
+            way = (at[real[0]][2] - at[real[0]][1]) / at[real[0]][0]
+            lean |= {int(wood.rods.a[real[0]]): way, int(wood.rods.b[real[0]]): way}
+        # at a clamp the slope is its own
+        for e in chain if len(chain) > 1 else []:
+            if wood.rods.k[e] == 0:
+                lean[int(wood.rods.b[e] if e == chain[0] else wood.rods.a[e])] = at[e][3]
     out = np.zeros(len(b.i), x.dtype)
     for n in np.flatnonzero(b.on):
         h, y0, y1, m0, m1 = at[int(b.j[n])]
@@ -64,6 +78,8 @@ def bond_energies(wood: Wood, x: np.ndarray) -> np.ndarray:
         place = place + (u - v) * h * slope
         d = x[b.i[n]] - place
         apart = _length(d)
-        shear = (d * slope).sum() / apart - b.cosine[n]
-        out[n] = 0.5 * b.k[n] * (apart / b.rest[n] - 1) ** 2 * b.rest[n] + b.s[n] * shear**2
+        shear = (d * (slope + lean.get(int(b.i[n]), 0))).sum() / 2 / apart - b.cosine[n]
+        keep = 1 - b.damage[n]
+        straight = 0.5 * b.k[n] * (apart / b.rest[n] - 1) ** 2 * b.rest[n]
+        out[n] = straight * (keep if apart.real > b.rest[n] else 1) + keep * b.s[n] * shear**2
     return out

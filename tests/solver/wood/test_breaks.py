@@ -6,6 +6,7 @@ import pytest
 from solver.wood import SOLVER
 from solver.wood.fracture import break_worst, overstress
 from solver.wood.model.bundle import lay
+from solver.wood.model.joining import sloped
 from solver.wood.model.state import Wood
 
 
@@ -19,7 +20,7 @@ def split_at(wood: Wood, hinge: int) -> tuple[Wood, int, int]:
     edge = wood.rods.after[hinge]
     ratio[edge] = 2.0
     old, count = int(wood.rods.a[edge]), len(wood.motion.x)
-    found = break_worst(wood, ratio, place, np.zeros(len(wood.bonds.i)), np.inf)
+    found = break_worst(wood, ratio, place, np.inf)
     assert (found.rods, found.bonds) == (1, 0)
     assert len(found.wood.motion.x) == count + 1
     return found.wood, old, count
@@ -47,12 +48,35 @@ def test_halves_of_a_split_vertex_share_bonds_mass_and_load(which):
         was = (before.bonds.i == old) & (before.bonds.j == j) & (before.bonds.rest == rest)
         pair = [np.flatnonzero((b.i == v) & (b.j == j) & (b.rest == rest)) for v in (old, new)]
         assert [len(p) for p in pair] == [1, 1]
-        for name in ("k", "s", "limit"):
+        for name in ("k", "s", "opens", "slides", "torn", "shorn", "area"):
             shared = [float(getattr(b, name)[p[0]]) for p in pair]
             assert shared == pytest.approx(float(getattr(before.bonds, name)[was][0]) * np.array([0.25, 0.75]))
     others = np.flatnonzero(before.bonds.i != old)
-    for name in ("k", "s", "limit", "rest", "share"):
+    for name in ("k", "s", "opens", "slides", "torn", "shorn", "area", "damage", "rest", "share"):
         assert np.array_equal(getattr(b, name)[others], getattr(before.bonds, name)[others])
+
+
+def sheared(wood: Wood) -> float:
+    """Return the energy [J] that bonds hold in shear."""
+    b = wood.bonds
+    return float(((sloped(wood.motion.x, wood.rods, b) - b.cosine) ** 2 * b.s)[b.on > 0].sum())
+
+
+@pytest.mark.parametrize("place", [0.0, 0.5])
+def test_a_break_of_bent_rods_shears_no_bond(place):
+    """The slopes of what is left are others, and all that bonds hold in shear is kept."""
+    wood = laid()
+    x = wood.motion.x
+    s = x[:, 0] - x[:, 0].min()
+    x[:, 2] += 0.3 * np.sin(12 * s / s.max()) * s.max()
+    ratio, where = np.zeros(len(wood.rods.a)), np.full(len(wood.rods.a), place)
+    ratio[wood.rods.after[[7, 40]]] = 2.0
+    before, cosine = sheared(wood), wood.bonds.cosine.copy()
+    found = break_worst(wood, ratio, where, np.inf)
+    assert (found.rods, found.bonds) == (2, 0)
+    assert sheared(found.wood) == pytest.approx(before, rel=1e-9)
+    # as bonds were laid, those beside the breaks would be sheared by this
+    assert np.abs(found.wood.bonds.cosine[: len(cosine)] - cosine).max() > 0.05
 
 
 def bent(circle: float, stretch: float = 0.0, **values) -> tuple[Wood, np.ndarray, np.ndarray]:

@@ -77,7 +77,7 @@ def test_breaks_keep_mass_and_momentum_and_hand_bonds_over():
     stiffness, places = wood.bonds.s.sum(), wood.motion.x[wood.bonds.i]
     ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
     ratio[[4, 15, 30]], place[[4, 15, 30]] = 1.5, [0.0, 0.5, 1.0]
-    broken = break_worst(wood, ratio, place, np.zeros(len(wood.bonds.i)), np.inf)
+    broken = break_worst(wood, ratio, place, np.inf)
     assert (broken.rods, broken.bonds) == (3, 0)
     now = broken.wood
     assert len(now.motion.x) == len(places) * 0 + 12 * 12 + 2

@@ -24,6 +24,7 @@ def marched(wood, dt, steps):
         wood.bonds,
         wood.turns,
         wood.bodies,
+        wood.pins,
         state.scratch,
         wood.turning,
         0.0,

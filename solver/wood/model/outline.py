@@ -1,0 +1,113 @@
+"""The outline of the section: a disk, or any simple polygon; and rods that stand evenly in it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...contract import InvalidGeometry
+from ..params import WoodParams
+from .section import areas, balanced, place
+
+__all__ = ["Standing", "area", "chords", "corners", "inside", "stand"]
+
+#: Corners of the polygon that stands for a disk, of the disk's area.
+_DISK = 96
+#: Points of the section per rod by which cells are measured, and rounds of evening out (Lloyd 1982).
+_PER_ROD, _FEWEST, _ROUNDS = 400, 20_000, 60
+
+
+class Standing(NamedTuple):
+    """Where k rods stand in the section."""
+
+    points: np.ndarray  # (k, 2) [m]
+    area: np.ndarray  # (k,) [m2], together the section's
+    least: float  # least distance of two of them before they were balanced [m]
+
+
+def area(outline: np.ndarray) -> float:
+    """Return the area [m2] of a polygon (m, 2), positive if its corners run counter-clockwise."""
+    y, z = outline.T
+    return float(y @ np.roll(z, -1) - z @ np.roll(y, -1)) / 2
+
+
+def corners(params: WoodParams) -> np.ndarray:
+    """Return the outline's corners (m, 2) [m], counter-clockwise about +x, its centroid at the origin."""
+    if not params.outline:
+        turn = 2 * np.pi * np.arange(_DISK) / _DISK
+        reach = params.radius * np.sqrt(2 * np.pi / (_DISK * np.sin(2 * np.pi / _DISK)))
+        disk: np.ndarray = reach * np.column_stack([np.cos(turn), np.sin(turn)])
+        return disk
+    found = np.array(params.outline, float)
+    if area(found) < 0:
+        found = found[::-1].copy()
+    following = np.roll(found, -1, 0)
+    cross = found[:, 0] * following[:, 1] - found[:, 1] * following[:, 0]
+    centred: np.ndarray = found - ((found + following) * cross[:, None]).sum(0) / (3 * cross.sum())
+    return centred
+
+
+def inside(outline: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return whether points (n, 2) are inside a polygon (m, 2): an odd number of its sides is to their right."""
+    odd = np.zeros(len(points), bool)
+    y, z = points.T
+    for (y0, z0), (y1, z1) in zip(outline, np.roll(outline, -1, 0), strict=True):
+        if z0 != z1:
+            odd ^= ((z0 > z) != (z1 > z)) & (y < y0 + (z - z0) * (y1 - y0) / (z1 - z0))
+    return odd
+
+
+def chords(outline: np.ndarray, normal: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """Return how long (n,) [m] the lines {p: p.normal = offset} (n, 2), (n,) are within a polygon (m, 2)."""
+    way = np.column_stack([-normal[:, 1], normal[:, 0]])
+    found = np.zeros(len(offset))
+    for first, second in zip(outline, np.roll(outline, -1, 0), strict=True):
+        a, b = normal @ first - offset, normal @ second - offset
+        hit = (a < 0) != (b < 0)
+        share = np.where(hit, a / np.where(hit, a - b, 1.0), 0.0)
+        along = way @ first + share * (way @ (second - first))
+        # where the outline goes out of the half plane a chord ends, where it goes in one begins
+        found += np.where(hit, np.where(a < 0, -along, along), 0.0)
+    return np.abs(found)
+
+
+def stand(params: WoodParams, generator: np.random.Generator) -> Standing:
+    """Return where rods stand: in a disk as the thesis has them, in a polygon evened out to cells of one size.
+
+    Raises:
+        InvalidGeometry: two rods stand at the same place.
+
+    """
+    if params.outline:
+        return _even(corners(params), params.rods, generator)
+    points, least = place(params.rods, params.radius, generator)
+    if not least > 0:
+        raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
+    section = areas(points, params.radius)
+    return Standing(balanced(points, section, params.radius), section, least)
+
+
+def _even(outline: np.ndarray, rods: int, generator: np.random.Generator) -> Standing:
+    """Return rods at the centroids of their cells: so the section's second moments are kept without more ado."""
+    low, wide = outline.min(0), np.ptp(outline, axis=0)
+    share = area(outline) / float(wide.prod())
+    count = int(max(_FEWEST, _PER_ROD * rods) / share)
+    # an additive recurrence fills a rectangle evenly (Roberts 2018: the plastic number)
+    steps = np.arange(1, count + 1)[:, None] * np.array([0.7548776662466927, 0.5698402909980532])
+    fine = low + wide * ((0.5 + steps) % 1)
+    fine = fine[inside(outline, fine)]
+    points = fine[generator.choice(len(fine), rods, replace=False)]
+    for _ in range(_ROUNDS):
+        owner = cKDTree(points).query(fine)[1]
+        size = np.bincount(owner, minlength=rods)
+        moved = np.column_stack([np.bincount(owner, fine[:, c], rods) for c in range(2)])
+        points = np.where(size[:, None] > 0, moved / np.maximum(size, 1)[:, None], points)
+    owner = cKDTree(points).query(fine)[1]
+    size = np.bincount(owner, minlength=rods)
+    if size.min() == 0:
+        raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a larger outline.")
+    least = float(np.asarray(cKDTree(points).query(points, 2)[0])[:, 1].min()) if rods > 1 else float(wide.min())
+    own = size * (area(outline) / len(fine))
+    return Standing(points - own @ points / own.sum(), own, least)

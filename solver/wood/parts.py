@@ -1,0 +1,116 @@
+"""What a set-up is made of besides the bundle: grain, notches, cuts, bodies and grips, as parameters."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+__all__ = ["Body", "Corner", "Cut", "Grain", "Grip", "GripPoint", "Newtons", "Notch", "Rate", "Vector", "Waypoint"]
+
+Metres = Annotated[float, Field(ge=-10, le=10)]
+Vector = tuple[Metres, Metres, Metres]
+Rate = tuple[
+    Annotated[float, Field(ge=-100, le=100)],
+    Annotated[float, Field(ge=-100, le=100)],
+    Annotated[float, Field(ge=-100, le=100)],
+]
+Corner = tuple[Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)]]
+Turn = Annotated[float, Field(ge=-100, le=100)]
+Newtons = Annotated[float, Field(ge=-1e7, le=1e7)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Grain(_Part):
+    """How stiffness and strength vary over the section and along the rods: a smooth field from the run's seed."""
+
+    stiffness: float = Field(0.0, ge=0, le=0.5, description="Relative deviation of the stiffness [1]")
+    strength: float = Field(0.1, ge=0, le=0.5, description="Relative deviation of the strength [1]")
+    along: float = Field(0.02, gt=1e-5, le=10, description="Correlation length along the rods [m]")
+    across: float = Field(0.003, gt=1e-6, le=1, description="Correlation length across them [m]")
+
+
+class Notch(_Part):
+    """A place where all rods are weaker, as if cut in from all sides."""
+
+    position: float = Field(ge=0, le=10, description="Along the bundle [m]")
+    depth: float = Field(ge=0, lt=1, description="Depth over the rod's radius [1]")
+    width: float = Field(1e-3, gt=0, le=1, description="Length of the bundle that it weakens [m]")
+
+
+class Waypoint(_Part):
+    """Where a body's centre is at a time; between two of them it moves evenly."""
+
+    time: float = Field(ge=0, le=1000, description="Time [s]")
+    position: Vector = Field(description="Centre [m]")
+
+
+class Body(_Part):
+    """A rigid body on a given path."""
+
+    shape: Literal["box", "cylinder"] = Field("box", description="Shape; it does not turn")
+    size: tuple[float, float, float] = Field(
+        description="Sides of a box along x, y, z; diameter, length and 0 of a cylinder [m]"
+    )
+    axis: Literal["x", "y", "z"] = Field("y", description="Axis of a cylinder")
+    path: tuple[Waypoint, ...] = Field(min_length=1, max_length=64, description="Its way; it rests before and after")
+    friction: float = Field(0.3, ge=0, le=2, description="Coulomb friction with the rods [1]")
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        wanted = self.size if self.shape == "box" else self.size[:2]
+        if min(wanted) <= 0:
+            raise ValueError("sides, diameter and length must be positive")
+        if any(a.time >= b.time for a, b in pairwise(self.path)):
+            raise ValueError("the times of the path must rise: sort them, and give each once")
+        return self
+
+
+def _ordered(box: Cut | Grip) -> None:
+    if any(a > b for a, b in zip(box.low, box.high, strict=True)):
+        raise ValueError("the corner `low` must not be above `high` in any direction")
+
+
+class Cut(_Part):
+    """A saw cut without width: bonds that pass the box are broken, rods that pass it where its middle is are parted."""
+
+    low: Vector = Field(description="Lowest corner x, y, z of a box in the unloaded straight bundle [m]")
+    high: Vector = Field(description="Highest corner; a box may be flat [m]")
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        _ordered(self)
+        return self
+
+
+class GripPoint(_Part):
+    """How far a grip has gone at a time; between two of them it goes evenly."""
+
+    time: float = Field(ge=0, le=1000, description="Time [s]")
+    shift: Vector = Field((0.0, 0.0, 0.0), description="How far it has been moved [m]")
+    turn: tuple[Turn, Turn, Turn] = Field(
+        (0.0, 0.0, 0.0), description="How far it has been turned about its pivot: axis times angle [radian]"
+    )
+
+
+class Grip(_Part):
+    """Jaws that hold what is in a box of the unloaded bundle, and move and turn it on a path."""
+
+    low: Vector = Field(description="Lowest corner x, y, z of the box [m]")
+    high: Vector = Field(description="Highest corner [m]")
+    path: tuple[GripPoint, ...] = Field((), max_length=64, description="Its way; it rests before and after")
+    pivot: Vector | None = Field(None, description="What it turns about; by default the middle of what it holds [m]")
+    holds: Literal["xyz", "xy", "xz", "yz", "x", "y", "z"] = Field(
+        "xyz", description="Directions in which it holds; what holds in z alone lets an end turn as a hinge does"
+    )
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        if any(a.time >= b.time for a, b in pairwise(self.path)):
+            raise ValueError("the times of the path must rise: sort them, and give each once")
+        _ordered(self)
+        return self
