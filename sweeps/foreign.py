@@ -109,6 +109,8 @@ def sound(path: Path, points: Array, faces: Array) -> None:
     """
     if points.ndim != 2 or points.shape[1:] != (3,) or faces.ndim != 2 or faces.shape[1:] != (3,) or not len(faces):
         raise ForeignMesh(path, "no triangles", "Name a mesh of triangles.")
+    if not len(points):
+        raise ForeignMesh(path, "corners that are no vertices")
     if len(points) > _MOST or len(faces) > _MOST:
         raise ForeignMesh(path, f"more than {_MOST} points or triangles", "Thin it out first.")
     if not np.isfinite(points).all() or np.abs(points).max() > 1e15:

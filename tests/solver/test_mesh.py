@@ -54,7 +54,8 @@ def test_a_brick_s_volume_comes_from_its_faces():
 @pytest.mark.parametrize("preset", sorted(registry.get("dehydration").presets))
 def test_elements_are_right_handed_and_fill_the_fruit(preset):
     fruit = registry.get("dehydration").parse({}, preset=preset)
-    mesh = build_mesh(fruit, 12, layer_fractions(0.6, 0.05, 1.3))
+    # the rule below is off by 6 % at 12 for a banana, whose tips are sharp, and by n^-2 of that on finer meshes
+    mesh = build_mesh(fruit, 24, layer_fractions(0.6, 0.05, 1.3))
     each = volumes(mesh)
     assert each.min() > 0
     # what two elements share cancels only if both number its corners alike

@@ -79,9 +79,13 @@ def _number(word: str, place: int, counts: tuple[int, int]) -> int:
     if place >= len(parts) or not parts[place]:
         return -1
     found = int(parts[place])
+    if abs(found) > _LARGEST:
+        raise ValueError(f"a corner that no file can hold: {parts[place][:20]}")
     return found - 1 if found > 0 else counts[place] + found
 
 
+#: Largest number of a vertex; what is larger fits into no array of corners.
+_LARGEST = 2**62
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
