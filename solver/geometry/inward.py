@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .outward import STEEP
+
 __all__ = ["candidates", "pairs"]
 
 Doubles = NDArray[np.float64]
@@ -21,8 +23,6 @@ Words = NDArray[np.int32]
 
 #: How far around a triangle others are looked for, as a share of its size (root of its area).
 _AROUND = 0.1
-#: Cosine between a triangle's normal and the direction to it below which it counts as facing inwards.
-_STEEP = 0.03
 #: Sides of the cube around the origin reach to this, so that triangles over an edge are whole on one; and their cells.
 _WIDE, _CELLS = 1.3, 96
 
@@ -40,7 +40,7 @@ def _look(x: Doubles, faces: Words, t: int, size: Doubles) -> bool:
     if volume <= 0:
         return True
     square *= x[a, 0] ** 2 + x[a, 1] ** 2 + x[a, 2] ** 2
-    is_steep: bool = volume * volume <= _STEEP**2 * square
+    is_steep: bool = volume * volume <= STEEP**2 * square
     return is_steep
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from .. import shell
 from ..contract import InvalidGeometry
-from .shapes import Mesh
+
+if TYPE_CHECKING:
+    from .. import shell
+    from .shapes import Mesh
 
 __all__ = ["OwnMesh"]
 
@@ -40,6 +40,9 @@ class OwnMesh(BaseModel):
 
     @model_validator(mode="after")
     def _is_a_surface(self) -> Self:
+        # parameters and schemas are read without what compiles
+        from .. import shell
+
         points, faces = np.array(self.points), np.array(self.faces, np.int64)
         try:
             top = shell.topology(faces, len(points))
@@ -57,12 +60,17 @@ class OwnMesh(BaseModel):
 
     def shape(self) -> Mesh:
         """Return it as a start shape, without the points that no triangle has."""
+        from .shapes import Mesh
+
         used, faces = np.unique(np.array(self.faces, np.int64), return_inverse=True)
         return Mesh(np.array(self.points)[used], faces.reshape(-1, 3))
 
 
 def _pinched(mesh: shell.Topology) -> int:
     """Return how many more fans of triangles there are than vertices that have triangles."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     faces, corners = mesh.hinge_faces, mesh.hinge_corners
     # both triangles of a hinge have the edge's ends at the corners after their opposite one, in turn
     ends = [3 * faces[:, 0] + (corners[:, 0] + k) % 3 for k in (1, 2)]

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from solver.arrays import Array
-from solver.geometry.apart import Topology, put_apart
+from solver.geometry.outward import faces_outward
 from solver.lattice import closed_lattice
+
+if TYPE_CHECKING:
+    from solver.geometry.apart import Topology
 
 __all__ = ["COARSE", "Evened", "even_out"]
 
@@ -41,6 +44,11 @@ def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = F
     """
     points, poles = whole(n)
     given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
+    if faces_outward(given, _triangles(n)):
+        return Evened(None, None, 0, 0)
+    # compiled: loaded when the first surface that folds is asked for
+    from solver.geometry.apart import put_apart
+
     topology, moved = _topology(n), given.copy()
     # of a fine lattice only whether it has to be, at first
     found = put_apart(moved, topology, 0) if keep or n > COARSE else put_apart(moved, topology)
@@ -60,8 +68,15 @@ def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = F
 
 
 @lru_cache(maxsize=8)
+def _triangles(n: int) -> Array:
+    return closed_lattice(n)
+
+
+@lru_cache(maxsize=8)
 def _topology(n: int) -> Topology:
-    return Topology.of(closed_lattice(n), 2 * n * n + 2)
+    from solver.geometry.apart import Topology
+
+    return Topology.of(_triangles(n), 2 * n * n + 2)
 
 
 def _refine(coarse: Array, poles: Array, n: int) -> Array:

@@ -29,8 +29,11 @@ KNOWN = {
     "degC",
     "percent",
     "J",
+    "J m-2",
     "J m-3",
+    "N m s",
     "N s",
+    "m2",
     "Pa",
     "0.1 lg(re 1)",
 }
