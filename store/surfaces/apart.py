@@ -43,9 +43,9 @@ def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = F
     `keep` moves nothing where nothing crosses, however near it comes: a stored result, on a lattice fine enough.
     """
     points, poles = whole(n)
-    given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
-    if faces_outward(given, _triangles(n)):
+    if faces_outward(points, poles):
         return Evened(None, None, 0, 0)
+    given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
     # compiled: loaded when the first surface that folds is asked for
     from solver.geometry.apart import put_apart
 
@@ -68,15 +68,10 @@ def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = F
 
 
 @lru_cache(maxsize=8)
-def _triangles(n: int) -> Array:
-    return closed_lattice(n)
-
-
-@lru_cache(maxsize=8)
 def _topology(n: int) -> Topology:
     from solver.geometry.apart import Topology
 
-    return Topology.of(_triangles(n), 2 * n * n + 2)
+    return Topology.of(closed_lattice(n), 2 * n * n + 2)
 
 
 def _refine(coarse: Array, poles: Array, n: int) -> Array:

@@ -33,14 +33,14 @@ def test_a_lattice_is_read_at_columns_as_at_its_own_points() -> None:
     assert np.abs(on_columns(directions(*lattice(64)), nodes) - nodes).max() < 2e-3
 
 
-def test_a_ridged_surface_comes_near_balance_and_says_how_near() -> None:
-    """These ridges are nobody's equilibrium: they grow and move, without crossing, and what is not met is said."""
+def test_a_ridged_surface_comes_to_balance() -> None:
+    """These ridges are nobody's equilibrium: they grow and move, without crossing."""
     solver = registry.get("dehydration")
     given = ridged(0.83, 0.03)
     found = solver.relaxed(solver.parse(EIGHTH), given, 0.2, NEED).isel(stage=0)
     assert found.attrs["path"] == "relaxed"
-    assert float(found["residual"]) < 3e-2
-    assert bool(found["converged"]) == (float(found["residual"]) <= RESIDUAL)
+    assert float(found["residual"]) <= RESIDUAL == 5e-3
+    assert bool(found["converged"])
     assert int(found["crossings"]) == int(found["lattice_crossings"]) == 0
     radii = [np.linalg.norm(one, axis=-1).ravel() for one in (found["position"].values, given)]
     assert np.corrcoef(*radii)[0, 1] > 0.3
@@ -48,14 +48,13 @@ def test_a_ridged_surface_comes_near_balance_and_says_how_near() -> None:
 
 
 @pytest.mark.slow
-def test_a_looked_up_shape_comes_near_balance_and_keeps_its_pattern() -> None:
+def test_a_looked_up_shape_comes_to_balance_and_keeps_its_pattern() -> None:
     table = ShapeTable.open(ROOT, surfaces=registry.surface)
     shape = table.at({"te": 0.0375, "gamma": 22.0}, 0.2, resolution=64)
     found, said = relaxed(registry.get("dehydration"), table, shape)
     assert found.tier == "relaxed"
-    # not every shape comes to `RESIDUAL` in the most steps allowed; what is left is said
-    assert said["residual"] < 2e-2
-    assert found.converged == (said["residual"] <= RESIDUAL)
+    assert said["residual"] <= RESIDUAL
+    assert found.converged
     assert found.crossings == 0
     assert shape.position is not None
     assert found.position is not None
