@@ -317,10 +317,9 @@ class ShapeTable:
 
     def _describe(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
         stored = _stored(stages)
-        places = np.ix_(near.samples, list(stored))
-        weights, parts = np.asarray(near.weights, float), np.array(list(stored.values()), float)
+        places, parts = np.array(list(stored), int), np.array(list(stored.values()), float)
         # (name, sample, stage) to (name,)
-        found = (self._numbers[(slice(None), *places)] @ parts) @ weights
+        found = (self._numbers[:, near.samples][:, :, places] @ parts) @ np.asarray(near.weights, float)
         known = _ZERO_AT_FIRST if _FRESH in stages else self._descriptors
         told = dict(zip(self._descriptors, found.tolist(), strict=True))
         return {name: told[name] for name in known if name in told}
