@@ -3,8 +3,8 @@
     python -m benchmarks.dehydration.families --store maps
 
 Of each table in the package, from the runs in the store that it was made of: how many stages meet their residual, the
-worst one, crossing triangles of finite elements and lattices, the least J; and of its file bytes and loss. A table whose
-runs the store does not hold keeps what is in the record of it, if it is that very file (by its digest).
+worst one, crossing triangles of finite elements and lattices, the least J; and of its file bytes and loss. A table
+whose runs the store does not hold keeps what is in the record of it, if it is that very file (by its digest).
 """
 
 from __future__ import annotations
