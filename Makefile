@@ -14,7 +14,7 @@ PAGE   := $(VIEWER)/dist/index.html
 NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
 
-.PHONY: demo demo-map page test test-processor test-slow mutants bench docs stress lint format clean constraints
+.PHONY: demo demo-map page test test-clients test-processor test-slow mutants bench docs stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -48,6 +48,10 @@ demo-map: $(STAMP)
 ## test: everything quick, on two cores; CI runs this
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+## test-clients: what others' generators make of the OpenAPI page, fetched from package registries; CI runs this too
+test-clients: $(STAMP)
+	$(BIN)/python -m pytest -m 'slow or not slow' tests/service/test_clients.py -rs
 
 # solvers' tests whose numbers hang on compiled kernels or on BLAS, of each solver those that compile soonest
 PROCESSOR ?= haswell
