@@ -69,7 +69,7 @@ mutants: $(STAMP)
 
 ## test-slow: the long checks as well; those of the page need a Chromium (Debian: apt-get install chromium)
 test-slow: $(STAMP) $(PAGE)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser,notebooks]'
 	$(BIN)/python -m pytest -m 'slow or not slow' --timeout 3600
 
 ## bench: the kernel against the C prototype, the look-up per resolution, the solver's error over time in short; run it
