@@ -42,22 +42,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ask", nargs="+", default=["64:10000", "128:1000", "256:200"], metavar="LATTICE:SHAPES")
     parser.add_argument("--pieces", type=Path, help="where each family's answers are kept while this goes on")
+    parser.add_argument("--families", nargs="+", help="only these; others keep their share of the questions")
     asked = parser.parse_args()
     sheet = Sheet("dehydration-apart", _HEAD, "dehydration")
     store = Store.open(ROOT)
     families = [ShapeTable.open(store, name, surfaces=registry.surface) for name in store.table_names()]
     for text in asked.ask:
         n, count = map(int, text.split(":"))
-        rows = list(_all(families, n, count, asked.pieces))
+        rows = list(_all(families, n, count, asked.pieces, asked.families))
         for low, high in pairwise(_EDGES):
             _add(sheet, n, f"{low:g} to {high:g}", [row for row in rows if low < row["s"] <= high])
     sheet.keep(digests={table.info.name: table.digest for table in families})
 
 
-def _all(families: list[ShapeTable], n: int, count: int, pieces: Path | None) -> Iterator[Row]:
+def _all(families: list[ShapeTable], n: int, count: int, pieces: Path | None, only: list[str] | None) -> Iterator[Row]:
     """Yield what became of each question on one lattice, family by family."""
     shares = [2 if table.axes else 1 for table in families]
     for table, share in zip(families, shares, strict=True):
+        if only is not None and table.info.name not in only:
+            continue
         piece = None if pieces is None else pieces / f"{table.info.name}-{n}-{count}-{table.digest[:16]}.json"
         if piece is not None and piece.is_file():
             yield from json.loads(piece.read_text())
