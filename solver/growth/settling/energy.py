@@ -16,7 +16,7 @@ from ...arrays import Floats, Ints
 from ...linalg.multifrontal import Analysis
 from ...shell.inverse import fronts_of, inverse_of
 from ...shell.normals import normals
-from ..params import Bending, Plane, SolidBall
+from ..params import Bending, Solid
 from ..state import State
 from .loads import area_vectors, depth_in
 from .tangent import LEAF, Tangent
@@ -54,7 +54,7 @@ class StepEnergy:
         state: State,
         material: shell.Material,
         pressure: float,
-        solids: Sequence[Plane | SolidBall],
+        solids: Sequence[Solid],
         tangent: Tangent,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         distance: float = 0.0,
@@ -67,6 +67,10 @@ class StepEnergy:
         self._pressure, self._gravity, self._bending = pressure, gravity, bending
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
+        if "stiff" in state.matter:
+            stiff = state.matter["stiff"]
+            self.stiffness *= np.exp(stiff[state.mesh.hinges[:, :2]].mean(axis=1))
+            self._mean = None if self._mean is None else (self._mean[0], self._mean[1] * np.exp(stiff))
         self.load: Floats | None = None
         self.free = ~state.held
         #: Which blocks of the last `hessian` are on the diagonal (n,).
