@@ -18,7 +18,7 @@ from ...shell.inverse import fronts_of, inverse_of
 from ...shell.normals import normals
 from ..params import Bending, Solid
 from ..state import State
-from .loads import area_vectors, depth_in
+from .loads import area_vectors, depth_in, half_way
 from .tangent import LEAF, Tangent
 from .touching import Touching
 
@@ -76,6 +76,8 @@ class StepEnergy:
         #: Which blocks of the last `hessian` are on the diagonal (n,).
         self.diagonal: Ints = np.empty(0, np.int64)
         self._last: tuple[Floats, float, Floats] | None = None
+        #: How far a vertex may move in a step.
+        self._room = min((half_way(solid) for solid in solids), default=np.inf)
         #: Whether the last step asked for was not allowed whole.
         self.cut = False
         thirds = np.repeat(shell.areas(state.g) / 3, 3)
@@ -145,6 +147,10 @@ class StepEnergy:
     def allowed(self, x: Floats, way: Floats, wanted: float) -> float:
         """Return how much of `way` (n, 3), at most `wanted`, may be gone from x in one step."""
         found = self.touching.allowed(x, way, wanted) if self.touching else wanted
+        if self._room < np.inf:
+            # no vertex jumps over a solid: beyond its middle it would be pushed out on the other side
+            speed = float(np.sqrt((way * way).sum(axis=1).max()))
+            found = min(found, self._room / max(speed, 1e-300))
         self.cut = found < wanted
         return found
 

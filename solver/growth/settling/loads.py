@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ..params import Plane, Solid, SolidBox
+from ..params import Plane, Solid, SolidBall, SolidBox
 
-__all__ = ["area_vectors", "depth_in"]
+__all__ = ["area_vectors", "depth_in", "half_way"]
 
 
 def area_vectors(x: Floats, triangles: Ints) -> Floats:
@@ -27,6 +27,13 @@ def depth_in(solid: Solid, x: Floats) -> tuple[Floats, Floats]:
         return _depth_in_box(solid, way)
     distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]
+
+
+def half_way(solid: Solid) -> float:
+    """Return half of what it is from a solid's surface to its middle at least."""
+    if isinstance(solid, Plane):
+        return np.inf
+    return solid.radius / 2 if isinstance(solid, SolidBall) else min(solid.size) / 4
 
 
 def _depth_in_box(box: SolidBox, way: Floats) -> tuple[Floats, Floats]:
