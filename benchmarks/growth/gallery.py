@@ -35,7 +35,7 @@ _COLUMNS = 5
 _TIMES, _ABREAST = (0.35, 0.7, 1.0), 2
 #: What lies flat is looked at from above, a strip from its side.
 _VIEWS = {"b-leaf": (60, 60), "c": (60, 60), "c-pumpkin": (35, 22), "c-flower": (60, 55), "d-bed": (55, 35)}
-_VIEWS |= {"e-cloth": (35, 25), "f-cabbage": (35, 22), "h-fern": (35, 22), "h-lettuce": (35, 48)}
+_VIEWS |= {"e-cloth": (35, 25), "f-cabbage": (35, 22), "h-fern": (35, 22)}
 
 
 def grown(path: Path, quality: str, keep: Path | None) -> xr.Dataset:
@@ -68,9 +68,10 @@ def panel(run: xr.Dataset, name: str) -> Panel:
 
 
 def panels_in_time(run: xr.Dataset, name: str) -> list[Panel | None]:
-    """Return its pictures at the growth times of the run, all at one scale."""
-    shapes = zip(triangles(run), run["stage"].values, strict=True)
-    return [replace(shape, note=f"{name}, t = {float(time):g}", view=_view(name)) for shape, time in shapes]
+    """Return its pictures at the growth times of the run, all at one scale; its name stands below the middle one."""
+    shapes, times = triangles(run), run["stage"].values
+    notes = [name if k == len(times) // 2 else f"t = {float(time):g}" for k, time in enumerate(times)]
+    return [replace(shape, note=note, view=_view(name)) for shape, note in zip(shapes, notes, strict=True)]
 
 
 def line(run: xr.Dataset, name: str) -> tuple[str, ...]:
@@ -110,7 +111,9 @@ def main() -> None:
         asked.out.write_bytes(sheet(rows, title="Growth: the gallery of Combaz and Neyret 2004, Fig. 2", pixels=260))
     if asked.times:
         abreast = [list(chain(*times[i : i + _ABREAST])) for i in range(0, len(times), _ABREAST)]
-        asked.times.write_bytes(sheet(abreast, title="Growth: three times of each", pixels=150))
+        asked.times.write_bytes(
+            sheet(abreast, title="Growth: each at t = " + ", ".join(f"{time:g}" for time in _TIMES), pixels=150)
+        )
 
 
 if __name__ == "__main__":
