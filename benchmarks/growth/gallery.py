@@ -108,11 +108,11 @@ def main() -> None:
         table.keep(quality=asked.quality)
     if asked.out:
         rows = [panels[i : i + _COLUMNS] for i in range(0, len(panels), _COLUMNS)]
-        asked.out.write_bytes(sheet(rows, title="Growth: the gallery of Combaz and Neyret 2004, Fig. 2", pixels=260))
+        asked.out.write_bytes(sheet(rows, title="Growth: the gallery of Combaz and Neyret 2004, Fig. 2", pixels=240))
     if asked.times:
         abreast = [list(chain(*times[i : i + _ABREAST])) for i in range(0, len(times), _ABREAST)]
         asked.times.write_bytes(
-            sheet(abreast, title="Growth: each at t = " + ", ".join(f"{time:g}" for time in _TIMES), pixels=150)
+            sheet(abreast, title="Growth: each at t = " + ", ".join(f"{time:g}" for time in _TIMES), pixels=135)
         )
 
 
