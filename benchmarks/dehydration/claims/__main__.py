@@ -2,8 +2,8 @@
 
 Runs what is cheap of the plans examples/fig7.toml and examples/maps, and judges the statements C1 to C6 of Liu et al.
 2014, section 4, at s = 0.3: a part of each fruit between planes of symmetry, at preview, of skins not thinner than
-`--thinnest` (of Table 1 than `--thinnest-fruit`), with three seeds, each from its own noise. With `--whole` the plans are
-run as they are written, which takes days. What is stored already is not run again; `--judge` runs nothing.
+`--thinnest` (of Table 1 than `--thinnest-fruit`), with three seeds, each from its own noise. With `--whole` the plans
+are run as they are written, which takes days. What is stored already is not run again; `--judge` runs nothing.
 """
 
 from __future__ import annotations
