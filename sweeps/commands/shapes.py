@@ -234,13 +234,7 @@ def _limits(text: str | None) -> dict[str, float] | None:
 def _document(shape: Any) -> dict[str, Any]:
     return {
         "stage": shape.stage,
-        "exact": shape.exact,
-        "converged": shape.converged,
-        "crossings": shape.crossings,
-        "tier": shape.tier,
-        "nearest": shape.nearest,
-        "inside": shape.inside,
-        "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
+        **shape.trust(),
         "weights": dict(shape.weights),
         "descriptors": {
             name: {"value": value, "units": shape.units.get(name, "")} for name, value in shape.descriptors.items()
