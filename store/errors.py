@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 __all__ = [
+    "NO_DAMAGE",
     "Advised",
     "CorruptBackup",
     "CorruptLedger",
@@ -33,6 +34,9 @@ __all__ = [
     "UnknownToken",
     "full_disk",
 ]
+
+#: What reading a file may end with although nothing is wrong with the file.
+NO_DAMAGE = (FileNotFoundError, PermissionError, ImportError)
 
 _BROKEN = {errno.EIO, errno.EREMOTEIO, errno.ENXIO}
 _REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS}

@@ -26,6 +26,7 @@ from . import asking, exact
 from . import detail as level
 from .answers import Answer, Answers, matches
 from .asking import Asked
+from .compiling import NotAtOnce
 from .query import ShapeQuery
 
 __all__ = ["at_once", "router"]
@@ -36,6 +37,8 @@ router = APIRouter(tags=["shapes"])
 #: for the interpreter there.
 _QUICK = ("points", "npz", "json")
 _SMALL = 128
+#: Says of a request that its shape turned out not to be computed at once.
+_FOLDS = "wizen.folds"
 
 _CONTENT = problems.files(f.media_type for f in FORMATS.values() if f.name != "json")
 
@@ -85,14 +88,18 @@ async def at_once(request: Request, solver: str) -> Response | None:
         ServiceError, StoreError, SolverError: as `_ask` and `_settle`, or too many wait already.
 
     """
-    if not request.app.state.tables.is_open(asking.table_for(request, solver).name):
+    if _FOLDS in request.scope or not request.app.state.tables.is_open(asking.table_for(request, solver).name):
         return None  # opening a large table takes seconds
     asked = asking.asked(request, solver)
     # a shape is small, and no job is to be asked for
     if asked.resolution > _SMALL or asked.chosen.name not in _QUICK or asked.query.exact:
         return None
     async with request.app.state.turns:
-        return _settle(request, asked)
+        try:
+            return _settle(request, asked)
+        except NotAtOnce:
+            request.scope[_FOLDS] = True  # putting it out of contact with itself takes longer than all the rest
+            return None
 
 
 def _shape(request: Request, solver: str) -> Response:
