@@ -74,6 +74,7 @@ register(
         "1", "out-of-balance force over internal force, or the largest error of a step, relative L2", "|r|/|f|"
     ),
     moved=Quantity("1", "how far relaxing moved a surface: rms of the radial motion over its roughness", "d/r"),
+    residual_placed=Quantity("1", "residual of a surface as it was put on the mesh, before it was relaxed", "|r|/|f|"),
     drift=Quantity("1", "rms motion of the surface in its last 200 steps, in exocarp thicknesses", "d"),
     iterations=Quantity("1", "steps or iterations spent up to and including this stage", "n"),
     seconds=Quantity("s", "wall time spent up to and including this stage", "t", volatile=True),

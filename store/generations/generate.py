@@ -28,6 +28,7 @@ from ..surfaces import packed, spectra
 from ..surfaces.measures import UNITS, Measures
 from . import trust
 from .generation import CONVERGENCE, DIMS, PACKED, combined, map_spectra
+from .output import Output
 from .samples import Samples
 
 if TYPE_CHECKING:
@@ -75,10 +76,15 @@ def write(
             rows.append(_rows(result))
             yield spectra_of(result, key, samples.need, band)
 
+    from xarray.backends import H5NetCDFStore
+
     total = hashlib.sha256()
     more: dict[str, Any] = {}
     stored: packed.Packed | None = None
-    with h5netcdf.File(path, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file:
+    with (
+        Output(path) as output,
+        h5netcdf.File(output, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file,
+    ):
         if dtype == "int16":
             whole = [block.astype(np.float32) for block in blocks()]
             codes = packed.encode(whole)
@@ -94,6 +100,8 @@ def write(
         for i, block in enumerate(written):
             total.update(block.data)
             target[i] = block
+            output.check()
+    output.check()
     small = _small(samples, rows, solver, band).assign(more)
     small = small.assign(_judge(map_spectra(path) if stored is None else stored, samples, solver))
     content = combined(small, total.hexdigest())
@@ -101,7 +109,9 @@ def write(
     encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
     for name in ("key", "component", "part"):
         encoding[name]["dtype"] = "S1"
-    small.to_netcdf(path, mode="a", engine="h5netcdf", encoding=encoding)
+    with Output(path) as output, h5netcdf.File(output, "r+") as file:
+        small.dump_to_store(H5NetCDFStore(file), encoding=encoding)
+    output.check()
     return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
 
 
