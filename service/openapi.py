@@ -166,8 +166,12 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
         ]
         for axis in whole:
             found.setdefault(axis.name, _axis(axis, examples.get(axis.name, {})))
+    return [*found.values(), *_what(settings), *_how()]
+
+
+def _what(settings: Settings) -> list[Json]:
+    """Return the parameters that say which shape: of which table, when, how fine, with what."""
     return [
-        *found.values(),
         _query(
             "resolution",
             f"Colatitude samples, {LOWEST_RESOLUTION} to {settings.max_resolution}; azimuth has twice as many. "
@@ -192,6 +196,12 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
             + ", ".join(f"{name}: {', '.join(vocabulary.solver_named(name).presets)}" for name in registry.names()),
             {"type": "string"},
         ),
+    ]
+
+
+def _how() -> list[Json]:
+    """Return the parameters that say how a shape is looked up and handed over, and what becomes of a bad one."""
+    return [
         _query(
             "format",
             "Representation; goes before the Accept header",

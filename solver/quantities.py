@@ -146,6 +146,9 @@ register(
     elastic_strain=Quantity(
         "1", "mean principal stretch of the membrane less 1, averaged over a vertex's triangles", "e"
     ),
+    red=Quantity("1", "red of the surface, linear light", "R", share=True),
+    green=Quantity("1", "green of the surface, linear light", "G", share=True),
+    blue=Quantity("1", "blue of the surface, linear light", "B", share=True),
     rest_area=Quantity("1", "area of the grown rest state, in the start shape's unit squared", "A_g"),
     mesh_area=Quantity("1", "area of the shape, in the start shape's unit squared", "A"),
     stored_energy=Quantity("1", "elastic energy, membrane and bending, in units of mu l^2", "E"),

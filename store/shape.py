@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from solver.arrays import Array
 
@@ -49,6 +50,18 @@ class Shape:
     method: str = ""
     crossings: int | None = None
     tier: str = "table"
+
+    def trust(self) -> dict[str, Any]:
+        """Return how far to trust it, as plain values; every answer says so in this order."""
+        return {
+            "exact": self.exact,
+            "converged": self.converged,
+            "crossings": self.crossings,
+            "tier": self.tier,
+            "nearest": self.nearest,
+            "inside": self.inside,
+            "expected_error": None if self.expected_error is None else dict(self.expected_error),
+        }
 
     @cached_property
     def normals(self) -> Array:

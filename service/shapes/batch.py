@@ -93,14 +93,7 @@ def batch(request: Request, body: BatchRequest) -> Response:
     def look_up() -> Iterator[tuple[Shape, About]]:
         yield from batch_detail.each_once(distinct, sent, at, lambda one: replace(about, detail=one.said))
 
-    about = About(
-        solver=body.solver,
-        table=name,
-        fixed=words.fixed,
-        stage_symbol=words.stage,
-        units=words.units,
-        made=words.made,
-    )
+    about = words.about(body.solver, name)
     rest = (rows if body.once else None, detail.window, fields, look_up)
     made = Batch(table, replace(about, detail=sent[0].said), sent, *rest)
     return _answer(batch_formats.encode(chosen, made), batch_formats.media_type(chosen, made))

@@ -16,9 +16,10 @@ from store.families.ties import Tie
 from store.surfaces.measures import Measures
 
 from ..errors import InvalidQuery, Wrong
+from ..formats import About
 from . import detail
 
-__all__ = ["EXACT", "LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
+__all__ = ["EXACT", "LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "number_of", "parse"]
 
 #: Names that are not axes.
 RESERVED = ("resolution", "table", "preset", "format", "method", "max_error", "exact", *detail.NAMES)
@@ -58,6 +59,10 @@ class Words(NamedTuple):
     def ranges(self) -> dict[str, Range]:
         """All that must be given, with its range."""
         return {**self.axes, self.stage: self.stages}
+
+    def about(self, solver: str, table: str) -> About:
+        """Return what files say of every shape of the table of that name."""
+        return About(solver, table, self.fixed, self.stage, self.units, made=self.made)
 
     def say(self, name: str) -> str:
         """Return the range of an axis or of the stage with its units, in words."""
@@ -116,7 +121,7 @@ def parse(
             else:
                 chosen[name] = found
         elif name in words.ranges or name in words.fixed or name in words.tied:
-            number = _number(text)
+            number = number_of(text)
             if number is None:
                 wrong.append(Wrong(name, f"{text[:40]!r} is not a finite number", "Write it like 0.05."))
             else:
@@ -175,7 +180,8 @@ def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:
     return [Wrong(name[:40], "is given more than once", "Give it once.") for name, n in counts.items() if n > 1]
 
 
-def _number(text: str) -> float | None:
+def number_of(text: str) -> float | None:
+    """Return the finite number that a text is, None if it is none."""
     try:
         number = float(text)
     except ValueError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Request
@@ -17,7 +18,7 @@ from store.errors import TooUncertain
 
 from .. import problems
 from ..errors import OutsideRanges
-from ..formats import FORMATS, About, Format
+from ..formats import FORMATS, Format
 from ..settings import Settings
 from ..views.addresses import link
 from ..views.shape import ShapePage
@@ -158,16 +159,11 @@ def _answer(request: Request, asked: Asked) -> Response:
         window=detail.window,
     )
     looked = time.perf_counter()
-    about = About(
-        solver=solver.name,
-        table=name,
-        fixed=words.fixed,
-        stage_symbol=words.stage,
-        units=words.units,
+    about = replace(
+        words.about(solver.name, name),
         detail=detail.said(resolution, table.resolution),
         links=_links(request, resolution, detail) if chosen.name == "json" else {},
         timings={"lookup": 1e3 * (looked - begin)},
-        made=words.made,
     )
     body = chosen.encode(shape, about)
     encoded = time.perf_counter()

@@ -68,14 +68,15 @@ def build(
     plan, text = _plan(opened, plan)
     chosen = registry.get(solver or _only_solver(opened, plan))
     made = None
-    if chosen.surface is not None and finished(opened, chosen.name, Choice(plan, quality), is_surface):
+    choice = Choice(plan, quality)
+    if chosen.surface is not None and finished(opened, chosen.name, choice, is_surface):
         told: dict[str, Any] = {"resolution": resolution, "text": text, "dtype": precision}
         made = tables.build(opened, chosen, name, plan=plan, quality=quality, **told)
     elif resolution is not None:
         raise InvalidOption("--resolution cuts shapes, and there are none.", "Leave it out.")
     numbers: dict[str, Any] | None = None
     try:
-        path = scalars.build(opened, chosen, name, plan=plan, quality=quality, keys=made.keys if made else None)
+        path = scalars.build(opened, chosen, name, choice._replace(keys=made.keys if made else None))
         numbers = _numbers(scalars.read(opened, name), path)
     except EmptyTable:
         if made is None:  # shapes alone, without a number beside them, are a table as well

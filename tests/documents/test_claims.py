@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.dehydration import claims
-from benchmarks.dehydration.criteria import Found, judge
-from benchmarks.dehydration.pattern import Pattern
+from benchmarks.dehydration.claims import __main__ as claims
+from benchmarks.dehydration.claims.criteria import Found, judge
+from benchmarks.dehydration.claims.pattern import Pattern, name_of
+from solver.dehydration import SOLVER as DEHYDRATION
+from solver.dehydration import DehydrationParams
 
 _PLAIN = Pattern(
     name="", seed=0, quality="preview", mirrors="", version="0", converged=True, te=0.04, gamma=10.0, stone=(0.4, 0.4),
@@ -124,4 +126,13 @@ def test_the_cheap_part_of_the_plans() -> None:
     assert {job.params["mirrors"] for job in claims.jobs("table1", [0], 0.001, False)} == {"xyz", "xz"}
     whole = claims.jobs("fig8", [0, 1], 0.03, True)
     assert len(whole) == 12
-    assert not any(job.params.get("mirrors") for job in whole)
+    assert all(job.params["pattern"] for job in whole)
+    assert not any(job.params["pattern"] for job in jobs)
+
+
+def test_table_1_is_its_six_fruits() -> None:
+    jobs = claims.jobs("table1", [0], 0.001, False)
+    params = [DehydrationParams.model_validate(job.params) for job in jobs]
+    assert [name_of(each) for each in params] == [plan.removeprefix("maps/") for plan in claims.PLANS["table1"]]
+    own = [DEHYDRATION.parse({"gamma": 10}, name_of(each)) for each in params]
+    assert [each.exocarp_thickness for each in params] == [each.axis("te") for each in own]
