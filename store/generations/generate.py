@@ -76,8 +76,6 @@ def write(
             rows.append(_rows(result))
             yield spectra_of(result, key, samples.need, band)
 
-    from xarray.backends import H5NetCDFStore
-
     total = hashlib.sha256()
     more: dict[str, Any] = {}
     stored: packed.Packed | None = None
@@ -106,13 +104,20 @@ def write(
     small = small.assign(_judge(map_spectra(path) if stored is None else stored, samples, solver))
     content = combined(small, total.hexdigest())
     small.attrs["digest"] = content
+    _append(path, small)
+    return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
+
+
+def _append(path: Path, small: xr.Dataset) -> None:
+    """Write what is beside the spectra into the file that holds them."""
+    from xarray.backends import H5NetCDFStore
+
     encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
     for name in ("key", "component", "part"):
         encoding[name]["dtype"] = "S1"
     with Output(path) as output, h5netcdf.File(output, "r+") as file:
         small.dump_to_store(H5NetCDFStore(file), encoding=encoding)
     output.check()
-    return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
 
 
 def _spectrum(file: Any, dims: tuple[str, ...], dtype: str) -> Any:
