@@ -52,7 +52,6 @@ def scene(
     from ..scenes.compose import FORMATS, make
     from ..scenes.request import parse
     from ..settings import Settings
-    from ..shapes.live import LiveTables
 
     formats = {suffix: name for name, (_, suffix) in FORMATS.items() if name != "json"}
     if out is not None and out.suffix not in formats:

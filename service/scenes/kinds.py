@@ -140,7 +140,9 @@ def _shade(solver: Solver, item: Item) -> tuple[str, Shade]:
         if item.shade not in shades:
             near = difflib.get_close_matches(item.shade, list(shades), n=1)
             hint = f"Did you mean {near[0]!r}? " if near else ""
-            raise InvalidInput(f"{solver.name} has no skin {item.shade!r}.", f"{hint}Known: {', '.join(shades)}.")
+            raise InvalidInput(
+                f"{solver.name} has no skin {item.shade!r}.", advice=f"{hint}Known: {', '.join(shades)}."
+            )
         return item.shade, shades[item.shade]
     for name, shade in shades.items():
         if item.preset is not None and item.preset.startswith(name):

@@ -19,7 +19,7 @@ __all__ = ["VERTEX", "Packed", "Skin", "linear", "pack", "relief", "skin"]
 VERTEX = np.dtype([("position", "<i2", 4), ("normal", "i1", 4), ("colour", "u1", 4)])
 #: Height [r1] over the smoothed shape from furrow to ridge, and the share of ridge where it is smooth.
 _DEEP, _FLAT = 0.05, 0.6
-#: Largest coordinate as a number: half a step is 1.2e-4 of the radius. More bits would be noise that costs as much as all the rest.
+#: Largest coordinate as a number: half a step is 1.2e-4 of the radius. More bits would be noise, and half the file.
 _STEPS = 4095
 #: Shades from furrow to ridge.
 _SHADES = 32

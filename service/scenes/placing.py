@@ -16,7 +16,7 @@ from solver.contract import SolverError
 from ..errors import Wrong
 from .errors import InvalidScene
 from .kinds import Kind
-from .request import Item, Place, Scene
+from .request import Place, Scene
 
 __all__ = ["Instances", "Prop", "bowls", "place"]
 
@@ -60,20 +60,21 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
     kind = np.asarray(rows)[item]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     scale = np.repeat([one.size for one in scene.items], counts).astype(float)
-    centre, turn = np.zeros((len(item), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(item), 1))
-    mirrored = np.zeros(len(item), bool)
+    centre = np.zeros((len(item), 3))
     members: dict[str, list[Array]] = {one.name: [] for one in scene.places}
+    seeds = np.array([-1 if one.seed is None else one.seed for one in scene.items])[item]
+    turn, mirrored, share = _individuals(seeds, np.arange(len(item)) - first[item])
+    scale *= 1 + np.array([one.vary for one in scene.items])[item] * share
+    which = np.array([bool(one.transforms) for one in scene.items])[item]
+    if which.any():
+        given = [t for one in scene.items for t in one.transforms]
+        centre[which] = [t.position for t in given]
+        rotation = np.array([t.rotation for t in given])
+        rotation /= np.linalg.norm(rotation, axis=1)[:, None]
+        turn[which] = _product(rotation, turn[which])
+        scale[which] *= [t.scale for t in given]
     for i, one in enumerate(scene.items):
-        span = slice(first[i], first[i] + counts[i])
-        if one.seed is not None:
-            turn[span], mirrored[span], scale[span] = _individual(one, counts[i])
-        if one.transforms:
-            centre[span] = [t.position for t in one.transforms]
-            given = np.array([t.rotation for t in one.transforms])
-            given /= np.linalg.norm(given, axis=1)[:, None]
-            turn[span] = _product(given, turn[span])
-            scale[span] *= [t.scale for t in one.transforms]
-        elif one.place is not None:
+        if one.place is not None:
             members[one.place].append(np.arange(first[i], first[i] + counts[i]))
     found = Instances(item, kind, centre, turn, scale, mirrored)
     rests = {}
@@ -98,13 +99,26 @@ def bowls(scene: Scene) -> list[Prop]:
     return [Prop(_bowl(p), p.at) for p in scene.places if p.rule == "bowl"]
 
 
-def _individual(item: Item, count: int) -> tuple[Floats, Array, Floats]:
-    """Return turns, mirrorings and sizes of an item's individuals by its seed."""
-    random = np.random.default_rng(item.seed)
-    turn = random.standard_normal((count, 4))
-    turn /= np.linalg.norm(turn, axis=1)[:, None]
-    mirrored = random.random(count) < 0.5
-    return turn, mirrored, item.size * (1 + item.vary * random.uniform(-1, 1, count))
+def _individuals(seeds: Array, numbers: Array) -> tuple[Floats, Array, Floats]:
+    """Return turns (b, 4), mirrorings (b) and -1 to 1 for sizes (b) of individuals by seed and number; -1: as stored.
+
+    Numbers come from a hash of both (splitmix64): a generator for each item would take longer than all else about it.
+    """
+    state = seeds.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + numbers.astype(np.uint64) * np.uint64(
+        0xD1B54A32D192ED03
+    )
+    u = np.empty((5, len(seeds)))
+    for k in range(5):
+        state = state + np.uint64(0x9E3779B97F4A7C15)
+        z = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        u[k] = ((z ^ (z >> np.uint64(31))) >> np.uint64(11)).astype(float) * 2.0**-53
+    # uniform over all turns (Shoemake 1992)
+    a, b, p, q = np.sqrt(1 - u[0]), np.sqrt(u[0]), 2 * np.pi * u[1], 2 * np.pi * u[2]
+    turn = np.stack([a * np.sin(p), a * np.cos(p), b * np.sin(q), b * np.cos(q)], axis=1)
+    alike = seeds < 0
+    turn[alike] = [0.0, 0.0, 0.0, 1.0]
+    return turn, (u[3] < 0.5) & ~alike, np.where(alike, 0.0, 2 * u[4] - 1)
 
 
 def _product(a: Floats, b: Floats) -> Floats:

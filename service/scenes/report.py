@@ -51,8 +51,10 @@ def document(told: Told) -> dict[str, Any]:
     order = np.argsort(told.everything.item, kind="stable")
     ends = np.searchsorted(told.everything.item[order], np.arange(len(told.scene.items) + 1))
     first: set[tuple[int, int]] = set()
+    least = min(spent.values(), default=0.0)
     items = [
-        _item(told, i, order[ends[i] : ends[i + 1]], n, wanted, spent, first) for i in range(len(told.scene.items))
+        _item(told, i, order[ends[i] : ends[i + 1]], n, wanted, spent, least, first)
+        for i in range(len(told.scene.items))
     ]
     why = {text: int((told.found.why == code).sum()) for code, text in _WHY.items()}
     distinct = sorted(
@@ -87,15 +89,35 @@ def _by_lattice(kinds: Sequence[Kind]) -> dict[int, float]:
 
 
 def _item(
-    told: Told, i: int, rows: Array, n: Array, wanted: Array, spent: Mapping[int, float], first: set[tuple[int, int]]
+    told: Told,
+    i: int,
+    rows: Array,
+    n: Array,
+    wanted: Array,
+    spent: Mapping[int, float],
+    least: float,
+    first: set[tuple[int, int]],
 ) -> dict[str, Any]:
     one, k = told.scene.items[i], told.rows[i]
     kind = told.kinds[k]
+    if len(rows) == 1 and not told.shown[rows[0]]:
+        # most items of a large scene
+        return {
+            "name": one.name or kind.label,
+            "table": kind.table.info.name,
+            "instances": 1,
+            "shown": 0,
+            "computed": [],
+            "shared": 0,
+            "reduced": 0,
+            "skipped": {_WHY[int(told.found.why[rows[0]])]: 1},
+            "lattices": {},
+            "milliseconds_saved": round(least, 2),
+        }
     shown = rows[told.shown[rows]]
     lattices, counts = np.unique(n[shown], return_counts=True)
     computed = [int(size) for size in lattices if (k, int(size)) not in first]
     first |= {(k, size) for size in computed}
-    least = min(spent.values(), default=0.0)
     alone = sum(spent.get(int(size), least) for size in n[shown]) + least * (len(rows) - len(shown))
     used = sum(1e3 * kind.spent.get(size, 0.0) for size in computed)
     left = {text: int((told.found.why[rows] == code).sum()) for code, text in _WHY.items()}
@@ -108,7 +130,7 @@ def _item(
         "shared": max(len(shown) - len(computed), 0),
         "reduced": int((n[shown] < wanted[shown]).sum()),
         "skipped": {text: count for text, count in left.items() if count},
-        "lattices": {int(size): int(count) for size, count in zip(lattices, counts, strict=True)},
+        "lattices": {str(size): int(count) for size, count in zip(lattices, counts, strict=True)},
         "milliseconds_saved": round(max(alone - used, 0.0), 2),
     }
     looked = [kind.shapes[int(size)] for size in lattices if int(size) in kind.shapes] or (

@@ -41,7 +41,7 @@ def radius_at(table: Floats, x: float, y: float, z: float, r: float) -> float:
     left, right = int(j) % (2 * n), int(j + 1) % (2 * n)
     high = table[top, left] * (1 - b) + table[top, right] * b
     low = table[bottom, left] * (1 - b) + table[bottom, right] * b
-    return high * (1 - a) + low * a
+    return float(high * (1 - a) + low * a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -71,7 +71,7 @@ def _push(at: Floats, turn: Floats, i: int, arm: Floats, d: Floats, amount: floa
 def _ease(arm: Floats, d: Floats, mass: float, inertia: float) -> float:
     """Return how far the point at `arm` gives way along d to a unit impulse."""
     x, y, z = arm[1] * d[2] - arm[2] * d[1], arm[2] * d[0] - arm[0] * d[2], arm[0] * d[1] - arm[1] * d[0]
-    return 1 / mass + (x * x + y * y + z * z) / inertia
+    return float(1 / mass + (x * x + y * y + z * z) / inertia)
 
 
 @njit(cache=True, error_model="numpy")
@@ -162,7 +162,7 @@ def _meet(
     normal[0], normal[1], normal[2] = rotate(turn[j], slope, False)
     # the depth was along the radius
     lean = (normal[0] * moved[0] + normal[1] * moved[1] + normal[2] * moved[2]) / r
-    return deepest * max(lean, 0.2)
+    return float(deepest * max(lean, 0.2))
 
 
 @njit(cache=True, error_model="numpy")

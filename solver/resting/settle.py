@@ -19,7 +19,7 @@ MOST = 1500
 _DIRECTIONS, _POINTS = 24, 12
 _STEP, _FRICTION = 0.02, 0.5
 #: Speed below which a pile is at rest, where gravity and the mean radius are 1.
-_STILL = 0.03
+_STILL = 0.02
 _BATCH, _LONGEST = 100, 40
 
 
@@ -85,7 +85,7 @@ def settle(bodies: Sequence[Body], kinds: Sequence[int], sizes: Floats, bowl: Bo
     count = len(kinds)
     if count > MOST:
         raise InvalidInput(
-            f"{count} bodies are more than {MOST} of one pile.", f"Make several piles of at most {MOST}."
+            f"{count} bodies are more than {MOST} of one pile.", advice=f"Make several piles of at most {MOST}."
         )
     random = np.random.default_rng(seed)
     tables = np.stack([radii(body) for body in bodies])
@@ -112,7 +112,7 @@ def settle(bodies: Sequence[Body], kinds: Sequence[int], sizes: Floats, bowl: Bo
             break
         if batch > 10:
             # thicker air, but never so thick that what falls in it would seem to rest
-            drag = min(1.3 * drag, 3.0)
+            drag = min(1.3 * drag, 1.0)
     return Rest(at * unit, turn, float(fastest), bool(fastest < _STILL))
 
 
