@@ -283,13 +283,15 @@ def _client(where: Any) -> Iterator[Any]:
     except (OSError, TimeoutError, ValueError) as error:
         advice = "Start one with `dask scheduler`, and name it as in tcp://10.0.0.1:8786."
         raise NoScheduler(f"no Dask scheduler answers at {where} ({error}).", advice) from error
-    logger = logging.getLogger("distributed.client")
-    logger.addFilter(_is_news)
+    loggers = [logging.getLogger(name) for name in ("distributed.client", "asyncio", "tornado.application")]
+    for logger in loggers:
+        logger.addFilter(_is_news)
     try:
         with client:
             yield client
     finally:
-        logger.removeFilter(_is_news)
+        for logger in loggers:
+            logger.removeFilter(_is_news)
 
 
 def _is_news(record: logging.LogRecord) -> bool:
