@@ -27,6 +27,7 @@ from .limits import memory
 from .limits.admission import Admission
 from .limits.requests import Limits
 from .openapi import Documented, operation_id
+from .scenes import routes as scenes
 from .security import requires
 from .settings import Settings
 from .shapes import batch
@@ -96,6 +97,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         catalogue.router,
         shapes.router,
         batch.router,
+        scenes.router,
         jobs.reading,
         jobs_events.router,
         jobs_fields.router,

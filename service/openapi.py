@@ -23,7 +23,7 @@ from .hours import UNDER
 from .settings import Settings
 from .shapes import detail
 from .shapes.live import LiveTables
-from .shapes.query import LIMITS, LOWEST_RESOLUTION
+from .shapes.query import EXACT, LIMITS, LOWEST_RESOLUTION
 
 __all__ = ["Documented", "operation_id"]
 
@@ -222,8 +222,9 @@ def _how() -> list[Json]:
         ),
         _query(
             "exact",
-            "run: what max_error refuses, or the table does not reach, is run as a job; needs a token",
-            {"type": "string", "enum": ["run"]},
+            "run: what max_error refuses, or the table does not reach, is run as a job; relax: what the table answers "
+            "is relaxed by its solver, a short job. Both need a token",
+            {"type": "string", "enum": list(EXACT)},
         ),
     ]
 

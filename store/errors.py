@@ -25,6 +25,7 @@ __all__ = [
     "QueueFull",
     "QuotaSpent",
     "ReadOnlyStore",
+    "StaleTable",
     "StorageFailed",
     "StorageFull",
     "StoreError",
@@ -91,6 +92,12 @@ class UnknownTable(StoreError):
     """No table has that name."""
 
     code = "unknown-table"
+
+
+class StaleTable(StoreError):
+    """A table of another version of its solver: its shapes are not those that this version solves."""
+
+    code = "stale-table"
 
 
 class EmptyTable(StoreError):

@@ -72,7 +72,9 @@ class ShapeTable:
         self._units |= dict.fromkeys(FIELDS, QUANTITIES["displacement"].units)
         power = opened["degree_power"].values if "degree_power" in opened else None
         found = generation.left_out(opened)
-        self._descriptors = {name: columns[name] for name in table.descriptors}
+        self._descriptors = tuple(table.descriptors)
+        shape = (len(self._keys), len(table.stages))
+        self._numbers = np.array([columns[name] for name in table.descriptors], float).reshape(-1, *shape)
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
         self._samples = None if values is None else Samples(values)
         self._blender = Blender(self._spectra, self._samples, power)
@@ -323,13 +325,13 @@ class ShapeTable:
         return lambda: self._blender(point, near.samples, near.weights, _stored(stages), method, band)
 
     def _describe(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
-        terms = self._terms(near, stages)
+        stored = _stored(stages)
+        places, parts = np.array(list(stored), int), np.array(list(stored.values()), float)
+        # (name, sample, stage) to (name,)
+        found = (self._numbers[:, near.samples][:, :, places] @ parts) @ np.asarray(near.weights, float)
         known = _ZERO_AT_FIRST if _FRESH in stages else self._descriptors
-        return {
-            name: float(sum(w * self._descriptors[name][i, j] for i, j, w in terms))
-            for name in known
-            if name in self._descriptors
-        }
+        told = dict(zip(self._descriptors, found.tolist(), strict=True))
+        return {name: told[name] for name in known if name in told}
 
     def _has_converged(self, near: Weighted, stages: Mapping[int, float]) -> bool:
         terms = self._terms(near, stages)

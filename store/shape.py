@@ -27,7 +27,8 @@ class Shape:
     `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape
     may be off the true one; None where the table does not know, as for any method but the one it was built for.
     `crossings` counts the pairs of triangles of the closed lattice that cross, on these positions; None where no
-    positions were computed, or those of a part. `tier`: whether it is from the `table` or `relaxed` by its solver.
+    positions were computed, or those of a part. `tier`: whether it is looked up in a `table`,
+    `relaxed` from there by its solver, or a `run`.
     """
 
     colatitude: Array = field(repr=False)

@@ -165,7 +165,13 @@ def beyond(found: Found, words: Words) -> list[Wrong]:
 
 
 def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
-    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers."""
+    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers.
+
+    Raises:
+        StaleTable: it is of another version of the solver.
+
+    """
+    stored.check_version(table.info, solver)
     described = vocabulary.axes(solver.name)
     fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
     units = {name: described[name].units for name in (*table.axes, *table.info.tied, *fixed) if name in described}

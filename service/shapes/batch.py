@@ -46,7 +46,7 @@ _CONTENT = problems.files(batch_formats.MEDIA_TYPES)
     response_class=Response,
     responses={
         200: {"description": "The shapes, in the order asked for", "content": _CONTENT},
-        **problems.responses(400, 404, 406, 413, 422, 500, 503),
+        **problems.responses(400, 404, 406, 409, 413, 422, 500, 503),
     },
 )
 def batch(request: Request, body: BatchRequest) -> Response:

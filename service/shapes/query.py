@@ -19,10 +19,13 @@ from ..errors import InvalidQuery, Wrong
 from ..formats import About
 from . import detail
 
-__all__ = ["LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "number_of", "parse"]
+__all__ = ["EXACT", "LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "number_of", "parse"]
 
 #: Names that are not axes.
 RESERVED = ("resolution", "table", "preset", "format", "method", "max_error", "exact", *detail.NAMES)
+
+#: What may be asked for beyond the table: a run of what it does not answer, or what it answers, relaxed.
+EXACT = ("run", "relax")
 
 #: Fewer colatitude samples hold no shape.
 LOWEST_RESOLUTION = 4
@@ -73,8 +76,8 @@ class ShapeQuery(NamedTuple):
 
     `named` are fixed parameters that were given all the same, and `outside` what is off the table: then `point`,
     `stage` and `named` are a question to the solver, not to the table. `method` is spelt in one way. `max_error` limits
-    errors by measure. `exact`: what the table cannot answer is to be run. `said` are the numbers that the asker named,
-    and `is_elsewhere`: no table holds this fruit, whatever its skin and stage.
+    errors by measure. `exact`: what the table cannot answer is to be `run`, or what it answers to be `relax`ed. `said`
+    are the numbers that the asker named, and `is_elsewhere`: no table holds this fruit, whatever its skin and stage.
     """
 
     point: dict[str, float]
@@ -84,7 +87,7 @@ class ShapeQuery(NamedTuple):
     outside: tuple[Wrong, ...] = ()
     method: str = methods.DEFAULT
     max_error: dict[str, float] | None = None
-    exact: bool = False
+    exact: str = ""
     said: Mapping[str, float] = {}
     is_elsewhere: bool = False
 
@@ -133,6 +136,8 @@ def parse(
     for name in words.ranges:
         if name not in numbers and name not in given:
             wrong.append(Wrong(name, "is missing", f"Add {name}= and a number from {words.say(name)}."))
+    if chosen.get("exact") == "relax" and "max_error" in given:
+        wrong.append(Wrong("max_error", "nobody knows the error of what is relaxed", "Leave it out."))
     if wrong:
         raise InvalidQuery.of([*wrong, *outside])
     named_already = {w.name for w in outside}
@@ -221,10 +226,10 @@ def _max_error(text: str, words: Words) -> dict[str, float] | Wrong:
     return limits
 
 
-def _exact(text: str, words: Words) -> bool | Wrong:
-    if text != "run":
-        return Wrong("exact", f"{text[:40]!r} is not run", "Write exact=run, or leave it out.")
-    return True
+def _exact(text: str, words: Words) -> str | Wrong:
+    if text not in EXACT:
+        return Wrong("exact", f"{text[:40]!r} is not {' or '.join(EXACT)}", "Write exact=run, or leave it out.")
+    return text
 
 
 _READERS: Mapping[str, Callable[[str, Words], Any]] = {

@@ -61,7 +61,9 @@ async def shape(
 
     Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Every answer
     says what error to expect (`expected_error`, by measure) and whether it lies between the runs (`inside`);
-    `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table.
+    `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table;
+    `exact=relax` brings what is looked up into balance. `Wizen-Tier` says of each answer whether it is looked up in a
+    `table`, `relaxed` from there, or a `run`.
     """
     found = await at_once(request, solver)
     return await run_in_threadpool(_shape, request, solver) if found is None else found
@@ -73,7 +75,7 @@ async def shape(
     response_model=ShapePage,
     responses={
         304: {"description": "What the asker has is current"},
-        **problems.responses(404, 413, 414, 422, 500, 503),
+        **problems.responses(404, 409, 413, 414, 422, 500, 503),
     },
 )
 def info(request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Response:
@@ -111,9 +113,12 @@ def _settle(request: Request, asked: Asked) -> Response:
     try:
         if asked.query.outside:
             raise OutsideRanges.of(asked.query.outside)
+        # the fresh shape is in balance as it is
+        if asked.query.exact == "relax" and asked.query.stage != 0:
+            return exact.relax(request, asked)
         return _answer(request, asked)
     except (OutsideRanges, TooUncertain) as error:
-        if not asked.query.exact:
+        if asked.query.exact != "run":
             raise exact.offered(request, asked, error) from None
         return exact.redirect(request, asked)
 
@@ -134,6 +139,7 @@ def _answer(request: Request, asked: Asked) -> Response:
         "ETag": tag,
         "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
         "Vary": "Accept",
+        "Wizen-Tier": "table",
     }
     if matches(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers=headers)

@@ -61,10 +61,10 @@ def even_out(
     `before` is called where there is something to do that takes its time: the surface folds.
     """
     points, poles = whole(n)
-    given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
-    if faces_outward(given, _triangles(n)):
+    if faces_outward(points, poles):
         return Evened(None, None, 0, 0)
     before()
+    given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
     # compiled: loaded when the first surface that folds is asked for
     from solver.geometry.apart import put_apart
 
@@ -87,15 +87,10 @@ def even_out(
 
 
 @lru_cache(maxsize=8)
-def _triangles(n: int) -> Array:
-    return closed_lattice(n)
-
-
-@lru_cache(maxsize=8)
 def _topology(n: int) -> Topology:
     from solver.geometry.apart import Topology
 
-    return Topology.of(_triangles(n), 2 * n * n + 2)
+    return Topology.of(closed_lattice(n), 2 * n * n + 2)
 
 
 def _refine(coarse: Array, poles: Array, n: int) -> Array:

@@ -1,0 +1,143 @@
+"""From a scene to a file and a report: where everything is, what is seen, how fine, and only then what is computed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solver.arrays import Array, Floats
+
+from ..errors import Wrong
+from ..shapes.live import LiveTables
+from . import detail, glb, report, seen, usd
+from .errors import InvalidScene, OverBudget
+from .kinds import Kind, distinct
+from .placing import Instances, bowls, place
+from .request import Scene
+
+__all__ = ["FORMATS", "Made", "make"]
+
+#: Name -> media type and suffix.
+FORMATS = {
+    "glb": ("model/gltf-binary", ".glb"),
+    "usdc": ("model/vnd.usd", ".usdc"),
+    "usda": ("model/vnd.usda", ".usda"),
+    "json": ("application/json", ".json"),
+}
+#: How often a file that is larger than expected is made again with less in it.
+_AGAIN = 6
+
+
+class Made(NamedTuple):
+    """A scene's file, empty where only its report was asked for, and the report as JSON values."""
+
+    data: bytes
+    report: dict[str, Any]
+
+
+def make(scene: Scene, tables: LiveTables, highest: int, to: str = "glb", compress: bool = True) -> Made:
+    """Return a scene as a file of a format in `FORMATS`.
+
+    Raises:
+        InvalidScene: listing what no table holds, a place that is too small, or a camera within a fruit.
+        OverBudget: the coarsest shapes cost more than the budget; it says what to drop.
+        Unavailable: a format whose library is not installed.
+
+    """
+    times, start = {}, time.perf_counter()
+
+    def lap(name: str) -> None:
+        nonlocal start
+        now = time.perf_counter()
+        times[name] = 1e3 * (now - start)
+        start = now
+
+    kinds, rows = distinct(scene.items, tables, highest)
+    lap("understood")
+    everything, rests = place(scene, kinds, rows)
+    lap("placed")
+    inner, outer = _reaches(scene, kinds, everything)
+    found = seen.view(scene.camera, everything.centre, outer)
+    if scene.cull:
+        found.why[seen.hidden(scene.camera, found, inner, outer)] = seen.BEHIND
+    else:
+        found.why[:] = seen.SEEN
+    _check_eye(scene, kinds, everything, outer)
+    shown = found.why == seen.SEEN
+    visible, pixels = everything.only(shown), found.pixels[shown]
+    lap("seen")
+    held = {"bowl": bowls(scene)} if scene.props else {}
+    encoder = {"glb": glb.encode, "usdc": usd.usdc, "usda": usd.usda}.get(to)
+    compress = compress and to == "glb" and glb.compressor() is not None
+    data, share = b"", 1.0
+    for _ in range(_AGAIN):
+        levels = detail.choose(scene.budget, kinds, visible.kind, pixels, compress, share)
+        if encoder is None:
+            break
+        data = encoder(kinds, visible, levels.n, held, scene.unit, compress)
+        if scene.budget.bytes is None or len(data) <= scene.budget.bytes:
+            break
+        share = 0.8 * levels.share
+    else:
+        advice = f"Allow {len(data)}, or drop items."
+        raise OverBudget.of([Wrong("budget.bytes", f"{scene.budget.bytes} are too few for {len(data)}", advice)])
+    lap("computed and written")
+    told = report.Told(scene, kinds, rows, everything, found, shown, levels, rests, len(data), compress, times)
+    return Made(data, report.document(told))
+
+
+def _reaches(scene: Scene, kinds: Sequence[Kind], everything: Instances) -> tuple[Floats, Floats]:
+    """Return radii of the balls within and around every instance [scene unit].
+
+    Kinds of which nothing is in sight, by a ball around the fresh shape, are not looked up at all.
+    """
+    fresh = np.array([_fresh_reach(kind) for kind in kinds])
+    outer = fresh[everything.kind] * everything.scale
+    inner = np.zeros(len(outer))
+    near = seen.view(scene.camera, everything.centre, outer).why == seen.SEEN
+    for k in np.unique(everything.kind[near]) if scene.cull else ():
+        which = everything.kind == k
+        radii = kinds[k].reach
+        inner[which], outer[which] = (radius * everything.scale[which] for radius in radii)
+    return inner, outer
+
+
+def _fresh_reach(kind: Kind) -> float:
+    """Return a radius that holds the fresh shape and what it shrinks to: drying moves nothing outwards by 5 %."""
+    fresh = kind.table.fresh(kind.point)
+    angles = np.meshgrid(np.linspace(0, np.pi, 17), np.linspace(0, 2 * np.pi, 32, endpoint=False), indexing="ij")
+    return 1.05 * float(np.linalg.norm(fresh.points(*angles), axis=-1).max())
+
+
+def _check_eye(scene: Scene, kinds: Sequence[Kind], everything: Instances, outer: Floats) -> None:
+    """Refuse a camera within a fruit.
+
+    Raises:
+        InvalidScene: naming it.
+
+    """
+    away = np.asarray(scene.camera.position) - everything.centre
+    distance = np.linalg.norm(away, axis=1)
+    for i in np.flatnonzero(distance < outer):
+        ahead = _turned_back(everything, int(i), away[i]) / everything.scale[i]
+        points = kinds[everything.kind[i]].coarse
+        r = np.linalg.norm(points, axis=1)
+        nearest = np.argmax(points @ ahead / r)
+        if np.linalg.norm(ahead) < r[nearest]:
+            item = int(everything.item[i])
+            back = math.ceil(100 * outer[i]) / 100
+            advice = f"Move it {back:g} or more away from {[round(float(x), 3) for x in everything.centre[i]]}."
+            name = kinds[everything.kind[i]].label
+            raise InvalidScene.of([Wrong("camera.position", f"is inside a fruit of items.{item} ({name})", advice)])
+
+
+def _turned_back(everything: Instances, i: int, vector: Array) -> Floats:
+    """Return a vector in the frame of an instance."""
+    q = everything.turn[i] * [-1, -1, -1, 1]
+    cross = 2 * np.cross(q[:3], vector)
+    found = vector + q[3] * cross + np.cross(q[:3], cross)
+    return np.asarray(found * [-1 if everything.mirrored[i] else 1, 1, 1])

@@ -1,0 +1,237 @@
+"""A scene as binary glTF: every distinct lattice of a shape once, its instances by `EXT_mesh_gpu_instancing`, quantised
+(`KHR_mesh_quantization`) and, where the encoder is installed, compressed (`EXT_meshopt_compression`).
+
+A mirror image is the same mesh below a node that mirrors; its instances are turned to suit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from solver.arrays import Array, Floats
+
+from ..formats import mesh
+from ..formats.about import GENERATOR
+from . import props
+from .kinds import Kind
+from .meshes import VERTEX, Packed, Skin, pack, skin
+from .placing import Instances, Prop
+
+__all__ = ["compressor", "encode"]
+
+_INSTANCING, _QUANTIZED, _MESHOPT = "EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "EXT_meshopt_compression"
+_BYTE, _UBYTE, _SHORT, _USHORT, _UINT, _FLOAT = 5120, 5121, 5122, 5123, 5125, 5126
+_VERTICES, _INDICES = 34962, 34963
+
+Json = dict[str, Any]
+
+
+def compressor() -> Any | None:
+    """Return the meshopt encoder, set to the versions that glTF readers know, or None where it is not installed."""
+    try:
+        from meshoptimizer import encoder
+    except ImportError:
+        return None
+    encoder.encode_vertex_version(0)
+    encoder.encode_index_version(1)
+    return encoder
+
+
+class _File:
+    """The growing document: views, which are compressed one by one, accessors, and the binary part."""
+
+    def __init__(self, encoder: Any | None) -> None:
+        self._encoder = encoder
+        self.views: list[Json] = []
+        self.accessors: list[Json] = []
+        self.parts: list[bytes] = []
+        self.length = self.plain = 0
+
+    def view(self, array: Array, mode: str, target: int | None) -> int:
+        """Append an array of elements of 4 n bytes, or indices, and return the number of its view."""
+        raw = array.tobytes()
+        stride = len(raw) // len(array)
+        more: Json = {} if target is None else {"target": target}
+        if mode == "ATTRIBUTES" and target is not None:
+            more["byteStride"] = stride
+        if self._encoder is None:
+            self.views.append({"buffer": 0, "byteOffset": self._put(raw), "byteLength": len(raw), **more})
+            return len(self.views) - 1
+        if mode == "ATTRIBUTES":
+            data = self._encoder.encode_vertex_buffer(np.frombuffer(raw, np.uint8), len(array), stride)
+        else:
+            data = self._encoder.encode_index_buffer(array.astype(np.uint32), len(array), int(array.max()) + 1)
+        said = {"buffer": 0, "byteOffset": self._put(data), "byteLength": len(data), "byteStride": stride}
+        extension = {_MESHOPT: {**said, "count": len(array), "mode": mode}}
+        self.views.append(
+            {"buffer": 1, "byteOffset": self.plain, "byteLength": len(raw), **more, "extensions": extension}
+        )
+        self.plain += len(raw) + -len(raw) % 4
+        return len(self.views) - 1
+
+    def accessor(self, view: int, component: int, kind: str, count: int, offset: int = 0, **more: Any) -> int:
+        """Append an accessor and return its number."""
+        said = {"bufferView": view, "componentType": component, "count": count, "type": kind, **more}
+        self.accessors.append(said | ({"byteOffset": offset} if offset else {}))
+        return len(self.accessors) - 1
+
+    def _put(self, data: bytes) -> int:
+        at = self.length
+        data += b"\0" * (-len(data) % 4)
+        self.parts.append(data)
+        self.length += len(data)
+        return at
+
+    def pack(self, document: Json) -> bytes:
+        """Return the file."""
+        buffers: list[Json] = [{"byteLength": self.length}]
+        if self._encoder is not None:
+            buffers.append({"byteLength": self.plain, "extensions": {_MESHOPT: {"fallback": True}}})
+        document = {**document, "accessors": self.accessors, "bufferViews": self.views, "buffers": buffers}
+        text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        head = struct.pack("<III", 0x46546C67, 2, 20 + len(text) + 8 + self.length)
+        chunk = struct.pack("<II", len(text), 0x4E4F534A)
+        return b"".join([head, chunk, text, struct.pack("<II", self.length, 0x004E4942), *self.parts])
+
+
+def encode(
+    kinds: Sequence[Kind], seen: Instances, n: Array, held: Mapping[str, Sequence[Prop]], unit: float, compress: bool
+) -> bytes:
+    """Return the file of the seen instances with their lattices; `held` are props by what they are.
+
+    unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of its content.
+    """
+    file = _File(compressor() if compress else None)
+    meshes: list[Json] = []
+    nodes: list[Json] = []
+    materials: list[Json] = []
+    skins: dict[tuple[str, float], tuple[int, Skin]] = {}
+    indices = {size: _indices(file, mesh.triangles(int(size))) for size in np.unique(n)}
+    groups = np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1).T if len(n) else []
+    order = [np.flatnonzero((seen.kind == k) & (n == size) & (seen.mirrored == m)) for k, size, m in groups]
+    made: dict[tuple[int, int], tuple[int, Packed]] = {}
+    for k, size, _ in groups:
+        if (k, size) in made:
+            continue
+        kind = kinds[k]
+        name = (kind.shade[0], round(kind.dryness, 3))
+        if name not in skins:
+            skins[name] = len(materials), skin(kind.shade[1], kind.dryness)
+            materials.append(_material(kind.shade[0], skins[name][1]))
+        material, looks = skins[name]
+        packed = pack(kind.shape(int(size)), looks)
+        made[k, size] = len(meshes), packed
+        meshes.append(_mesh(file, packed, indices[size], material, f"{kind.label} {size}"))
+    if len(n):
+        nodes = _instances(file, kinds, seen, groups, order, made)
+    for prop in held.get("bowl", ()):
+        nodes.append(props.bowl(file, meshes, materials, prop))
+    used = {_INSTANCING} if len(n) else set()
+    used |= {_QUANTIZED} if len(n) else set()
+    required = sorted(used | ({_MESHOPT} if compress and compressor() is not None else set()))
+    more = {name for material in materials for name in material.get("extensions", {})}
+    document: Json = {
+        "asset": {"version": "2.0", "generator": GENERATOR},
+        "scene": 0,
+        "scenes": [{"nodes": [len(nodes)]}],
+        "nodes": [
+            *nodes,
+            {"name": "scene", "scale": [unit] * 3, **({"children": [*range(len(nodes))]} if nodes else {})},
+        ],
+        "extensionsUsed": sorted({*required, *more}),
+        "extensionsRequired": required,
+        "meshes": meshes,
+        "materials": materials,
+    }
+    return file.pack({key: value for key, value in document.items() if value != []})
+
+
+def _indices(file: _File, triangles: Array) -> int:
+    flat = triangles.ravel()
+    small = int(flat.max()) < 0xFFFF
+    view = file.view(flat.astype("<u2" if small else "<u4"), "TRIANGLES", _INDICES)
+    return file.accessor(view, _USHORT if small else _UINT, "SCALAR", len(flat))
+
+
+def _mesh(file: _File, packed: Packed, indices: int, material: int, name: str) -> Json:
+    vertices, count = packed.vertices, len(packed.vertices)
+    view = file.view(vertices, "ATTRIBUTES", _VERTICES)
+    at = VERTEX.fields
+    assert at is not None
+    attributes = {
+        "POSITION": file.accessor(view, _SHORT, "VEC3", count, at["position"][1], min=packed.low, max=packed.high),
+        "NORMAL": file.accessor(view, _BYTE, "VEC3", count, at["normal"][1], normalized=True),
+        "COLOR_0": file.accessor(view, _UBYTE, "VEC4", count, at["colour"][1], normalized=True),
+    }
+    etag = hashlib.sha256(vertices.tobytes()).hexdigest()[:16]
+    primitive = {"attributes": attributes, "indices": indices, "material": material}
+    return {"name": name, "primitives": [primitive], "extras": {"etag": etag}}
+
+
+def _instances(
+    file: _File,
+    kinds: Sequence[Kind],
+    seen: Instances,
+    groups: Sequence[Array],
+    order: Sequence[Array],
+    made: Mapping[tuple[int, int], tuple[int, Packed]],
+) -> list[Json]:
+    """Append translations, rotations and scales of all instances, and return the nodes that draw them."""
+    row = np.concatenate(order)
+    mirrored = seen.mirrored[row][:, None]
+    move = seen.centre[row] * np.where(mirrored, [-1, 1, 1], 1)
+    turn = seen.turn[row] * np.where(mirrored, [1, -1, -1, 1], 1)
+    scales = np.repeat([made[k, size][1].scale for k, size, _ in groups], [len(one) for one in order])
+    grow = np.repeat((seen.scale[row] * scales)[:, None], 3, axis=1)
+    views = (
+        (file.view(move.astype("<f4"), "ATTRIBUTES", None), _FLOAT, "VEC3", 12, {}),
+        (file.view(np.round(turn * 32767).astype("<i2"), "ATTRIBUTES", None), _SHORT, "VEC4", 8, {"normalized": True}),
+        (file.view(grow.astype("<f4"), "ATTRIBUTES", None), _FLOAT, "VEC3", 12, {}),
+    )
+    nodes, first = [], 0
+    for (k, size, mirror), rows in zip(groups, order, strict=True):
+        attributes = {
+            name: file.accessor(view, component, kind, len(rows), first * stride, **more)
+            for name, (view, component, kind, stride, more) in zip(
+                ("TRANSLATION", "ROTATION", "SCALE"), views, strict=True
+            )
+        }
+        node: Json = {
+            "mesh": made[k, size][0],
+            "name": kinds[k].label,
+            "extensions": {_INSTANCING: {"attributes": attributes}},
+        }
+        nodes.append(node | ({"scale": [-1, 1, 1]} if mirror else {}))
+        first += len(rows)
+    return nodes
+
+
+def _material(name: str, looks: Skin) -> Json:
+    extensions: Json = {}
+    if looks.coat:
+        extensions["KHR_materials_clearcoat"] = {"clearcoatFactor": looks.coat, "clearcoatRoughnessFactor": 0.3}
+    if looks.bloom.any():
+        extensions["KHR_materials_sheen"] = {
+            "sheenColorFactor": _rounded(looks.bloom),
+            "sheenRoughnessFactor": 0.6,
+        }
+    return {
+        "name": name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*_rounded(looks.base), 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": round(looks.roughness, 4),
+        },
+        **({"extensions": extensions} if extensions else {}),
+    }
+
+
+def _rounded(values: Floats) -> list[float]:
+    return [round(float(value), 5) for value in values]

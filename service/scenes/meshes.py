@@ -1,0 +1,99 @@
+"""A shape as quantised vertices: positions in 13 bits, normals in 8, and the colours of its ridges and furrows."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from solver.arrays import Array, Floats
+from solver.contract import Shade
+from store.shape import Shape
+
+from ..formats import mesh
+
+__all__ = ["VERTEX", "Packed", "Skin", "linear", "pack", "relief", "skin"]
+
+#: One vertex: 16 bytes, multiples of four as accessors want them.
+VERTEX = np.dtype([("position", "<i2", 4), ("normal", "i1", 4), ("colour", "u1", 4)])
+#: Height [r1] over the smoothed shape from furrow to ridge, and the share of ridge where it is smooth.
+_DEEP, _FLAT = 0.05, 0.6
+#: Largest coordinate as a number: half a step is 1.2e-4 of the radius. More bits would be noise, and half the file.
+_STEPS = 4095
+#: Shades from furrow to ridge.
+_SHADES = 32
+
+
+class Packed(NamedTuple):
+    """Vertices (v) as `VERTEX`; a position times `scale` is in r1."""
+
+    vertices: Array
+    scale: float
+    low: list[int]
+    high: list[int]
+
+
+class Skin(NamedTuple):
+    """Colours (3) of ridges and furrows, linear light, roughness, coat, and the colour of the bloom."""
+
+    ridge: Floats
+    furrow: Floats
+    roughness: float
+    coat: float
+    bloom: Floats
+
+    @property
+    def base(self) -> Floats:
+        """The factor over vertex colours: 8 bits of a dark colour would be few."""
+        return np.maximum(np.maximum(self.ridge, self.furrow), 1e-3)
+
+
+def linear(colour: str) -> Floats:
+    """Return a colour #rrggbb in linear light."""
+    c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.asarray(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4))
+
+
+def skin(shade: Shade, dryness: float) -> Skin:
+    """Return what a shade says of a fruit that is so dry, 0 to 1."""
+
+    def between(pair: tuple[str, str]) -> Floats:
+        return linear(pair[0]) * (1 - dryness) + linear(pair[1]) * dryness
+
+    rough = shade.roughness[0] * (1 - dryness) + shade.roughness[1] * dryness
+    bloom = linear(shade.bloom) * shade.bloom_amount
+    return Skin(between(shade.ridge), between(shade.furrow), rough, shade.coat, bloom)
+
+
+def relief(position: Array, normal: Array) -> Floats:
+    """Return how high (n, 2n) a lattice surface stands over itself smoothed over an eighth of the way pole to pole."""
+    n = len(position)
+    wide = max(n // 8, 1) | 1
+    # across a pole a column goes on half a turn further
+    over = np.roll(position, n, axis=1)
+    tall = np.concatenate([over[:wide][::-1], position, over[-wide:][::-1]])
+    smooth = uniform_filter1d(uniform_filter1d(tall, wide, axis=0), wide, axis=1, mode="wrap")[wide:-wide]
+    return np.asarray(np.einsum("ijk,ijk->ij", position - smooth, normal))
+
+
+def pack(shape: Shape, looks: Skin) -> Packed:
+    """Return a shape's closed mesh, 2 n^2 + 2 vertices, quantised."""
+    position, ends = mesh.surface(shape)
+    lattice, poles = mesh.normals(position)
+    points, normal = mesh.vertices(position, ends), mesh.vertices(lattice, poles)
+    scale = float(np.abs(points).max()) / _STEPS
+    height = relief(position, lattice)
+    # a smoothed round body lies within it: only what stands out of the mean is ridge
+    height = height - np.median(height)
+    share = np.clip(_FLAT + height / _DEEP, 0, 1)
+    share = np.concatenate([share.ravel(), [share[0].mean(), share[-1].mean()]])[:, None]
+    share = np.round(share * _SHADES) / _SHADES
+    colour = (looks.furrow * (1 - share) + looks.ridge * share) / looks.base
+    out = np.zeros(len(points), VERTEX)
+    out["position"][:, :3] = np.round(points / scale)
+    out["normal"][:, :3] = np.round(normal * 127)
+    out["colour"][:, :3] = np.round(np.clip(colour, 0, 1) * 255)
+    out["colour"][:, 3] = 255
+    columns = [out["position"][:, i] for i in range(3)]
+    return Packed(out, scale, [int(c.min()) for c in columns], [int(c.max()) for c in columns])

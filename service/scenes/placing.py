@@ -1,0 +1,219 @@
+"""Where every individual of a scene is: arrays over all instances, from transforms or by a rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from solver import resting
+from solver.arrays import Array, Floats
+from solver.contract import SolverError
+
+from ..errors import Wrong
+from .errors import InvalidScene
+from .kinds import Kind
+from .request import Place, Scene
+
+__all__ = ["Instances", "Prop", "bowls", "place"]
+
+#: Share of a heaped bowl's room that fruits fill, and how much higher than its rim they may heap.
+_FILLED, _HEAPED = 0.55, 1.6
+
+
+class Instances(NamedTuple):
+    """All individuals: item and kind by number (b), centre (b, 3), quaternion (b, 4; x, y, z, w), scale [scene unit of
+    r1] (b), and whether it is the mirror image across x (b).
+    """
+
+    item: Array
+    kind: Array
+    centre: Floats
+    turn: Floats
+    scale: Floats
+    mirrored: Array
+
+    def only(self, which: Array) -> Instances:
+        """Return some of them."""
+        return Instances(*(values[which] for values in self))
+
+
+class Prop(NamedTuple):
+    """A bowl that stands in the scene."""
+
+    bowl: resting.Bowl
+    at: tuple[float, float, float]
+
+
+def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Instances, dict[str, resting.Rest]]:
+    """Return where all individuals are, and how the piles and bowls came to rest.
+
+    Raises:
+        InvalidScene: a place is too small for what it is to hold.
+
+    """
+    counts = np.array([item.instances for item in scene.items])
+    item = np.repeat(np.arange(len(counts)), counts)
+    kind = np.asarray(rows)[item]
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    scale = np.repeat([one.size for one in scene.items], counts).astype(float)
+    centre = np.zeros((len(item), 3))
+    members: dict[str, list[Array]] = {one.name: [] for one in scene.places}
+    seeds = np.array([-1 if one.seed is None else one.seed for one in scene.items])[item]
+    turn, mirrored, share = _individuals(seeds, np.arange(len(item)) - first[item])
+    scale *= 1 + np.array([one.vary for one in scene.items])[item] * share
+    which = np.array([bool(one.transforms) for one in scene.items])[item]
+    if which.any():
+        given = [t for one in scene.items for t in one.transforms]
+        centre[which] = [t.position for t in given]
+        rotation = np.array([t.rotation for t in given])
+        rotation /= np.linalg.norm(rotation, axis=1)[:, None]
+        turn[which] = _product(rotation, turn[which])
+        scale[which] *= [t.scale for t in given]
+    for i, one in enumerate(scene.items):
+        if one.place is not None:
+            members[one.place].append(np.arange(first[i], first[i] + counts[i]))
+    found = Instances(item, kind, centre, turn, scale, mirrored)
+    rests = {}
+    for i, rule in enumerate(scene.places):
+        which = np.concatenate(members[rule.name]) if members[rule.name] else np.zeros(0, int)
+        if not len(which):
+            continue
+        try:
+            rest = _RULES[rule.rule](rule, found.only(which), kinds)
+        except SolverError as error:
+            raise InvalidScene.of([Wrong(f"places.{i}", error.message.rstrip("."), error.advice)]) from None
+        except ValueError as error:
+            raise InvalidScene.of([Wrong(f"places.{i}.radius", str(error), "")]) from None
+        centre[which] = rest.centre + rule.at
+        turn[which] = rest.turn
+        rests[rule.name] = rest
+    return found, rests
+
+
+def bowls(scene: Scene) -> list[Prop]:
+    """Return the bowls of a scene."""
+    return [Prop(_bowl(p), p.at) for p in scene.places if p.rule == "bowl"]
+
+
+def _individuals(seeds: Array, numbers: Array) -> tuple[Floats, Array, Floats]:
+    """Return turns (b, 4), mirrorings (b) and -1 to 1 for sizes (b) of individuals by seed and number; -1: as stored.
+
+    Numbers come from a hash of both (splitmix64): a generator for each item would take longer than all else about it.
+    """
+    state = seeds.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + numbers.astype(np.uint64) * np.uint64(
+        0xD1B54A32D192ED03
+    )
+    u = np.empty((5, len(seeds)))
+    for k in range(5):
+        state = state + np.uint64(0x9E3779B97F4A7C15)
+        z = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        u[k] = ((z ^ (z >> np.uint64(31))) >> np.uint64(11)).astype(float) * 2.0**-53
+    # uniform over all turns (Shoemake 1992)
+    a, b, p, q = np.sqrt(1 - u[0]), np.sqrt(u[0]), 2 * np.pi * u[1], 2 * np.pi * u[2]
+    turn = np.stack([a * np.sin(p), a * np.cos(p), b * np.sin(q), b * np.cos(q)], axis=1)
+    alike = seeds < 0
+    turn[alike] = [0.0, 0.0, 0.0, 1.0]
+    return turn, (u[3] < 0.5) & ~alike, np.where(alike, 0.0, 2 * u[4] - 1)
+
+
+def _product(a: Floats, b: Floats) -> Floats:
+    """Return quaternions a b, rows of x, y, z, w."""
+    vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + np.cross(a[:, :3], b[:, :3])
+    real = a[:, 3] * b[:, 3] - np.einsum("ij,ij->i", a[:, :3], b[:, :3])
+    return np.concatenate([vector, real[:, None]], axis=1)
+
+
+def _reach(found: Instances, kinds: Sequence[Kind]) -> Floats:
+    outer = np.array([kinds[k].reach[1] if k in set(found.kind) else 0.0 for k in range(len(kinds))])
+    return np.asarray(outer[found.kind] * found.scale)
+
+
+def _lowest(found: Instances, kinds: Sequence[Kind]) -> Floats:
+    """Return how far each individual reaches below its centre, as it is turned."""
+    down = np.array([[0.0, -1.0, 0.0]])
+    back = found.turn * [-1, -1, -1, 1]
+    vector = np.repeat(down, len(back), axis=0)
+    cross = 2 * np.cross(back[:, :3], vector)
+    local = vector + back[:, 3:] * cross + np.cross(back[:, :3], cross)
+    local[:, 0] *= np.where(found.mirrored, -1, 1)
+    return np.array([(kinds[k].coarse @ d).max() for k, d in zip(found.kind, local, strict=True)]) * found.scale
+
+
+def _row(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
+    """Stand them in a row along x on the floor."""
+    reach = _reach(found, kinds)
+    x = np.cumsum(2 * reach + rule.gap) - reach
+    centre = np.stack([x - 0.5 * (x[-1] + reach[-1]), _lowest(found, kinds), np.zeros(len(x))], axis=1)
+    return resting.Rest(centre, found.turn, 0.0, True)
+
+
+def _scatter(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
+    """Scatter them over a square of the floor: a lattice of cells, one in each, jittered as far as cells allow."""
+    assert rule.radius is not None
+    random, reach = np.random.default_rng(rule.seed), _reach(found, kinds)
+    count = len(reach)
+    side = math.ceil(math.sqrt(count))
+    cell = 2 * rule.radius / side
+    need = 2 * float(reach.max())
+    if cell < need:
+        raise ValueError(f"{count} fruits up to {need:.3g} across need a radius of {0.5 * need * side:.3g} or more")
+    place = random.permutation(side * side)[:count]
+    loose = 0.5 * cell - reach
+    x, z = ((index + 0.5) * cell - rule.radius for index in np.divmod(place, side))
+    x, z = (values + random.uniform(-1, 1, count) * loose for values in (x, z))
+    return resting.Rest(np.stack([x, _lowest(found, kinds), z], axis=1), found.turn, 0.0, True)
+
+
+def _bowl(rule: Place) -> resting.Bowl:
+    assert rule.radius is not None
+    return resting.Bowl(rule.radius, 0.05 * rule.radius)
+
+
+def _pour(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
+    """Pour them; the result is kept, so that another camera or budget waits for no pile."""
+    bowl = _bowl(rule) if rule.rule == "bowl" else None
+    if bowl is not None:
+        room = math.pi * (bowl.rim - bowl.thickness) ** 2 * (bowl.sphere - (bowl.rim - bowl.thickness) / 3)
+        volume = 4 / 3 * math.pi * float((_reach(found, kinds) ** 3).sum())
+        if volume * _FILLED > _HEAPED * room:
+            least = bowl.opening * (volume * _FILLED / (_HEAPED * room)) ** (1 / 3)
+            raise ValueError(f"{len(found.kind)} fruits heap over a bowl of {bowl.opening:g}: take {least:.3g} or more")
+    used, kind = np.unique(found.kind, return_inverse=True)
+    # the mirror image is a body of its own
+    number = 2 * kind + found.mirrored
+    shapes = tuple(_Told(kinds[k], mirrored) for k in used for mirrored in (False, True))
+    return _settled(shapes, number.tobytes(), found.scale.tobytes(), bowl, rule.seed)
+
+
+class _Told:
+    """A body that is equal to another one of the same content."""
+
+    def __init__(self, kind: Kind, mirrored: bool) -> None:
+        self.key = (kind.table.digest, tuple(sorted(kind.point.items())), kind.stage, mirrored)
+        surface = kind.body.surface
+        self.body = resting.Body(surface * [-1, 1, 1] if mirrored else surface)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Told) and other.key == self.key
+
+
+@lru_cache(maxsize=16)
+def _settled(
+    shapes: tuple[_Told, ...], number: bytes, scale: bytes, bowl: resting.Bowl | None, seed: int
+) -> resting.Rest:
+    order = np.random.default_rng(seed).permutation(len(scale) // 8)
+    kinds, sizes = np.frombuffer(number, np.int64)[order], np.frombuffer(scale)[order]
+    rest = resting.settle([one.body for one in shapes], kinds.tolist(), sizes, bowl, seed)
+    back = np.argsort(order)
+    return rest._replace(centre=rest.centre[back], turn=rest.turn[back])
+
+
+_RULES = {"row": _row, "scatter": _scatter, "bowl": _pour, "pile": _pour}

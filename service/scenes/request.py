@@ -1,0 +1,191 @@
+"""The grammar of a scene: what may stand in a scene file or in the body of `POST /v1/scenes`."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from ..errors import Wrong
+from .errors import InvalidScene, SceneTooLarge
+
+__all__ = ["MOST", "Budget", "Camera", "Item", "Place", "Scene", "Transform", "parse"]
+
+#: Most instances of one scene; one that is parsed in full before it is refused would cost what it asks for.
+MOST = 20_000
+#: Most items with an entry of their own.
+MOST_ITEMS = 20_000
+
+Vector = tuple[float, float, float]
+Length = Annotated[float, Field(gt=0, le=1e6)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Camera(_Strict):
+    """A pinhole camera; lengths in the scene's unit."""
+
+    position: Vector = Field(description="The eye")
+    target: Vector = Field((0.0, 0.0, 0.0), description="What it looks at")
+    up: Vector = Field((0.0, 1.0, 0.0), description="What is up in the picture")
+    fov: float = Field(40.0, gt=0, lt=180, description="Vertical angle of view [degree]")
+    width: int = Field(1280, ge=1, le=16384, description="Width of the picture [pixel]")
+    height: int = Field(720, ge=1, le=16384, description="Height of the picture [pixel]")
+
+    @model_validator(mode="after")
+    def _looks(self) -> Self:
+        forward = [t - p for t, p in zip(self.target, self.position, strict=True)]
+        reach, tall = math.hypot(*forward), math.hypot(*self.up)
+        if reach < 1e-9:
+            raise ValueError("the camera stands on its target: move position or target")
+        aligned = abs(sum(f * u for f, u in zip(forward, self.up, strict=True)))
+        if tall < 1e-9 or aligned > (1 - 1e-9) * reach * tall:
+            raise ValueError("up points along the line of sight: take another up, as [0, 0, 1]")
+        return self
+
+
+class Place(_Strict):
+    """A rule that places all items which name it, in the order of the items.
+
+    row: along x. scatter: on a square of the floor, apart from each other where there is room. bowl: poured into a bowl
+    whose lowest inner point is `at`. pile: poured onto the floor.
+    """
+
+    name: str = Field("", max_length=40, description="What items call it")
+    rule: Literal["row", "scatter", "bowl", "pile"] = Field(description="How items are placed")
+    at: Vector = Field((0.0, 0.0, 0.0), description="Its middle, on the floor [scene unit]")
+    radius: Length | None = Field(None, description="bowl: inner radius. scatter: half the side. [scene unit]")
+    gap: float = Field(0.2, ge=0, le=1e6, description="row: between neighbours [scene unit]")
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="Of the places and of how things fall")
+
+
+class Transform(_Strict):
+    """Where one instance is."""
+
+    position: Vector = Field((0.0, 0.0, 0.0), description="[scene unit]")
+    rotation: tuple[float, float, float, float] = Field((0.0, 0.0, 0.0, 1.0), description="Quaternion x, y, z, w")
+    scale: Length = Field(1.0, description="Over the item's size")
+
+    @field_validator("rotation")
+    @classmethod
+    def _turns(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if math.hypot(*value) < 1e-6:
+            raise ValueError("a quaternion of length 0 turns nothing: write [0, 0, 0, 1]")
+        return value
+
+
+class Item(_Strict):
+    """Fruits of one kind: a preset and/or parameters at one stage."""
+
+    solver: str = Field("dehydration", description="Whose shapes")
+    preset: str | None = Field(None, description="A fruit by its name; `wizen presets` lists them")
+    parameters: dict[str, float] = Field({}, description="By axis, over the preset's")
+    stage: float = Field(description="Stage, as the solver counts them")
+    name: str = Field("", max_length=80, description="What the report calls it")
+    size: Length = Field(1.0, description="Length of r1 [scene unit]")
+    count: int = Field(1, ge=1, description="How many individuals")
+    seed: int | None = Field(None, ge=0, le=2**32 - 1, description="Turns and mirrors the individuals; none: as stored")
+    vary: float = Field(0.0, ge=0, le=0.5, description="Share by which sizes of individuals differ; needs a seed")
+    shade: str | None = Field(None, description="The skin, as the solver names it; the preset's, if not given")
+    place: str | None = Field(None, description="The place that holds it")
+    transforms: tuple[Transform, ...] = Field((), description="Where the individuals are, instead of a place")
+
+    @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if self.transforms and self.place is not None:
+            raise ValueError("transforms and place exclude each other: keep one of them")
+        if self.transforms and self.count not in (1, len(self.transforms)):
+            raise ValueError(f"count is {self.count}, and there are {len(self.transforms)} transforms: leave out count")
+        if self.vary and self.seed is None:
+            raise ValueError("vary needs a seed")
+        return self
+
+    @property
+    def instances(self) -> int:
+        """Number of individuals."""
+        return len(self.transforms) or self.count
+
+
+class Budget(_Strict):
+    """What the file may cost; what is not named is free."""
+
+    bytes: int | None = Field(None, ge=1, description="Size of the file [byte]")
+    triangles: int | None = Field(None, ge=1, description="Triangles drawn, over all instances")
+    milliseconds: float | None = Field(None, gt=0, description="Expected processor time of the look-ups [ms]")
+
+
+class Scene(_Strict):
+    """A scene: a camera, items, the places that hold them, a budget."""
+
+    camera: Camera
+    items: tuple[Item, ...] = Field(min_length=1)
+    places: tuple[Place, ...] = Field((), max_length=100)
+    budget: Budget = Field(default_factory=Budget)
+    unit: float = Field(1.0, gt=0, le=1e3, description="Length of the scene's unit [m]")
+    props: bool = Field(True, description="Bowls and the floor are in the file too")
+    cull: bool = Field(True, description="Leave out what the camera does not see")
+
+    @model_validator(mode="after")
+    def _placed(self) -> Self:
+        names = [place.name for place in self.places]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise ValueError(f"several places are called {', '.join(map(repr, sorted(twice)))}: name each of its own")
+        for i, item in enumerate(self.items):
+            if item.place is not None and item.place not in names:
+                known = ", ".join(map(repr, names)) or "none"
+                raise ValueError(f"items.{i}.place: there is no place {item.place!r}: known are {known}")
+            if item.place is None and item.instances > 1 and not item.transforms:
+                raise ValueError(
+                    f"items.{i}: {item.count} individuals need a place or transforms, or stand in each other"
+                )
+        for i, place in enumerate(self.places):
+            if place.rule in ("bowl", "scatter") and place.radius is None:
+                raise ValueError(f"places.{i}: a {place.rule} needs a radius")
+        return self
+
+
+def parse(values: Any) -> Scene:
+    """Return a scene of plain values.
+
+    Raises:
+        SceneTooLarge: it has more instances than `MOST`; said before anything else is read.
+        InvalidScene: listing all that is wrong.
+
+    """
+    if not isinstance(values, dict):
+        raise InvalidScene.of([Wrong("scene", "is no object", "Write camera and items.")])
+    _check_count(values.get("items"))
+    try:
+        return Scene.model_validate(values)
+    except ValidationError as error:
+        wrong = []
+        for item in error.errors(include_url=False)[:50]:
+            name = ".".join(str(part) for part in item["loc"]) or "scene"
+            detail = str(item["msg"]).removeprefix("Value error, ")
+            given = item.get("input")
+            shown = f" (got {given!r})" if isinstance(given, str | int | float) else ""
+            wrong.append(Wrong(name, f"{detail}{shown}"[:400], _advice(item["type"])))
+        raise InvalidScene.of(wrong) from None
+
+
+def _check_count(items: Any) -> None:
+    """Refuse a scene by the number of its instances alone."""
+    if not isinstance(items, list | tuple):
+        return
+    counts = [item.get("count", 1) for item in items[: MOST_ITEMS + 1] if isinstance(item, dict)]
+    total = len(items) + sum(max(0, c - 1) for c in counts if isinstance(c, int) and not isinstance(c, bool))
+    if total > MOST or len(items) > MOST_ITEMS:
+        advice = f"Send at most {MOST}: split the scene, or leave out what is far away."
+        raise SceneTooLarge.of([Wrong("items", f"{total} instances are more than {MOST}", advice)])
+
+
+def _advice(kind: str) -> str:
+    return {
+        "extra_forbidden": "Leave it out; the documentation lists what there is.",
+        "missing": "Add it.",
+        "finite_number": "Take finite numbers.",
+    }.get(kind, "")

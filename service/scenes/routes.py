@@ -1,0 +1,64 @@
+"""`POST /v1/scenes`: a scene as one file, or as numbers alone."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+from typing import Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Body, Query, Request
+from starlette.responses import Response
+
+from .. import problems
+from ..errors import InvalidQuery, Wrong
+from ..settings import Settings
+from ..shapes.live import LiveTables
+from .compose import FORMATS, make
+from .request import Scene, parse
+
+__all__ = ["router"]
+
+router = APIRouter(tags=["scenes"])
+
+_TYPES = {media_type: {} for media_type, _ in FORMATS.values()}
+
+
+@router.post(
+    "/v1/scenes",
+    summary="Many shapes as one scene",
+    response_class=Response,
+    responses={
+        200: {"description": "The scene", "content": problems.files(_TYPES)},
+        **problems.responses(400, 404, 406, 413, 422, 500, 501, 503),
+    },
+    openapi_extra={"requestBody": {"content": {"application/json": {"schema": Scene.model_json_schema()}}}},
+)
+def scenes(
+    request: Request,
+    body: Annotated[Any, Body()],
+    format: Annotated[str, Query(description="glb, usdc, usda or json")] = "glb",
+    compress: Annotated[bool, Query(description="glb: with EXT_meshopt_compression")] = True,
+) -> Response:
+    """Answer with one file in which each distinct shape is there once, at the detail that the camera can see.
+
+    What is out of the picture, behind others or smaller than a pixel is left out, and kinds of which nothing is in
+    sight are not computed. `format=json` is the report alone, without a file; a file brings the report's summary in
+    the header `Wizen-Scene`.
+    """
+    settings: Settings = request.app.state.settings
+    tables: LiveTables = request.app.state.tables
+    if format not in FORMATS:
+        near = difflib.get_close_matches(format, list(FORMATS), n=1)
+        hint = f"Did you mean {near[0]!r}? " if near else ""
+        advice = f"{hint}Formats: {', '.join(FORMATS)}."
+        raise InvalidQuery.of([Wrong("format", f"there is no format {format[:40]!r}", advice)])
+    made = make(parse(body), tables, settings.max_resolution, format, compress)
+    if format == "json":
+        return Response(orjson.dumps(made.report), media_type=FORMATS["json"][0])
+    told = {name: value for name, value in made.report.items() if name not in ("items", "places", "generator")}
+    etag = f'"{hashlib.sha256(made.data).hexdigest()[:32]}"'
+    headers = {"Wizen-Scene": orjson.dumps(told).decode(), "ETag": etag}
+    if request.headers.get("if-none-match") == etag:
+        return Response(status_code=304, headers=headers)
+    return Response(made.data, media_type=FORMATS[format][0], headers=headers)

@@ -1,0 +1,157 @@
+"""A scene as USD: one prototype mesh for each distinct lattice of a shape, and a PointInstancer that places them.
+
+Mirror images are prototypes of their own: an instancer's scales mirror the points and not the winding.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.arrays import Array
+
+from ..errors import Unavailable
+from ..formats import mesh
+from . import props
+from .kinds import Kind
+from .meshes import Skin, pack, skin
+from .placing import Instances, Prop
+
+__all__ = ["usda", "usdc"]
+
+
+def _encode(
+    suffix: str,
+    kinds: Sequence[Kind],
+    seen: Instances,
+    n: Array,
+    held: Mapping[str, Sequence[Prop]],
+    unit: float,
+    _: bool,
+) -> bytes:
+    """Return the layer's bytes.
+
+    Raises:
+        Unavailable: usd-core is not installed.
+
+    """
+    try:
+        from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+    except ImportError:
+        raise Unavailable(
+            "USD needs the package usd-core.", advice="pip install 'wizen[usd]', or ask for glb."
+        ) from None
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, unit)
+    root = UsdGeom.Xform.Define(stage, "/scene")
+    stage.SetDefaultPrim(root.GetPrim())
+    materials: dict[str, Any] = {}
+    if len(n):
+        instancer = UsdGeom.PointInstancer.Define(stage, "/scene/fruits")
+        UsdGeom.Scope.Define(stage, "/scene/fruits/prototypes")
+        groups, number = np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1, return_inverse=True)
+        for place, (k, size, mirrored) in enumerate(groups.T):
+            kind = kinds[k]
+            path = f"/scene/fruits/prototypes/shape{place}"
+            _prototype(stage, path, kind, int(size), bool(mirrored), _material(stage, materials, kind))
+            instancer.GetPrototypesRel().AddTarget(Sdf.Path(path))
+        instancer.CreateProtoIndicesAttr(Vt.IntArray.FromNumpy(number.ravel().astype(np.int32)))
+        instancer.CreatePositionsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(seen.centre, np.float32)))
+        turns = [Gf.Quath(float(w), Gf.Vec3h(float(x), float(y), float(z))) for x, y, z, w in seen.turn]
+        instancer.CreateOrientationsAttr(Vt.QuathArray(turns))
+        scales = np.repeat(seen.scale[:, None], 3, axis=1).astype(np.float32)
+        instancer.CreateScalesAttr(Vt.Vec3fArray.FromNumpy(scales))
+        extent = instancer.ComputeExtentAtTime(Usd.TimeCode.Default(), Usd.TimeCode.Default())
+        instancer.CreateExtentAttr(extent)
+    for place, prop in enumerate(held.get("bowl", ())):
+        _bowl(stage, f"/scene/bowl{place}", prop, materials)
+    with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
+        path_ = Path(folder) / f"scene.{suffix}"
+        stage.GetRootLayer().Export(str(path_))
+        return path_.read_bytes()
+
+
+usdc, usda = partial(_encode, "usdc"), partial(_encode, "usda")
+
+
+def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, bound: tuple[Any, Skin]) -> None:
+    from pxr import UsdGeom, Vt
+
+    material, looks = bound
+    shape = kind.shape(n)
+    points = mesh.vertices(*mesh.surface(shape))
+    normal = mesh.vertices(*mesh.normals(mesh.surface(shape)[0]))
+    colour = pack(shape, looks).vertices["colour"][:, :3] / 255 * looks.base
+    triangles = mesh.triangles(n)
+    if mirrored:
+        points, normal = points * np.float32([-1, 1, 1]), normal * np.float32([-1, 1, 1])
+        triangles = triangles[:, ::-1]
+    _mesh(stage, path, points, normal, triangles, material)
+    paint = UsdGeom.Mesh.Get(stage, path).CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    paint.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(colour, np.float32)))
+    stage.GetPrimAtPath(path).SetDisplayName(kind.label)
+
+
+def _mesh(stage: Any, path: str, points: Array, normal: Array, triangles: Array, material: Any) -> Any:
+    from pxr import UsdGeom, UsdShade, Vt
+
+    found = UsdGeom.Mesh.Define(stage, path)
+    found.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    found.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, np.float32)))
+    found.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(normal, np.float32)))
+    found.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    found.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, np.int32)))
+    found.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel(), np.int32)))
+    ends = np.stack([points.min(axis=0), points.max(axis=0)]).astype(np.float32)
+    found.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(ends)))
+    UsdShade.MaterialBindingAPI.Apply(found.GetPrim()).Bind(material)
+    return found
+
+
+def _material(stage: Any, made: dict[str, Any], kind: Kind) -> tuple[Any, Skin]:
+    looks = skin(kind.shade[1], kind.dryness)
+    name = f"{kind.shade[0]}{round(1000 * kind.dryness)}"
+    if name not in made:
+        made[name] = _shader(stage, f"/scene/looks/{name}", looks.roughness, looks.coat, None)
+    return made[name], looks
+
+
+def _shader(stage: Any, path: str, roughness: float, coat: float, colour: tuple[float, ...] | None) -> Any:
+    """Define a preview surface, of one colour or of the vertices' own."""
+    from pxr import Gf, Sdf, UsdGeom, UsdShade
+
+    if not stage.GetPrimAtPath("/scene/looks"):
+        UsdGeom.Scope.Define(stage, "/scene/looks")
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness)
+    shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(0.0)
+    if coat:
+        shader.CreateInput("clearcoat", Sdf.ValueTypeNames.Float).Set(coat)
+        shader.CreateInput("clearcoatRoughness", Sdf.ValueTypeNames.Float).Set(0.3)
+    diffuse = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    if colour is not None:
+        diffuse.Set(Gf.Vec3f(*colour))
+    else:
+        reader = UsdShade.Shader.Define(stage, f"{path}/colour")
+        reader.CreateIdAttr("UsdPrimvarReader_float3")
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+        diffuse.ConnectToSource(reader.CreateOutput("result", Sdf.ValueTypeNames.Float3))
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    return material
+
+
+def _bowl(stage: Any, path: str, prop: Prop, made: dict[str, Any]) -> None:
+    from pxr import Gf, UsdGeom
+
+    if "glaze" not in made:
+        made["glaze"] = _shader(stage, "/scene/looks/glaze", 0.35, 0.0, (0.8, 0.77, 0.7))
+    found = _mesh(stage, path, *props.lathe(prop.bowl), made["glaze"])
+    UsdGeom.XformCommonAPI(found.GetPrim()).SetTranslate(Gf.Vec3d(*prop.at))

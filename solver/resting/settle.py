@@ -1,0 +1,136 @@
+"""Bodies poured onto a floor or into a bowl, until they rest on each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Floats
+from ..contract import InvalidInput
+from ..lattice import azimuths, colatitudes, directions
+from . import kernel
+
+__all__ = ["MOST", "Body", "Bowl", "Rest", "radii", "settle"]
+
+#: Most bodies of one pile: each is held against all others.
+MOST = 1500
+_DIRECTIONS, _POINTS = 24, 12
+_STEP, _FRICTION = 0.02, 0.5
+#: Speed below which a pile is at rest, where gravity and the mean radius are 1.
+_STILL = 0.02
+_BATCH, _LONGEST = 100, 40
+
+
+class Body(NamedTuple):
+    """A shape: points (v, 3) of its surface about its centre."""
+
+    surface: Floats
+
+
+class Bowl(NamedTuple):
+    """A part of a spherical shell that opens upwards, standing on the floor: radius of its opening, and thickness."""
+
+    opening: float
+    thickness: float
+
+    @property
+    def sphere(self) -> float:
+        """Radius of the inner sphere."""
+        return 1.12 * self.opening
+
+    @property
+    def rim(self) -> float:
+        """Height of the rim over the floor."""
+        return self.sphere + self.thickness - float(np.sqrt(self.sphere**2 - self.opening**2))
+
+
+class Rest(NamedTuple):
+    """Where bodies came to rest: centres (b, 3) and quaternions (b, 4: x, y, z, w); y is up, the floor y = 0.
+
+    speed: the largest, in units of the square root of gravity times mean radius. still: whether that is rest.
+    """
+
+    centre: Floats
+    turn: Floats
+    speed: float
+    still: bool
+
+
+def radii(body: Body) -> Floats:
+    """Return the outer radius (n, 2n) of a body by direction: of a fold, the outermost."""
+    n = _DIRECTIONS
+    r = np.linalg.norm(body.surface, axis=1)
+    row = np.clip(np.arccos(np.clip(body.surface[:, 1] / r, -1, 1)) / np.pi * n, 0, n - 1).astype(int)
+    column = (np.arctan2(body.surface[:, 2], body.surface[:, 0]) / np.pi * n).round().astype(int) % (2 * n)
+    table = np.zeros((n, 2 * n))
+    np.maximum.at(table, (row, column), r)
+    while not table.all():
+        # directions that no point has: as far as their neighbours
+        padded = np.pad(np.pad(table, ((1, 1), (0, 0)), mode="edge"), ((0, 0), (1, 1)), mode="wrap")
+        around = np.stack([padded[a : a + n, b : b + 2 * n] for a in range(3) for b in range(3)])
+        found = around.sum(axis=0) / np.maximum((around > 0).sum(axis=0), 1)
+        table = np.where(table > 0, table, found)
+    return table
+
+
+def settle(bodies: Sequence[Body], kinds: Sequence[int], sizes: Floats, bowl: Bowl | None, seed: int) -> Rest:
+    """Pour bodies, `kinds` of `bodies` by number, each `sizes` large, and return how they rest.
+
+    Raises:
+        InvalidInput: there are too many for one pile.
+
+    """
+    count = len(kinds)
+    if count > MOST:
+        raise InvalidInput(
+            f"{count} bodies are more than {MOST} of one pile.", advice=f"Make several piles of at most {MOST}."
+        )
+    random = np.random.default_rng(seed)
+    tables = np.stack([radii(body) for body in bodies])
+    ways = directions(*np.meshgrid(colatitudes(_POINTS), azimuths(_POINTS), indexing="ij")).reshape(-1, 3)
+    ways = np.concatenate([ways, [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]])
+    points = np.stack([ways * _along(table, ways)[:, None] for table in tables])
+    kind = np.asarray(kinds)
+    reach = tables.max(axis=(1, 2))[kind] * sizes
+    mean = np.sqrt((tables**2).mean(axis=(1, 2)))[kind] * sizes
+    unit = float(mean.mean())
+    scale, mass = sizes / unit, (mean / unit) ** 3
+    shell = np.zeros(3) if bowl is None else np.array([bowl.sphere, bowl.thickness, bowl.rim]) / unit
+    at = _poured(reach / unit, 0.0 if bowl is None else bowl.opening / unit, shell, random)
+    turn = random.standard_normal((count, 4))
+    turn /= np.linalg.norm(turn, axis=1)[:, None]
+    speed, spin = np.zeros((count, 3)), np.zeros((count, 3))
+    fastest, drag = np.inf, 0.05
+    for batch in range(_LONGEST):
+        fastest = kernel.step(
+            at, turn, speed, spin, kind, scale, tables, points, reach / unit, mass, 0.4 * mass * (mean / unit) ** 2,
+            shell, _STEP, drag, _FRICTION, _BATCH,
+        )  # fmt: skip
+        if batch > 6 and fastest < _STILL:
+            break
+        if batch > 10:
+            # thicker air, but never so thick that what falls in it would seem to rest
+            drag = min(1.3 * drag, 1.0)
+    return Rest(at * unit, turn, float(fastest), bool(fastest < _STILL))
+
+
+def _along(table: Floats, ways: Floats) -> Floats:
+    return np.array([kernel.radius_at(table, x, y, z, 1.0) for x, y, z in ways])
+
+
+def _poured(reach: Floats, opening: float, shell: Floats, random: np.random.Generator) -> Floats:
+    """Return centres above the floor, layer by layer, in which no body touches another."""
+    cell = 2.05 * float(reach.max())
+    wide = max(opening * 0.7 if opening else 0.75 * cell * len(reach) ** (1 / 3), 0.5 * cell)
+    span = np.arange(-int(wide / cell), int(wide / cell) + 1) * cell
+    x, z = (grid.ravel() for grid in np.meshgrid(span, span))
+    inside = np.hypot(x, z) <= wide
+    x, z = x[inside], z[inside]
+    layer, place = np.divmod(np.arange(len(reach)), len(x))
+    angle = layer * 0.7
+    cos, sin = np.cos(angle), np.sin(angle)
+    first = cell if not opening else float(shell[2])
+    found = np.stack([x[place] * cos - z[place] * sin, first + layer * cell, x[place] * sin + z[place] * cos], axis=1)
+    return found + random.uniform(-0.02, 0.02, found.shape) * cell
