@@ -14,7 +14,7 @@ PAGE   := $(VIEWER)/dist/index.html
 NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
 
-.PHONY: demo demo-map page test test-processor test-slow mutants bench docs stress lint format clean constraints
+.PHONY: demo demo-map page test test-clients test-processor test-slow mutants bench docs stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -49,6 +49,10 @@ demo-map: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
+## test-clients: what others' generators make of the OpenAPI page, fetched from package registries; CI runs this too
+test-clients: $(STAMP)
+	$(BIN)/python -m pytest -m 'slow or not slow' tests/service/test_clients.py -rs
+
 # solvers' tests whose numbers hang on compiled kernels or on BLAS, of each solver those that compile soonest
 PROCESSOR ?= haswell
 PROCESSOR_TESTS ?= $(addprefix tests/solver/,shell growth/test_growth.py decay/test_waves.py wood/test_rods.py \
@@ -65,7 +69,7 @@ mutants: $(STAMP)
 
 ## test-slow: the long checks as well; those of the page need a Chromium (Debian: apt-get install chromium)
 test-slow: $(STAMP) $(PAGE)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser,notebooks]'
 	$(BIN)/python -m pytest -m 'slow or not slow' --timeout 3600
 
 ## bench: the kernel against the C prototype, the look-up per resolution, the solver's error over time in short; run it

@@ -33,6 +33,7 @@ from .settings import Settings
 from .shapes import batch
 from .shapes import routes as shapes
 from .shapes.answers import Answers, Repeats
+from .shapes.compiling import Compiling
 from .shapes.live import LiveTables
 from .shapes.shortcut import Shortcut
 from .shapes.turns import Turns
@@ -80,7 +81,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         generate_unique_id_function=operation_id,
     )
     app.state.settings = settings
-    app.state.tables = LiveTables(settings.store, settings.reload_interval)
+    app.state.compiling = Compiling()
+    app.state.tables = LiveTables(settings.store, settings.reload_interval, app.state.compiling)
     app.state.answers = Answers(settings.cache_bytes)
     app.state.turns = Turns(app.state.settings.max_waiting)
     app.state.tokens = Tokens(settings.store)
@@ -122,7 +124,7 @@ def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
     if settings.public_read:
         app.add_middleware(Shortcut, state=app.state)
     app.add_middleware(Admission, settings=settings)
-    app.add_middleware(Limits, settings=settings)
+    app.add_middleware(Limits, settings=settings, is_patient=lambda: app.state.compiling.is_under_way)
     if settings.public_read and settings.cache_bytes:
         app.add_middleware(Repeats, state=app.state)
     if settings.compress != "off":

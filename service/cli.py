@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
     from .formats import Format
     from .settings import Settings
+    from .shapes.compiling import Compiling
 
 __all__ = ["app", "main"]
 
@@ -69,6 +71,7 @@ def serve(
     from .app import create_app
     from .commands.hints import hints
     from .limits.connections import GuardedProtocol
+    from .shapes.compiling import Compiling
     from .stopping import PATIENCE
 
     settings = _settings(store=store, host=host, port=port, workers=workers, scheduler=scheduler)
@@ -80,8 +83,9 @@ def serve(
         note(line)
     options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": PATIENCE, "http": GuardedProtocol}
     if settings.workers == 1:
-        with listener:
-            uvicorn.Server(uvicorn.Config(create_app(settings), **options)).run(sockets=[listener])
+        made = create_app(settings)
+        with listener, _compiling(made.state.compiling):
+            uvicorn.Server(uvicorn.Config(made, **options)).run(sockets=[listener])
         return
     # several processes, one that dies being replaced: they bind the address that was found to be free, and read their
     # settings from the environment
@@ -90,7 +94,8 @@ def serve(
     for name in ("store", "scheduler"):
         if getattr(settings, name) is not None:
             os.environ[f"WIZEN_{name.upper()}"] = str(getattr(settings, name))
-    uvicorn.run("service.app:app", host=settings.host, port=port, workers=settings.workers, **options)
+    with _compiling(Compiling()):
+        uvicorn.run("service.app:app", host=settings.host, port=port, workers=settings.workers, **options)
 
 
 @app.command()
@@ -124,6 +129,15 @@ def doctor(
         emit([finding._asdict() for finding in findings], True, lambda _: None)
     if any(finding.state == "bad" for finding in findings):
         raise typer.Exit(1)
+
+
+@contextmanager
+def _compiling(compiling: Compiling) -> Iterator[None]:
+    compiling.begin()
+    try:
+        yield
+    finally:
+        compiling.end()
 
 
 def _settings(**given: Any) -> Settings:

@@ -23,7 +23,7 @@ from .hours import UNDER
 from .settings import Settings
 from .shapes import detail
 from .shapes.live import LiveTables
-from .shapes.query import LIMITS, LOWEST_RESOLUTION
+from .shapes.query import EXACT, LIMITS, LOWEST_RESOLUTION
 
 __all__ = ["Documented", "operation_id"]
 
@@ -166,8 +166,12 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
         ]
         for axis in whole:
             found.setdefault(axis.name, _axis(axis, examples.get(axis.name, {})))
+    return [*found.values(), *_what(settings), *_how()]
+
+
+def _what(settings: Settings) -> list[Json]:
+    """Return the parameters that say which shape: of which table, when, how fine, with what."""
     return [
-        *found.values(),
         _query(
             "resolution",
             f"Colatitude samples, {LOWEST_RESOLUTION} to {settings.max_resolution}; azimuth has twice as many. "
@@ -192,6 +196,12 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
             + ", ".join(f"{name}: {', '.join(vocabulary.solver_named(name).presets)}" for name in registry.names()),
             {"type": "string"},
         ),
+    ]
+
+
+def _how() -> list[Json]:
+    """Return the parameters that say how a shape is looked up and handed over, and what becomes of a bad one."""
+    return [
         _query(
             "format",
             "Representation; goes before the Accept header",
@@ -212,8 +222,9 @@ def _parameters(settings: Settings, examples: dict[str, Json]) -> list[Json]:
         ),
         _query(
             "exact",
-            "run: what max_error refuses, or the table does not reach, is run as a job; needs a token",
-            {"type": "string", "enum": ["run"]},
+            "run: what max_error refuses, or the table does not reach, is run as a job; relax: what the table answers "
+            "is relaxed by its solver, a short job. Both need a token",
+            {"type": "string", "enum": list(EXACT)},
         ),
     ]
 

@@ -42,6 +42,7 @@ STATUS: Mapping[type[Exception], int] = {
     stored.CorruptTable: 503,
     stored.CorruptLedger: 503,
     stored.UnknownTable: 404,
+    stored.StaleTable: 409,
     stored.EmptyTable: 503,
     stored.OutsideTable: 422,
     stored.TooUncertain: 422,

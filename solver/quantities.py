@@ -74,6 +74,7 @@ register(
         "1", "out-of-balance force over internal force, or the largest error of a step, relative L2", "|r|/|f|"
     ),
     moved=Quantity("1", "how far relaxing moved a surface: rms of the radial motion over its roughness", "d/r"),
+    residual_placed=Quantity("1", "residual of a surface as it was put on the mesh, before it was relaxed", "|r|/|f|"),
     drift=Quantity("1", "rms motion of the surface in its last 200 steps, in exocarp thicknesses", "d"),
     iterations=Quantity("1", "steps or iterations spent up to and including this stage", "n"),
     seconds=Quantity("s", "wall time spent up to and including this stage", "t", volatile=True),
@@ -145,6 +146,9 @@ register(
     elastic_strain=Quantity(
         "1", "mean principal stretch of the membrane less 1, averaged over a vertex's triangles", "e"
     ),
+    red=Quantity("1", "red of the surface, linear light", "R", share=True),
+    green=Quantity("1", "green of the surface, linear light", "G", share=True),
+    blue=Quantity("1", "blue of the surface, linear light", "B", share=True),
     rest_area=Quantity("1", "area of the grown rest state, in the start shape's unit squared", "A_g"),
     mesh_area=Quantity("1", "area of the shape, in the start shape's unit squared", "A"),
     stored_energy=Quantity("1", "elastic energy, membrane and bending, in units of mu l^2", "E"),

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 __all__ = [
+    "NO_DAMAGE",
     "Advised",
     "CorruptBackup",
     "CorruptLedger",
@@ -24,6 +25,7 @@ __all__ = [
     "QueueFull",
     "QuotaSpent",
     "ReadOnlyStore",
+    "StaleTable",
     "StorageFailed",
     "StorageFull",
     "StoreError",
@@ -33,6 +35,9 @@ __all__ = [
     "UnknownToken",
     "full_disk",
 ]
+
+#: What reading a file may end with although nothing is wrong with the file.
+NO_DAMAGE = (FileNotFoundError, PermissionError, ImportError)
 
 _BROKEN = {errno.EIO, errno.EREMOTEIO, errno.ENXIO}
 _REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS}
@@ -87,6 +92,12 @@ class UnknownTable(StoreError):
     """No table has that name."""
 
     code = "unknown-table"
+
+
+class StaleTable(StoreError):
+    """A table of another version of its solver: its shapes are not those that this version solves."""
+
+    code = "stale-table"
 
 
 class EmptyTable(StoreError):

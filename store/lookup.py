@@ -54,8 +54,15 @@ _ZERO_AT_FIRST = ("roughness", "buckle_count", "penetration")
 class ShapeTable:
     """One generation of a table, open for queries by any number of threads."""
 
-    def __init__(self, table: TableInfo, path: Path, surface: Surface | None = None) -> None:
+    def __init__(
+        self,
+        table: TableInfo,
+        path: Path,
+        surface: Surface | None = None,
+        before_folds: Callable[[], None] = lambda: None,
+    ) -> None:
         self.info = table
+        self._before_folds = before_folds
         self._spectra = generation.map_spectra(path)
         opened = generation.read(path)
         columns = {name: opened[name].values for name in (*table.axes, *table.descriptors)}
@@ -65,7 +72,9 @@ class ShapeTable:
         self._units |= dict.fromkeys(FIELDS, QUANTITIES["displacement"].units)
         power = opened["degree_power"].values if "degree_power" in opened else None
         found = generation.left_out(opened)
-        self._descriptors = {name: columns[name] for name in table.descriptors}
+        self._descriptors = tuple(table.descriptors)
+        shape = (len(self._keys), len(table.stages))
+        self._numbers = np.array([columns[name] for name in table.descriptors], float).reshape(-1, *shape)
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
         self._samples = None if values is None else Samples(values)
         self._blender = Blender(self._spectra, self._samples, power)
@@ -88,11 +97,13 @@ class ShapeTable:
         name: str = "default",
         verify: bool = True,
         surfaces: Callable[[str], Surface | None] = lambda solver: None,
+        before_folds: Callable[[], None] = lambda: None,
     ) -> Self:
         """Open the current generation of a table; `verify` reads all of it once and finds any changed byte.
 
         `surfaces` knows the fresh surfaces by solver, as `solver.registry.surface` does: without, a table gives
-        displacements and no positions.
+        displacements and no positions. `before_folds` is called before a shape that folds is put out of contact with
+        itself, which takes longer than the look-up, and seconds where the code for it has to be compiled.
 
         Raises:
             MissingStore: there is no store in that directory.
@@ -107,7 +118,7 @@ class ShapeTable:
             try:
                 if verify and not seal.is_whole(path):
                     raise CorruptTable(f"{path} is damaged.", "Rebuild the table from the shards.")
-                return cls(table, path, surfaces(table.solver))
+                return cls(table, path, surfaces(table.solver), before_folds)
             except FileNotFoundError:
                 # swapped and pruned since the manifest was read
                 if last_try:
@@ -234,10 +245,10 @@ class ShapeTable:
             return kept[n]
 
         is_all = patch == WHOLE.on(patch.n)
-        if not is_all and not even_out(whole, min(patch.n, COARSE), exact).near:
+        if not is_all and not even_out(whole, min(patch.n, COARSE), exact, self._before_folds).near:
             # what does not touch as a whole does not in part: only that is computed
             return _synthesize(waves, patch, fresh, displaced), None
-        moved = even_out(whole, patch.n, exact)
+        moved = even_out(whole, patch.n, exact, self._before_folds)
         if is_all and not displaced:
             position, poles = kept[patch.n]
             found: _Fields = position, None, poles
@@ -314,13 +325,13 @@ class ShapeTable:
         return lambda: self._blender(point, near.samples, near.weights, _stored(stages), method, band)
 
     def _describe(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
-        terms = self._terms(near, stages)
+        stored = _stored(stages)
+        places, parts = np.array(list(stored), int), np.array(list(stored.values()), float)
+        # (name, sample, stage) to (name,)
+        found = (self._numbers[:, near.samples][:, :, places] @ parts) @ np.asarray(near.weights, float)
         known = _ZERO_AT_FIRST if _FRESH in stages else self._descriptors
-        return {
-            name: float(sum(w * self._descriptors[name][i, j] for i, j, w in terms))
-            for name in known
-            if name in self._descriptors
-        }
+        told = dict(zip(self._descriptors, found.tolist(), strict=True))
+        return {name: told[name] for name in known if name in told}
 
     def _has_converged(self, near: Weighted, stages: Mapping[int, float]) -> bool:
         terms = self._terms(near, stages)

@@ -29,8 +29,10 @@ from .store import Store
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["build", "names", "path_of", "read"]
+__all__ = ["ANY", "build", "names", "path_of", "read"]
 
+#: All finished runs.
+ANY = Choice()
 #: Dimensions of the numbers that are tabulated.
 _DIMS = (("stage",), ("stage", "component"))
 
@@ -39,23 +41,19 @@ def build(
     store: Store,
     solver: Solver,
     name: str = "default",
-    *,
-    plan: str | None = None,
-    quality: str | None = None,
-    version: str | None = None,
-    keys: Sequence[str] | None = None,
+    choice: Choice = ANY,
 ) -> Path:
-    """Tabulate the numbers of the finished runs of `solver`, make that the current table, and return its path.
+    """Tabulate the numbers of those finished runs of `solver` that are chosen; return the path of the table.
 
     Raises:
         EmptyTable: no finished run fits, or their results have no number in common.
         MixedSamples: the runs are of several versions, or were asked for different stages or qualities.
-        UnknownJob: one of `keys` is not stored.
+        UnknownJob: one of the chosen keys is not stored.
         CorruptShard: a run's result is damaged.
         StorageFull: the disk is full; the old table stays.
 
     """
-    jobs = finished(store, solver.name, Choice(plan, quality, version, keys))
+    jobs = finished(store, solver.name, choice)
     if not jobs:
         raise EmptyTable(f"there are no finished runs of {solver.name}.", "Run a sweep, or say another solver or plan.")
     agree(jobs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from solver.arrays import Array
 
@@ -26,7 +27,8 @@ class Shape:
     `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape
     may be off the true one; None where the table does not know, as for any method but the one it was built for.
     `crossings` counts the pairs of triangles of the closed lattice that cross, on these positions; None where no
-    positions were computed, or those of a part. `tier`: whether it is from the `table` or `relaxed` by its solver.
+    positions were computed, or those of a part. `tier`: whether it is looked up in a `table`,
+    `relaxed` from there by its solver, or a `run`.
     """
 
     colatitude: Array = field(repr=False)
@@ -48,6 +50,18 @@ class Shape:
     method: str = ""
     crossings: int | None = None
     tier: str = "table"
+
+    def trust(self) -> dict[str, Any]:
+        """Return how far to trust it, as plain values; every answer says so in this order."""
+        return {
+            "exact": self.exact,
+            "converged": self.converged,
+            "crossings": self.crossings,
+            "tier": self.tier,
+            "nearest": self.nearest,
+            "inside": self.inside,
+            "expected_error": None if self.expected_error is None else dict(self.expected_error),
+        }
 
     @cached_property
     def normals(self) -> Array:

@@ -13,7 +13,7 @@ from solver.quantities import QUANTITIES
 
 from . import seal
 from .canonical import canonical
-from .errors import CorruptShard
+from .errors import NO_DAMAGE, CorruptShard
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,6 +129,8 @@ def parse(data: bytes, path: Path, verify: bool = True) -> xr.Dataset:
 
         with xr.open_dataset(io.BytesIO(data), engine="h5netcdf", decode_times=False, decode_timedelta=False) as opened:
             dataset = opened.load()
+    except NO_DAMAGE:
+        raise
     except Exception as error:  # HDF5 reports damage as whatever it stumbles over: OSError, KeyError, RuntimeError
         raise CorruptShard(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
     dataset = dataset.drop_encoding()

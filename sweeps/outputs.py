@@ -223,4 +223,5 @@ def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Sh
         exact=True,
         converged=bool(result["converged"][index]),
         table="",
+        tier="relaxed" if result.attrs.get("path") == "relaxed" else "run",
     )

@@ -15,6 +15,7 @@ from store.store import Store
 from store.tables import TableInfo
 
 from . import tabled
+from .relaxing import starts
 
 __all__ = ["Spot", "recompute"]
 
@@ -64,7 +65,7 @@ def _spot(store: Store, key: str, tolerance: float, cancelled: Callable[[], bool
     job = store.ledger.get(key)
     solver, stored = registry.get(job.solver), store.get(key)
     try:
-        context = Context(cancelled=cancelled, library=store.find, shapes=tabled.shape)
+        context = Context(cancelled=cancelled, library=store.find, shapes=tabled.shape, starts=starts(store))
         again = solver.solve(solver.parse(job.params), Need.parse(job.need), context)
     except SolverError as error:
         if error.code == "cancelled":

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solver.contract import Context, Need, Quality, Solver
-from store.lookup import ShapeTable
-from store.shape import Shape
+from solver.arrays import Floats
+from solver.contract import Context, InvalidInput, Need, Params, Quality, Solver, Start
 
-__all__ = ["relaxed"]
+if TYPE_CHECKING:
+    from store.lookup import ShapeTable
+    from store.shape import Shape
+    from store.store import Store
+
+__all__ = ["relaxed", "starts"]
 
 
 def relaxed(
@@ -52,3 +58,60 @@ def relaxed(
     )
     said = {name: float(found[name]) for name in ("residual", "moved", "iterations", "seconds")}
     return made, said
+
+
+def starts(store: Store) -> Callable[[Start, Params, float], Floats]:
+    """Return how a run finds the looked-up position that it starts from: `starts` of a `Context`.
+
+    The table is the store's of that name, or the one that comes with wizen: the one whose content is meant.
+    """
+
+    def find(start: Start, params: Params, stage: float) -> Floats:
+        from store.errors import OutsideTable
+        from store.generations.samples import read_axes
+
+        table = _meant(store.root, start)
+        values = read_axes(params.model_dump(mode="json"), {axis: table.info.places[axis] for axis in table.axes})
+        asked = InvalidInput("these parameters are not the table's.", advice="Ask for the shape with exact=relax.")
+        if table.at_parameters(values) != params.model_dump(mode="json"):
+            raise asked
+        try:
+            shape = table.at(values, stage, method=start.method)
+        except OutsideTable as error:
+            raise InvalidInput(error.message, advice=error.advice) from error
+        assert shape.position is not None
+        return np.asarray(shape.position, np.float64)
+
+    return find
+
+
+def _meant(root: Path, start: Start) -> ShapeTable:
+    """Return the table that a start names, of the very content that it names.
+
+    Raises:
+        InvalidInput: there is none.
+
+    """
+    from store.errors import StoreError
+    from store.starter import ROOT
+
+    for place in dict.fromkeys((root, ROOT)):
+        try:
+            table = _open(place, start.table, start.digest)
+        except StoreError:
+            continue
+        if table.digest == start.digest:
+            return table
+    raise InvalidInput(
+        f"no table {start.table!r} with the digest {start.digest} is here: it was rebuilt or removed since.",
+        advice="Ask for the shape again.",
+    )
+
+
+@lru_cache(maxsize=4)
+def _open(root: Path, name: str, digest: str) -> ShapeTable:
+    """Return the current table of that name; `digest` tells generations apart that are kept open."""
+    from solver import registry
+    from store.lookup import ShapeTable
+
+    return ShapeTable.open(root, name, surfaces=registry.surface)

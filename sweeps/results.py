@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from solver import quantities, registry
 from solver.contract import SolverError
-from store.errors import CorruptShard
+from store.errors import NO_DAMAGE, CorruptShard
 from store.store import Store
 
 from .errors import InvalidOption
@@ -157,6 +157,8 @@ def _rows(path: Path, stamp: int) -> tuple[Row, ...]:
             }
             attrs = dict(opened.attrs)
             params, need = json.loads(attrs["params"]), json.loads(attrs["need"])
+    except NO_DAMAGE:
+        raise
     except (OSError, KeyError, ValueError, RuntimeError) as error:
         advice = "`wizen table verify` looks closer; delete the file and run the same sweep again."
         raise CorruptShard(f"{path} cannot be read ({type(error).__name__}: {error}).", advice) from error

@@ -22,7 +22,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from benchmarks.dehydration.pattern import name_of
+from benchmarks.dehydration.claims.pattern import name_of
 from solver.dehydration.params import DehydrationParams
 from solver.fruit import lattice
 from store.store import Store

@@ -12,6 +12,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _AT_ONCE = 2_000_000
+#: Least volume of an edge and a triangle that can cross, over the product of their lengths.
+_FLAT = 1e-6
 
 
 def crossings(x: Floats, triangles: Ints) -> int:
@@ -38,7 +40,9 @@ def _cross(segments: Floats, corners: Floats) -> int:
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = np.cross(way, b)
     volume = (a * p).sum(-1)
-    good = np.abs(volume) > 1e-300
+    # in a flat part edges lie in the plane of their neighbours, but for rounding: they do not pass through it
+    size = np.linalg.norm(way, axis=1) * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+    good = np.abs(volume) > _FLAT * size
     inverse = 1 / np.where(good, volume, 1.0)
     offset = segments[:, 0] - corners[:, 0]
     u = (offset * p).sum(-1) * inverse

@@ -1,6 +1,6 @@
 """How long commands take to end: twenty of them, each sent SIGTERM or SIGINT at a random moment.
 
-    python -m benchmarks.service.stopping [--seed 0] [--commands 20]
+    python -m benchmarks.service.stopping [--seed 0] [--commands 20] [--term]
 
 A command has ended when every process of its session is gone. What is stopped: solves and onsets in this process,
 sweeps with one and two workers, a service with a job under way. Prints one row per command, and the longest time.
@@ -21,6 +21,7 @@ from pathlib import Path
 
 import httpx
 
+from benchmarks.figures import Sheet
 from store.store import Store
 from store.tokens import Tokens
 
@@ -109,20 +110,33 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--commands", type=int, default=20)
+    parser.add_argument("--term", action="store_true", help="send SIGTERM alone")
     chosen = parser.parse_args()
     chance = random.Random(chosen.seed)
-    times = []
+    head = ["command", "signal", "after", "until all of it had ended", "exit", "it said"]
+    sheet = Sheet("service-stopping", head)
     with tempfile.TemporaryDirectory() as folder:
         Store.open(Path(folder) / "served", create=True)
         for words in itertools.islice(itertools.cycle(commands(Path(folder))), chosen.commands):
-            moment, number = chance.uniform(0.5, LATEST), chance.choice([signal.SIGTERM, signal.SIGINT])
-            seconds, code, said = stop(words, moment, number)
-            times.append(seconds)
-            print(
-                f"{seconds:5.2f} s  {number.name} at {moment:4.1f} s  exit {code}  {' '.join(words[:4])}: {said}",
-                flush=True,
+            moment, number = (
+                chance.uniform(0.5, LATEST),
+                signal.SIGTERM if chosen.term else chance.choice([signal.SIGTERM, signal.SIGINT]),
             )
-    print(f"longest {max(times):.2f} s, median {sorted(times)[len(times) // 2]:.2f} s of {len(times)}")
+            seconds, code, said = stop(words, moment, number)
+            called = " ".join(word.replace(folder, "").lstrip("/") for word in words[:4])
+            cells = [
+                f"`wizen {called}`",
+                number.name,
+                f"{moment:.1f} s",
+                f"{seconds:.2f} s",
+                code,
+                said.replace("|", "/"),
+            ]
+            run = {"command": called, "signal": number.name, "after_s": moment, "ended_s": seconds, "exit": code}
+            sheet.add(cells, **run, said=said)
+    times = sorted(run["ended_s"] for run in sheet.runs)
+    print(f"longest {times[-1]:.2f} s, median {times[len(times) // 2]:.2f} s of {len(times)}")
+    sheet.keep(seed=chosen.seed)
 
 
 if __name__ == "__main__":

@@ -116,6 +116,7 @@ def result(
     headers = {
         "ETag": tag,
         "Vary": "Accept",
+        "Wizen-Tier": "run" if job.need.get("start") is None else "relaxed",
         "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
     }
     if tag in {part.strip().removeprefix("W/") for part in request.headers.get("if-none-match", "").split(",")}:

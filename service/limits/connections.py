@@ -1,7 +1,8 @@
 """Limits on connections: how many, from whom, and how long and how large the head of a request may be.
 
 uvicorn's parser takes heads of any length at any pace. Nobody who is honest sends a head of 32 kB, or needs ten seconds
-for it; whoever does either is told so and let go, so that slow and silent connections cannot use up the service.
+for it; whoever does either is told so and let go, so that slow and silent connections cannot use up the service. Where
+all connections are taken, a newcomer displaces the one that has been longest about its head.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ __all__ = ["GuardedProtocol"]
 
 #: Connections of each server by client.
 _clients: WeakKeyDictionary[ServerState, Counter[str]] = WeakKeyDictionary()
+#: Those of each server whose head has not come yet, the longest awaited first.
+_slow: WeakKeyDictionary[ServerState, dict[GuardedProtocol, None]] = WeakKeyDictionary()
 
 
 @cache
@@ -49,15 +52,24 @@ class GuardedProtocol(HttpToolsProtocol):
         super().connection_made(transport)
         limits = self._limits
         counts = _clients.setdefault(self.server_state, Counter())
+        _slow.setdefault(self.server_state, {})
         self._name = address(self.client[0]) if self.client else ""
         counts[self._name] += 1
-        if len(self.connections) > limits.max_connections:
-            self._refuse(503, "too-many-connections", f"{limits.max_connections} connections are open already.")
-        elif self._name and counts[self._name] > limits.max_connections_per_client:
+        if self._name and counts[self._name] > limits.max_connections_per_client:
             most = limits.max_connections_per_client
             self._refuse(503, "too-many-connections", f"{most} connections of this client are open already.")
+        elif len(self.connections) > limits.max_connections and not self._displace():
+            self._refuse(503, "too-many-connections", f"{limits.max_connections} connections are open already.")
         else:
             self._await_head()
+
+    def _displace(self) -> bool:
+        """Let the connection go that has been longest about its head; return whether there was one."""
+        slowest = next(iter(_slow[self.server_state]), None)
+        if slowest is None:
+            return False
+        slowest._refuse(503, "too-many-connections", "others came with whole requests.")
+        return True
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget a connection."""
@@ -113,15 +125,17 @@ class GuardedProtocol(HttpToolsProtocol):
             super().on_message_complete()
 
     def _await_head(self) -> None:
+        _slow[self.server_state][self] = None
         self._timer = self.loop.call_later(self._limits.head_timeout, self._too_slow)
 
     def _stop_timer(self) -> None:
+        _slow[self.server_state].pop(self, None)
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     def _too_slow(self) -> None:
-        self._timer = None
+        self._stop_timer()
         if self._head or self.headers:
             self._refuse(408, "request-timeout", f"no whole request came within {self._limits.head_timeout:g} s.")
         else:

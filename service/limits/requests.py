@@ -6,6 +6,8 @@ Plain ASGI, so that nothing is buffered and nothing is copied on the way through
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -16,13 +18,17 @@ from ..settings import Settings
 
 __all__ = ["Limits"]
 
+#: How often within `timeout` is looked whether there is a reason to be patient.
+_LOOKS = 4
+
 
 class Limits:
-    """Refuses what is too long, and answers for a handler that takes too long."""
+    """Refuses what is too long, and answers for a handler that takes too long; while `is_patient()`, none does."""
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    def __init__(self, app: ASGIApp, settings: Settings, is_patient: Callable[[], bool] = lambda: False) -> None:
         self.app = app
         self.settings = settings
+        self.is_patient = is_patient
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on within its limits."""
@@ -74,7 +80,8 @@ class Limits:
 
         try:
             async with asyncio.timeout(self.settings.timeout) as timer:
-                await self.app(scope, counted, watched)
+                with self._patience(timer):
+                    await self.app(scope, counted, watched)
         except TimeoutError:
             if begun or not timer.expired():
                 raise
@@ -84,6 +91,26 @@ class Limits:
             await problems.of(error, scope)(scope, receive, send)
         if failure and not begun:
             await problems.of(failure, scope)(scope, receive, send)
+
+    @contextmanager
+    def _patience(self, timer: asyncio.Timeout) -> Iterator[None]:
+        """Put a timer off as long as `is_patient`: what happens once on a machine is no reason to send anybody away."""
+        loop, limit = asyncio.get_running_loop(), self.settings.timeout
+        next_look: asyncio.TimerHandle
+
+        def look() -> None:
+            nonlocal next_look
+            if timer.when() is None:
+                return  # the answer has begun
+            if self.is_patient():
+                timer.reschedule(loop.time() + limit)
+            next_look = loop.call_later(limit / _LOOKS, look)
+
+        next_look = loop.call_later(limit / _LOOKS, look)
+        try:
+            yield
+        finally:
+            next_look.cancel()
 
     def _too_slow(self) -> SlowBody:
         return SlowBody(f"the body did not arrive within {self.settings.body_timeout:g} s.", advice="Send it at once.")

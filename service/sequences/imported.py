@@ -13,7 +13,6 @@ surface that moves them, and `Bound.coarseness` how long its edges are beside th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -21,7 +20,7 @@ import numpy as np
 
 from solver.arrays import Array, Ints
 from solver.geometry.nearest import nearest
-from sweeps import foreign
+from sweeps import foreign, meshparts
 from sweeps.errors import SweepError
 from sweeps.foreign import KINDS
 
@@ -82,9 +81,8 @@ def load(path: Path) -> tuple[Array, Array]:
     """
     try:
         if path.suffix.lower() == ".obj":
-            points, faces = _obj(
-                path
-            )  # trimesh splits vertices along texture seams, and a cache counts those of the file
+            # trimesh splits vertices along texture seams, and a cache counts those of the file
+            points, faces = _obj(path)
         else:
             mesh = foreign.read(path)
             points, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
@@ -97,19 +95,11 @@ def load(path: Path) -> tuple[Array, Array]:
 
 
 def _obj(path: Path) -> tuple[Array, Array]:
-    points, faces = [], []
     try:
-        for line in foreign.checked(path).decode(errors="replace").splitlines():
-            words = line.split()
-            if words[:1] == ["v"]:
-                points.append([float(word) for word in words[1:4]])
-            elif words[:1] == ["f"]:
-                corners = [int(word.split("/")[0]) for word in words[1:]]
-                corners = [c - 1 if c > 0 else len(points) + c for c in corners]
-                faces += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
-        return np.array(points, float), np.array(faces, np.int64).reshape(-1, 3)
-    except (ValueError, IndexError, OverflowError) as error:
+        parts = meshparts.obj(foreign.checked(path).decode(errors="replace"))
+    except (ValueError, IndexError) as error:
         raise foreign.ForeignMesh(path, str(error)[:200]) from None
+    return parts.points, parts.faces
 
 
 def bind(

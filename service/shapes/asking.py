@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -23,7 +22,7 @@ from ..hours import timed
 from ..settings import Settings
 from . import detail as level
 from .live import LiveTables
-from .query import RESERVED, ShapeQuery, Words, parse
+from .query import RESERVED, ShapeQuery, Words, number_of, parse
 
 __all__ = ["Asked", "Found", "asked", "preset_of", "read", "table_for", "words_of"]
 
@@ -73,7 +72,7 @@ def table_for(request: Request, solver: str) -> Found:
             found = Found(name, preset, {} if preset is None else tables.families(known).values({}, preset))
         else:
             items = timed(given.multi_items(), known, preset)
-            said = {k: number for k, v in items if k not in RESERVED and (number := _number(v)) is not None}
+            said = {k: number for k, v in items if k not in RESERVED and (number := number_of(v)) is not None}
             found = choose(tables.families(known), said, known.stages.symbol, preset)
         request.scope[_TABLE] = found
     assert isinstance(found, Found)
@@ -166,7 +165,13 @@ def beyond(found: Found, words: Words) -> list[Wrong]:
 
 
 def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
-    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers."""
+    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers.
+
+    Raises:
+        StaleTable: it is of another version of the solver.
+
+    """
+    stored.check_version(table.info, solver)
     described = vocabulary.axes(solver.name)
     fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
     units = {name: described[name].units for name in (*table.axes, *table.info.tied, *fixed) if name in described}
@@ -180,11 +185,3 @@ def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
         tied=table.info.tied,
         made=stored.made(table.info, solver),
     )
-
-
-def _number(text: str) -> float | None:
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if math.isfinite(number) else None

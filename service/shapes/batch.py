@@ -46,7 +46,7 @@ _CONTENT = problems.files(batch_formats.MEDIA_TYPES)
     response_class=Response,
     responses={
         200: {"description": "The shapes, in the order asked for", "content": _CONTENT},
-        **problems.responses(400, 404, 406, 413, 422, 500, 503),
+        **problems.responses(400, 404, 406, 409, 413, 422, 500, 503),
     },
 )
 def batch(request: Request, body: BatchRequest) -> Response:
@@ -93,14 +93,7 @@ def batch(request: Request, body: BatchRequest) -> Response:
     def look_up() -> Iterator[tuple[Shape, About]]:
         yield from batch_detail.each_once(distinct, sent, at, lambda one: replace(about, detail=one.said))
 
-    about = About(
-        solver=body.solver,
-        table=name,
-        fixed=words.fixed,
-        stage_symbol=words.stage,
-        units=words.units,
-        made=words.made,
-    )
+    about = words.about(body.solver, name)
     rest = (rows if body.once else None, detail.window, fields, look_up)
     made = Batch(table, replace(about, detail=sent[0].said), sent, *rest)
     return _answer(batch_formats.encode(chosen, made), batch_formats.media_type(chosen, made))

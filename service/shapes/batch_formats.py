@@ -195,6 +195,7 @@ class _Rows:
                 "inside": shape.inside,
                 "exact": shape.exact,
                 "converged": shape.converged,
+                "tier": shape.tier,
             }
         )
 

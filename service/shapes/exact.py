@@ -1,4 +1,7 @@
-"""From a shape that the table cannot give to the run that can: 303 to a job, or to its result once it is done."""
+"""From a shape that the table cannot give to the run that can: 303 to a job, or to its result once it is done.
+
+Between table and run lies what the table gives, relaxed by its solver: a job as well, but a short one.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import Response
 
-from solver.contract import Need
+from solver.contract import Need, Start
 from store.errors import TooUncertain
 from store.families.stored import document, refusal
 from sweeps.commands.terminal.tables import run_command
@@ -20,11 +23,11 @@ from ..security import authorize, bearer
 from ..views.addresses import link
 from .asking import Asked
 
-__all__ = ["RESPONSE", "offered", "redirect"]
+__all__ = ["RESPONSE", "offered", "redirect", "relax"]
 
 #: What the OpenAPI page says of it.
 RESPONSE: dict[str, Any] = {
-    "description": "exact=run: the job that computes this shape, or its result once it is done",
+    "description": "exact=run or relax: the job that computes this shape, or its result once it is done",
     "headers": {"Location": {"description": "Address of the job or its result", "schema": {"type": "string"}}},
 }
 
@@ -73,15 +76,41 @@ def redirect(request: Request, asked: Asked) -> Response:
         TooCostly, QueueFull, ReadOnlyStore: as for any job.
 
     """
-    token = authorize(request.app.state, bearer(request), "run")
-    query, need = asked.query, Need(stages=(asked.query.stage,), quality="default")
+    need = Need(stages=(asked.query.stage,), quality="default")
     params, preset = _run(asked)
+    return _sent(request, asked, params, need, preset)
+
+
+def relax(request: Request, asked: Asked) -> Response:
+    """Ask for what the table gives, relaxed by its solver, in the name of the request's token; send its asker there.
+
+    The quality is `preview`. The same shape of the same table is the same job: what was relaxed once is kept.
+
+    Raises:
+        Unauthorized, Forbidden: the request has no token for it.
+        InvalidInput: the solver relaxes nothing.
+        StaleTable: the table is of another version of the solver.
+        TooCostly, QueueFull, ReadOnlyStore: as for any job.
+
+    """
+    table, query = asked.table, asked.query
+    need = Need(
+        stages=(query.stage,),
+        quality="preview",
+        resolution=asked.resolution,
+        start=Start(table=asked.found.name, digest=table.digest, method=query.method),
+    )
+    return _sent(request, asked, table.at_parameters(query.point), need, None)
+
+
+def _sent(request: Request, asked: Asked, params: Mapping[str, Any], need: Need, preset: str | None) -> Response:
+    """Submit a job in the name of the request's token, and send its asker there."""
+    token = authorize(request.app.state, bearer(request), "run")
     who, unlimited = asker_of(request, token), token.allows("admin")
     found = submit(request.app.state, asked.solver, params, need, who, preset=preset, unlimited=unlimited)
     location = found.location
     if found.job.state == "done":
         location += f"/result?{urlencode({'format': asked.chosen.name})}"
-    assert query.exact
     return Response(status_code=303, headers={"Location": location, "Cache-Control": "no-store"})
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -41,8 +42,9 @@ class _Open:
 class LiveTables:
     """The store's tables by name, each opened when first asked for and looked at again at most every `interval` s."""
 
-    def __init__(self, root: Path, interval: float) -> None:
+    def __init__(self, root: Path, interval: float, before_folds: Callable[[], None]) -> None:
         self._root = root
+        self._before_folds = before_folds
         self._interval = interval
         self._open: dict[str, _Open] = {}
         self._manifests: dict[str, tuple[Stamp, TableInfo]] = {}
@@ -190,7 +192,10 @@ class LiveTables:
         self._known(name)
         # the stamp comes first: a swap in between is then noticed at the next look
         stamp = self._stamp(name)
-        return _Open(ShapeTable.open(self.store, name, surfaces=registry.surface), stamp, time.monotonic())
+        return _Open(self._read(name), stamp, time.monotonic())
+
+    def _read(self, name: str) -> ShapeTable:
+        return ShapeTable.open(self.store, name, surfaces=registry.surface, before_folds=self._before_folds)
 
     def _look(self, name: str, entry: _Open) -> None:
         """See whether there is another generation, and open it on the side: a large one takes seconds to verify."""
@@ -206,7 +211,7 @@ class LiveTables:
 
     def _renew(self, name: str, entry: _Open, stamp: Stamp) -> None:
         try:
-            table = ShapeTable.open(self.store, name, surfaces=registry.surface)
+            table = self._read(name)
         except (StoreError, OSError) as error:
             if entry.stamp == stamp:
                 entry.complaint = str(error)

@@ -16,12 +16,16 @@ from store.families.ties import Tie
 from store.surfaces.measures import Measures
 
 from ..errors import InvalidQuery, Wrong
+from ..formats import About
 from . import detail
 
-__all__ = ["LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "parse"]
+__all__ = ["EXACT", "LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "number_of", "parse"]
 
 #: Names that are not axes.
 RESERVED = ("resolution", "table", "preset", "format", "method", "max_error", "exact", *detail.NAMES)
+
+#: What may be asked for beyond the table: a run of what it does not answer, or what it answers, relaxed.
+EXACT = ("run", "relax")
 
 #: Fewer colatitude samples hold no shape.
 LOWEST_RESOLUTION = 4
@@ -56,6 +60,10 @@ class Words(NamedTuple):
         """All that must be given, with its range."""
         return {**self.axes, self.stage: self.stages}
 
+    def about(self, solver: str, table: str) -> About:
+        """Return what files say of every shape of the table of that name."""
+        return About(solver, table, self.fixed, self.stage, self.units, made=self.made)
+
     def say(self, name: str) -> str:
         """Return the range of an axis or of the stage with its units, in words."""
         low, high = self.ranges[name]
@@ -68,8 +76,8 @@ class ShapeQuery(NamedTuple):
 
     `named` are fixed parameters that were given all the same, and `outside` what is off the table: then `point`,
     `stage` and `named` are a question to the solver, not to the table. `method` is spelt in one way. `max_error` limits
-    errors by measure. `exact`: what the table cannot answer is to be run. `said` are the numbers that the asker named,
-    and `is_elsewhere`: no table holds this fruit, whatever its skin and stage.
+    errors by measure. `exact`: what the table cannot answer is to be `run`, or what it answers to be `relax`ed. `said`
+    are the numbers that the asker named, and `is_elsewhere`: no table holds this fruit, whatever its skin and stage.
     """
 
     point: dict[str, float]
@@ -79,7 +87,7 @@ class ShapeQuery(NamedTuple):
     outside: tuple[Wrong, ...] = ()
     method: str = methods.DEFAULT
     max_error: dict[str, float] | None = None
-    exact: bool = False
+    exact: str = ""
     said: Mapping[str, float] = {}
     is_elsewhere: bool = False
 
@@ -113,7 +121,7 @@ def parse(
             else:
                 chosen[name] = found
         elif name in words.ranges or name in words.fixed or name in words.tied:
-            number = _number(text)
+            number = number_of(text)
             if number is None:
                 wrong.append(Wrong(name, f"{text[:40]!r} is not a finite number", "Write it like 0.05."))
             else:
@@ -128,6 +136,8 @@ def parse(
     for name in words.ranges:
         if name not in numbers and name not in given:
             wrong.append(Wrong(name, "is missing", f"Add {name}= and a number from {words.say(name)}."))
+    if chosen.get("exact") == "relax" and "max_error" in given:
+        wrong.append(Wrong("max_error", "nobody knows the error of what is relaxed", "Leave it out."))
     if wrong:
         raise InvalidQuery.of([*wrong, *outside])
     named_already = {w.name for w in outside}
@@ -170,7 +180,8 @@ def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:
     return [Wrong(name[:40], "is given more than once", "Give it once.") for name, n in counts.items() if n > 1]
 
 
-def _number(text: str) -> float | None:
+def number_of(text: str) -> float | None:
+    """Return the finite number that a text is, None if it is none."""
     try:
         number = float(text)
     except ValueError:
@@ -215,10 +226,10 @@ def _max_error(text: str, words: Words) -> dict[str, float] | Wrong:
     return limits
 
 
-def _exact(text: str, words: Words) -> bool | Wrong:
-    if text != "run":
-        return Wrong("exact", f"{text[:40]!r} is not run", "Write exact=run, or leave it out.")
-    return True
+def _exact(text: str, words: Words) -> str | Wrong:
+    if text not in EXACT:
+        return Wrong("exact", f"{text[:40]!r} is not {' or '.join(EXACT)}", "Write exact=run, or leave it out.")
+    return text
 
 
 _READERS: Mapping[str, Callable[[str, Words], Any]] = {

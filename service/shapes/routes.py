@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Request
@@ -17,7 +18,7 @@ from store.errors import TooUncertain
 
 from .. import problems
 from ..errors import OutsideRanges
-from ..formats import FORMATS, About, Format
+from ..formats import FORMATS, Format
 from ..settings import Settings
 from ..views.addresses import link
 from ..views.shape import ShapePage
@@ -25,6 +26,7 @@ from . import asking, exact
 from . import detail as level
 from .answers import Answer, Answers, matches
 from .asking import Asked
+from .compiling import NotAtOnce
 from .query import ShapeQuery
 
 __all__ = ["at_once", "router"]
@@ -35,6 +37,8 @@ router = APIRouter(tags=["shapes"])
 #: for the interpreter there.
 _QUICK = ("points", "npz", "json")
 _SMALL = 128
+#: Says of a request that its shape turned out not to be computed at once.
+_FOLDS = "wizen.folds"
 
 _CONTENT = problems.files(f.media_type for f in FORMATS.values() if f.name != "json")
 
@@ -57,7 +61,9 @@ async def shape(
 
     Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Every answer
     says what error to expect (`expected_error`, by measure) and whether it lies between the runs (`inside`);
-    `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table.
+    `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table;
+    `exact=relax` brings what is looked up into balance. `Wizen-Tier` says of each answer whether it is looked up in a
+    `table`, `relaxed` from there, or a `run`.
     """
     found = await at_once(request, solver)
     return await run_in_threadpool(_shape, request, solver) if found is None else found
@@ -69,7 +75,7 @@ async def shape(
     response_model=ShapePage,
     responses={
         304: {"description": "What the asker has is current"},
-        **problems.responses(404, 413, 414, 422, 500, 503),
+        **problems.responses(404, 409, 413, 414, 422, 500, 503),
     },
 )
 def info(request: Request, solver: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Response:
@@ -84,14 +90,18 @@ async def at_once(request: Request, solver: str) -> Response | None:
         ServiceError, StoreError, SolverError: as `_ask` and `_settle`, or too many wait already.
 
     """
-    if not request.app.state.tables.is_open(asking.table_for(request, solver).name):
+    if _FOLDS in request.scope or not request.app.state.tables.is_open(asking.table_for(request, solver).name):
         return None  # opening a large table takes seconds
     asked = asking.asked(request, solver)
     # a shape is small, and no job is to be asked for
     if asked.resolution > _SMALL or asked.chosen.name not in _QUICK or asked.query.exact:
         return None
     async with request.app.state.turns:
-        return _settle(request, asked)
+        try:
+            return _settle(request, asked)
+        except NotAtOnce:
+            request.scope[_FOLDS] = True  # putting it out of contact with itself takes longer than all the rest
+            return None
 
 
 def _shape(request: Request, solver: str) -> Response:
@@ -103,9 +113,12 @@ def _settle(request: Request, asked: Asked) -> Response:
     try:
         if asked.query.outside:
             raise OutsideRanges.of(asked.query.outside)
+        # the fresh shape is in balance as it is
+        if asked.query.exact == "relax" and asked.query.stage != 0:
+            return exact.relax(request, asked)
         return _answer(request, asked)
     except (OutsideRanges, TooUncertain) as error:
-        if not asked.query.exact:
+        if asked.query.exact != "run":
             raise exact.offered(request, asked, error) from None
         return exact.redirect(request, asked)
 
@@ -126,6 +139,7 @@ def _answer(request: Request, asked: Asked) -> Response:
         "ETag": tag,
         "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
         "Vary": "Accept",
+        "Wizen-Tier": "table",
     }
     if matches(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers=headers)
@@ -145,16 +159,11 @@ def _answer(request: Request, asked: Asked) -> Response:
         window=detail.window,
     )
     looked = time.perf_counter()
-    about = About(
-        solver=solver.name,
-        table=name,
-        fixed=words.fixed,
-        stage_symbol=words.stage,
-        units=words.units,
+    about = replace(
+        words.about(solver.name, name),
         detail=detail.said(resolution, table.resolution),
         links=_links(request, resolution, detail) if chosen.name == "json" else {},
         timings={"lookup": 1e3 * (looked - begin)},
-        made=words.made,
     )
     body = chosen.encode(shape, about)
     encoded = time.perf_counter()

@@ -44,7 +44,9 @@ class ShapePage(BaseModel):
     exact: bool = Field(description="A stored run at a stored stage, or the fresh shape")
     converged: bool = Field(description="All runs that took part did converge")
     crossings: int | None = Field(description="Pairs of triangles that cross; null where no positions were computed")
-    tier: str = Field(description="Whether it is from the `table` or `relaxed` by its solver")
+    tier: str = Field(
+        description="How it came about: looked up in a `table`, `relaxed` from there by its solver, or a `run`"
+    )
     nearest: float = Field(description="Distance to the nearest run; 1 is a whole range of a parameter")
     inside: bool = Field(description="The runs surround the question")
     expected_error: dict[str, float | None] | None = Field(description="By measure; null where nobody knows")

@@ -8,7 +8,7 @@ from .clock import Clock
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
 from .looks import Fur, Label, Looks, Place, Shade, Skin
-from .need import Need, Quality, Region
+from .need import Need, Quality, Region, Start
 from .params import Params
 from .solver import Cost, Solver, StageAxis, finish
 from .surface import Fresh, Surface
@@ -36,6 +36,7 @@ __all__ = [
     "Solver",
     "SolverError",
     "StageAxis",
+    "Start",
     "Surface",
     "Unstable",
     "finish",

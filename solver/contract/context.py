@@ -13,6 +13,9 @@ from .words import SHORT
 if TYPE_CHECKING:
     import xarray as xr
 
+    from .need import Start
+    from .params import Params
+
 __all__ = ["Context"]
 
 
@@ -25,11 +28,13 @@ class Context:
         cancelled: Callable[[], bool] | None = None,
         library: Callable[[str], xr.Dataset | None] | None = None,
         shapes: Callable[[str, Mapping[str, float], float, int], np.ndarray] | None = None,
+        starts: Callable[[Start, Params, float], np.ndarray] | None = None,
     ) -> None:
         self._observe = observe
         self._cancelled = cancelled
         self._library = library
         self._shapes = shapes
+        self._starts = starts
         self._fraction = 0.0
 
     def report(self, fraction: float, message: str = "") -> None:
@@ -63,6 +68,20 @@ class Context:
                 advice="Run it by `wizen solve`, by a sweep or as a job, or give Context(shapes=sweeps.tabled.shape).",
             )
         return self._shapes(solver, point, stage, resolution)
+
+    def start(self, start: Start, params: Params, stage: float) -> np.ndarray:
+        """Return the position (n, 2 n, 3) of the looked-up shape that a run of `params` is to relax.
+
+        Raises:
+            InvalidInput: there are no tables here, no such one, or it does not hold that shape.
+
+        """
+        if self._starts is None:
+            raise InvalidInput(
+                f"the run starts from a shape of the table {start.table!r}, and there is none here.",
+                advice="Run it as a job, or relax the shape by `wizen query --relax`.",
+            )
+        return self._starts(start, params, stage)
 
     def result(self, key: str) -> xr.Dataset:
         """Return an earlier result by its key, for runs that start from one.

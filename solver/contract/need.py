@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    field_validator,
+    model_serializer,
+)
 
 from .errors import InvalidInput
 from .words import named, say
 
-__all__ = ["Need", "Quality", "Region"]
+__all__ = ["Need", "Quality", "Region", "Start"]
 
 Quality = Literal["preview", "default", "fine"]
 
@@ -29,6 +37,16 @@ class Region(BaseModel):
         if not value[0] < value[1]:
             raise ValueError("a range runs from a smaller to a larger angle")
         return value
+
+
+class Start(BaseModel):
+    """The shape that a run is not to find by itself but to start from: one of a table, which is only relaxed."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    table: str = Field(min_length=1, max_length=100, description="Name of the table")
+    digest: str = Field(min_length=1, max_length=100, description="Its generation, as GET /v1/tables says it")
+    method: str = Field(min_length=1, max_length=100, description="How to look up in it")
 
 
 class Need(BaseModel):
@@ -50,6 +68,15 @@ class Need(BaseModel):
     )
     region: Region | None = Field(None, description="Part of the surface to return; None is all of it")
     dtype: Literal["float32", "float64"] = Field("float32", description="Precision of the returned fields")
+    start: Start | None = Field(None, description="Relax this looked-up shape, at one stage, instead of a run")
+
+    @model_serializer(mode="wrap")
+    def _written(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out a start that is not there: keys of what was stored before there was one stay as they are."""
+        written: dict[str, Any] = plain(self)
+        if self.start is None:
+            written.pop("start", None)
+        return written
 
     @field_validator("stages")
     @classmethod

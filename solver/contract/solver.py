@@ -60,9 +60,9 @@ class Solver:
     can say at which stage its shape begins to lose its symmetry; `incidental`, parameters that say how a run is done
     and not what of: tables that differ in them hold the same shapes; `error(params, quality, last stage)`, the relative
     error to expect of these parameters, which refuses what was never measured; `relax(params, position, stage, need,
-    context)`, which brings a surface on the lattice into the equilibrium next to it and returns what `run` returns of
-    one stage, and how far it `moved`. `tolerances` are the worst of each
-    quality over all that was. `clock` turns hours under given conditions into
+    context, steps)`, which brings a surface on the lattice into the equilibrium next to it, or so many steps nearer,
+    and returns what `run` returns of one stage, how far it `moved` and from which residual (`residual_placed`).
+    `tolerances` are the worst of each quality over all that was. `clock` turns hours under given conditions into
     stages.
     """
 
@@ -84,7 +84,7 @@ class Solver:
     onset: Callable[..., Any] | None = None
     incidental: tuple[str, ...] = ("seed",)
     error: Callable[[Any, Quality, float], float] | None = None
-    relax: Callable[[Any, Floats, float, Need, Context], xr.Dataset] | None = None
+    relax: Callable[..., xr.Dataset] | None = None
     clock: Clock | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
@@ -167,6 +167,8 @@ class Solver:
                     f"stage {stage:g} lies outside {axis.symbol} = {axis.lowest:g} to {axis.highest:g}.",
                     advice=f"Ask for stages ({axis.long_name}) in that range.",
                 )
+        if need.start is not None:
+            self._check_start(need, stages)
         quality: Quality = need.quality
         if need.tolerance is not None:
             quality = self._quality_for(need.tolerance, max(stages), tuple(of))
@@ -179,6 +181,15 @@ class Solver:
                 "resolution": need.resolution or self.default_resolution[quality],
             }
         )
+
+    def _check_start(self, need: Need, stages: tuple[float, ...]) -> None:
+        """Refuse to relax what cannot be."""
+        if self.relax is None:
+            raise InvalidInput(f"{self.name} relaxes no surfaces.", advice="Leave need.start out.")
+        if len(stages) != 1:
+            raise InvalidInput("one shape is relaxed at a time.", advice="Name one stage.")
+        if need.tolerance is not None:
+            raise InvalidInput("relaxing promises no tolerance.", advice="Leave it out, or run it without a start.")
 
     def _quality_for(self, tolerance: float, last: float, of: tuple[Params, ...]) -> Quality:
         """Return the cheapest quality whose error is at most `tolerance`, for all parameters."""
@@ -203,14 +214,23 @@ class Solver:
             SolverError: typed, with the converged stages attached where there are any.
 
         """
-        settled = self.settle(need or Need(), of=(params,))
-        result = self.run(params, settled, context or Context())
-        return finish(result, self, params, settled)
+        settled, observer = self.settle(need or Need(), of=(params,)), context or Context()
+        if settled.start is None or self.relax is None:
+            return finish(self.run(params, settled, observer), self, params, settled)
+        stage = settled.stages[0]
+        position = np.asarray(observer.start(settled.start, params, stage), np.float64)
+        return finish(self.relax(params, position, stage, settled, observer), self, params, settled)
 
     def relaxed(
-        self, params: Params, position: Floats, stage: float, need: Need | None = None, context: Context | None = None
+        self,
+        params: Params,
+        position: Floats,
+        stage: float,
+        need: Need | None = None,
+        context: Context | None = None,
+        steps: int | None = None,
     ) -> xr.Dataset:
-        """Relax a surface (n, 2n, 3) at a stage, and check what leaves as `solve` does.
+        """Relax a surface (n, 2n, 3) at a stage, for `steps` at most, and check what leaves as `solve` does.
 
         Raises:
             InvalidInput: this solver relaxes nothing, or the need cannot be met.
@@ -221,7 +241,7 @@ class Solver:
             raise InvalidInput(f"{self.name} relaxes no surfaces.", advice="Run it: it finds its own.")
         asked = (need or Need()).model_copy(update={"stages": (stage,)})
         settled = self.settle(asked, of=(params,))
-        result = self.relax(params, position, stage, settled, context or Context())
+        result = self.relax(params, position, stage, settled, context or Context(), steps)
         return finish(result, self, params, settled)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
 from ..fresh import SURFACE
+from .accuracy import expected_error
 from .looks import LOOKS
 from .names import ALL, DEFAULT
 from .params import DecayParams, Weather
@@ -40,8 +41,9 @@ SOLVER = Solver(
     default_fields=DEFAULT,
     stages=StageAxis("t", "time since the wounds", "day", 0.0, 120.0, (5.0, 10.0, 15.0, 20.0)),
     default_resolution={"preview": 64, "default": 128, "fine": 256},
-    # error of the mould's density, apple, day 10, against a mesh of 384 cells (docs/decay.md)
-    tolerances={"preview": 0.015, "default": 0.0015, "fine": 0.0004},
+    # the worst of what was measured; which runs reach less, `error` says (docs/decay.md)
+    tolerances={"preview": 0.15, "default": 0.055},
+    error=expected_error,
     presets=PRESETS,
     run=_run,
     cost=_cost,

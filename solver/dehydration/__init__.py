@@ -53,11 +53,13 @@ def _run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     return run(params, need, context)
 
 
-def _relax(params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context) -> xr.Dataset:
+def _relax(
+    params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context, steps: int | None = None
+) -> xr.Dataset:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
     from .relax import relax
 
-    return relax(params, position, stage, need, context)
+    return relax(params, position, stage, need, context, steps)
 
 
 def _cost(params: DehydrationParams, need: Need) -> Cost:

@@ -35,6 +35,7 @@ from .kernel import (
     weigh,
 )
 from .kernel.fixed_point import QUANTUM
+from .kernel.layout import aligned_copy
 from .kernel.march import SEARCH_EVERY
 from .params import DehydrationParams
 from .settings import Settings
@@ -174,11 +175,33 @@ class Motion:
     ) -> Floats:
         """March from shrinkage a to b under rest volumes `rest`, and return those that go with the new pressures."""
         self.run(state, velocity, rest, count, a, b, damping)
+        return self._followed(state, rest, count, b, damping)
+
+    def settle_inside(
+        self, state: Fixed, velocity: Singles, rest: Floats, count: int, shrinkage: float, damping: float
+    ) -> Floats:
+        """Let all but the surface nodes move, which stay where they are, touching or not; return the rest volumes that
+        go with the new pressures. Velocities of the surface nodes are to be 0.
+        """
+        self._context.check_cancelled()
+        self.drive.lead(state, shrinkage)
+        self._follow(state, velocity)
+        ready = self._ready(shrinkage, rest)
+        inverse = aligned_copy(ready.inverse_mass, np.float32)
+        inverse[self.sector.mesh.surface_nodes] = 0
+        held = dataclasses.replace(ready, inverse_mass=inverse)
+        theta = 1 - shrinkage
+        march(held, state, velocity, count, theta=(theta, theta), damping=damping, one_point=True)
+        self._arrive(state, count, shrinkage)
+        return self._followed(state, rest, count, shrinkage, damping)
+
+    def _followed(self, state: Fixed, rest: Floats, count: int, shrinkage: float, damping: float) -> Floats:
+        """Return the rest volumes that go with the pressures after `count` steps at this damping."""
         settings = self.settings
         if settings.kappa_ratio == settings.march_kappa_ratio:
             return rest
-        loaded = self._ready(b, rest)
-        goal = rests(dilatations(loaded, state, 1 - b), settings.march_kappa_ratio, settings.kappa_ratio)
+        loaded = self._ready(shrinkage, rest)
+        goal = rests(dilatations(loaded, state, 1 - shrinkage), settings.march_kappa_ratio, settings.kappa_ratio)
         # volumes ring for 2 / damping steps; following faster than that feeds what rings
         share = 1 - np.exp(-_FOLLOW * damping * count)
         following: Floats = rest * (goal / rest) ** share
@@ -218,10 +241,14 @@ class Motion:
                 )
                 assert skin is not None
                 self._skin = skin
+        self._arrive(state, count, b)
+
+    def _arrive(self, state: Fixed, count: int, shrinkage: float) -> None:
+        """Count the steps that led to a state, and refuse one that has left the finite."""
         self.steps += count
         if out_of_reach(state):
             raise Unstable(
-                f"the run blew up at shrinkage s = {b:.3f}.",
+                f"the run blew up at shrinkage s = {shrinkage:.3f}.",
                 advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             )
 

@@ -1,8 +1,12 @@
 """A surface from elsewhere, relaxed: put on the mesh of a fruit and let go until forces balance, pattern and all.
 
-A looked-up shape is near many equilibria and on none. Its surface is pushed on in small increments, the inside
-following with the cube of its depth and settling after each; then all is free. The pattern stays, the residual falls a
-hundredfold in some hundred steps: what a run needs many thousands for.
+A looked-up shape is near many equilibria and on none. Its surface is pushed on in a few increments, the inside
+following with the cube of its depth and settling after each, its volumes going with the pressure; then all is free. The
+pattern stays, the residual falls a hundredfold in some hundred steps: what a run needs many thousands for.
+
+What is slow then is the skin: scaled by its thickness, its mass is large beside what holds a wrinkle back. Damping that
+calms the inside would hold it for thousands of steps, so that it is taken away by and by. Rest volumes stay as they
+are from there on: under light damping, volumes that follow the pressure feed what rings.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Singles
 from ..contract import Context, InvalidInput, Need, Unstable
 from ..geometry.apart import Topology, put_apart
 from ..geometry.crossings import split_quads
@@ -27,25 +31,33 @@ from .settle import State
 
 __all__ = ["RESIDUAL", "on_columns", "relax"]
 
+Fixed = NDArray[np.int32]
+
 #: Residual at which a relaxed shape counts as an equilibrium.
 RESIDUAL = 5e-3
 #: Increments in which a surface is pushed on, steps of the inside after each, and their damping.
-_INCREMENTS, _STEPS, _DAMPING = 40, 15, 0.2
-#: Steps in which what was pushed on is calmed, the volumes' updates after it, and the steps between looks afterwards.
-_CALM, _PRESSINGS, _LOOK = 300, 2, 100
-#: Damping while calming, and of what follows.
-_CALM_DAMPING, _FREE_DAMPING = 0.06, 0.03
+_INCREMENTS, _STEPS, _DAMPING = 5, 20, 0.2
+#: Damping of the turns in which what was pushed on is calmed, volumes following, and the steps of each.
+_CALMING, _TURN = (0.12, 0.12, 0.12, 0.12, 0.06, 0.06), 50
+#: Likewise once the residual is within so many times the wanted one.
+_PRESSING, _NEAR = (0.12, 0.12, 0.12), 2.0
+#: Damping of what follows, and after how many steps in all it is lessened, for shapes that still slide then; the steps
+#: between two looks at the residual.
+_FREE_DAMPING, _SLIDING_DAMPING, _PATIENCE, _LOOK = 0.01, 0.004, 1500, 100
 #: Most steps of all; a shape that has no residual of `RESIDUAL` then says so.
 _MOST = 4000
 #: Levels of the mesh below the surface that move with it as they are: those of the skin.
 _SKIN = 3
 
 
-def relax(params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context) -> xr.Dataset:
-    """Return what `run` returns of one stage for the equilibrium next to a surface `position` (n, 2n, 3), and `moved`:
-    how far relaxing moved it, rms of the radial motion over its roughness.
+def relax(
+    params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context, steps: int | None = None
+) -> xr.Dataset:
+    """Return what `run` returns of one stage for the equilibrium next to a surface `position` (n, 2n, 3); `moved`, how
+    far relaxing moved it, rms of the radial motion over its roughness; and `residual_placed`, what it began with.
 
-    The bumps and the pattern that runs begin with are left out: the surface has its own.
+    The bumps and the pattern that runs begin with are left out: the surface has its own. It ends after about so many
+    `steps`, in balance or not; without, when in balance.
 
     Raises:
         InvalidInput: a stage at which the driest flesh would be gone, or a surface that is not on a lattice.
@@ -63,20 +75,10 @@ def relax(params: DehydrationParams, position: Floats, stage: float, need: Need,
     sector = motion.sector
     target = on_columns(np.asarray(position, np.float64), motion.mesh.sphere.directions)
     put_apart(target, Topology.of(split_quads(motion.mesh.sphere.quads), len(target)))
-    state, velocity = _put_on(motion, target[sector.own], stage)
+    state, velocity, rest = _put_on(motion, target[sector.own], stage)
     placed = sector.whole(motion.surface(state))
-    motion.run(state, velocity, motion.rest, _CALM, stage, stage, _CALM_DAMPING)
-    rest, residual = motion.rest, np.inf
-    for _ in range(_PRESSINGS):
-        rest = motion.advance(state, velocity, rest, _LOOK, stage, stage, 2 * _CALM_DAMPING)
-    while motion.steps < _MOST:
-        before = motion.surface(state)
-        motion.run(state, velocity, rest, _LOOK, stage, stage, _FREE_DAMPING)
-        residual = motion.residual(state, rest, stage, _FREE_DAMPING)
-        drift = float(np.sqrt(np.square(motion.surface(state) - before).sum(axis=1).mean()))
-        context.report(motion.steps / _MOST, f"residual {residual:.1e}")
-        if residual <= RESIDUAL:
-            break
+    began = motion.residual(state, rest, stage, _FREE_DAMPING)
+    rest, residual, drift = _balance(motion, state, velocity, rest, stage, steps or _MOST, context)
     report = motion.report(state, rest, stage)
     least = float(report.least_ratio.min())
     if least <= 0:
@@ -89,7 +91,32 @@ def relax(params: DehydrationParams, position: Floats, stage: float, need: Need,
     attrs = {"path": "relaxed", "elements": motion.elements, "residual_limit": RESIDUAL, "unit_of_length": "r1"}
     result = record.dataset({**attrs, "kappa_over_mu": settings.kappa_ratio})
     result["moved"] = ("stage", [_moved(placed, whole)])
+    result["residual_placed"] = ("stage", [began])
     return result
+
+
+def _balance(
+    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, stage: float, most: int, context: Context
+) -> tuple[Floats, float, float]:
+    """Let a state go until forces balance, `most` steps in all; return rest volumes, the residual, and the drift [r1]
+    of the surface in 200 steps. State and velocity change in place.
+    """
+    for damping in _CALMING:
+        rest = motion.advance(state, velocity, rest, _TURN, stage, stage, damping)
+    residual, drift, is_pressed = np.inf, np.inf, False
+    while motion.steps < most and residual > RESIDUAL:
+        if not is_pressed and residual <= _NEAR * RESIDUAL:
+            # what has moved since has other pressures
+            for damping in _PRESSING:
+                rest = motion.advance(state, velocity, rest, _TURN, stage, stage, damping)
+            is_pressed = True
+        before = motion.surface(state)
+        damping = _FREE_DAMPING if motion.steps < _PATIENCE else _SLIDING_DAMPING
+        motion.run(state, velocity, rest, _LOOK, stage, stage, damping)
+        residual = motion.residual(state, rest, stage, damping)
+        drift = 200 / _LOOK * float(np.sqrt(np.square(motion.surface(state) - before).sum(axis=1).mean()))
+        context.report(motion.steps / most, f"residual {residual:.1e}")
+    return rest, residual, drift
 
 
 def on_columns(position: Floats, directions: Floats) -> Floats:
@@ -108,8 +135,8 @@ def on_columns(position: Floats, directions: Floats) -> Floats:
     return found
 
 
-def _put_on(motion: Motion, target: Floats, stage: float) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return state and velocity with the surface nodes of the part at `target` (nc, 3), at rest."""
+def _put_on(motion: Motion, target: Floats, stage: float) -> tuple[Fixed, Singles, Floats]:
+    """Return state, velocity and rest volumes with the surface nodes of the part at `target` (nc, 3), at rest."""
     mesh = motion.sector.mesh
     smooth = motion.drive.smooth(stage)
     columns = smooth.reshape(len(mesh.rays), mesh.levels, 3)
@@ -118,17 +145,13 @@ def _put_on(motion: Motion, target: Floats, stage: float) -> tuple[NDArray[np.in
     share = ((distance - distance[:, :1]) / (distance[:, -1:] - distance[:, :1])) ** 3
     share[:, mesh.levels - _SKIN :] = 1.0
     way = (target - columns[:, -1])[:, None] / _INCREMENTS * share[..., None]
-    step = np.zeros_like(state)
+    step, rest = np.zeros_like(state), motion.rest
     place(step, way.reshape(-1, 3))
     for _ in range(_INCREMENTS):
         state += step
-        held = state[mesh.surface_nodes].copy()
-        for _ in range(3):
-            motion.run(state, velocity, motion.rest, _STEPS // 3, stage, stage, _DAMPING)
-            state[mesh.surface_nodes] = held
-            velocity[mesh.surface_nodes] = 0
+        rest = motion.settle_inside(state, velocity, rest, _STEPS, stage, _DAMPING)
     velocity[:] = 0
-    return state, velocity
+    return state, velocity, rest
 
 
 def _moved(before: Floats, after: Floats) -> float:

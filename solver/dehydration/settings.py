@@ -99,6 +99,8 @@ _KAPPA = 1000.0
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
 _SECONDS_PER_ELEMENT_STEP = 5e-8
+#: Steps after which most looked-up shapes are in balance, for estimates only.
+_RELAXING_STEPS = 1500
 #: Seconds until compiled kernels are loaded and the mesh is made.
 _LOADING = 2.0
 
@@ -161,9 +163,15 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     """Return expected wall seconds on this machine's cores and bytes of memory."""
     last = max(need.stages, default=0.0)
     settings = choose(params, need.quality, last)
+    if need.start is not None:
+        return _whole_cost(settings, _RELAXING_STEPS)
     rungs = {RUNG * k for k in range(math.floor(settings.start / RUNG) + 1, math.floor(last / RUNG + 1e-9) + 1)}
     # most settle for a sixth of the steps they may take
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
     steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 6 * states
+    return _whole_cost(settings, steps)
+
+
+def _whole_cost(settings: Settings, steps: float) -> Cost:
     seconds = steps * settings.elements * _SECONDS_PER_ELEMENT_STEP / (os.cpu_count() or 1)
     return Cost(_LOADING + seconds, settings.elements * 1200 + 150_000_000)

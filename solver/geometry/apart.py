@@ -67,7 +67,7 @@ def put_apart(x: Doubles, topology: Topology, rounds: int = _ROUNDS) -> Apart:
     return Apart(*_put_apart(x, *topology, rounds))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)  # a service has others to answer meanwhile
 def _put_apart(x: Doubles, faces: Words, first: Words, near: Words, rounds: int) -> tuple[int, int, int]:
     began, spent = -1, 0
     size, weight, way = np.empty(len(faces)), np.empty(0), np.empty(0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Need, Solver, StageAxis
+from .looks import CHANNELS, LOOKS
 from .params import GrowthParams
 from .presets import PRESETS
 
@@ -29,16 +30,17 @@ def _cost(params: GrowthParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="growth",
-    version="4",
+    version="5",
     title="Growth of thin shells",
     params=GrowthParams,
-    fields=("mesh_position", "elastic_strain", "mesh_area", "stored_energy", "rest_area"),
+    fields=("mesh_position", "elastic_strain", *CHANNELS, "mesh_area", "stored_energy", "rest_area"),
     default_fields=("mesh_position", "mesh_area", "rest_area", "stored_energy"),
     stages=StageAxis("t", "growth time", "1", 0.0, 100.0, (0.25, 0.5, 0.75, 1.0)),
     default_resolution={"preview": 16, "default": 32, "fine": 64},
     # error of the height of a smooth hot spot's bulge, by extrapolation over three meshes (docs/growth.md)
     tolerances={"preview": 0.04, "default": 0.01, "fine": 0.003},
     presets=PRESETS,
+    looks=LOOKS,
     run=_run,
     cost=_cost,
 )

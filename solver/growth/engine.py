@@ -17,6 +17,7 @@ from .. import shell
 from ..contract import Context, InvalidGeometry
 from ..geometry.crossings import crossings
 from .fresh import fresh
+from .matter import grown_further
 from .params import GrowthParams
 from .plastic import forgotten
 from .remeshing.remesh import remesh
@@ -170,7 +171,7 @@ class Engine:
         acting = dict(enumerate(self._tools[:tools]))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         yield
-        state = replace(state, g=g, rest=rest, time=state.time + dt)
+        state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
         p = self.params
         tangent = self._tangent
         energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)

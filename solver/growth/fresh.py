@@ -6,6 +6,7 @@ import numpy as np
 
 from .. import shell
 from ..contract import Context
+from .matter import matter
 from .params import GrowthParams
 from .shapes import Mesh
 from .state import State
@@ -39,4 +40,5 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         held=held,
         spots={},
         curves={},
+        matter=matter(params.ribs, params.colours, mesh, border(top), params.seed),
     )

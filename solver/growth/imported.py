@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from ..contract import InvalidGeometry
+from ..contract.mesh import GivenMesh
 
 if TYPE_CHECKING:
     from .. import shell
@@ -19,10 +20,8 @@ __all__ = ["OwnMesh"]
 _THIN = 1e-6
 
 
-class OwnMesh(BaseModel):
+class OwnMesh(GivenMesh):
     """Points and triangles; triangles that share an edge share its two points."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     points: tuple[tuple[float, float, float], ...] = Field(
         min_length=3, max_length=100_000, description="Vertices [start shape's unit]"
@@ -30,13 +29,6 @@ class OwnMesh(BaseModel):
     faces: tuple[tuple[int, int, int], ...] = Field(
         min_length=1, max_length=200_000, description="Triangles, counter-clockwise from outside, vertices from 0"
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read(cls, values: object) -> object:
-        if isinstance(values, str):
-            raise ValueError("expected points and faces; on the command line, --set mesh=@FILE reads them from a file")
-        return values
 
     @model_validator(mode="after")
     def _is_a_surface(self) -> Self:

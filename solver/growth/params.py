@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
 from ..contract import Params
 from .imported import OwnMesh
+from .matter import Colour, Rib
 from .shapes import Shape
 from .tooling.places import Place
 from .tooling.tools import HotSurface, Tool
 
-__all__ = ["Attachment", "Bending", "GrowthParams", "Plane", "Solid", "SolidBall"]
+__all__ = ["Attachment", "Bending", "GrowthParams", "Plane", "Solid", "SolidBall", "SolidBox"]
+
+
+Side = Annotated[float, Field(gt=0, le=100)]
 
 
 class _Model(BaseModel):
@@ -43,7 +47,24 @@ class SolidBall(_Model):
     radius: float = Field(1.0, gt=0, le=100, description="Radius [start shape's unit]")
 
 
-Solid = Annotated[Plane | SolidBall, Field(discriminator="kind")]
+class SolidBox(_Model):
+    """A box with rounded edges, its sides along the axes, that the surface cannot enter."""
+
+    kind: Literal["box"] = "box"
+    centre: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
+    size: tuple[Side, Side, Side] = Field(
+        (1.0, 1.0, 1.0), description="Length along x, y and z, edges included [start shape's unit]"
+    )
+    edge: float = Field(0.1, ge=0, le=100, description="Radius of its edges, half a side at most [start shape's unit]")
+
+    @model_validator(mode="after")
+    def _round(self) -> Self:
+        if 2 * self.edge > min(self.size):
+            raise ValueError(f"edges of radius {self.edge:g} do not fit a box of size {self.size}; half a side at most")
+        return self
+
+
+Solid = Annotated[Plane | SolidBall | SolidBox, Field(discriminator="kind")]
 
 Bending = Literal["hinges", "mean_curvature"]
 
@@ -124,6 +145,15 @@ class GrowthParams(Params):
     )
     yield_strain: float = Field(
         0.05, ge=0, le=1, description="Strain alpha below which nothing is forgotten", json_schema_extra=_units("1")
+    )
+    ribs: tuple[Rib, ...] = Field(
+        (),
+        max_length=50,
+        description="What resists bending more, or less, than the sheet",
+        json_schema_extra=_units("1"),
+    )
+    colours: tuple[Colour, ...] = Field(
+        (), max_length=20, description="Coats of colour, the last on top", json_schema_extra=_units("1")
     )
     attached: tuple[Attachment, ...] = Field(
         (), max_length=20, description="What is held", json_schema_extra=_units("1")

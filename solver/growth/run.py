@@ -15,6 +15,8 @@ from ..contract import Context, InvalidInput, Need, SolverError
 from ..linalg import definite
 from ..meshes import Frame, changing
 from .engine import Engine
+from .looks import CHANNELS
+from .matter import coloured
 from .params import GrowthParams
 from .settings import choose
 from .settling.energy import elastic
@@ -23,7 +25,7 @@ from .state import State
 
 __all__ = ["run"]
 
-_MESH = frozenset({"mesh_position", "elastic_strain"})
+_MESH = frozenset({"mesh_position", "elastic_strain", *CHANNELS})
 
 
 def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
@@ -55,6 +57,9 @@ def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
             rows.append(_row(state, params, need, settings.tolerance, stage, time.perf_counter() - begun))
             if _MESH & set(need.fields):
                 fields = {"elastic_strain": _strain(state)} if "elastic_strain" in need.fields else {}
+                if set(CHANNELS) & set(need.fields):
+                    shown = dict(zip(CHANNELS, coloured(state, params.colours).T, strict=True))
+                    fields |= {name: shown[name] for name in CHANNELS if name in need.fields}
                 frames.append(Frame(state.x, state.mesh.triangles, fields))
             context.report(stage / max(need.stages[-1], 1e-9), f"growth time {stage:g} settled")
     except SolverError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -34,7 +34,7 @@ class State:
     time: growth time. x: (n, 3). mesh: topology. g: rest metrics (f, 3). rest: rest angles (h,). shares: (n, k) of
     hot surfaces that have started. held: (n, 3) directions that are held, bool. spots, curves: by number of the tool.
     forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far. drift: (n, 3) how fast
-    the shape moved in the last step, None at the start.
+    the shape moved in the last step, None at the start. matter: (n, ...) what rides on the material (`matter`).
     """
 
     time: float
@@ -49,6 +49,7 @@ class State:
     forces: float = 0.0
     iterations: int = 0
     drift: Floats | None = None
+    matter: dict[str, Floats] = field(default_factory=dict)
 
     @cached_property
     def length(self) -> float:

@@ -12,14 +12,14 @@ import numpy as np
 from solver.arrays import Array
 from solver.contract import Solver
 
-from ..errors import CorruptTable, OutsideTable, UnknownTable
+from ..errors import CorruptTable, OutsideTable, StaleTable, UnknownTable
 from ..generations import generation
 from ..manifest import TableInfo, directory, read_manifest
 from ..store import Store
 from .choose import Base, Families
 from .match import Fit, Miss, same
 
-__all__ = ["base", "describe", "document", "families", "made", "refusal", "samples", "values"]
+__all__ = ["base", "check_version", "describe", "document", "families", "made", "refusal", "samples", "values"]
 
 
 def base(solver: Solver) -> Base:
@@ -74,6 +74,21 @@ def _samples(path: Path, axes: tuple[str, ...]) -> Array | None:
         return None
     opened = generation.read(path)  # a generation's file never changes
     return np.stack([opened[name].values for name in axes], axis=-1)
+
+
+def check_version(info: TableInfo, solver: Solver) -> None:
+    """Refuse to answer from a table of another version of its solver.
+
+    Raises:
+        StaleTable: it is one; what to rebuild.
+
+    """
+    if info.version != solver.version:
+        raise StaleTable(
+            f"table {info.name!r} is of version {info.version} of {solver.name}, and this is {solver.version}.",
+            f"Make it anew: `wizen table plan {info.name} > plan.toml`, `wizen sweep plan.toml`, "
+            f"`wizen table build --plan plan.toml --name {info.name}`; or install the wizen that made it.",
+        )
 
 
 def made(info: TableInfo, solver: Solver) -> dict[str, Any]:

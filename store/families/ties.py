@@ -1,7 +1,7 @@
-"""Parameters that go together in a table: the radii of an ellipse, both half-axes of a spherical stone.
+"""Parameters that go together in a table: the half-axes of an outline, both measures of what is round.
 
 One of them leads and is the table's axis; the others follow from it, by a monotone curve through the samples' values
-(Fritsch and Butland 1984), so that a line through a space of eight radii is one axis and not eight.
+(Fritsch and Butland 1984), so that a line through a space of eight of them is one axis and not eight.
 """
 
 from __future__ import annotations

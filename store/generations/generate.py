@@ -28,6 +28,7 @@ from ..surfaces import packed, spectra
 from ..surfaces.measures import UNITS, Measures
 from . import trust
 from .generation import CONVERGENCE, DIMS, PACKED, combined, map_spectra
+from .output import Output
 from .samples import Samples
 
 if TYPE_CHECKING:
@@ -78,7 +79,10 @@ def write(
     total = hashlib.sha256()
     more: dict[str, Any] = {}
     stored: packed.Packed | None = None
-    with h5netcdf.File(path, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file:
+    with (
+        Output(path) as output,
+        h5netcdf.File(output, "w", alignment_threshold=_PAGE, alignment_interval=_PAGE) as file,
+    ):
         if dtype == "int16":
             whole = [block.astype(np.float32) for block in blocks()]
             codes = packed.encode(whole)
@@ -94,15 +98,26 @@ def write(
         for i, block in enumerate(written):
             total.update(block.data)
             target[i] = block
+            output.check()
+    output.check()
     small = _small(samples, rows, solver, band).assign(more)
     small = small.assign(_judge(map_spectra(path) if stored is None else stored, samples, solver))
     content = combined(small, total.hexdigest())
     small.attrs["digest"] = content
+    _append(path, small)
+    return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
+
+
+def _append(path: Path, small: xr.Dataset) -> None:
+    """Write what is beside the spectra into the file that holds them."""
+    from xarray.backends import H5NetCDFStore
+
     encoding: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in small.variables}
     for name in ("key", "component", "part"):
         encoding[name]["dtype"] = "S1"
-    small.to_netcdf(path, mode="a", engine="h5netcdf", encoding=encoding)
-    return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
+    with Output(path) as output, h5netcdf.File(output, "r+") as file:
+        small.dump_to_store(H5NetCDFStore(file), encoding=encoding)
+    output.check()
 
 
 def _spectrum(file: Any, dims: tuple[str, ...], dtype: str) -> Any:

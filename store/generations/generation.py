@@ -17,7 +17,7 @@ from solver.arrays import Array
 
 from .. import shards
 from ..canonical import canonical
-from ..errors import CorruptTable
+from ..errors import NO_DAMAGE, CorruptTable
 from ..surfaces.measures import Measures
 from ..surfaces.packed import Codes, Packed, Stored
 
@@ -66,7 +66,7 @@ def read(path: Path) -> dict[str, Column]:
     try:
         with h5py.File(path) as file:
             return {name: _column(file[name]) for name in file if name != "spectrum" and file[name].ndim}
-    except FileNotFoundError:
+    except NO_DAMAGE:
         raise
     except Exception as error:  # HDF5 reports damage as whatever it stumbles over
         raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error
@@ -90,7 +90,7 @@ def open(path: Path) -> xr.Dataset:
 
     try:
         return xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
-    except FileNotFoundError:
+    except NO_DAMAGE:
         raise
     except Exception as error:  # HDF5 reports damage as whatever it stumbles over
         raise CorruptTable(f"{path} cannot be read ({type(error).__name__}: {error}).", _ADVICE) from error

@@ -132,6 +132,8 @@ def finished(store: Store, solver: str, choice: Choice, fits: Callable[[Job], bo
     if not jobs and plan is None:
         store.ledger.rebuild(store.results())
         jobs = _done(store, solver, plan)
+    # relaxed blends of a table are no samples of one
+    jobs = [job for job in jobs if job.need.get("start") is None]
     jobs = [j for j in jobs if fits(j) and quality in (None, j.need["quality"]) and version in (None, j.version)]
     if plan is None:
         # a run that others start from is no sample of theirs

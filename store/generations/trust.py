@@ -15,7 +15,7 @@ from solver.contract import Fresh
 from solver.lattice import lattice
 
 from ..blending.blend import Blend, Blender, complex_view
-from ..blending.methods import Method
+from ..blending.methods import Method, parse
 from ..blending.methods.weights import Samples
 from ..blending.neighbours import Weighted
 from ..errors import OutsideTable, TooUncertain
@@ -24,7 +24,7 @@ from ..surfaces.measures import LATTICE, Measures, Surface, compare
 from ..surfaces.packed import Stored
 from ..surfaces.window import WHOLE
 
-__all__ = ["Trust", "correlations", "errors", "fresh", "leave_one_out", "refuse", "surface_of"]
+__all__ = ["COVERED", "Trust", "correlations", "errors", "foretold", "fresh", "leave_one_out", "refuse", "surface_of"]
 
 
 def errors(found: Measures) -> dict[str, float]:
@@ -79,17 +79,40 @@ def _dot(a: Array, b: Array) -> float:
     return float((harmonics.area(len(a)) * a * b).sum())
 
 
+#: Errors below this are none.
+_NOTHING = 1e-9
+#: Share of errors that the expected one covers.
+COVERED = 0.9
+
+
+def foretold(found: Array, method: str, samples: Samples) -> tuple[Array, Array]:
+    """Return the errors (sample, stage, measure) that leave-one-out measures stand for, and for each sample those that
+    the other samples' let expect there.
+    """
+    own = np.array([[list(errors(Measures(*row)).values()) for row in rows] for rows in found])
+    others = [samples.without(i, parse(method).weighting) for i in range(len(own))]
+    # weights that extrapolate may be negative: an error is none the less for that
+    expected = [np.maximum(np.tensordot(near.weights, own[near.samples], 1), 0) for near in others]
+    return own, np.array(expected)
+
+
 class Trust:
-    """Leave-one-out measures (sample, stage, measure) of a table, interpolated to queries."""
+    """Leave-one-out measures (sample, stage, measure) of a table, interpolated to queries.
+
+    What neighbours' errors foretell of a sample's is a mean: half of the samples err more. So what is said is that many
+    times larger, the same factor in the whole table, that it covers `COVERED` of them.
+    """
 
     def __init__(self, found: Array, method: str, samples: Samples) -> None:
         self.method = method
-        own = np.array([[list(errors(Measures(*row)).values()) for row in rows] for rows in found])
+        own, expected = foretold(found, method, samples)
+        ratios = (own / np.maximum(expected, _NOTHING)).reshape(-1, own.shape[-1])
+        own = own * np.maximum(np.quantile(ratios, COVERED, axis=0), 1.0)
         # side by side: the errors by stage, and the spacing
         self._rows = np.column_stack([own.reshape(len(own), -1), samples.spacing])
 
     def expect(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
-        """Return the error to expect of each measure: nothing at a sample, a sample's own a whole spacing away."""
+        """Return what errors of each measure hardly exceed: nothing at a sample, most of them a whole spacing away."""
         *own, spacing = (near.weights @ self._rows[near.samples]).tolist()
         share, count = min(near.nearest / spacing, 1.0), len(Measures._fields)
         return {

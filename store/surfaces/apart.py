@@ -15,15 +15,17 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.geometry.outward import faces_outward
-from solver.lattice import closed_lattice
+from solver.lattice import azimuths, closed_lattice, colatitudes
 
 if TYPE_CHECKING:
     from solver.geometry.apart import Topology
 
-__all__ = ["COARSE", "Evened", "even_out"]
+__all__ = ["COARSE", "Evened", "compiled", "even_out"]
 
 #: Lattice on which most of the evening out is done: what tables are asked for mostly.
 COARSE = 64
+#: The smallest that is a surface.
+_LEAST = 4
 
 
 class Evened(NamedTuple):
@@ -37,15 +39,32 @@ class Evened(NamedTuple):
     near: int
 
 
-def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = False) -> Evened:
+def compiled() -> None:
+    """Load the compiled code that folded surfaces need; where none is kept yet, make it: some 15 s of a processor."""
+    from solver.geometry.apart import put_apart
+
+    colatitude, azimuth = np.meshgrid(colatitudes(_LEAST), azimuths(_LEAST), indexing="ij")
+    x, y = np.sin(colatitude) * np.cos(azimuth), np.sin(colatitude) * np.sin(azimuth)
+    ball = np.stack([x, y, np.cos(colatitude)], axis=-1).reshape(-1, 3)
+    put_apart(np.concatenate([ball, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]]), _topology(_LEAST), 0)
+
+
+def even_out(
+    whole: Callable[[int], tuple[Array, Array]],
+    n: int,
+    keep: bool = False,
+    before: Callable[[], None] = lambda: None,
+) -> Evened:
     """Return how the surface `whole(n)`, points and poles of the lattice of n colatitudes, comes out of contact.
 
     `keep` moves nothing where nothing crosses, however near it comes: a stored result, on a lattice fine enough.
+    `before` is called where there is something to do that takes its time: the surface folds.
     """
     points, poles = whole(n)
-    given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
-    if faces_outward(given, _triangles(n)):
+    if faces_outward(points, poles):
         return Evened(None, None, 0, 0)
+    before()
+    given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
     # compiled: loaded when the first surface that folds is asked for
     from solver.geometry.apart import put_apart
 
@@ -58,7 +77,7 @@ def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = F
     if keep and n <= COARSE:
         found = put_apart(moved, topology)
     if n > COARSE:
-        coarse = even_out(whole, COARSE)
+        coarse = even_out(whole, COARSE, before=before)
         if coarse.points is not None and coarse.poles is not None:
             moved[:-2] += _refine(coarse.points, coarse.poles, n).reshape(-1, 3)
             moved[-2:] += coarse.poles
@@ -68,15 +87,10 @@ def even_out(whole: Callable[[int], tuple[Array, Array]], n: int, keep: bool = F
 
 
 @lru_cache(maxsize=8)
-def _triangles(n: int) -> Array:
-    return closed_lattice(n)
-
-
-@lru_cache(maxsize=8)
 def _topology(n: int) -> Topology:
     from solver.geometry.apart import Topology
 
-    return Topology.of(_triangles(n), 2 * n * n + 2)
+    return Topology.of(closed_lattice(n), 2 * n * n + 2)
 
 
 def _refine(coarse: Array, poles: Array, n: int) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid
+from .terminal.grouped import grouped
 from .terminal.options import (
     As_json,
     Hours,
@@ -26,6 +28,7 @@ from .terminal.options import (
 from .terminal.tables import asked_table, open_store, solver_of
 
 if TYPE_CHECKING:
+    from store.lookup import ShapeTable
     from store.shape import Shape
 
 __all__ = ["add_to"]
@@ -37,21 +40,27 @@ def add_to(app: typer.Typer) -> None:
     app.command()(query)
 
 
-def draw_map(
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="The picture.")],
-    store: StoreToRead = None,
+@dataclass(frozen=True)
+class _Drawn:
+    """What `wizen map` is told."""
+
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.png", help="The picture.")]
+    store: StoreToRead = None
     name: Annotated[
         str | None, typer.Option("--name", help="The table; without, the one that holds --preset and --set.")
-    ] = None,
-    preset: Preset = None,
-    x: Annotated[str | None, typer.Option("--x", metavar="AXIS", help="From left to right.")] = None,
-    y: Annotated[str | None, typer.Option("--y", metavar="AXIS", help="From bottom to top.")] = None,
-    stage: Annotated[float | None, typer.Option("--stage", help="One stage; the last one if not given.")] = None,
-    stages: Stages = None,
-    set_: Set = None,
-    pixels: Annotated[int, typer.Option("--pixels", min=32, max=1024, help="Side of one fruit.")] = 260,
-    as_json: As_json = False,
-) -> None:
+    ] = None
+    preset: Preset = None
+    x: Annotated[str | None, typer.Option("--x", metavar="AXIS", help="From left to right.")] = None
+    y: Annotated[str | None, typer.Option("--y", metavar="AXIS", help="From bottom to top.")] = None
+    stage: Annotated[float | None, typer.Option("--stage", help="One stage; the last one if not given.")] = None
+    stages: Stages = None
+    set_: Set = None
+    pixels: Annotated[int, typer.Option("--pixels", min=32, max=1024, help="Side of one fruit.")] = 260
+    as_json: As_json = False
+
+
+@grouped(_Drawn)
+def draw_map(asked: _Drawn) -> None:
     """Draw a table as a contact sheet: two axes at one stage, or with --stages one row per sample.
 
     [bold]Examples[/bold]
@@ -66,45 +75,55 @@ def draw_map(
     from .. import outputs
     from ..pictures.maps import Map
 
+    out = asked.out
     if out.suffix != ".png":
         raise InvalidOption(f"--out {out}: a map is a picture.", "Name it .png.")
-    if stage is not None and stages is not None:
+    if asked.stage is not None and asked.stages is not None:
         raise InvalidOption("--stage and --stages exclude each other.", "Keep one of them.")
     outputs.check_suffix(out, False, 1)
-    said = assignments(set_)
-    table, values = asked_table(store, name, None, said, stage, preset)
+    said = assignments(asked.set_)
+    table, values = asked_table(asked.store, asked.name, None, said, asked.stage, asked.preset)
     name, given = table.info.name, {axis: value for axis, value in values.items() if axis in said}
-    drawing = Map(open_store(store), table, registry.get(table.info.solver).axis_units(), given, pixels)
-    at = table.stages[-1] if stage is None else stage
-    picture = drawing.by_stages(numbers(stages)) if stages is not None else drawing.by_axes(x, y, at)
+    units = registry.get(table.info.solver).axis_units()
+    drawing = Map(open_store(asked.store), table, units, given, asked.pixels)
+    if asked.stages is not None:
+        picture = drawing.by_stages(numbers(asked.stages))
+    else:
+        picture = drawing.by_axes(asked.x, asked.y, table.stages[-1] if asked.stage is None else asked.stage)
     seal.publish(out, picture)
     document = {"path": str(out), "table": name, "digest": table.digest, "shapes": drawing.count}
-    emit(document, as_json, lambda console: console.print(f"{drawing.count} shapes drawn to {out}", markup=False))
+    emit(document, asked.as_json, lambda console: console.print(f"{drawing.count} shapes drawn to {out}", markup=False))
 
 
-def query(
-    store: StoreToRead = None,
-    set_: Set = None,
-    stages: Stages = None,
-    hours: Hours = None,
-    under: Under = None,
-    preset: Preset = None,
+@dataclass(frozen=True)
+class _Asked:
+    """What `wizen query` is told."""
+
+    store: StoreToRead = None
+    set_: Set = None
+    stages: Stages = None
+    hours: Hours = None
+    under: Under = None
+    preset: Preset = None
     name: Annotated[
         str | None, typer.Option("--name", help="The table; without, the one of --solver that holds this.")
-    ] = None,
-    solver: Annotated[str | None, typer.Option("--solver", help="Whose shapes, if several have tables.")] = None,
-    resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None,
-    method: Annotated[str | None, typer.Option("--method", help="How to look up, as `table score` names it.")] = None,
+    ] = None
+    solver: Annotated[str | None, typer.Option("--solver", help="Whose shapes, if several have tables.")] = None
+    resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None
+    method: Annotated[str | None, typer.Option("--method", help="How to look up, as `table score` names it.")] = None
     max_error: Annotated[
         str | None,
         typer.Option("--max-error", metavar="X|M:X,...", help="Refuse worse: 0.05 (roughness), rgh:0.05,dB:1.5."),
-    ] = None,
+    ] = None
     relax: Annotated[
         bool, typer.Option("--relax", help="Let the solver relax what was looked up: an equilibrium, in seconds.")
-    ] = False,
-    out: Out = None,
-    as_json: As_json = False,
-) -> None:
+    ] = False
+    out: Out = None
+    as_json: As_json = False
+
+
+@grouped(_Asked)
+def query(asked: _Asked) -> None:
     """Ask the tables for a shape between their samples, and write it as .obj, .glb, .npz or .png.
 
     Presets fill what is not set. The table is the one that holds these parameters; where none does, the nearest is
@@ -129,44 +148,56 @@ def query(
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
     from solver import registry
-    from store.blending import methods
 
     from .. import outputs
     from ..formats import Made
 
-    said = assignments(set_)
-    wanted = stages_asked(solver_of(open_store(store), name, solver), stages, hours, under, preset)
-    table, values = asked_table(store, name, solver, said, max(wanted, key=abs, default=None), preset)
-    name = table.info.name
+    table, shapes, notes = _found(asked)
+    name, known = table.info.name, registry.get(table.info.solver)
+    document = {
+        "table": name,
+        "digest": table.digest,
+        "method": shapes[0].method,
+        "parameters": {**table.fixed, **shapes[0].parameters},
+        "path": None if asked.out is None else str(asked.out),
+        "stages": [{**_document(shape), **note} for shape, note in zip(shapes, notes, strict=True)],
+    }
+    if asked.out is not None:
+        title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
+        outputs.save(asked.out, Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units()))
+    emit(document, asked.as_json, lambda console: _show(console, shapes, known.stages.symbol, asked.out))
+
+
+def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, Any]]]:
+    """Return the table, the shapes that were asked for, and what relaxing them has to say of each."""
+    from solver import registry
+    from store.blending import methods
+
+    from .. import outputs
+
+    said, out = assignments(asked.set_), asked.out
+    solver = solver_of(open_store(asked.store), asked.name, asked.solver)
+    wanted = stages_asked(solver, asked.stages, asked.hours, asked.under, asked.preset)
+    last = max(wanted, key=abs, default=None)
+    table, values = asked_table(asked.store, asked.name, asked.solver, said, last, asked.preset)
     if not wanted:
         low, high = table.reach
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
     fields = outputs.fields_for(out, False)
-    if relax:
+    if asked.relax:
         fields = tuple(sorted({*fields, "position"}))
-    how, limits = method or methods.DEFAULT, _limits(max_error)
-    told: dict[str, Any] = {"resolution": resolution, "fields": fields, "method": how, "max_error": limits}
+    how, limits = asked.method or methods.DEFAULT, _limits(asked.max_error)
+    told: dict[str, Any] = {"resolution": asked.resolution, "fields": fields, "method": how, "max_error": limits}
     shapes = [table.at(values, stage, **told) for stage in wanted]
-    known = registry.get(table.info.solver)
     notes: list[Mapping[str, Any]] = [{} for _ in shapes]
-    if relax:
+    if asked.relax:
         from ..relaxing import relaxed
 
+        known = registry.get(table.info.solver)
         shapes, notes = map(list, zip(*(relaxed(known, table, shape) for shape in shapes), strict=True))
-    document = {
-        "table": name,
-        "digest": table.digest,
-        "method": shapes[0].method,
-        "parameters": {**table.fixed, **shapes[0].parameters},
-        "path": None if out is None else str(out),
-        "stages": [{**_document(shape), **note} for shape, note in zip(shapes, notes, strict=True)],
-    }
-    if out is not None:
-        title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
-        outputs.save(out, Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units()))
-    emit(document, as_json, lambda console: _show(console, shapes, known.stages.symbol, out))
+    return table, shapes, notes
 
 
 def _show(console: Any, shapes: list[Shape], symbol: str, out: Path | None) -> None:
@@ -203,13 +234,7 @@ def _limits(text: str | None) -> dict[str, float] | None:
 def _document(shape: Any) -> dict[str, Any]:
     return {
         "stage": shape.stage,
-        "exact": shape.exact,
-        "converged": shape.converged,
-        "crossings": shape.crossings,
-        "tier": shape.tier,
-        "nearest": shape.nearest,
-        "inside": shape.inside,
-        "expected_error": None if shape.expected_error is None else dict(shape.expected_error),
+        **shape.trust(),
         "weights": dict(shape.weights),
         "descriptors": {
             name: {"value": value, "units": shape.units.get(name, "")} for name, value in shape.descriptors.items()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit
+from .terminal.grouped import grouped
 from .terminal.options import (
     As_json,
     Hours,
@@ -42,37 +44,43 @@ def add_to(app: typer.Typer) -> None:
     app.command()(solve)
 
 
-def solve(
-    solver: Annotated[str, typer.Argument(help="Name of a solver (`wizen presets`).")],
-    preset: Preset = None,
-    params_file: Params = None,
-    set_: Set = None,
-    stages: Stages = None,
-    hours: Hours = None,
-    under: Under = None,
-    quality: Quality = None,
+@dataclass(frozen=True)
+class _Asked:
+    """What `wizen solve` is told."""
+
+    solver: Annotated[str, typer.Argument(help="Name of a solver (`wizen presets`).")]
+    preset: Preset = None
+    params_file: Params = None
+    set_: Set = None
+    stages: Stages = None
+    hours: Hours = None
+    under: Under = None
+    quality: Quality = None
     tolerance: Annotated[
         float | None, typer.Option("--tolerance", metavar="E", help="Relative error in place of a quality, e.g. 0.1.")
-    ] = None,
+    ] = None
     fields: Annotated[
         str | None, typer.Option("--fields", metavar="NAME,...", help="What to keep; nothing else is computed.")
-    ] = None,
+    ] = None
     resolution: Annotated[
         int | None, typer.Option("--resolution", metavar="N", help="Colatitudes of surface fields; azimuths are 2 N.")
-    ] = None,
+    ] = None
     region: Annotated[
         str | None,
         typer.Option("--region", metavar="A,B,C,D", help="Colatitudes A to B and azimuths C to D alone (degree)."),
-    ] = None,
-    dtype: Annotated[str | None, typer.Option("--dtype", help="float32 or float64, of surface fields.")] = None,
-    seed: Seed = None,
-    max_seconds: Most_seconds = None,
-    out: Out = None,
+    ] = None
+    dtype: Annotated[str | None, typer.Option("--dtype", help="float32 or float64, of surface fields.")] = None
+    seed: Seed = None
+    max_seconds: Most_seconds = None
+    out: Out = None
     cut: Annotated[
         str | None, typer.Option("--cut", metavar="PLANE", help=".png: cut open along an azimuth (degree), or equator.")
-    ] = None,
-    as_json: As_json = False,
-) -> None:
+    ] = None
+    as_json: As_json = False
+
+
+@grouped(_Asked)
+def solve(asked: _Asked) -> None:
     """Run a solver once, here and now, without a store.
 
     --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, shapes as .obj or .glb, and all stages as
@@ -92,39 +100,48 @@ def solve(
 
     wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
     """
-    from solver import registry
-    from solver.contract import Need, budget
+    from solver.contract import budget
     from store import shards
 
     from ..planning.plan import job
     from .terminal.words import per_stage, show_run
 
-    if cut is not None:
-        _check_cut(cut, out)
-    chosen = registry.get(solver)
-    own = {} if seed is None else {"seed": seed}
-    params = chosen.parse(parameters(params_file) | assignments(set_) | own, preset)
-    said: dict[str, Any] = {"quality": quality, "tolerance": tolerance, "resolution": resolution, "dtype": dtype}
-    said["region"] = _region(region)
-    wanted = stages_asked(chosen, stages, hours, under, preset)
-    kept = {"stages": wanted, "fields": [name.strip() for name in fields.split(",")] if fields else ()}
-    asked = Need.parse(kept | {name: value for name, value in said.items() if value is not None})
-    need = _for_file(out, chosen, chosen.settle(asked, preset, (params,)))
-    if max_seconds is not None:
-        budget.within(chosen, (params,), need, max_seconds)
+    if asked.cut is not None:
+        _check_cut(asked.cut, asked.out)
+    chosen, params, need = _parsed(asked)
+    if asked.max_seconds is not None:
+        budget.within(chosen, (params,), need, asked.max_seconds)
     spec = job(chosen, params, need)
     result, seconds = _run(chosen, params, need)
     document = {
         **{name: getattr(spec, name) for name in ("key", "solver", "version", "params", "need")},
         "digest": shards.digest(result),
         "seconds": seconds,
-        "path": out and str(out),
+        "path": asked.out and str(asked.out),
         "stages": [float(stage) for stage in result["stage"]],
         "descriptors": per_stage(result),
     }
-    if out is not None:
-        _save(out, preset or (params_file.stem if params_file else solver), chosen, params, result, document, cut)
-    emit(document, as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+    if asked.out is not None:
+        of = asked.preset or (asked.params_file.stem if asked.params_file else asked.solver)
+        _save(asked.out, of, chosen, params, result, document, asked.cut)
+    emit(document, asked.as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+def _parsed(asked: _Asked) -> tuple[Solver, Parameters, Need]:
+    """Return the solver, the run's parameters and its need, settled."""
+    from solver import registry
+    from solver.contract import Need
+
+    chosen = registry.get(asked.solver)
+    own = {} if asked.seed is None else {"seed": asked.seed}
+    params = chosen.parse(parameters(asked.params_file) | assignments(asked.set_) | own, asked.preset)
+    said: dict[str, Any] = {name: getattr(asked, name) for name in ("quality", "tolerance", "resolution", "dtype")}
+    said["region"] = _region(asked.region)
+    wanted = stages_asked(chosen, asked.stages, asked.hours, asked.under, asked.preset)
+    names = asked.fields.split(",") if asked.fields else ()
+    kept = {"stages": wanted, "fields": [name.strip() for name in names]}
+    need = Need.parse(kept | {name: value for name, value in said.items() if value is not None})
+    return chosen, params, _for_file(asked.out, chosen, chosen.settle(need, asked.preset, (params,)))
 
 
 def _run(solver: Solver, params: Parameters, need: Need) -> tuple[xr.Dataset, float]:

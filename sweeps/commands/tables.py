@@ -9,6 +9,7 @@ import typer
 
 from ..errors import InvalidOption
 from . import care as cli_tools
+from . import scoring
 from .terminal.console import emit, grid
 from .terminal.options import As_json, Quality, StorePath, StoreToRead, TableName
 from .terminal.tables import open_store
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     from store.store import Store
 
-    from ..refining.score import Report
 
 __all__ = ["add_to"]
 
@@ -28,6 +28,7 @@ table_app = typer.Typer(no_args_is_help=True, help="Build, keep, check, compare 
 def add_to(app: typer.Typer) -> None:
     """Add the commands of this module to the root command."""
     cli_tools.add_to(table_app)
+    scoring.add_to(table_app)
     app.add_typer(table_app, name="table")
 
 
@@ -67,14 +68,15 @@ def build(
     plan, text = _plan(opened, plan)
     chosen = registry.get(solver or _only_solver(opened, plan))
     made = None
-    if chosen.surface is not None and finished(opened, chosen.name, Choice(plan, quality), is_surface):
+    choice = Choice(plan, quality)
+    if chosen.surface is not None and finished(opened, chosen.name, choice, is_surface):
         told: dict[str, Any] = {"resolution": resolution, "text": text, "dtype": precision}
         made = tables.build(opened, chosen, name, plan=plan, quality=quality, **told)
     elif resolution is not None:
         raise InvalidOption("--resolution cuts shapes, and there are none.", "Leave it out.")
     numbers: dict[str, Any] | None = None
     try:
-        path = scalars.build(opened, chosen, name, plan=plan, quality=quality, keys=made.keys if made else None)
+        path = scalars.build(opened, chosen, name, choice._replace(keys=made.keys if made else None))
         numbers = _numbers(scalars.read(opened, name), path)
     except EmptyTable:
         if made is None:  # shapes alone, without a number beside them, are a table as well
@@ -187,75 +189,6 @@ def info(store: StoreToRead = None, name: TableName = "default", as_json: As_jso
         return
     found = tables.info(opened, name)
     _show_table(found, tables.path_of(opened, found), as_json, numbers)
-
-
-@table_app.command()
-def score(
-    store: StoreToRead = None,
-    name: TableName = "default",
-    held_out: Annotated[
-        Path | None,
-        typer.Option("--held-out", metavar="PLAN|STORE", help="Runs to predict; without, each sample from the others."),
-    ] = None,
-    methods_: Annotated[str | None, typer.Option("--methods", metavar="M,M,...", help="Only these methods.")] = None,
-    picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE.png", help="Truth, the paper's and the default.")
-    ] = None,
-    stage: Annotated[float, typer.Option("--stage", help="The picture's stage: the stored one next to it.")] = 0.2,
-    as_json: As_json = False,
-) -> None:
-    """Score the look-up methods by stage: against runs that the table has not seen, or leaving out its own.
-
-    rgh: roughness over the true one. dB: error of band powers. W1: slopes' distributions [degree]. patch: variation of
-    local slope energy. L2nr, ang [degree] and corr: point by point. The method "seed" is the floor: how two runs
-    differ whose seeds alone do.
-
-    [bold]Examples[/bold]
-
-    wizen table score --store demo
-
-    wizen table score --store demo --held-out held.toml --picture score.png
-
-    wizen table score --store demo --held-out other-store --methods idw,linear+LL+env --json
-    """
-    from solver import registry
-    from store import seal, starter
-    from store.blending import methods
-    from store.lookup import ShapeTable
-    from store.store import Store
-
-    from ..refining import score as scores
-
-    if picture is not None and picture.suffix != ".png":
-        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
-    names = methods.NAMED if methods_ is None else [str(methods.parse(part)) for part in methods_.split(",")]
-    opened = Store.open(store or starter.ROOT)
-    table = ShapeTable.open(opened, name, surfaces=registry.surface)
-    cases, pairs = scores.cases(opened, table, held_out)
-    report = scores.score(table, cases, pairs, names, held_out is not None)
-    if picture is not None:
-        near = min(table.stages, key=lambda stored: abs(stored - stage))
-        seal.publish(picture, scores.picture(cases, near))
-    document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
-
-    def show(console: Any) -> None:
-        _show_score(console, name, report, methods.DEFAULT, registry.get(table.info.solver).stages.symbol)
-        if picture is not None:
-            console.print(f"drawn to {picture}", markup=False)
-
-    emit(document, as_json, show)
-
-
-def _show_score(console: Any, name: str, report: Report, default: str, symbol: str) -> None:
-    kind = "held-out runs" if report.held_out else "samples, each predicted from the others"
-    console.print(f"table {name}: {len(report.labels)} {kind}; {report.seeds} pairs of seeds; * default", markup=False)
-    rows = [
-        [row.method + " *" * (row.method == default), f"{row.stage:g}"] + [f"{value:.3g}" for value in row.measures]
-        for row in report.rows
-    ]
-    grid(console, ["method", symbol, *report.rows[0].measures._fields], rows)
-    likeness = [[f"{s:g}", f"{value:.3f}"] for s, value in report.correlation.items()]
-    grid(console, [symbol, "correlation of neighbours"], likeness)
 
 
 def _only_solver(store: Store, plan: str | None) -> str:

@@ -35,7 +35,7 @@ class Feet(NamedTuple):
 class Threads(NamedTuple):
     """Threads that stand: points (k, 4, 3) from the foot up, which feet (k), colours of foot and tip (k, 3).
 
-    width: at the foot. heads (k): radii of the heads, 0 where there is none. out (k, 3): the skin's normals.
+    width: at the foot. heads (k): half-widths of the heads, 0 where there is none. out (k, 3): the skin's normals.
     """
 
     points: Floats

@@ -1,4 +1,4 @@
-"""What stands on the surfaces of a run's stages, as triangles for pictures: threads of mould."""
+"""What stands on the surfaces of a run's stages, as triangles for pictures: threads with heads."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from store import scalars, tables
 from store.blending import methods
 from store.blending.methods.weights import Samples
 from store.generations import trust
-from store.generations.samples import read_axes
+from store.generations.samples import Choice, read_axes
 from store.ledger.jobs import Job, JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
@@ -137,7 +137,7 @@ def _add(store: Store, name: str, asked: Mapping[str, Job]) -> None:
         solver = registry.get(table.solver)
         grown = tables.rebuild(store, solver, name, more=[job.key for job in more])
         if scalars.path_of(store, name).is_file():
-            scalars.build(store, solver, name, keys=grown.keys)
+            scalars.build(store, solver, name, Choice(keys=grown.keys))
 
 
 def _would_end_grid(store: Store, table: TableInfo, more: Collection[Job]) -> bool:

@@ -6,6 +6,8 @@ unless the user has set `NUMBA_NUM_THREADS` and the like.
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import os
 import signal
 import threading
@@ -281,5 +283,16 @@ def _client(where: Any) -> Iterator[Any]:
     except (OSError, TimeoutError, ValueError) as error:
         advice = "Start one with `dask scheduler`, and name it as in tcp://10.0.0.1:8786."
         raise NoScheduler(f"no Dask scheduler answers at {where} ({error}).", advice) from error
-    with client:
-        yield client
+    logger = logging.getLogger("distributed.client")
+    logger.addFilter(_is_news)
+    try:
+        with client:
+            yield client
+    finally:
+        logger.removeFilter(_is_news)
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Return whether Dask's client says more than that its connection is gone, which is said in a sentence."""
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, OSError | TimeoutError | asyncio.CancelledError)

@@ -26,6 +26,7 @@ from store.store import Store
 
 from .. import tabled
 from ..errors import SweepError, describe
+from ..relaxing import starts
 
 __all__ = ["GRACE", "Hold", "Outcome", "Task", "beat", "quarantine_path", "stop_mark", "work"]
 
@@ -161,7 +162,9 @@ def _solver(job: JobSpec) -> Solver:
 
 def _solve(task: Task, heart: _Heart, store: Store) -> xr.Dataset:
     solver = _solver(task.job)
-    context = Context(observe=heart.note, cancelled=heart.lost.is_set, library=store.find, shapes=tabled.shape)
+    context = Context(
+        observe=heart.note, cancelled=heart.lost.is_set, library=store.find, shapes=tabled.shape, starts=starts(store)
+    )
     return solver.solve(solver.parse(task.job.params), Need.parse(task.job.need), context)
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.dehydration import claims
-from benchmarks.dehydration.criteria import Found, judge
-from benchmarks.dehydration.pattern import Pattern
+from benchmarks.dehydration.claims import __main__ as claims
+from benchmarks.dehydration.claims.criteria import Found, judge
+from benchmarks.dehydration.claims.pattern import Pattern, name_of
+from solver.dehydration import SOLVER as DEHYDRATION
+from solver.dehydration import DehydrationParams
 
 _PLAIN = Pattern(
     name="", seed=0, quality="preview", mirrors="", version="0", converged=True, te=0.04, gamma=10.0, stone=(0.4, 0.4),
@@ -119,9 +121,22 @@ def test_what_was_not_run_is_not_judged() -> None:
 
 
 def test_the_cheap_part_of_the_plans() -> None:
-    jobs = claims.jobs("table1", [0, 1], 0.03, False)
+    jobs = claims.jobs("table1", [0, 1], 0.03)
     assert [(job.params["mirrors"], job.params["seed"]) for job in jobs] == [("xyz", 0), ("xyz", 1)]
-    assert {job.params["mirrors"] for job in claims.jobs("table1", [0], 0.001, False)} == {"xyz", "xz"}
-    whole = claims.jobs("fig8", [0, 1], 0.03, True)
-    assert len(whole) == 12
-    assert not any(job.params.get("mirrors") for job in whole)
+    assert {job.params["mirrors"] for job in claims.jobs("table1", [0], 0.001)} == {"xyz", "xz"}
+    assert not any(job.params["pattern"] for job in jobs)
+
+
+@pytest.mark.parametrize(("name", "count"), [("fig7", 12), ("fig8", 16), ("fig9", 16), ("fig10", 16), ("table1", 6)])
+def test_what_figures_and_tables_show_is_planned(name: str, count: int) -> None:
+    """Four skins by three stiffnesses, stone radii, stone lengths or waists four each, and six fruits."""
+    params = [DehydrationParams.model_validate(job.params) for job in claims.jobs(name, [0], 0.001)]
+    shown = {(each.exocarp_thickness, each.modulus_ratio, each.stone, each.radii) for each in params}
+    assert len(shown) == len(params) == count
+
+
+def test_table_1_is_its_six_fruits() -> None:
+    params = [DehydrationParams.model_validate(job.params) for job in claims.jobs("table1", [0], 0.001)]
+    assert {name_of(each) for each in params} == {"plum1", "plum2", "jujube1", "jujube2", "raisin", "wolfberry"}
+    own = [DEHYDRATION.parse({"gamma": 10}, name_of(each)) for each in params]
+    assert [each.exocarp_thickness for each in params] == [each.axis("te") for each in own]

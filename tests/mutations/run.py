@@ -3,7 +3,8 @@
     python -m tests.mutations.run [--only WORD] [--again] [--limit SECONDS]
 
 Writes benchmarks/results/mutants.json after each mutation, and the survivors as mutants.md beside it. What is known of
-the same file, change and tests is not run again. The test that notices must pass without the mutation.
+the same file, change and tests is not run again; what is known of other ones is old, and counts as not known. The test
+that notices must pass without the mutation.
 
 All that is slow to import is imported once, and each mutation runs in a fork of that process. Compiled functions are
 kept among mutations but for those of modules that import the changed one: numba looks at a function's own file only.
@@ -199,33 +200,43 @@ class Ledger:
             fcntl.flock(lock, fcntl.LOCK_EX)
             self._read()
             self.rows[row["name"]] = row
-            self._write(mutations)
+            self.write(mutations)
 
-    def _write(self, mutations: Sequence[Mutation]) -> None:
-        rows = [self.rows[m.name] for m in mutations if m.name in self.rows]
-        caught = sum(row["outcome"].startswith("caught") for row in rows)
+    def write(self, mutations: Sequence[Mutation]) -> None:
+        """Write what is known; of changed files, changes and tests only that it is old."""
+        rows = [self.rows[m.name] | {"old": self.old(m)} for m in mutations if m.name in self.rows]
+        known = [row for row in rows if not row["old"]]
+        caught = sum(row["outcome"].startswith("caught") for row in known)
         figures.keep(
             "mutants",
             rows,
             listed=len(mutations),
-            run=len(rows),
+            run=len(known),
+            old=len(rows) - len(known),
             caught=caught,
-            caught_share=round(caught / len(rows), 4),
-            table={"head": ["where", "mutations", "caught"], "rows": _floors(rows)},
+            caught_share=round(caught / max(len(known), 1), 4),
+            table={"head": ["where", "listed", "known", "caught"], "rows": _floors(mutations, known)},
         )
         (RESULTS / "mutants.md").write_text(_table(figures.load("mutants")))
 
+    def old(self, mutation: Mutation) -> bool:
+        """Return whether what is known of it is of another file, change or test."""
+        return bool(self.rows[mutation.name]["digest"] != mutation.digest(ROOT))
 
-def _floors(rows: Sequence[dict[str, Any]]) -> list[list[str]]:
-    """Return rows of where, how many, how many caught."""
+
+def _floors(mutations: Sequence[Mutation], known: Sequence[dict[str, Any]]) -> list[list[str]]:
+    """Return rows of where, how many are listed, how many known as they are now, how many of these caught."""
     floors: dict[str, list[int]] = {}
-    for row in rows:
-        parts = row["file"].split("/")
+    rows = {row["name"]: row for row in known}
+    for mutation in mutations:
+        parts = mutation.file.split("/")
         place = "/".join(parts[:2]) if parts[0] == "solver" and len(parts) > 2 else parts[0]
-        counts = floors.setdefault(place, [0, 0])
+        counts = floors.setdefault(place, [0, 0, 0])
         counts[0] += 1
-        counts[1] += row["outcome"].startswith("caught")
-    return [[place, str(total), str(caught)] for place, (total, caught) in sorted(floors.items())]
+        if mutation.name in rows:
+            counts[1] += 1
+            counts[2] += rows[mutation.name]["outcome"].startswith("caught")
+    return [[place, *map(str, counts)] for place, counts in sorted(floors.items())]
 
 
 def _table(page: dict[str, Any]) -> str:
@@ -233,10 +244,11 @@ def _table(page: dict[str, Any]) -> str:
         "# Mutations",
         "",
         f"Written by `make mutants` at {page['commit']}: {page['caught']} of {page['run']} caught "
-        f"({100 * page['caught_share']:.1f} %), {page['listed']} listed.",
+        f"({100 * page['caught_share']:.1f} %), {page['listed']} listed. {page['old']} were run before their file, "
+        "change or tests were altered, and do not count.",
         "",
-        "| where | mutations | caught |",
-        "|---|---|---|",
+        "| where | listed | known | caught |",
+        "|---|---|---|---|",
         *("| " + " | ".join(row) + " |" for row in page["table"]["rows"]),
         "",
         "| not caught | file | what it breaks | outcome |",
@@ -259,8 +271,8 @@ def main() -> None:
     copy = Copy(asked.home)
     wanted = [m for m in mutations if re.search(asked.only, f"{m.name} {m.file}")]
     todo = [m for m in wanted if asked.again or not ledger.known(m, copy)]
-    # in no order: what is known after an hour says something of the whole
-    todo.sort(key=lambda m: m.digest(copy.root))
+    # what nobody has tried first, then what takes least: most is known soon
+    todo.sort(key=lambda m: (ledger.rows.get(m.name, {"seconds": 0.0})["seconds"], m.digest(copy.root)))
     for name in _EARLY:
         importlib.import_module(name)
     passed: dict[str, bool] = {}
@@ -279,7 +291,8 @@ def main() -> None:
             digest=mutation.digest(copy.root),
         )
         print(f"{number}/{len(todo)} {outcome}: {mutation.name} ({seconds:.1f} s) {by}", flush=True)
-    rows = [ledger.rows[m.name] for m in mutations if m.name in ledger.rows]
+    ledger.write(mutations)
+    rows = [ledger.rows[m.name] for m in mutations if m.name in ledger.rows and not ledger.old(m)]
     caught = sum(row["outcome"].startswith("caught") for row in rows)
     print(f"{caught} of {len(rows)} caught, {len(mutations)} listed")
     sys.exit(caught < 0.95 * len(mutations))

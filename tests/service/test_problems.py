@@ -37,6 +37,7 @@ EXPECTED: dict[type[Exception], int] = {
     stored.CorruptLedger: 503,
     stored.UnknownTable: 404,
     stored.EmptyTable: 503,
+    stored.StaleTable: 409,
     stored.OutsideTable: 422,
     stored.TooUncertain: 422,
     stored.MixedSamples: 503,

@@ -179,7 +179,7 @@ def test_the_catalogue_says_how_to_ask(client: httpx.Client, built: Path, own: S
     table = tables.info(own)
     path = tables.path_of(own, table)
     path.write_bytes(path.read_bytes()[:100])
-    assert LiveTables(own.root, 0).judged(table) == generation.Judged(None, None)
+    assert LiveTables(own.root, 0, lambda: None).judged(table) == generation.Judged(None, None)
     with client_of(own.root, max_resolution=100) as other:
         said = other.get("/v1/tables/default").json()
         assert (said["max_resolution"], said["methods"]["judged"]) == (100, None)

@@ -12,6 +12,7 @@ from jsonschema import Draft202012Validator
 from store.store import Store
 
 from ._asking import checked
+from ._gltf import parsed
 from ._jobs import bearer, body, drain
 from .conftest import QUERY, SHAPE, client_of
 
@@ -79,7 +80,9 @@ def test_every_answer_is_as_declared(both: tuple[httpx.Client, Store]) -> None:
     page.get("stages", "/v1/solvers/dehydration/stages", params={"hours": "24,48", "preset": "raisin"})
     page.get("shape", SHAPE, params=QUERY)
     info = page.get("info", f"{SHAPE}/info", params=QUERY)
-    assert info["links"]["glb"].startswith(f"{SHAPE}?")
+    document, binary = parsed(client.get(info["links"]["glb"]).content)
+    assert document["asset"]["version"] == "2.0"
+    assert sum(view["byteLength"] for view in document["bufferViews"]) <= len(binary)
     page.get("shape", SHAPE, params={k: v for k, v in QUERY.items() if k != "resolution"} | {"screen_px": 100})
     job = page.check("ask", client.post("/v1/jobs", json=body()))
     page.get("jobs", "/v1/jobs")

@@ -10,7 +10,7 @@ from solver.arrays import Floats
 from solver.contract import InvalidInput, Need
 from solver.dehydration.fresh.mesh import cubed_sphere
 from solver.dehydration.relax import RESIDUAL, on_columns
-from solver.lattice import directions, lattice
+from solver.lattice import closed_lattice, directions, lattice
 from store.lookup import ShapeTable
 from store.starter import ROOT
 from sweeps.relaxing import relaxed
@@ -33,14 +33,14 @@ def test_a_lattice_is_read_at_columns_as_at_its_own_points() -> None:
     assert np.abs(on_columns(directions(*lattice(64)), nodes) - nodes).max() < 2e-3
 
 
-def test_a_ridged_surface_comes_near_balance_and_says_how_near() -> None:
-    """These ridges are nobody's equilibrium: they grow and move, without crossing, and what is not met is said."""
+def test_a_ridged_surface_comes_to_balance() -> None:
+    """These ridges are nobody's equilibrium: they grow and move, without crossing."""
     solver = registry.get("dehydration")
     given = ridged(0.83, 0.03)
     found = solver.relaxed(solver.parse(EIGHTH), given, 0.2, NEED).isel(stage=0)
     assert found.attrs["path"] == "relaxed"
-    assert float(found["residual"]) < 3e-2
-    assert bool(found["converged"]) == (float(found["residual"]) <= RESIDUAL)
+    assert float(found["residual"]) <= RESIDUAL == 5e-3
+    assert bool(found["converged"])
     assert int(found["crossings"]) == int(found["lattice_crossings"]) == 0
     radii = [np.linalg.norm(one, axis=-1).ravel() for one in (found["position"].values, given)]
     assert np.corrcoef(*radii)[0, 1] > 0.3
@@ -48,20 +48,52 @@ def test_a_ridged_surface_comes_near_balance_and_says_how_near() -> None:
 
 
 @pytest.mark.slow
-def test_a_looked_up_shape_comes_near_balance_and_keeps_its_pattern() -> None:
+@pytest.mark.parametrize(
+    ("te", "gamma", "alike"),
+    [
+        (0.0325, 13.0, 0.9),
+        # the nearest balance of this blend lies farther away: it slides there for two thousand steps
+        (0.0375, 22.0, 0.6),
+    ],
+)
+def test_a_looked_up_shape_comes_to_balance_and_keeps_its_pattern(te: float, gamma: float, alike: float) -> None:
     table = ShapeTable.open(ROOT, surfaces=registry.surface)
-    shape = table.at({"te": 0.0375, "gamma": 22.0}, 0.2, resolution=64)
+    shape = table.at({"te": te, "gamma": gamma}, 0.2, resolution=64)
     found, said = relaxed(registry.get("dehydration"), table, shape)
     assert found.tier == "relaxed"
-    # not every shape comes to `RESIDUAL` in the most steps allowed; what is left is said
-    assert said["residual"] < 2e-2
-    assert found.converged == (said["residual"] <= RESIDUAL)
+    assert said["residual"] <= RESIDUAL == 5e-3
+    assert found.converged
     assert found.crossings == 0
     assert shape.position is not None
     assert found.position is not None
     radii = [np.linalg.norm(one, axis=-1).ravel() for one in (found.position, shape.position)]
-    assert np.corrcoef(*radii)[0, 1] > 0.8
+    assert np.corrcoef(*radii)[0, 1] > alike
     assert said["moved"] < 1
+
+
+def volume(position: Floats) -> float:
+    """What the triangles of a lattice and its mean poles enclose."""
+    whole = np.concatenate([position.reshape(-1, 3), position[[0, -1]].mean(axis=1)])
+    a, b, c = (whole[closed_lattice(len(position))[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+def test_what_is_relaxed_keeps_the_volume_of_what_does_not_shrink() -> None:
+    """Only the flesh shrinks, by (1 - s)^3; skin and stone are incompressible."""
+    solver = registry.get("dehydration")
+    params = solver.parse(EIGHTH)
+    found = solver.relaxed(params, ridged(0.83, 0.03), 0.2, NEED).isel(stage=0)
+    stone = min(params.model_dump()["stone"]) ** 3
+    exact = 4 / 3 * np.pi * (0.8**3 * (1 - stone) + stone + 1.04**3 - 1)
+    # a lattice of 32 colatitudes cuts off some .5 %
+    assert volume(found["position"].values.astype(float)) / exact == pytest.approx(1, abs=0.015)
+
+
+def test_so_many_steps_and_no_more() -> None:
+    solver = registry.get("dehydration")
+    found = solver.relaxed(solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED, steps=500).isel(stage=0)
+    assert 500 <= int(found["iterations"]) < 800
+    assert float(found["residual_placed"]) > float(found["residual"])
 
 
 def test_what_is_no_lattice_or_relaxes_nothing_is_refused() -> None:

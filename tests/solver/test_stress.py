@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.dehydration.stress_matrix import matrix
-from benchmarks.dehydration.stress_run import Case, judge
+from benchmarks.dehydration.stress.judged import Case, judge
+from benchmarks.dehydration.stress.matrix import matrix
 from solver.contract import Unstable
 from solver.dehydration import run as run_module
 from solver.dehydration.path import Path

@@ -49,8 +49,9 @@ def test_every_unit_that_leaves_is_one_that_others_read() -> None:
 
 
 def files(store: Store) -> list[Path]:
-    table = tables.build(store, SOLVER)
-    return [store.shard_path(table.keys[0]), tables.path_of(store, table), scalars.build(store, SOLVER, "numbers")]
+    table, packed = tables.build(store, SOLVER), tables.build(store, SOLVER, "packed", dtype="int16")
+    built = [tables.path_of(store, table), tables.path_of(store, packed), scalars.build(store, SOLVER, "numbers")]
+    return [store.shard_path(table.keys[0]), *built]
 
 
 def test_every_file_says_what_it_is_and_how_it_came_about(filled: Store) -> None:

@@ -15,7 +15,9 @@ from store import starter, tables
 from store.blending import methods
 from store.blending.methods import envelope
 from store.blending.methods.bands import Bands, Targets, add_up, multiplier
+from store.blending.methods.weights import Samples
 from store.errors import OutsideTable, TooUncertain
+from store.generations import trust
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import harmonics, spectra
@@ -170,6 +172,24 @@ def test_expected_errors_vanish_at_samples_and_grow_between(rough: ShapeTable) -
     assert far["rgh"] < 0.3
     assert at.inside
     assert at.method == methods.DEFAULT
+
+
+def test_nine_tenths_of_the_errors_are_within_what_is_expected() -> None:
+    rng = np.random.default_rng(3)
+    values = np.array([(te, gamma) for te in (0.03, 0.035, 0.04, 0.045) for gamma in (10.0, 20.0, 30.0, 40.0)])
+    samples = Samples(values)
+    rows = rng.lognormal(0, 1, (len(values), 5, len(Measures._fields)))
+    rows[..., -1] = 1 - rows[..., -1]  # correlations, whose error is what they lack
+    trusted = trust.Trust(rows, methods.DEFAULT, samples)
+    made, mean = trust.foretold(rows, methods.DEFAULT, samples)
+    within = []
+    for i in range(len(values)):
+        near = samples.without(i, "linear")
+        said = [list(trusted.expect(near._replace(nearest=1.0), {j: 1.0}).values()) for j in range(5)]
+        within.append(made[i] <= np.array(said) + 1e-12)
+    assert (np.mean(within, axis=(0, 1)) >= trust.COVERED - 1e-9).all()
+    # a mean of neighbours' errors does not
+    assert ((made <= mean).mean(axis=(0, 1)) < 0.8).all()
 
 
 def test_a_poor_answer_is_refused(rough: ShapeTable) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import resource
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -150,3 +151,13 @@ def test_full_disk_leaves_nothing(tmp_path: Path) -> None:
     assert result.stdout.split() == ["ready", "storage-full"], result.stderr
     with pytest.raises(StorageFull, match="Free space"):
         raise StorageFull("full.", "Free space.")
+
+
+def test_a_missing_library_is_no_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever is told that a file is damaged deletes it."""
+    name, dataset = make()
+    path = tmp_path / "one.h5"
+    shards.write(path, dataset, name)
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ImportError):
+        shards.read(path)

@@ -87,47 +87,80 @@ def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
     return [child.pid for child in below if "spawn_main" in " ".join(child.cmdline())]
 
 
-def test_a_sweep_over_hosts(
+Running = list[subprocess.Popen[bytes]]
+
+
+def cluster(tmp_path: Path, store: Store, turn: int) -> Running:
+    """Start a scheduler and two workers, of which the second does not see the store's files."""
+    at, scheduler = tmp_path / f"scheduler{turn}.log", f"tcp://{ADDRESS.format(1)}:8786"
+    words = ("distributed.cli.dask_scheduler", "--host", ADDRESS.format(1), "--port", "8786", "--no-dashboard")
+    running = [start(NAMES[0], at, *words)]
+    wait_for(at, "Scheduler at")
+    worker = ("distributed.cli.dask_worker", scheduler, "--nthreads", "1", "--no-dashboard", "--local-directory")
+    hidden = f"mount -t tmpfs none {store.root}"
+    for i, before in ((1, "true"), (2, hidden)):
+        local = tmp_path / f"local{turn}{i}"
+        local.mkdir()
+        log = tmp_path / f"worker{turn}{i}.log"
+        running.append(start(NAMES[i], log, *worker, str(local), "--name", NAMES[i], before=before))
+    for i in (1, 2):
+        wait_for(tmp_path / f"worker{turn}{i}.log", "Registered to")
+    return running
+
+
+def end(running: Running) -> None:
+    for process in reversed(running):
+        process.kill()
+        process.wait()
+
+
+def wait_for_shards(store: Store, count: int) -> None:
+    until = time.monotonic() + 400
+    while len(list(store.keys())) < count:
+        assert time.monotonic() < until, f"{len(list(store.keys()))} shards"
+        time.sleep(0.1)
+
+
+@pytest.mark.timeout(3000)
+def test_two_hundred_jobs_over_hosts(
     hosts: None, shrinking: Solves, store: Store, write_plan: Callable[..., Path], tmp_path: Path
 ) -> None:
+    """Workers of both hosts are killed, then the scheduler is: no job is lost, and nothing is told from a local run."""
     pytest.importorskip("distributed")
-    many = write_plan("[0.02, 0.025, 0.03, 0.035, 0.04]", "[10, 15, 20, 25, 30, 35]", more="pause = 0.2")
+    thick = [round(0.02 + 0.001 * i, 3) for i in range(20)]
+    many = write_plan(str(thick), str(list(range(10, 60, 5))), more="pause = 0.02")
     scheduler = f"tcp://{ADDRESS.format(1)}:8786"
-    running = []
+    sweep = ("service.cli", "sweep", str(many), "--store", str(store.root), "--scheduler", scheduler, "--json")
+    running = cluster(tmp_path, store, 1)
     try:
-        words = ("distributed.cli.dask_scheduler", "--host", ADDRESS.format(1), "--port", "8786", "--no-dashboard")
-        running.append(start(NAMES[0], tmp_path / "scheduler.log", *words))
-        wait_for(tmp_path / "scheduler.log", "Scheduler at")
-        worker = ("distributed.cli.dask_worker", scheduler, "--nthreads", "1", "--no-dashboard", "--local-directory")
-        hidden = f"mount -t tmpfs none {store.root}"
-        for i, before in ((1, "true"), (2, hidden)):
-            local = tmp_path / f"local{i}"
-            local.mkdir()
-            log = tmp_path / f"worker{i}.log"
-            running.append(start(NAMES[i], log, *worker, str(local), "--name", NAMES[i], before=before))
-        for i in (1, 2):
-            wait_for(tmp_path / f"worker{i}.log", "Registered to")
-        sweep = ("service.cli", "sweep", str(many), "--store", str(store.root), "--scheduler", scheduler, "--json")
-        sweeping = start(NAMES[0], tmp_path / "sweep.log", *sweep)
+        sweeping = start(NAMES[0], tmp_path / "sweep1.log", *sweep)
         running.append(sweeping)
         # once each worker has had some, those of both hosts are killed; their nannies start others
-        until = time.monotonic() + 240
-        while len(list(store.keys())) < 6 and time.monotonic() < until:
-            time.sleep(0.1)
+        wait_for_shards(store, 20)
         for process in running[1:3]:
             for pid in workers_of(process):
                 os.kill(pid, 9)
-        assert sweeping.wait(timeout=400) == 0, (tmp_path / "sweep.log").read_text()
+        wait_for_shards(store, 60)
+        running[0].kill()
+        assert sweeping.wait(timeout=400) not in (0, -9)
+        said = (tmp_path / "sweep1.log").read_text()
+        assert "Traceback" not in said
+        assert "scheduler" in said
     finally:
-        for process in reversed(running):
-            process.kill()
-            process.wait()
+        end(running)
+    assert len(list(store.keys())) < 200
+    running = cluster(tmp_path, store, 2)
+    try:
+        sweeping = start(NAMES[0], tmp_path / "sweep2.log", *sweep)
+        running.append(sweeping)
+        assert sweeping.wait(timeout=1200) == 0, (tmp_path / "sweep2.log").read_text()
+    finally:
+        end(running)
     found = {run.attrs["key"]: run for run in store.results()}
-    assert len(found) == 30
-    assert store.ledger.counts() == {"wanted": 0, "running": 0, "done": 30, "failed": 0, "cancelled": 0}
+    assert len(found) == 200
+    assert store.ledger.counts() == {"wanted": 0, "running": 0, "done": 200, "failed": 0, "cancelled": 0}
     # both hosts took part
     assert all((tmp_path / f"solves-{name}").read_text() for name in NAMES[1:])
-    # and nothing tells their results from a local run's
     local = Store.open(tmp_path / "here", create=True)
     with executors.serial() as here:
         run_plan(Plan.load(many), local, here)

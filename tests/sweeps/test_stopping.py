@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -34,9 +35,9 @@ def until(happened: Callable[[], bool], seconds: float = 60) -> None:
         time.sleep(0.02)
 
 
-def command(*words: object) -> subprocess.Popen[str]:
+def command(*words: object, within: Sequence[str] = ()) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "service.cli", *map(str, words)],
+        [*within, sys.executable, "-m", "service.cli", *map(str, words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -121,7 +122,7 @@ def test_what_was_suspended_past_its_lease_comes_too_late(
     script.write_text(
         "import sys\nfrom store.store import Store\nfrom sweeps.running import executors, runner\n"
         "from sweeps.planning.plan import Plan\nif __name__ == '__main__':\n    with executors.serial() as workers:\n"
-        "        report = runner.run_plan(Plan.load(sys.argv[1]), Store.open(sys.argv[2]), workers, lease=1.0)\n"
+        "        report = runner.run_plan(Plan.load(sys.argv[1]), Store.open(sys.argv[2]), workers, lease=5.0)\n"
         "    print(report.solved, report.reused)\n"
     )
     first = subprocess.Popen(
@@ -132,11 +133,30 @@ def test_what_was_suspended_past_its_lease_comes_too_late(
     )
     until(lambda: len(shrinking) == 1)
     first.send_signal(signal.SIGSTOP)
-    woken = threading.Timer(2.5, first.send_signal, [signal.SIGCONT])
-    woken.start()
+
+    def wake(event: Event) -> None:
+        first.send_signal(signal.SIGCONT)  # the job is ours by now: the first one's lease has run out
+
     with executors.serial() as workers:
-        report = run_plan(Plan.load(path), store, workers, lease=1.0)
+        report = run_plan(Plan.load(path), store, workers, wake, lease=5.0)
     assert first.communicate(timeout=60)[0].split() == ["0", "1"]
     assert (report.solved, report.reused) == (1, 0)
     assert len(shrinking) == 2
     assert store.ledger.get(next(iter(store.keys()))).claims == 2
+
+
+def test_two_process_id_namespaces_under_one_host_name(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    """Two containers that share a store: neither sees the other's processes, and neither takes it for dead."""
+    apart = ["unshare", "--pid", "--fork", "--kill-child", "--mount-proc"]
+    try:
+        subprocess.run([*apart, "true"], check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"no namespaces here: {error}")
+    sweep = ("sweep", write_plan("[0.03]", "[10]", "pause = 4"), "--store", store.root, "--json")
+    first = command(*sweep)
+    until(lambda: len(shrinking) == 1)
+    second = command(*sweep, within=apart)
+    said = [json.loads(each.communicate(timeout=300)[0]) for each in (first, second)]
+    assert [one["solved"] for one in said] == [1, 0]
+    assert len(shrinking) == 1
+    assert store.ledger.get(next(iter(store.keys()))).claims == 1

@@ -17,7 +17,7 @@ import { Choice, Slider } from "./controls";
 import { Detail } from "./detail";
 import { button, byId, el } from "./dom";
 import { Exact } from "./exact";
-import { familyChoice, familyOf } from "./families";
+import { counted, familyChoice, familyOf } from "./families";
 import { Fruit } from "./fruit";
 import { Latest } from "./live";
 import { dressed } from "./looks";
@@ -214,7 +214,7 @@ async function page(table: Table, covered: Family[], wanted: Record<string, stri
   );
   ways.mark(wayOf(method));
 
-  byId("subject").textContent = `${solver.title} · ${table.samples} runs`;
+  byId("subject").textContent = `${solver.title} · ${counted(table.samples)}`;
   byId("controls").replaceChildren(
     ...(covered.length > 1 ? [familyChoice(covered, table.name, visit)] : []),
     ...sliders.slice(0, 1).map((slider) => slider.root),

@@ -9,18 +9,17 @@ from __future__ import annotations
 from typing import Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from ...arrays import Floats
+from ...contract.mesh import GivenMesh
 from .surface import Extent, Surface
 
 __all__ = ["Mesh", "extent_of", "rays_from"]
 
 
-class Mesh(BaseModel):
+class Mesh(GivenMesh):
     """Points and triangles; triangles that share an edge share its two points."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     points: tuple[tuple[float, float, float], ...] = Field(
         min_length=3, max_length=400_000, description="Vertices [r1]"
@@ -36,13 +35,6 @@ class Mesh(BaseModel):
     )
     materials: tuple[str, ...] = Field((), max_length=256, description="Names of materials, for files made of it")
     face_materials: tuple[int, ...] = Field((), max_length=800_000, description="The material of each triangle, from 0")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read(cls, values: object) -> object:
-        if isinstance(values, str):
-            raise ValueError("expected points and faces; on the command line, --set mesh=@FILE reads them from a file")
-        return values
 
     @model_validator(mode="after")
     def _within(self) -> Self:

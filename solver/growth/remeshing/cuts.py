@@ -74,6 +74,7 @@ def cut(state: State, longest: float) -> tuple[State, Ints]:
         rest=rest,
         drift=None if state.drift is None else carried(state.drift),
         shares={k: carried(v) for k, v in state.shares.items()},
+        matter={k: carried(v) for k, v in state.matter.items()},
         held=np.concatenate([state.held, state.held[i] & state.held[j]]),
         spots={k: tuple(moved(spot) for spot in spots) for k, spots in state.spots.items()},
         curves={k: on_surface(a, state.x, mesh.triangles, corners) for k, a in state.curves.items()},

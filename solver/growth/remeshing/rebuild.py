@@ -47,6 +47,7 @@ def rebuilt(state: State, triangles: Ints, g: Floats, left: Ints) -> State:
         rest=rest,
         shares={k: v[left] for k, v in state.shares.items()},
         held=state.held[left],
+        matter={k: v[left] for k, v in state.matter.items()},
         drift=None if state.drift is None else state.drift[left],
         spots={k: tuple(replace(spot, anchor=moved(spot.anchor)) for spot in v) for k, v in state.spots.items()},
         curves={k: moved(a) for k, a in state.curves.items()},

@@ -60,6 +60,7 @@ class Part:
             rest=state.rest[self.hinges],
             held=state.held[v] | ~self.free[:, None],
             drift=None if state.drift is None else state.drift[v] * self.free[:, None],
+            matter={k: values[v] for k, values in state.matter.items()},
             shares={},
             spots={},
             curves={},

@@ -16,9 +16,9 @@ from ...arrays import Floats, Ints
 from ...linalg.multifrontal import Analysis
 from ...shell.inverse import fronts_of, inverse_of
 from ...shell.normals import normals
-from ..params import Bending, Plane, SolidBall
+from ..params import Bending, Solid
 from ..state import State
-from .loads import area_vectors, depth_in
+from .loads import area_vectors, depth_in, half_way
 from .tangent import LEAF, Tangent
 from .touching import Touching
 
@@ -54,7 +54,7 @@ class StepEnergy:
         state: State,
         material: shell.Material,
         pressure: float,
-        solids: Sequence[Plane | SolidBall],
+        solids: Sequence[Solid],
         tangent: Tangent,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         distance: float = 0.0,
@@ -67,11 +67,17 @@ class StepEnergy:
         self._pressure, self._gravity, self._bending = pressure, gravity, bending
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
+        if "stiff" in state.matter:
+            stiff = state.matter["stiff"]
+            self.stiffness *= np.exp(stiff[state.mesh.hinges[:, :2]].mean(axis=1))
+            self._mean = None if self._mean is None else (self._mean[0], self._mean[1] * np.exp(stiff))
         self.load: Floats | None = None
         self.free = ~state.held
         #: Which blocks of the last `hessian` are on the diagonal (n,).
         self.diagonal: Ints = np.empty(0, np.int64)
         self._last: tuple[Floats, float, Floats] | None = None
+        #: How far a vertex may move in a step.
+        self._room = min((half_way(solid) for solid in solids), default=np.inf)
         #: Whether the last step asked for was not allowed whole.
         self.cut = False
         thirds = np.repeat(shell.areas(state.g) / 3, 3)
@@ -141,6 +147,10 @@ class StepEnergy:
     def allowed(self, x: Floats, way: Floats, wanted: float) -> float:
         """Return how much of `way` (n, 3), at most `wanted`, may be gone from x in one step."""
         found = self.touching.allowed(x, way, wanted) if self.touching else wanted
+        if self._room < np.inf:
+            # no vertex jumps over a solid: beyond its middle it would be pushed out on the other side
+            speed = float(np.sqrt((way * way).sum(axis=1).max()))
+            found = min(found, self._room / max(speed, 1e-300))
         self.cut = found < wanted
         return found
 

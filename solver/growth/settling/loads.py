@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ..params import Plane, SolidBall
+from ..params import Plane, Solid, SolidBall, SolidBox
 
-__all__ = ["area_vectors", "depth_in"]
+__all__ = ["area_vectors", "depth_in", "half_way"]
 
 
 def area_vectors(x: Floats, triangles: Ints) -> Floats:
@@ -17,11 +17,33 @@ def area_vectors(x: Floats, triangles: Ints) -> Floats:
     return np.stack([np.bincount(triangles.ravel(), np.repeat(third[:, c], 3), len(x)) for c in range(3)], -1)
 
 
-def depth_in(solid: Plane | SolidBall, x: Floats) -> tuple[Floats, Floats]:
+def depth_in(solid: Solid, x: Floats) -> tuple[Floats, Floats]:
     """Return how deep vertices are in a solid (n,), 0 outside, and the way out (n, 3)."""
     if isinstance(solid, Plane):
         normal = np.array(solid.normal) / np.linalg.norm(solid.normal)
         return np.maximum((np.array(solid.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
     way = x - np.array(solid.centre)
+    if isinstance(solid, SolidBox):
+        return _depth_in_box(solid, way)
     distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     return np.maximum(solid.radius - distance, 0.0), way / distance[:, None]
+
+
+def half_way(solid: Solid) -> float:
+    """Return half of what it is from a solid's surface to its middle at least."""
+    if isinstance(solid, Plane):
+        return np.inf
+    return solid.radius / 2 if isinstance(solid, SolidBall) else min(solid.size) / 4
+
+
+def _depth_in_box(box: SolidBox, way: Floats) -> tuple[Floats, Floats]:
+    """Return depths and ways out of a box, `way` (n, 3) being places from its centre."""
+    signs = np.where(way < 0, -1.0, 1.0)
+    # how far beyond the box without its rounding: outside of that the nearest point is on it, inside a side is
+    beyond = np.abs(way) - (np.array(box.size) / 2 - box.edge)
+    outside = np.maximum(beyond, 0.0)
+    away = np.linalg.norm(outside, axis=1)
+    nearest = np.eye(3)[np.argmax(beyond, axis=1)]
+    depth = box.edge - np.where(away > 0, away, beyond.max(axis=1))
+    normal = np.where(away[:, None] > 0, outside / np.maximum(away, 1e-300)[:, None], nearest)
+    return np.maximum(depth, 0.0), signs * normal

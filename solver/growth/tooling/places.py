@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -19,6 +21,7 @@ __all__ = [
     "Band",
     "Everywhere",
     "Harmonic",
+    "Lines",
     "Meridians",
     "Noise",
     "Painted",
@@ -131,8 +134,25 @@ class Harmonic(_Model):
         return self
 
 
+class Lines(_Model):
+    """Along lines, such as the veins of a leaf; fades to 0 at the width."""
+
+    kind: Literal["lines"] = "lines"
+    lines: tuple[tuple[tuple[float, float, float], ...], ...] = Field(
+        min_length=1, max_length=200, description="Points of each line, straight between [start shape's unit]"
+    )
+    width: float = Field(gt=0, le=100, description="Half width [start shape's unit]")
+
+    @field_validator("lines")
+    @classmethod
+    def _with_ends(cls, value: tuple[tuple[tuple[float, float, float], ...], ...]) -> object:
+        if any(not 2 <= len(line) <= 500 for line in value):
+            raise ValueError("a line has two points or more, 500 at most")
+        return value
+
+
 Place = Annotated[
-    Everywhere | Ball | Band | Rim | Meridians | Noise | Painted | Texture | Reaction | Harmonic,
+    Everywhere | Ball | Band | Rim | Meridians | Lines | Noise | Painted | Texture | Reaction | Harmonic,
     Field(discriminator="kind"),
 ]
 
@@ -140,6 +160,17 @@ Place = Annotated[
 def _smooth(values: Floats | float) -> Floats:
     v = np.clip(np.asarray(values, float), 0, 1)
     found: Floats = v * v * (3 - 2 * v)
+    return found
+
+
+def _away(x: Floats, lines: Sequence[Sequence[tuple[float, float, float]]]) -> Floats:
+    """Return how far points (n, 3) are from the nearest of lines."""
+    found = np.full(len(x), np.inf)
+    for line in lines:
+        for tail, head in pairwise(np.array(line)):
+            way = head - tail
+            u = np.clip((x - tail) @ way / max(float(way @ way), 1e-300), 0, 1)
+            found = np.minimum(found, np.linalg.norm(x - tail - u[:, None] * way, axis=1))
     return found
 
 
@@ -164,6 +195,8 @@ def share(place: Place, mesh: Mesh, border: Ints, seed: int) -> Floats:
     if isinstance(place, Meridians):
         turn = np.arctan2(x[:, 1], x[:, 0]) * place.count / (2 * np.pi)
         return _smooth(np.abs(turn - np.round(turn)) * 2 / place.width - 0.5)
+    if isinstance(place, Lines):
+        return _smooth(1 - _away(x, place.lines) / place.width)
     if isinstance(place, Noise):
         generator = Context.generator(seed)
         waves = generator.normal(size=(64, 3)) * 2 / place.size

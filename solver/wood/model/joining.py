@@ -91,6 +91,15 @@ def sloped(x: np.ndarray, rods: Rods, bonds: Bonds) -> np.ndarray:
     return _lying(x, rods, bonds.i, bonds.j, bonds.share)[2]
 
 
+def _along(s: np.ndarray) -> np.ndarray:
+    """Return the length (k, n) that each vertex stands for, at places s (k, n) along: a bond has its vertex's wood."""
+    gap = np.diff(s, axis=1)
+    own = np.zeros_like(s)
+    own[:, :-1] += gap / 2
+    own[:, 1:] += gap / 2
+    return own
+
+
 def bonded(
     params: WoodParams,
     points: np.ndarray,
@@ -127,12 +136,7 @@ def bonded(
     middle, length, cosine = _lying(rest, rods, i, e, u)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    # the wood of a bond: by the length that its vertex stands for
-    gap = np.diff(s, axis=1)
-    own = np.zeros_like(s)
-    own[:, :-1] += gap / 2
-    own[:, 1:] += gap / 2
-    part = own.ravel()[np.searchsorted(grid.ravel(), i)]
+    part = _along(s).ravel()[np.searchsorted(grid.ravel(), i)]
     volume = area(outline) * params.length * part / max(float(part.sum()), 1e-300)
     stiff = grain.factor(middle, params.grain.stiffness)
     strength = strong.factor(middle, params.grain.strength)

@@ -10,7 +10,7 @@ import numpy as np
 from ... import foreign
 from ...errors import InvalidOption, SweepError
 from ...foreign import KINDS
-from .meshparts import Parts, glb, obj
+from ...meshparts import Parts, glb, obj
 
 __all__ = ["KINDS", "read"]
 

@@ -44,6 +44,7 @@ def asked_table(
         InvalidOption: tables of several solvers are there, and none is chosen.
         InvalidInput: there is no such preset, or no fruit can be like that.
         OutsideTable: no table holds what is asked; which is the nearest, and what differs.
+        StaleTable: the table is of another version of the solver.
         UnknownTable, CorruptTable, MissingStore: there is no such table, it is damaged, or there is no store.
 
     """
@@ -68,6 +69,7 @@ def asked_table(
         # a lone table says itself what it does not hold
         name = families.infos[0].name if fit is None else fit.info.name
     table = ShapeTable.open(opened, name, surfaces=registry.surface)
+    stored.check_version(table.info, chosen)
     asked = families.values(said, preset)
     # entries that no axis reaches are no names to ask by
     quiet = {key for key in asked if key not in said and (key in chosen.incidental or not key.isidentifier())}

@@ -3,6 +3,7 @@
 import json
 import sys
 import time
+from pathlib import Path
 
 from generated import AuthenticatedClient
 from generated.api.jobs import ask, fields, job
@@ -27,12 +28,12 @@ while asked.state in ("wanted", "running"):
 numbers = fields.sync(asked.id, client=client)
 refused = info.sync("dehydration", client=client, **{**query, "te": 9.0})
 assert isinstance(refused, Problem)
+Path("shape.glb").write_bytes(file.payload.read())
+Path("batch.npz").write_bytes(archive.payload.read())
 print(
     json.dumps(
         {
             "value": said.stage.value,
-            "magic": file.payload.read(4).decode(),
-            "zip": archive.payload.read(2).decode(),
             "state": str(asked.state),
             "dims": numbers.fields["volume"].dims,
             "refused": refused.title,

@@ -16,7 +16,11 @@ def wavy(height: float, slide: float, n: int = 24) -> np.ndarray:
     waves = np.cos(8 * theta) * np.cos(6 * phi) * np.sin(theta)
     points = (1 + height * waves)[..., None] * directions(theta, phi)
     points[..., 1] += slide * waves
-    return np.concatenate([points.reshape(-1, 3), points[[0, -1]].mean(axis=1)])
+    return points
+
+
+def ends(points: np.ndarray) -> np.ndarray:
+    return np.asarray(points[[0, -1]].mean(axis=1))
 
 
 @pytest.mark.parametrize("height", [0.0, 0.02, 0.05, 0.1])
@@ -24,12 +28,21 @@ def wavy(height: float, slide: float, n: int = 24) -> np.ndarray:
 def test_it_is_whole_where_nothing_faces_inwards(height: float, slide: float) -> None:
     triangles = closed_lattice(24).astype(np.int32)
     points = wavy(height, slide)
-    found = candidates(points, triangles, np.empty(len(triangles)))
-    assert faces_outward(points, triangles) == (len(found) == 0)
+    whole = np.concatenate([points.reshape(-1, 3), ends(points)])
+    found = candidates(whole, triangles, np.empty(len(triangles)))
+    assert faces_outward(points, ends(points)) == (len(found) == 0)
+    assert faces_outward(points.astype("f4"), ends(points).astype("f4")) == (len(found) == 0)
 
 
 def test_both_answers_are_given() -> None:
-    triangles = closed_lattice(24)
-    assert faces_outward(wavy(0.02, 0.0), triangles)
-    assert not faces_outward(wavy(0.02, 0.3), triangles)
-    assert not faces_outward(-wavy(0.02, 0.0), triangles)
+    for points, seen in ((wavy(0.02, 0.0), True), (wavy(0.02, 0.3), False), (-wavy(0.02, 0.0), False)):
+        assert faces_outward(points, ends(points)) == seen
+
+
+@pytest.mark.parametrize(("row", "column"), [(0, 0), (0, 47), (11, 30), (23, 13)])
+def test_one_point_pushed_beyond_its_neighbours_is_seen_wherever_it_lies(row: int, column: int) -> None:
+    for n in (24, 96):  # of the finer one, bands of rows are looked at in turn
+        points = wavy(0.0, 0.0, n)
+        i, j = row * n // 24, column * n // 24
+        points[i, j] = points[i, (j + 3) % (2 * n)]
+        assert not faces_outward(points, ends(wavy(0.0, 0.0, n)))

@@ -35,7 +35,7 @@ def obj(text: str) -> Parts:
     """Return what an OBJ file's text holds; polygons are cut into fans.
 
     Raises:
-        ValueError: it cannot be read.
+        ValueError, IndexError: it cannot be read.
 
     """
     points: list[list[float]] = []
@@ -48,7 +48,7 @@ def obj(text: str) -> Parts:
     for line in text.splitlines():
         words = line.split()
         if words[:1] == ["v"]:
-            points.append([float(word) for word in words[1:4]])
+            points.append([float(words[k]) for k in (1, 2, 3)])
         elif words[:1] == ["vt"]:
             uv.append([float(word) for word in [*words[1:3], "0"][:2]])
         elif words[:1] == ["usemtl"]:

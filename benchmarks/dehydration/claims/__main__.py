@@ -1,9 +1,9 @@
-"""The paper's maps as measured statements: python -m benchmarks.dehydration.claims [--store DIR] [--whole] [--judge].
+"""The paper's maps as measured statements: python -m benchmarks.dehydration.claims [--store DIR] [--judge].
 
-Runs what is cheap of the plans examples/fig7.toml to fig10.toml and table1.toml, and judges the statements C1 to C6 of
-Liu et al. 2014, section 4, at s = 0.3: a part of each fruit between planes of symmetry, at preview, of skins not
-thinner than `--thinnest` (of Table 1 than `--thinnest-fruit`), with three seeds. With `--whole` the plans are run as
-they are written, which takes days. What is stored already is not run again; `--judge` runs nothing.
+Runs what is cheap of the plans examples/fig7.toml and examples/maps, and judges the statements C1 to C6 of Liu et al.
+2014, section 4, at s = 0.3: a part of each fruit between planes of symmetry, at preview, of skins not thinner than
+`--thinnest` (of Table 1 than `--thinnest-fruit`), with three seeds, each from its own noise. The maps as they are
+shipped are judged by `benchmarks.dehydration.mapped`. What is stored already is not run again; `--judge` runs nothing.
 """
 
 from __future__ import annotations
@@ -24,26 +24,28 @@ from sweeps.running.runner import run_jobs
 
 from .criteria import Found, judge
 from .pattern import Pattern, pattern
+from .shown import shown
 
 STAGE = 0.3
-PLANS = ("fig7", "fig8", "fig9", "fig10", "table1")
+#: The figures and tables that are judged, and the plans in examples/ of what they show.
+SHOWN = ("fig7", "fig8", "fig9", "fig10", "table1")
+PLANS = ("fig7.toml", "maps/*.toml")
 #: The start of wrinkling as well, where patterns are most regular.
 _NEED = Need(stages=(0.1, STAGE), quality="preview", resolution=96)
 
 
-def jobs(name: str, seeds: list[int], thinnest: float, whole: bool) -> list[JobSpec]:
-    """Return the jobs of a plan: its own, or the cheap part of them with several seeds."""
-    plan = Plan.load(ROOT / "examples" / f"{name}.toml")
-    if whole:
-        return plan.jobs()
-    samples = [params for params in plan.samples if isinstance(params, DehydrationParams)]
+def jobs(name: str, seeds: list[int], thinnest: float) -> list[JobSpec]:
+    """Return the cheap runs of what a figure or a table shows, each with several seeds."""
+    paths = [path for plan in PLANS for path in sorted((ROOT / "examples").glob(plan))]
+    samples = [params for path in paths for params in Plan.load(path).samples if isinstance(params, DehydrationParams)]
     parts = [
-        {**params.model_dump(mode="json"), "mirrors": planes(params), "seed": seed}
+        {**params.model_dump(mode="json"), "mirrors": planes(params), "seed": seed, "pattern": None}
         for seed in seeds
         for params in samples
-        if params.exocarp_thickness >= thinnest
+        if params.exocarp_thickness >= thinnest and name in shown(params)
     ]
-    return [JobSpec.of(SOLVER, SOLVER.parse(values), SOLVER.settle(_NEED)) for values in parts]
+    found = [JobSpec.of(SOLVER, SOLVER.parse(values), SOLVER.settle(_NEED)) for values in parts]
+    return list({job.key: job for job in found}.values())
 
 
 def planes(params: DehydrationParams) -> str:
@@ -58,13 +60,13 @@ def found(store: Store, job: JobSpec) -> Pattern | None:
     return None if run is None or STAGE not in run.stage else pattern(run.sel(stage=STAGE))
 
 
-def keep(runs: list[dict[str, Any]], clauses: list[Found], whole: bool) -> None:
+def keep(runs: list[dict[str, Any]], clauses: list[Found]) -> None:
     """Print the clauses, and write the record."""
     sheet = Sheet("dehydration-claims", ("", "what the paper says", "of", f"at s = {STAGE}", "verdict"), "dehydration")
     for one in clauses:
         sheet.add(one)
     told = {"head": sheet.head, "rows": sheet.rows}
-    figures.keep("dehydration-claims", runs, "dehydration", stage=STAGE, whole=whole, clauses=told)
+    figures.keep("dehydration-claims", runs, "dehydration", stage=STAGE, clauses=told)
 
 
 def main() -> None:
@@ -73,26 +75,23 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--thinnest", type=float, default=0.03, help="thinnest skin of Figs. 7 to 10 [r1]")
     parser.add_argument("--thinnest-fruit", type=float, default=0.03, help="thinnest skin of Table 1 [r1]")
-    parser.add_argument("--whole", action="store_true", help="the plans as they are written")
     parser.add_argument("--judge", action="store_true", help="run nothing")
     asked = parser.parse_args()
     store = Store.open(asked.store, create=True)
     wanted = {
-        name: jobs(name, asked.seeds, asked.thinnest_fruit if name == "table1" else asked.thinnest, asked.whole)
-        for name in PLANS
+        name: jobs(name, asked.seeds, asked.thinnest_fruit if name == "table1" else asked.thinnest) for name in SHOWN
     }
     if not asked.judge:
         with executors.serial() as executor:
             for name, own in wanted.items():
-                report = run_jobs(own, store, executor, name)
-                print(f"{name}: {report}", flush=True)
-    runs, plans = [], {name: list[Pattern]() for name in PLANS}
+                print(f"{name}: {run_jobs(own, store, executor, name)}", flush=True)
+    runs, patterns = [], {name: list[Pattern]() for name in SHOWN}
     for name, own in wanted.items():
         for job in own:
             one = found(store, job)
             runs.append({"plan": name, "key": job.key, **(one._asdict() if one else {"missing": True})})
-            plans[name] += [one] if one else []
-    keep(runs, judge(plans), asked.whole)
+            patterns[name] += [one] if one else []
+    keep(runs, judge(patterns))
 
 
 if __name__ == "__main__":

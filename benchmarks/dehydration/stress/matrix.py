@@ -8,7 +8,7 @@ from typing import Any
 
 from solver.fruit import PRESETS
 
-from .stress_run import Case
+from .judged import Case
 
 __all__ = ["matrix"]
 

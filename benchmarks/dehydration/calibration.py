@@ -1,0 +1,117 @@
+"""Whether the error that a look-up says to expect covers the one that it makes.
+
+    python -m benchmarks.dehydration.calibration [--held-out STORE --name NAME] [--picture docs/calibration.png]
+
+Every sample of a family in the package is predicted from the others, and what the others' own errors, so found, let
+expect there stands beside the error that is made; a table says so many times as much as covers 90 % of them. This is
+what a question one spacing away from its samples is told, which is farther than any between them.
+With a store of runs between the samples of one family, the errors of these beside what the table says of them. Shares
+of errors covered, and the factor that covers 90 % (record dehydration-calibration).
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.figures import Sheet
+from solver import registry
+from store.blending import methods
+from store.generations import generation, trust
+from store.lookup import ShapeTable
+from store.starter import ROOT
+from store.store import Store
+from store.surfaces.measures import Measures, Surface, compare
+from store.tables import path_of
+from sweeps.refining import score as scores
+
+_SHOWN = ("rgh", "dB", "W1", "corr")
+_HEAD = ("family", "errors of", "cases", *(f"{name} covered, factor" for name in _SHOWN))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--held-out", type=Path, help="a store with runs between the samples of --name")
+    parser.add_argument("--name", default="default")
+    parser.add_argument("--picture", type=Path, help="share covered over the factor on what is said")
+    asked = parser.parse_args()
+    store, sheet = Store.open(ROOT), Sheet("dehydration-calibration", _HEAD, "dehydration")
+    curves = {}
+    for name in store.table_names():
+        table = ShapeTable.open(store, name, surfaces=registry.surface)
+        if table.size > 2:
+            curves[name] = _add(sheet, name, "samples from the others", _left_out(store, table))
+    if asked.held_out is not None:
+        table = ShapeTable.open(store, asked.name, surfaces=registry.surface)
+        curves[f"{asked.name}, held out"] = _add(
+            sheet, asked.name, "runs held out", _held(store, table, asked.held_out)
+        )
+    if asked.picture is not None:
+        _draw(curves, asked.picture)
+    sheet.keep(share=trust.COVERED, measures=Measures._fields)
+
+
+def _left_out(store: Store, table: ShapeTable) -> np.ndarray:
+    """Return errors made and expected (2, case, measure) of samples predicted from the others."""
+    opened = generation.read(path_of(store, table.info))
+    found = generation.left_out(opened)
+    assert found is not None
+    assert table._samples is not None
+    own, expected = trust.foretold(*found, table._samples)
+    said = own.shape[-1]
+    return np.stack([own.reshape(-1, said), expected.reshape(-1, said)])
+
+
+def _held(store: Store, table: ShapeTable, held: Path) -> np.ndarray:
+    """Return errors made and expected (2, case, measure) of runs that the table has not seen."""
+    made, expected = [], []
+    for case in scores.cases(store, table, held)[0]:
+        values = {name: float(text) for name, text in (part.split(" = ") for part in case.label.split(", "))}
+        for stage in table.stages:
+            alike = compare(
+                Surface(case.fresh, case.found(methods.DEFAULT, stage)), Surface(case.fresh, case.truth(stage))
+            )
+            made.append(list(trust.errors(alike).values()))
+            said = table.at(values, stage, fields=()).expected_error
+            assert said is not None
+            expected.append([said[name] for name in Measures._fields])
+    return np.stack([np.array(made), np.array(expected)])
+
+
+def _add(sheet: Sheet, name: str, of: str, both: np.ndarray) -> np.ndarray:
+    """Print and keep one row; return the ratios (case, measure) of errors made to those expected."""
+    made, expected = both
+    ratios: np.ndarray = made / np.maximum(expected, 1e-12)
+    covered, factor = (ratios <= 1).mean(axis=0), np.quantile(ratios, trust.COVERED, axis=0)
+    places = [Measures._fields.index(shown) for shown in _SHOWN]
+    sheet.add(
+        (name, of, len(made), *(f"{covered[k]:.0%}, {factor[k]:.1f}" for k in places)),
+        family=name, of=of, cases=len(made), covered=dict(zip(Measures._fields, covered.tolist(), strict=True)),
+        factor=dict(zip(Measures._fields, factor.tolist(), strict=True)), ratios=ratios.round(4).tolist(),
+    )  # fmt: skip
+    return ratios
+
+
+def _draw(curves: dict[str, np.ndarray], path: Path) -> None:
+    """Draw which share of errors is covered by so many times what is said."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(_SHOWN), figsize=(13, 3.4), sharey=True)
+    factors = np.geomspace(0.1, 10, 200)
+    for panel, name in zip(axes, _SHOWN, strict=True):
+        for family, ratios in curves.items():
+            column = ratios[:, Measures._fields.index(name)]
+            panel.plot(factors, [(column <= factor).mean() for factor in factors], label=family)
+        panel.axvline(1, color="grey", linewidth=0.6)
+        panel.axhline(trust.COVERED, color="grey", linewidth=0.6)
+        panel.set(xscale="log", xlabel=f"times the expected {name}")
+    axes[0].set(ylabel="share of errors covered")
+    axes[-1].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""What the paper says of its maps, and whether runs bear it out."""

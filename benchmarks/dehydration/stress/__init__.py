@@ -1,0 +1,1 @@
+"""Hostile parameters, and what runs of them end in."""

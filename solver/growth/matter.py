@@ -1,0 +1,90 @@
+"""What a sheet is made of from place to place: ribs that resist bending, and colours; both ride on the material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from .. import shell
+from ..arrays import Floats, Ints
+from .shapes import Mesh
+from .state import State
+from .tooling.places import Everywhere, Place, share
+
+__all__ = ["BARE", "Colour", "Rib", "coloured", "grown_further", "matter"]
+
+Channel = Annotated[float, Field(ge=0, le=1)]
+
+#: Colour of a surface that says none, linear light.
+BARE = (0.42, 0.50, 0.20)
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Rib(_Model):
+    """A part that resists bending more than the sheet: a vein, a midrib; or less: a joint."""
+
+    where: Place = Field(description="Share of each vertex of the start shape, of the logarithm of `stiffness`")
+    stiffness: float = Field(30.0, ge=1e-3, le=1e4, description="Bending stiffness over that of the sheet [1]")
+
+
+class Colour(_Model):
+    """A coat of colour over those before it."""
+
+    colour: tuple[Channel, Channel, Channel] = Field(description="Red, green and blue of linear light, 0 to 1 [1]")
+    where: Place = Field(Everywhere(), description="Share of each vertex of the start shape")
+    grown: float = Field(
+        1.0,
+        ge=1,
+        le=1e6,
+        description="Growth of area by which it has come in whole; 1: it is there from the start [1]",
+    )
+
+
+def matter(ribs: Sequence[Rib], colours: Sequence[Colour], mesh: Mesh, border: Ints, seed: int) -> dict[str, Floats]:
+    """Return what rides on the material of a start shape, for `State.matter`; nothing where nothing is asked for.
+
+    stiff: (n,) logarithm of the bending stiffness over the sheet's. coats: (n, k) shares of the colours. grown: (n,)
+    logarithm of the growth of area, where a colour asks for it.
+
+    Raises:
+        InvalidInput: a place that the shape does not have.
+
+    """
+    found: dict[str, Floats] = {}
+    if ribs:
+        shares = [np.log(rib.stiffness) * share(rib.where, mesh, border, seed + k) for k, rib in enumerate(ribs)]
+        found["stiff"] = np.sum(shares, axis=0)
+    if colours:
+        found["coats"] = np.stack([share(c.where, mesh, border, seed + k) for k, c in enumerate(colours)], -1)
+        if any(c.grown > 1 for c in colours):
+            found["grown"] = np.zeros(len(mesh.x))
+    return found
+
+
+def grown_further(state: State, g: Floats) -> dict[str, Floats]:
+    """Return what rides on the material after rest metrics grew from the state's to g (f, 3)."""
+    if "grown" not in state.matter:
+        return state.matter
+    triangles, n = state.mesh.triangles, len(state.x)
+    areas = shell.areas(state.g)
+    more = np.repeat(areas * np.log(shell.areas(g) / areas), 3)
+    weights = np.bincount(triangles.ravel(), np.repeat(areas, 3), n)
+    mean = np.bincount(triangles.ravel(), more, n) / np.maximum(weights, 1e-300)
+    return state.matter | {"grown": state.matter["grown"] + mean}
+
+
+def coloured(state: State, colours: Sequence[Colour]) -> Floats:
+    """Return the colours (n, 3) of a state's vertices, linear light: the coats over each other, the last on top."""
+    found = np.broadcast_to(np.array(BARE), (len(state.x), 3)).copy()
+    for k, coat in enumerate(colours):
+        cover = state.matter["coats"][:, k]
+        if coat.grown > 1:
+            cover = cover * np.clip(state.matter["grown"] / np.log(coat.grown), 0, 1)
+        found += cover[:, None] * (np.array(coat.colour) - found)
+    return found

@@ -1,0 +1,97 @@
+"""How far looked-up shapes are from equilibrium: how the solver moves them when it relaxes them.
+
+Deep in the folds a run is one of many equilibria, so that correlation with one run is the wrong judge of a look-up. The
+right one: put on the mesh, from which residual does it start, how far does it go in some hundred steps, and does it
+still look the same afterwards?
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.contract import Need, Solver, SolverError
+from solver.lattice import lattice
+from store.lookup import ShapeTable
+from store.surfaces import measures
+from store.surfaces.measures import LATTICE, Surface
+
+__all__ = ["STEPS", "Distance", "between", "distance", "mean"]
+
+#: Steps for which a shape is relaxed.
+STEPS = 600
+
+
+@dataclass(frozen=True)
+class Distance:
+    """How relaxing changed a shape that `method` looked up at `stage`.
+
+    residual_placed and residual: before and after. moved: rms of the radial motion over the roughness. rgh, dB, W1 and
+    corr: the shape as looked up against what became of it, as `store.surfaces.measures` has them.
+    """
+
+    method: str
+    stage: float
+    residual_placed: float
+    residual: float
+    moved: float
+    rgh: float
+    dB: float
+    W1: float
+    corr: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return asdict(self)
+
+
+def between(table: ShapeTable, count: int, seed: int = 0) -> list[dict[str, float]]:
+    """Return random points between a table's samples, drawn evenly in the logarithm of axes that allow one.
+
+    A table of a single sample has one point.
+    """
+    rng = np.random.default_rng(seed)
+    return [{name: _drawn(rng, *span) for name, span in table.axes.items()} for _ in range(count if table.axes else 1)]
+
+
+def distance(solver: Solver, table: ShapeTable, values: dict[str, float], stage: float, method: str) -> Distance | None:
+    """Relax what a method looks up for `STEPS` steps at preview; None where the solver cannot.
+
+    Raises:
+        InvalidInput: it relaxes nothing.
+
+    """
+    shape = table.at(values, stage, resolution=LATTICE, fields=("position", "displacement"), method=method)
+    assert shape.position is not None
+    assert shape.displacement is not None
+    need = Need(fields=("displacement", "position"), quality="preview", resolution=LATTICE)
+    params = solver.parse(table.at_parameters(values))
+    try:
+        found = solver.relaxed(params, np.asarray(shape.position, float), stage, need, steps=STEPS).isel(stage=0)
+    except SolverError as error:
+        if error.code == "invalid-input":
+            raise
+        return None
+    fresh = table.fresh(values).points(*lattice(LATTICE))
+    alike = measures.compare(Surface(fresh, shape.displacement), Surface(fresh, found["displacement"].values))
+    said = {name: float(found[name]) for name in ("residual_placed", "residual", "moved")}
+    return Distance(method, stage, **said, rgh=alike.rgh, dB=alike.dB, W1=alike.W1, corr=alike.corr)
+
+
+def mean(rows: Sequence[Distance]) -> Distance:
+    """Return the means over rows of one method and stage."""
+    first = rows[0]
+    numbers = {k: float(np.mean([row.to_json()[k] for row in rows])) for k in first.to_json() if k not in _PLACE}
+    return Distance(first.method, first.stage, **numbers)
+
+
+_PLACE = ("method", "stage")
+
+
+def _drawn(rng: np.random.Generator, low: float, high: float) -> float:
+    if low <= 0:
+        return float(rng.uniform(low, high))
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
