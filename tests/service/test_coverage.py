@@ -25,7 +25,7 @@ MISSING: dict[str, dict[float, tuple[float, ...]]] = {
     "fig8": {0.01: (0.3, 0.5, 0.6)},
     "fig10": dict.fromkeys((0.01, 0.02), (0.6, 0.7, 0.8, 0.9)),
 }
-MISSING_FRUITS: tuple[str, ...] = ("wolfberry",)
+MISSING_FRUITS: tuple[str, ...] = ()
 
 
 def sphere(te: float, gamma: float) -> dict[str, float]:
