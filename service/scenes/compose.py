@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,7 +71,8 @@ def make(scene: Scene, tables: LiveTables, highest: int, to: str = "glb", compre
     visible, pixels = everything.only(shown), found.pixels[shown]
     lap("seen")
     held = {"bowl": bowls(scene)} if scene.props else {}
-    encoder = {"glb": glb.encode, "usdc": usd.usdc, "usda": usd.usda}.get(to)
+    encoders: dict[str, Callable[..., bytes]] = {"glb": glb.encode, "usdc": usd.usdc, "usda": usd.usda}
+    encoder = encoders.get(to)
     compress = compress and to == "glb" and glb.compressor() is not None
     data, share = b"", 1.0
     for _ in range(_AGAIN):

@@ -114,7 +114,7 @@ def encode(
     materials: list[Json] = []
     skins: dict[tuple[str, float], tuple[int, Skin]] = {}
     indices = {size: _indices(file, mesh.triangles(int(size))) for size in np.unique(n)}
-    groups = np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1).T if len(n) else []
+    groups: Sequence[Array] = list(np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1).T)
     order = [np.flatnonzero((seen.kind == k) & (n == size) & (seen.mirrored == m)) for k, size, m in groups]
     made: dict[tuple[int, int], tuple[int, Packed]] = {}
     for k, size, _ in groups:
@@ -190,7 +190,7 @@ def _instances(
     turn = seen.turn[row] * np.where(mirrored, [1, -1, -1, 1], 1)
     scales = np.repeat([made[k, size][1].scale for k, size, _ in groups], [len(one) for one in order])
     grow = np.repeat((seen.scale[row] * scales)[:, None], 3, axis=1)
-    views = (
+    views: tuple[tuple[int, int, str, int, Json], ...] = (
         (file.view(move.astype("<f4"), "ATTRIBUTES", None), _FLOAT, "VEC3", 12, {}),
         (file.view(np.round(turn * 32767).astype("<i2"), "ATTRIBUTES", None), _SHORT, "VEC4", 8, {"normalized": True}),
         (file.view(grow.astype("<f4"), "ATTRIBUTES", None), _FLOAT, "VEC3", 12, {}),

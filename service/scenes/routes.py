@@ -21,7 +21,7 @@ __all__ = ["router"]
 
 router = APIRouter(tags=["scenes"])
 
-_TYPES = {media_type: {} for media_type, _ in FORMATS.values()}
+_TYPES: dict[str, Any] = {media_type: {} for media_type, _ in FORMATS.values()}
 
 
 @router.post(

@@ -90,7 +90,8 @@ def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, bound:
     colour = pack(shape, looks).vertices["colour"][:, :3] / 255 * looks.base
     triangles = mesh.triangles(n)
     if mirrored:
-        points, normal = points * np.float32([-1, 1, 1]), normal * np.float32([-1, 1, 1])
+        across = np.array([-1, 1, 1], np.float32)
+        points, normal = points * across, normal * across
         triangles = triangles[:, ::-1]
     _mesh(stage, path, points, normal, triangles, material)
     paint = UsdGeom.Mesh.Get(stage, path).CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)

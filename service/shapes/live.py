@@ -42,7 +42,7 @@ class _Open:
 class LiveTables:
     """The store's tables by name, each opened when first asked for and looked at again at most every `interval` s."""
 
-    def __init__(self, root: Path, interval: float, before_folds: Callable[[], None]) -> None:
+    def __init__(self, root: Path, interval: float, before_folds: Callable[[], None] = lambda: None) -> None:
         self._root = root
         self._before_folds = before_folds
         self._interval = interval
