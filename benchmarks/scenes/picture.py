@@ -1,4 +1,4 @@
-"""A picture of a scene's file as three.js shows it: python -m benchmarks.scenes.picture SCENE.glb FILE.png [--camera ...].
+"""A picture of a scene's file as three.js shows it: python -m benchmarks.scenes.picture SCENE.glb FILE.png.
 
 Needs the page's libraries (`make page`), the extra `browser`, and a Chromium.
 """
@@ -21,7 +21,9 @@ from benchmarks.figures import ROOT
 
 LIBRARIES = ROOT / "service/viewer/node_modules/three"
 PAGE = """<!doctype html><title></title><style>body {margin: 0}</style>
-<script type="importmap">{"imports": {"three": "/three/build/three.module.js", "three/": "/three/examples/jsm/"}}</script>
+<script type="importmap">
+{"imports": {"three": "/three/build/three.module.js", "three/": "/three/examples/jsm/"}}
+</script>
 <script type="module">
 import * as T from "three";
 import { GLTFLoader } from "three/loaders/GLTFLoader.js";
