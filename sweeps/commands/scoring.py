@@ -72,8 +72,7 @@ def score(
 
     from ..refining import score as scores
 
-    if picture is not None and picture.suffix != ".png":
-        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+    _check(picture)
     names = methods.NAMED if methods_ is None else [str(methods.parse(part)) for part in methods_.split(",")]
     opened = Store.open(store or starter.ROOT)
     table = ShapeTable.open(opened, name, surfaces=registry.surface)
@@ -86,16 +85,24 @@ def score(
     moved = list(_distances(table, names, relax))
     if relax:
         document["relaxed"] = [row.to_json() for row in moved]
+    symbol = registry.get(table.info.solver).stages.symbol
+    emit(document, as_json, lambda console: _show(console, name, report, moved, symbol, picture))
 
-    def show(console: Any) -> None:
-        symbol = registry.get(table.info.solver).stages.symbol
-        _show_score(console, name, report, methods.DEFAULT, symbol)
-        if moved:
-            _show_distances(console, moved, symbol)
-        if picture is not None:
-            console.print(f"drawn to {picture}", markup=False)
 
-    emit(document, as_json, show)
+def _check(picture: Path | None) -> None:
+    """Refuse, before any work, a picture that is none."""
+    if picture is not None and picture.suffix != ".png":
+        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+
+
+def _show(console: Any, name: str, report: Any, moved: list[Any], symbol: str, picture: Path | None) -> None:
+    from store.blending import methods
+
+    _show_score(console, name, report, methods.DEFAULT, symbol)
+    if moved:
+        _show_distances(console, moved, symbol)
+    if picture is not None:
+        console.print(f"drawn to {picture}", markup=False)
 
 
 def _distances(table: ShapeTable, names: Sequence[str], count: int) -> Iterator[Distance]:

@@ -67,7 +67,7 @@ def below_onset(quality: Quality, shrinkage: float) -> Row:
 
 def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
     """Hand one settled stage over in every way; return CPU seconds, megabytes and error of each."""
-    from solver.contract import Context, Need, Region
+    from solver.contract import Context, Need
     from solver.dehydration import SOLVER
     from solver.dehydration.params import DehydrationParams
     from solver.dehydration.path import Path
@@ -94,7 +94,9 @@ def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
         return data, float(np.median([seconds for _, seconds in times])), data.nbytes / 1e6
 
     shape: dict[str, Any] = {"fields": ("displacement",)}
+    scalars = {"fields": ("roughness", "dominant_degree", "wavelength")}
     full, full_cpu, full_size = give({})
+    whole = {"instead_of": "all default fields", "cpu_full": full_cpu, "MB_full": full_size}
     exact, shape_cpu, shape_size = give({**shape, "dtype": "float64"})
     u = exact["displacement"].values[0]
     rms = float(np.sqrt(np.square(u - u.mean(axis=(0, 1))).mean()))
@@ -111,30 +113,25 @@ def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
         return float(np.abs(v - u[: v.shape[0], : v.shape[1]]).max())
 
     rows = [
-        {"what": "displacement only", "instead_of": "all default fields", "cpu_full": full_cpu, "MB_full": full_size}
-        | _row(give(shape), same, "largest difference [r1]"),
-        {"what": "descriptors only", "instead_of": "all default fields", "cpu_full": full_cpu, "MB_full": full_size}
-        | _row(
-            give({"fields": ("roughness", "dominant_degree", "wavelength")}), described, "difference of roughness [r1]"
-        ),
+        {"what": "displacement only", **whole} | _row(give(shape), same, "largest difference [r1]"),
+        {"what": "descriptors only", **whole} | _row(give(scalars), described, "difference of roughness [r1]"),
     ]
-    narrow: dict[str, dict[str, Any]] = {
-        "half of the surface": {"region": Region(colatitude=(0, 90), azimuth=(0, 360)), "dtype": "float64"},
-        "float32": {"dtype": "float32"},
-    }
     base = {"cpu_full": shape_cpu, "MB_full": shape_size}
-    for what, asked in narrow.items():
-        against = "all of it" if "region" in asked else "float64"
-        rows.append(
-            {"what": what, "instead_of": against, **base}
-            | _row(give({**shape, **asked}), same, "largest difference [r1]")
-        )
-    rows.append(
-        {"what": "resolution 32", "instead_of": "96", **base}
-        | _row(give({**shape, "dtype": "float64", "resolution": 32}), coarse, "rms of what is lost [r1]")
-    )
+    for what, (against, asked) in _narrow().items():
+        given = _row(give({**shape, **asked}), same, "largest difference [r1]")
+        rows.append({"what": what, "instead_of": against, **base} | given)
+    given = _row(give({**shape, "dtype": "float64", "resolution": 32}), coarse, "rms of what is lost [r1]")
+    rows.append({"what": "resolution 32", "instead_of": "96", **base} | given)
     shared = {"quality": quality, "stage": shrinkage, "cpu_of_the_run": run_seconds, "rms_displacement": rms}
     return [{**row, **shared} for row in rows]
+
+
+def _narrow() -> dict[str, tuple[str, dict[str, Any]]]:
+    """Return needs of less than the whole displacement in doubles, and what each is less than."""
+    from solver.contract import Region
+
+    half = {"region": Region(colatitude=(0, 90), azimuth=(0, 360)), "dtype": "float64"}
+    return {"half of the surface": ("all of it", half), "float32": ("float64", {"dtype": "float32"})}
 
 
 def _row(given: tuple[Any, float, float], error: Callable[[Any], float], meaning: str) -> Row:
