@@ -8,7 +8,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 FLOORS = ("solver", "store", "sweeps", "service", "benchmarks")
-FILES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
+# generated kernels are cached beside what generates them
+FILES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py") if "__pycache__" not in path.parts)
 #: Decorators of what is compiled: a kernel takes arrays, and calls of kernels by kernels cost.
 COMPILED = ("njit", "intrinsic")
 LINES, LONG, ARGUMENTS, SIDE_BY_SIDE = 60, 10, 10, 16

@@ -49,8 +49,8 @@ def scene(
 
     from store import seal
 
-    from ..scenes.compose import FORMATS, make
-    from ..scenes.request import parse
+    from ..scenes.compose import make
+    from ..scenes.request import FORMATS, parse
     from ..settings import Settings
 
     formats = {suffix: name for name, (_, suffix) in FORMATS.items() if name != "json"}

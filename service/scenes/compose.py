@@ -19,15 +19,8 @@ from .kinds import Kind, distinct
 from .placing import Instances, bowls, place
 from .request import Scene
 
-__all__ = ["FORMATS", "Made", "make"]
+__all__ = ["Made", "make"]
 
-#: Name -> media type and suffix.
-FORMATS = {
-    "glb": ("model/gltf-binary", ".glb"),
-    "usdc": ("model/vnd.usd", ".usdc"),
-    "usda": ("model/vnd.usda", ".usda"),
-    "json": ("application/json", ".json"),
-}
 #: How often a file that is larger than expected is made again with less in it.
 _AGAIN = 6
 
@@ -40,7 +33,7 @@ class Made(NamedTuple):
 
 
 def make(scene: Scene, tables: LiveTables, highest: int, to: str = "glb", compress: bool = True) -> Made:
-    """Return a scene as a file of a format in `FORMATS`.
+    """Return a scene as a file of a format in `request.FORMATS`.
 
     Raises:
         InvalidScene: listing what no table holds, a place that is too small, or a camera within a fruit.
@@ -102,8 +95,8 @@ def _reaches(scene: Scene, kinds: Sequence[Kind], everything: Instances) -> tupl
     near = seen.view(scene.camera, everything.centre, outer).why == seen.SEEN
     for k in np.unique(everything.kind[near]) if scene.cull else ():
         which = everything.kind == k
-        radii = kinds[k].reach
-        inner[which], outer[which] = (radius * everything.scale[which] for radius in radii)
+        within_and_around = kinds[k].reach
+        inner[which], outer[which] = (radius * everything.scale[which] for radius in within_and_around)
     return inner, outer
 
 

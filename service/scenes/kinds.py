@@ -113,7 +113,7 @@ def distinct(items: Sequence[Item], tables: LiveTables, highest: int) -> tuple[l
 
 
 def _kind(item: Item, tables: LiveTables, highest: int) -> Kind:
-    solver = vocabulary.solver_named(item.solver)
+    solver = vocabulary.solver_named(item.solver or _only(tables))
     preset = preset_of(solver, item.preset)
     symbol = solver.stages.symbol
     said = {**item.parameters, symbol: item.stage}
@@ -126,6 +126,20 @@ def _kind(item: Item, tables: LiveTables, highest: int) -> Kind:
     table.fresh(query.point)  # says what no shape can be
     label = f"{item.preset or table.info.name} {symbol}={item.stage:g}"
     return Kind(solver, table, dict(query.point), query.stage, _shade(solver, item), label)
+
+
+def _only(tables: LiveTables) -> str:
+    """Return the solver that the store's tables are of.
+
+    Raises:
+        InvalidInput: there are none, or of several.
+
+    """
+    found = sorted({tables.info(name).solver for name in tables.names()})
+    if len(found) != 1:
+        advice = f"Name one: {', '.join(found)}." if found else "Build a table first."
+        raise InvalidInput(f"the tables are of {len(found)} solvers, and the item names none.", advice=advice)
+    return found[0]
 
 
 def _shade(solver: Solver, item: Item) -> tuple[str, Shade]:

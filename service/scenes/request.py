@@ -10,8 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from ..errors import Wrong
 from .errors import InvalidScene, SceneTooLarge
 
-__all__ = ["MOST", "Budget", "Camera", "Item", "Place", "Scene", "Transform", "parse"]
+__all__ = ["FORMATS", "MOST", "Budget", "Camera", "Item", "Place", "Scene", "Transform", "parse"]
 
+#: Name -> media type and suffix.
+FORMATS = {
+    "glb": ("model/gltf-binary", ".glb"),
+    "usdc": ("model/vnd.usd", ".usdc"),
+    "usda": ("model/vnd.usda", ".usda"),
+    "json": ("application/json", ".json"),
+}
 #: Most instances of one scene; one that is parsed in full before it is refused would cost what it asks for.
 MOST = 20_000
 #: Most items with an entry of their own.
@@ -80,7 +87,7 @@ class Transform(_Strict):
 class Item(_Strict):
     """Fruits of one kind: a preset and/or parameters at one stage."""
 
-    solver: str = Field("dehydration", description="Whose shapes")
+    solver: str | None = Field(None, description="Whose shapes; none: of the one that the tables are of")
     preset: str | None = Field(None, description="A fruit by its name; `wizen presets` lists them")
     parameters: dict[str, float] = Field({}, description="By axis, over the preset's")
     stage: float = Field(description="Stage, as the solver counts them")

@@ -14,8 +14,7 @@ from .. import problems
 from ..errors import InvalidQuery, Wrong
 from ..settings import Settings
 from ..shapes.live import LiveTables
-from .compose import FORMATS, make
-from .request import Scene, parse
+from .request import FORMATS, Scene, parse
 
 __all__ = ["router"]
 
@@ -46,6 +45,9 @@ def scenes(
     sight are not computed. `format=json` is the report alone, without a file; a file brings the report's summary in
     the header `Wizen-Scene`.
     """
+    # what writes scenes takes a while to import; the service starts without
+    from .compose import make
+
     settings: Settings = request.app.state.settings
     tables: LiveTables = request.app.state.tables
     if format not in FORMATS:

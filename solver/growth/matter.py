@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from .. import shell
 from ..arrays import Floats, Ints
 from .shapes import Mesh
-from .state import State
 from .tooling.places import Everywhere, Place, share
+
+if TYPE_CHECKING:
+    from .state import State
 
 __all__ = ["BARE", "Colour", "Rib", "coloured", "grown_further", "matter"]
 
@@ -71,6 +72,9 @@ def grown_further(state: State, g: Floats) -> dict[str, Floats]:
     """Return what rides on the material after rest metrics grew from the state's to g (f, 3)."""
     if "grown" not in state.matter:
         return state.matter
+    # compiled code, which parameters must not load
+    from .. import shell
+
     triangles, n = state.mesh.triangles, len(state.x)
     areas = shell.areas(state.g)
     more = np.repeat(areas * np.log(shell.areas(g) / areas), 3)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 
 __all__ = ["radius_at", "rotate", "step"]
 
@@ -202,6 +202,34 @@ def _ground(
 
 
 @njit(cache=True, error_model="numpy")
+def _speeds(
+    at: Floats, turn: Floats, speed: Floats, spin: Floats, before: Floats, turned: Floats, touching: Bools, h: float
+) -> float:
+    """Find speeds and spins from where bodies were a step of h ago, less what rolling loses; return the fastest."""
+    fastest = 0.0
+    for i in range(len(at)):
+        for k in range(3):
+            speed[i, k] = (at[i, k] - before[i, k]) / h
+        # the turn of this step: q q0^-1
+        q, p = turn[i], turned[i]
+        w = q[3] * p[3] + q[0] * p[0] + q[1] * p[1] + q[2] * p[2]
+        sign = 2 / h if w >= 0 else -2 / h
+        spin[i, 0] = sign * (-q[3] * p[0] + q[0] * p[3] - q[1] * p[2] + q[2] * p[1])
+        spin[i, 1] = sign * (-q[3] * p[1] + q[1] * p[3] - q[2] * p[0] + q[0] * p[2])
+        spin[i, 2] = sign * (-q[3] * p[2] + q[2] * p[3] - q[0] * p[1] + q[1] * p[0])
+        size = math.sqrt(speed[i, 0] ** 2 + speed[i, 1] ** 2 + speed[i, 2] ** 2)
+        # soft skins roll with losses
+        if touching[i]:
+            speed[i] *= 1 - ROLLING * h
+            spin[i] *= 1 - ROLLING * h
+        # parting what overlapped is no motion to go on with
+        if size > 12.0:
+            speed[i] *= 12.0 / size
+        fastest = max(fastest, size)
+    return fastest
+
+
+@njit(cache=True, error_model="numpy")
 def step(
     at: Floats, turn: Floats, speed: Floats, spin: Floats, kind: Ints, scale: Floats, tables: Floats, points: Floats,
     reach: Floats, mass: Floats, inertia: Floats, bowl: Floats, h: float, drag: float, friction: float, count: int,
@@ -245,24 +273,5 @@ def step(
                     break
                 touching[i] = True
                 _resolve(at, turn, before, turned, (i, -1), point, normal, depth, mass, inertia, friction)
-        fastest = 0.0
-        for i in range(n):
-            for k in range(3):
-                speed[i, k] = (at[i, k] - before[i, k]) / h
-            # the turn of this step: q q0^-1
-            q, p = turn[i], turned[i]
-            w = q[3] * p[3] + q[0] * p[0] + q[1] * p[1] + q[2] * p[2]
-            sign = 2 / h if w >= 0 else -2 / h
-            spin[i, 0] = sign * (-q[3] * p[0] + q[0] * p[3] - q[1] * p[2] + q[2] * p[1])
-            spin[i, 1] = sign * (-q[3] * p[1] + q[1] * p[3] - q[2] * p[0] + q[0] * p[2])
-            spin[i, 2] = sign * (-q[3] * p[2] + q[2] * p[3] - q[0] * p[1] + q[1] * p[0])
-            size = math.sqrt(speed[i, 0] ** 2 + speed[i, 1] ** 2 + speed[i, 2] ** 2)
-            # soft skins roll with losses
-            if touching[i]:
-                speed[i] *= 1 - ROLLING * h
-                spin[i] *= 1 - ROLLING * h
-            # parting what overlapped is no motion to go on with
-            if size > 12.0:
-                speed[i] *= 12.0 / size
-            fastest = max(fastest, size)
+        fastest = _speeds(at, turn, speed, spin, before, turned, touching, h)
     return fastest

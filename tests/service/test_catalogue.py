@@ -120,7 +120,7 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     operations = {op["operationId"]: op for each in document["paths"].values() for op in each.values()}
     assert set(operations) == {
         "index", "health", "tables", "table", "solvers", "solver", "shape", "info", "batch", "jobs", "ask", "job",
-        "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan", "stages",
+        "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan", "stages", "scenes",
     }  # fmt: skip
     assert document["servers"]
     needs = {name: operation["security"] for name, operation in operations.items()}
