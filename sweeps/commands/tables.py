@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -127,26 +128,31 @@ def list_(
     def show(console: Any) -> None:
         rows = []
         for one in found:
-            axes = "; ".join(
-                f"{axis} {', '.join(f'{v:g}' for v in said['values'])}" for axis, said in one["axes"].items()
-            )
-            stages = ", ".join(f"{said['stage']:g}" for said in one["stages"])
+            axes = "; ".join(f"{axis} {_spanned(said['values'])}" for axis, said in one["axes"].items())
+            stages = _spanned([said["stage"] for said in one["stages"]])
             good = sum(said["converged"] or 0 for said in one["stages"])
             rows.append(
                 [
                     one["name"],
                     axes,
                     stages,
-                    f"{good} of {one['samples'] * len(one['stages'])}",
+                    f"{good}/{one['samples'] * len(one['stages'])}",
                     str(one["quality"]),
                     f"{one['solver']} {one['version']}",
                     ", ".join(one["presets"]),
-                    f"{one['bytes'] / 1e6:.3g} MB",
+                    f"{one['bytes'] / 1e6:.1f}",
                 ]
             )
-        grid(console, ["table", "axes", "stages", "converged", "quality", "version", "presets", "size"], rows)
+        grid(console, ["table", "axes", "stages", "converged", "quality", "version", "presets", "MB"], rows)
 
     emit({"tables": found}, as_json, show)
+
+
+def _spanned(values: Sequence[float]) -> str:
+    """Return values for people: all of a few, else the ends and how many there are."""
+    if len(values) <= 2:
+        return ", ".join(f"{value:g}" for value in values)
+    return f"{min(values):g}..{max(values):g} ({len(values)})"
 
 
 @table_app.command("plan")

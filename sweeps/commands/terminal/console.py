@@ -41,6 +41,7 @@ def grid(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]], t
     from rich.table import Table
 
     table = Table(*head, title=title or None, title_justify="left", box=box.SIMPLE_HEAD)
+    table.columns[0].no_wrap = True  # names are typed again: no terminal is too narrow for them
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     console.print(table)
