@@ -63,7 +63,7 @@ def _shown() -> list[tuple[Block, str]]:
 
 
 def _case(block: Block, command: str) -> object:
-    quick = _QUICK.match(command) and not re.search(r"exact=run", command)
+    quick = _QUICK.match(command) and not re.search(r"exact=run|--relax", command)
     return pytest.param(command, id=f"{block}:{command[:60]}", marks=() if quick else pytest.mark.slow)
 
 

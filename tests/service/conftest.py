@@ -69,7 +69,15 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def own(built: Path, tmp_path: Path) -> Store:
     """A copy of the store that a test may change."""
-    return Store.open(shutil.copytree(built, tmp_path / "store"))
+    for left in (2, 1, 0):
+        try:
+            return Store.open(shutil.copytree(built, tmp_path / "store"))
+        except shutil.Error:
+            # the last reader of the ledger takes its side files away while they are copied
+            if not left:
+                raise
+            shutil.rmtree(tmp_path / "store")
+    raise AssertionError("unreachable")
 
 
 @pytest.fixture(scope="session")
