@@ -20,6 +20,21 @@ __all__ = ["router"]
 
 router = APIRouter(tags=["scenes"])
 
+
+def _inlined(schema: Any, known: dict[str, Any]) -> Any:
+    """Return a schema with what it refers to in place: the page has no definitions beside its own."""
+    if isinstance(schema, list):
+        return [_inlined(one, known) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    if "$ref" in schema:
+        rest = {name: value for name, value in schema.items() if name != "$ref"}
+        return {**_inlined(known[schema["$ref"].rpartition("/")[2]], known), **rest}
+    return {name: _inlined(value, known) for name, value in schema.items() if name != "$defs"}
+
+
+_SCHEMA = Scene.model_json_schema()
+_BODY = _inlined(_SCHEMA, _SCHEMA.get("$defs", {}))
 _TYPES: dict[str, Any] = {media_type: {} for media_type, _ in FORMATS.values()}
 
 
@@ -31,7 +46,7 @@ _TYPES: dict[str, Any] = {media_type: {} for media_type, _ in FORMATS.values()}
         200: {"description": "The scene", "content": problems.files(_TYPES)},
         **problems.responses(400, 404, 406, 413, 422, 500, 501, 503),
     },
-    openapi_extra={"requestBody": {"content": {"application/json": {"schema": Scene.model_json_schema()}}}},
+    openapi_extra={"requestBody": {"content": {"application/json": {"schema": _BODY}}}},
 )
 def scenes(
     request: Request,
