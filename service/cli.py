@@ -71,6 +71,7 @@ def serve(
     from .app import create_app
     from .commands.hints import hints
     from .limits.connections import GuardedProtocol
+    from .limits.sockets import GuardedSocket
     from .shapes.compiling import Compiling
     from .stopping import PATIENCE
 
@@ -81,7 +82,14 @@ def serve(
     note(f"serving {settings.store} at {address}")
     for line in hints(settings.store, address):
         note(line)
-    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": PATIENCE, "http": GuardedProtocol}
+    options: dict[str, Any] = {
+        "log_level": "warning",
+        "timeout_graceful_shutdown": PATIENCE,
+        "http": GuardedProtocol,
+        "ws": GuardedSocket,
+        "ws_max_size": settings.max_body,
+        "ws_per_message_deflate": False,  # what is sent is differences, which compress to two thirds at best
+    }
     if settings.workers == 1:
         made = create_app(settings)
         with listener, _compiling(made.state.compiling):

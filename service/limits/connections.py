@@ -21,12 +21,20 @@ from ..problems import MEDIA_TYPE, URN
 from ..settings import Settings
 from .clients import address
 
-__all__ = ["GuardedProtocol"]
+__all__ = ["GuardedProtocol", "forget"]
 
 #: Connections of each server by client.
 _clients: WeakKeyDictionary[ServerState, Counter[str]] = WeakKeyDictionary()
 #: Those of each server whose head has not come yet, the longest awaited first.
 _slow: WeakKeyDictionary[ServerState, dict[GuardedProtocol, None]] = WeakKeyDictionary()
+
+
+def forget(server: ServerState, client: str) -> None:
+    """Count one connection less of a client: it is lost, as HTTP or as what it became since (`sockets`)."""
+    counts = _clients[server]
+    counts[client] -= 1
+    if counts[client] <= 0:
+        del counts[client]
 
 
 @cache
@@ -74,10 +82,7 @@ class GuardedProtocol(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget a connection."""
         self._stop_timer()
-        counts = _clients[self.server_state]
-        counts[self._name] -= 1
-        if counts[self._name] <= 0:
-            del counts[self._name]
+        forget(self.server_state, self._name)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:

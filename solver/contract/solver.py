@@ -15,6 +15,7 @@ from ..arrays import Floats
 from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
+from .live import Live
 from .looks import Looks
 from .need import Need, Quality
 from .params import Params
@@ -63,7 +64,7 @@ class Solver:
     context, steps)`, which brings a surface on the lattice into the equilibrium next to it, or so many steps nearer,
     and returns what `run` returns of one stage, how far it `moved` and from which residual (`residual_placed`).
     `tolerances` are the worst of each quality over all that was. `clock` turns hours under given conditions into
-    stages.
+    stages. `live` begins a run that is acted upon while it goes.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Solver:
     error: Callable[[Any, Quality, float], float] | None = None
     relax: Callable[..., xr.Dataset] | None = None
     clock: Clock | None = None
+    live: Live | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.
