@@ -74,6 +74,16 @@ class LiveTables:
         """
         return self.store.table_names()
 
+    def solvers(self) -> list[str]:
+        """Return the names of the solvers that the tables are of; a manifest is read once, until it changes.
+
+        Raises:
+            MissingStore: there is no store.
+            CorruptTable: a table's manifest is damaged.
+
+        """
+        return sorted({self._manifest(name).solver for name in self.names()})
+
     def info(self, name: str) -> TableInfo:
         """Return what is known of a table.
 
