@@ -51,10 +51,10 @@ def between(tables: LiveTables, count: int, random: np.random.Generator) -> Iter
 def families(tables: LiveTables, random: np.random.Generator) -> Iterator[Case]:
     """Yield shapes of other families."""
     for i, (name, axes) in enumerate(FAMILIES.items()):
-        for k in range(3):
+        for k in range(2):
             bounds = tables.get(name).axes
             truth = {axis: random.uniform(*bounds[axis]) for axis in axes} | {"s": random.uniform(0.08, 0.28)}
-            yield looked_up(tables, name, truth, 96, 3 * i + k)
+            yield looked_up(tables, name, truth, 96, 2 * i + k)
 
 
 def looked_up(tables: LiveTables, name: str, truth: dict[str, float], n: int, seed: int) -> Case:
@@ -67,12 +67,14 @@ def looked_up(tables: LiveTables, name: str, truth: dict[str, float], n: int, se
 
 
 def solved(folder: Path) -> Iterator[Case]:
-    """Yield every stage of the results in a folder."""
-    for path in sorted(folder.glob("*.h5")):
+    """Yield two stages of each of the results in a folder, in turns."""
+    for number, path in enumerate(sorted(folder.glob("*.h5"))):
         with xr.open_dataset(path, engine="h5netcdf") as run:
             params = json.loads(run.attrs["params"])
             said = {"te": params["exocarp_thickness"], "gamma": params["modulus_ratio"]}
-            for k, stage in enumerate(run.stage.values.tolist()):
+            stages = run.stage.values.tolist()
+            for k in (number % len(stages), (number + 1) % len(stages)):
+                stage = stages[k]
                 x = run.position.values[k].astype(float)
                 points = np.concatenate([x.reshape(-1, 3), x[[0, -1]].mean(axis=1)])
                 yield Case(points, {**said, "s": stage}, "default", int(params["seed"]))
@@ -157,7 +159,7 @@ def main() -> None:
     if given.runs is not None:
         groups["eighths solved from other seeds"] = list(solved(given.runs))
     for name, cases in groups.items():
-        for known in (True, False):
+        for known in (True,) if "families" in name else (True, False):
             row(sheet, name, cases, tables, known)
     spent = [case["processor_s"] for run in sheet.runs for case in run["cases"]]
     print(f"{np.median(spent):.1f} s of processor for one, {max(spent):.1f} s for the first")

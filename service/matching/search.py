@@ -27,7 +27,7 @@ _TABLES, _SECOND = 4, 7
 #: are apart: distances have hollows there which no run lies in.
 _BETWEEN, _APART = 256, 0.1
 #: Found as near as this, no further start is followed: what is matched lies in the table itself.
-_EXACT = 0.02
+_EXACT = 0.08
 #: Tables whose nearest run is this many times as far as the nearest of all are not followed.
 _HOPELESS = 6.0
 #: Most shapes of one way downhill, by dimension; the step of differences, of a range.
@@ -129,7 +129,7 @@ def _first_look(target: Target, table: ShapeTable, point: Mapping[str, float], s
     if target.kind == "descriptors":
         return target.of(table, point, stage, True)
     seen = _kept.setdefault(table, {})
-    key = (target.kind, target.parts, tuple(sorted(point.items())), stage)
+    key = (*target.like, tuple(sorted(point.items())), stage)
     if key not in seen:
         seen[key] = target.of(table, point, stage, True)
     return seen[key]

@@ -47,6 +47,8 @@ class Target(Protocol):
     kind: str
     parts: tuple[str, ...]
     about: dict[str, Any]
+    like: tuple[object, ...]
+    """What targets share that see shapes of tables alike"""
 
     def seen(self, coarse: bool) -> Look:
         """Return what it is like, for the first look at a table or for the search."""
@@ -123,6 +125,10 @@ def _points(table: ShapeTable, point: Mapping[str, float], stage: float, n: int)
     return found
 
 
+#: Lattices on which candidates are looked up: the one with about as many points as the target, which smooths as much.
+_LATTICES = np.array([32, 48, 64, 96])
+
+
 class _Mesh:
     kind = "mesh"
 
@@ -135,13 +141,15 @@ class _Mesh:
             False: signature(points, triangles, unit, FINE),
         }
         self.parts = self._seen[False].parts
+        self._n = int(_LATTICES[np.argmin(abs(np.log(_LATTICES / np.sqrt(0.5 * len(points)))))])
+        self.like = self.kind, unit is None, self._n
         self.about = {"vertices": len(points), "triangles": len(triangles), "radius": self._seen[False].radius}
 
     def seen(self, coarse: bool) -> Look:
         return Look(self._seen[coarse].values, self._seen[coarse].scatter)
 
     def of(self, table: ShapeTable, point: Mapping[str, float], stage: float, coarse: bool) -> Look:
-        n = COARSE if coarse or table.resolution <= COARSE else FINE
+        n = min(self._n, COARSE if coarse or table.resolution <= COARSE else FINE)
         known = None if self._unit is None else 1.0
         found = signature(_points(table, point, stage, n), closed_lattice(n), known, COARSE if coarse else FINE)
         return Look(found.values, found.scatter)
@@ -155,6 +163,7 @@ class _Mask:
         mask = outline.read(data)
         found = outline.of_mask(mask, unit)
         self._seen, self.parts = Look(found.values, found.scatter), found.parts
+        self.like = self.kind, unit is None
         self.about = {"pixels": int(mask.sum()), "radius": found.radius}
 
     def seen(self, coarse: bool) -> Look:
@@ -187,6 +196,7 @@ class _Numbers:
         if wrong:
             raise InvalidQuery.of(wrong)
         self.parts = tuple(numbers)
+        self.like = self.kind, *numbers
         self._seen = Look(*np.array(list(numbers.values())).T)
         self.about = {name: value for name, (value, _) in numbers.items()}
 
