@@ -26,6 +26,7 @@ from .jobs.runner import JobRunner
 from .limits import memory
 from .limits.admission import Admission
 from .limits.requests import Limits
+from .matching import routes as matching
 from .openapi import Documented, operation_id
 from .scenes import routes as scenes
 from .security import requires
@@ -101,6 +102,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         shapes.router,
         batch.router,
         scenes.router,
+        matching.router,
         jobs.reading,
         jobs_events.router,
         jobs_fields.router,

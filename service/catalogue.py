@@ -140,6 +140,7 @@ def _solver(solver: Solver) -> Json:
         "default_fields": list(solver.default_fields),
         "presets": solver.presets,
         "preset_stages": solver.preset_stages,
+        "sizes": solver.sizes,
         "looks": solver.looks.to_json(),
         "qualities": {
             # an error that was never measured is null, not a guess

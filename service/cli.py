@@ -20,6 +20,7 @@ from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
 
 from .commands import export as cli_export
+from .commands import match as cli_match
 from .commands import scene as cli_scene
 
 if TYPE_CHECKING:
@@ -217,6 +218,7 @@ def _encode(chosen: Format, made: Made) -> bytes:
 extend(_formats)
 cli_export.add_to(app)
 cli_scene.add_to(app)
+cli_match.add_to(app)
 
 if __name__ == "__main__":
     main()

@@ -170,6 +170,7 @@ class SolverPage(BaseModel):
     default_fields: list[str]
     presets: dict[str, dict[str, Any]]
     preset_stages: dict[str, list[float]]
+    sizes: dict[str, float] = Field(description="Length of r1 by preset [m]; none where any size is right")
     looks: dict[str, Any] = Field(description="Colours by field, and labels and places for a page")
     qualities: dict[str, Quality]
     session: SessionPage | None = Field(None, description="Where and how it is worked on live, if it can be")
