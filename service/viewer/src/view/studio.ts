@@ -165,25 +165,25 @@ export class Studio {
     this.last = now;
     if (this.subject?.step(passed)) this.reshaped();
     if (this.controls.update()) this.invalidate();
-    if (this.pinned && this.subject) this.both(this.pinned, this.subject.object);
+    if (this.pinned) this.both(this.pinned, this.subject?.object);
     else this.renderer.render(this.scene, this.camera);
     this.canvas.dataset.frames = String(this.renderer.info.render.frame);
   }
 
   /** What was kept on the left, what changes on the right: one camera, each with its own shadow. */
-  private both(left: Object3D, right: Object3D): void {
+  private both(left: Object3D, right: Object3D | undefined): void {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement as HTMLElement;
     const half = Math.floor(width / 2);
     this.renderer.setScissorTest(true);
     for (const [own, other, x] of [[left, right, 0], [right, left, half]] as const) {
-      own.visible = true;
-      other.visible = false;
+      if (own) own.visible = true;
+      if (other) other.visible = false;
       this.renderer.setViewport(x, 0, half, height);
       this.renderer.setScissor(x, 0, half, height);
       this.renderer.shadowMap.needsUpdate = true;
       this.renderer.render(this.scene, this.camera);
     }
-    left.visible = right.visible = true;
+    for (const one of [left, right]) if (one) one.visible = true;
     this.renderer.setScissorTest(false);
     this.renderer.setViewport(0, 0, width, height);
   }
