@@ -19,7 +19,9 @@ export class House {
   readonly canvas = byId<HTMLCanvasElement>("view");
   readonly panel = byId("panel");
   readonly wall = byId("wall");
-  private readonly caption = byId("caption");
+  private readonly what = el("p", { class: "what" });
+  private readonly badge = el("p", { class: "badge" });
+  private readonly tier = el("p", { class: "tier" });
   private readonly beside = byId("beside");
   private readonly tools = byId("tools");
   private readonly problem = byId("problem");
@@ -30,6 +32,7 @@ export class House {
 
   constructor() {
     this.compare = button("Compare", () => this.pin(!this.compared), { "aria-pressed": "false", title: "Keep this shape on the left, and go on changing on the right" });
+    byId("caption").replaceChildren(this.what, this.badge, this.tier);
     this.tools.append(this.compare, button("Reset view", () => this.studio.home()));
   }
 
@@ -47,8 +50,12 @@ export class House {
   /** Say what is shown, how it came about and how far to trust it. */
   say(title: string, tier: string, verdict: Verdict | undefined): void {
     this.said = [title, tier].filter(Boolean).join(" · ");
-    const badge = verdict && el("p", { class: `badge ${verdict.level}`, title: verdict.why }, verdict.text);
-    this.caption.replaceChildren(el("p", { class: "what" }, title), ...(badge ? [badge] : []), ...(tier ? [el("p", { class: "tier" }, tier)] : []));
+    this.what.textContent = title;
+    this.tier.textContent = tier;
+    this.badge.className = `badge ${verdict?.level ?? ""}`;
+    this.badge.textContent = verdict?.text ?? "";
+    this.badge.title = verdict?.why ?? "";
+    this.badge.hidden = !verdict;
   }
 
   complain(error: unknown): void {

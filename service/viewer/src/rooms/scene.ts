@@ -56,7 +56,7 @@ class Many {
   private readonly facts = el("section", { id: "trust", "aria-label": "What the service says of the scene" });
   private readonly said = el("p", { role: "status", class: "note" });
   private readonly rates = el("p", { class: "note", id: "rates" });
-  private readonly dry = el("input", { type: "range", id: "dry", min: "0", max: "1000", step: "1" });
+  private readonly dry = el("input", { type: "range", id: "dry" });
   private readonly value = el("span", { class: "value" });
   private readonly actions = new Actions(() => this.take());
   private readonly asking: Latest<number, Float32Array[]>;
@@ -81,8 +81,9 @@ class Many {
     this.symbol = kinds[0].table.stage.symbol;
     this.rule = RULES.some(([name]) => name === words.rule) ? words.rule : "bowl";
     const stage = Number(words.stage ?? NaN);
-    const share = Number.isFinite(stage) ? (stage - this.lowest) / (this.highest - this.lowest) : 0.6;
-    this.dry.value = String(Math.round(1000 * Math.min(1, Math.max(0, share))));
+    const step = 10 ** (Math.floor(Math.log10(this.highest - this.lowest)) - 2);
+    Object.assign(this.dry, { min: String(this.lowest), max: String(this.highest), step: String(step) });
+    this.dry.value = String(Number.isFinite(stage) ? stage : this.lowest + 0.6 * (this.highest - this.lowest));
     const given = Number(words.count ?? NaN);
     const shared = shares(Number.isFinite(given) ? Math.min(MOST, Math.max(1, given)) : 60, kinds.filter((kind) => kind.chosen).length);
     for (const kind of kinds) {
@@ -138,13 +139,13 @@ class Many {
   }
 
   private get stage(): number {
-    return Number((this.lowest + (Number(this.dry.value) / 1000) * (this.highest - this.lowest)).toPrecision(3));
+    return Number(Number(this.dry.value).toPrecision(4));
   }
 
   private word(): void {
     this.value.textContent = digits(this.stage);
     this.dry.setAttribute("aria-valuetext", digits(this.stage));
-    this.dry.style.setProperty("--share", String(Number(this.dry.value) / 1000));
+    this.dry.style.setProperty("--share", String((this.stage - this.lowest) / (this.highest - this.lowest)));
   }
 
   private thousand(): void {
@@ -169,7 +170,7 @@ class Many {
     if (falls && total > FALLING) {
       throw new Problem(`${total} fruits take minutes to fall, longer than an answer may.`, `Take ${FALLING} at most, lay them on the floor, or run the command below.`, "");
     }
-    const radius = falls ? Math.max(3, 1.15 * Math.cbrt(total)) : 1.26 * Math.sqrt(total) + 1.3;
+    const radius = falls ? Math.max(3, 1.15 * Math.cbrt(total)) : 1.5 * Math.ceil(Math.sqrt(total));
     const place = { name: "here", rule: this.rule, seed: 1, ...(this.rule === "bowl" || this.rule === "scatter" ? { radius: Number(radius.toFixed(2)) } : {}) };
     const far = radius / 6;
     const camera = { ...CAMERA, position: CAMERA.position.map((x) => Number((x * Math.max(1, far)).toFixed(2))) };
