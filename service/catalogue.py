@@ -112,8 +112,13 @@ def table(request: Request, name: str = Path(description="Name of a table; GET /
 @router.get("/v1/solvers", summary="All solvers", response_model=SolverList)
 def solvers() -> Json:
     """List the solvers."""
-    found = {name: registry.get(name).title for name in registry.names()}
-    return {"solvers": [{"name": n, "title": title, "href": link(f"/v1/solvers/{n}")} for n, title in found.items()]}
+    found = [registry.get(name) for name in registry.names()]
+    return {
+        "solvers": [
+            {"name": s.name, "title": s.title, "advance": s.looks.advance, "href": link(f"/v1/solvers/{s.name}")}
+            for s in found
+        ]
+    }
 
 
 @router.get(

@@ -55,6 +55,14 @@ def serve(
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler whose workers run the jobs."),
     ] = None,
+    studio: Annotated[
+        bool,
+        typer.Option(
+            "--studio",
+            help="Print an address whose page may run jobs for a day. A store that is not there is made, with the "
+            "package's tables.",
+        ),
+    ] = False,
 ) -> None:
     """Serve the tables of a store over HTTP. What is not given comes from WIZEN_STORE, WIZEN_HOST, WIZEN_PORT,
     WIZEN_WORKERS and WIZEN_SCHEDULER.
@@ -62,6 +70,8 @@ def serve(
     [bold]Examples[/bold]
 
     wizen serve --store demo
+
+    wizen serve --studio --store mine
 
     wizen serve --store demo --host 0.0.0.0 --port 9000 --workers 4
 
@@ -76,11 +86,16 @@ def serve(
     from .shapes.compiling import Compiling
     from .stopping import PATIENCE
 
-    settings = _settings(store=store, host=host, port=port, workers=workers, scheduler=scheduler)
+    own = (store or _own_store()) if studio else store
+    settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler)
+    secret = _fitted_out(settings.store) if studio else ""
     listener = _listen(settings.host, settings.port)
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{where}:{listener.getsockname()[1]}"
     note(f"serving {settings.store} at {address}")
+    if secret:
+        # behind the number sign: browsers send that to nobody
+        note(f"the studio: {address}/#token={secret}")
     for line in hints(settings.store, address):
         note(line)
     options: dict[str, Any] = {
@@ -138,6 +153,20 @@ def doctor(
         emit([finding._asdict() for finding in findings], True, lambda _: None)
     if any(finding.state == "bad" for finding in findings):
         raise typer.Exit(1)
+
+
+def _own_store() -> Path:
+    """Return where the store of one's own is, or would be."""
+    import platformdirs
+
+    named = os.environ.get("WIZEN_STORE")
+    return Path(named) if named else platformdirs.user_data_path("wizen") / "store"
+
+
+def _fitted_out(root: Path) -> str:
+    from .commands.studio import fit_out
+
+    return fit_out(root)
 
 
 @contextmanager

@@ -113,6 +113,7 @@ class SolverEntry(BaseModel):
 
     name: str
     title: str
+    advance: str = Field(description="The word for going along its stages, e.g. Dry")
     href: str
 
 
@@ -140,6 +141,7 @@ class StageAxis(BaseModel):
     units: str
     lowest: float
     highest: float
+    default: list[float] = Field(description="Stages of a run that names none")
 
 
 class Quality(BaseModel):
