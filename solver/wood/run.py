@@ -133,7 +133,7 @@ def _dataset(
 ) -> xr.Dataset:
     dims = {
         "impulse": ("stage", "component"),
-        "body_impulse": ("stage", "body", "component"),
+        "body_impulse": ("stage", "obstacle", "component"),
         "grip_impulse": ("stage", "grip", "component"),
         "grip_moment": ("stage", "grip", "component"),
         "tip_position": ("stage", "component"),
