@@ -120,6 +120,20 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
     return min(params.cleavage, opens), min(params.shear_strength, slides)
 
 
+def _closest(pairs: np.ndarray, s: np.ndarray, grid: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return vertices (b,) of each rod of a pair (m, 2), the edges (b,) of the other one that they are closest to, and
+    how far along those (b,).
+    """
+    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
+    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
+        # rods are parallel at rest: the closest point lies at the same place along
+        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, s.shape[1] - 2)
+        vertex.append(grid[p])
+        on.append(edge[q][j])
+        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
+    return np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
+
+
 def bonded(
     params: WoodParams,
     points: np.ndarray,
@@ -142,17 +156,10 @@ def bonded(
     near = params.reach * float(np.sqrt(area(outline) / len(points)))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T)] if len(pairs) else np.zeros((0, 2), int)
-    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
     n = s.shape[1]
     # each pair is bonded from both sides: half of its crack each
     crack = np.repeat(np.tile(widths(points, pairs, outline, sawn_through(params)) / 2, 2), n)
-    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
-        # rods are parallel at rest: the closest point lies at the same place along
-        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, n - 2)
-        vertex.append(grid[p])
-        on.append(edge[q][j])
-        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
-    i, e, u = np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
+    i, e, u = _closest(pairs, s, grid, edge)
     middle, length, cosine = _lying(rest, rods, i, e, u)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")

@@ -1,4 +1,4 @@
-"""Other ways to predict a shape between samples: python -m benchmarks.dehydration.surrogates [--held-out STORE].
+"""Other ways to predict a shape between samples: python -m benchmarks.peers.surrogates [--held-out STORE].
 
 On the table that comes with wizen, by the same measures as its own methods: POD with radial basis functions, POD with
 Kriging (SMT), and a POD-DeepONet, a small network from parameters and stage to the modes' coefficients (Lu et al. 2022,
