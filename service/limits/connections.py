@@ -23,7 +23,7 @@ from ..problems import MEDIA_TYPE, URN
 from ..settings import Settings
 from .clients import address
 
-__all__ = ["GuardedProtocol", "taken"]
+__all__ = ["GuardedProtocol", "forget", "taken"]
 
 #: Connections of each server by client.
 _clients: WeakKeyDictionary[ServerState, Counter[str]] = WeakKeyDictionary()
@@ -56,6 +56,14 @@ def _most(wanted: int) -> int:
 def taken() -> int:
     """Return how many connections this process has taken so far."""
     return _taken
+
+
+def forget(server: ServerState, client: str) -> None:
+    """Count one connection less of a client: it is lost, as HTTP or as what it became since (`sockets`)."""
+    counts = _clients[server]
+    counts[client] -= 1
+    if counts[client] <= 0:
+        del counts[client]
 
 
 @cache
@@ -110,10 +118,7 @@ class GuardedProtocol(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget a connection."""
         self._stop_timer()
-        counts = _clients[self.server_state]
-        counts[self._name] -= 1
-        if counts[self._name] <= 0:
-            del counts[self._name]
+        forget(self.server_state, self._name)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
