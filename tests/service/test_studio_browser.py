@@ -161,7 +161,7 @@ def test_a_run_is_asked_for_followed_shown_and_taken_away(browser: Browser, stud
         page.get_by_role("link", name="Download GLB").click()
     assert download.value.path().read_bytes()[:4] == b"glTF"
     page.get_by_text("Map", exact=True).click()
-    page.wait_for_function("() => document.querySelector('.map').naturalWidth === 512")
+    page.wait_for_function("() => document.querySelector('.map').naturalWidth === 256")
     said = json.loads(
         subprocess.run(
             ["wizen", *_words(command, tmp_path / "apple.h5"), "--json"], check=True, capture_output=True, cwd=tmp_path
@@ -264,7 +264,7 @@ def test_the_gallery_leads_to_what_it_shows(browser: Browser, studio: str) -> No
     assert "raisin" in visit.page.locator("#caption").inner_text()
     visit.page.get_by_role("link", name="Gallery").click()
     visit.page.get_by_role("link", name=re.compile("^potato not computed")).click()
-    visit.page.get_by_text("not computed yet").wait_for()
+    visit.page.locator("#caption").get_by_text("not computed yet").wait_for()
     assert "--preset potato" in visit.page.locator("#actions code").inner_text()
     assert visit.complaints == []
     visit.page.close()
