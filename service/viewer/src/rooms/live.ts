@@ -81,8 +81,11 @@ class Live {
     this.tools.hidden = true;
     this.lay();
     house.say(`${worded(this.preset)}: not begun`, "press Begin", { level: "fair", text: "nothing to see yet", why: "No session is open." });
+    const leave = (): void => this.session?.close(); // else the service keeps it for who comes back
+    addEventListener("pagehide", leave);
     return () => {
-      this.session?.close();
+      removeEventListener("pagehide", leave);
+      leave();
       this.painting(false);
       this.sheet.dispose();
     };
