@@ -20,6 +20,7 @@ from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
 
 from .commands import export as cli_export
+from .commands import match as cli_match
 from .commands import scene as cli_scene
 
 if TYPE_CHECKING:
@@ -76,27 +77,45 @@ def serve(
 
     wizen serve --store /shared/fruits --scheduler tcp://10.0.0.1:8786
     """
-    import uvicorn
-
-    from .app import create_app
-    from .commands.hints import hints
-    from .limits.connections import GuardedProtocol
-    from .shapes.compiling import Compiling
-    from .stopping import PATIENCE
-
     own = (store or _own_store()) if studio else store
     settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler)
     secret = _fitted_out(settings.store) if studio else ""
     listener = _listen(settings.host, settings.port)
+    _announce(settings, listener.getsockname()[1], secret)
+    _answer(settings, listener)
+
+
+def _announce(settings: Settings, port: int, secret: str) -> None:
+    from .commands.hints import hints
+
     where = f"[{settings.host}]" if ":" in settings.host else settings.host
-    address = f"http://{where}:{listener.getsockname()[1]}"
+    address = f"http://{where}:{port}"
     note(f"serving {settings.store} at {address}")
     if secret:
         # behind the number sign: browsers send that to nobody
         note(f"the studio: {address}/#token={secret}")
     for line in hints(settings.store, address):
         note(line)
-    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": PATIENCE, "http": GuardedProtocol}
+
+
+def _answer(settings: Settings, listener: socket.socket) -> None:
+    """Answer requests until the process is told to stop."""
+    import uvicorn
+
+    from .app import create_app
+    from .limits.connections import GuardedProtocol
+    from .limits.sockets import GuardedSocket
+    from .shapes.compiling import Compiling
+    from .stopping import PATIENCE
+
+    options: dict[str, Any] = {
+        "log_level": "warning",
+        "timeout_graceful_shutdown": PATIENCE,
+        "http": GuardedProtocol,
+        "ws": GuardedSocket,
+        "ws_max_size": settings.max_body,
+        "ws_per_message_deflate": False,  # what is sent is differences, which compress to two thirds at best
+    }
     if settings.workers == 1:
         made = create_app(settings)
         with listener, _compiling(made.state.compiling):
@@ -238,6 +257,7 @@ def _encode(chosen: Format, made: Made) -> bytes:
 extend(_formats)
 cli_export.add_to(app)
 cli_scene.add_to(app)
+cli_match.add_to(app)
 
 if __name__ == "__main__":
     main()

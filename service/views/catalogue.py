@@ -151,6 +151,14 @@ class Quality(BaseModel):
     resolution: int | None = Field(description="Colatitude samples of its lattice, where it has one")
 
 
+class SessionPage(BaseModel):
+    """A live engine (docs/sessions.md)."""
+
+    address: str = Field(description="WebSocket")
+    actions: dict[str, dict[str, Any]] = Field(description="JSON schema of what goes with each action")
+    fields: list[str] = Field(description="What may be shown beside the shape")
+
+
 class SolverPage(BaseModel):
     """A solver: what it takes and what it gives."""
 
@@ -164,6 +172,8 @@ class SolverPage(BaseModel):
     default_fields: list[str]
     presets: dict[str, dict[str, Any]]
     preset_stages: dict[str, list[float]]
+    sizes: dict[str, float] = Field(description="Length of r1 by preset [m]; none where any size is right")
     looks: dict[str, Any] = Field(description="Colours by field, and labels and places for a page")
     qualities: dict[str, Quality]
+    session: SessionPage | None = Field(None, description="Where and how it is worked on live, if it can be")
     links: dict[str, str]

@@ -41,8 +41,8 @@ def build(store: Store, name: str = "default", **options: Any) -> tables.TableIn
 
 
 @contextmanager
-def served(app: FastAPI) -> Iterator[httpx.Client]:
-    server = uvicorn.Server(uvicorn.Config(app, port=0, ws="none", log_config=None, access_log=False))
+def served(app: FastAPI, ws: Any = "none") -> Iterator[httpx.Client]:
+    server = uvicorn.Server(uvicorn.Config(app, port=0, ws=ws, log_config=None, access_log=False))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
