@@ -174,7 +174,9 @@ register(
     fragments=Quantity("1", "pieces that hang together by whole rods and bonds", "n_f"),
     fragment_mass=Quantity("kg", "masses of the 32 heaviest fragments, the heaviest first; 0 where there is none", "m"),
     fragment_place=Quantity("m", "middles of mass of the 32 heaviest fragments; 0 where there is none", "x_f"),
-    fragment_length=Quantity("m", "lengths of the 32 heaviest fragments where they are longest; 0 where there is none", "l_f"),
+    fragment_length=Quantity(
+        "m", "lengths of the 32 heaviest fragments where they are longest; 0 where there is none", "l_f"
+    ),
     fracture_energy=Quantity("J", "energy that breaks of rods and bonds took since the start", "E_f"),
     crack_area=Quantity(
         "m2", "area of the cracks along the grain, what is damaged by the share of its energy that is spent", "A_c"
