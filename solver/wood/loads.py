@@ -46,4 +46,5 @@ def measured(name: str, rows: list[dict[str, Any]], params: WoodParams) -> np.nd
             ways = [(p.time, p.shift) for p in grip.path] or rest
             paths.append(([w[0] for w in ways], [w[1] for w in ways]))
     gone = _along(paths, times)
-    return (gone[1:] + gone[:-1]) / 2
+    middle: np.ndarray = (gone[1:] + gone[:-1]) / 2
+    return middle

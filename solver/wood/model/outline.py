@@ -108,7 +108,7 @@ def sawn_through(params: WoodParams) -> list[tuple[int, float]]:
 def _shared(rods: int, size: np.ndarray) -> np.ndarray:
     """Return how many of the rods each part gets by its size, at least one each (largest remainders)."""
     share = rods * size / size.sum()
-    found = np.maximum(np.floor(share).astype(int), 1)
+    found: np.ndarray = np.maximum(np.floor(share).astype(int), 1)
     for n in np.argsort(found - share, kind="stable")[: max(rods - int(found.sum()), 0)]:
         found[n] += 1
     return found

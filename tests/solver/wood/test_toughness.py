@@ -1,4 +1,4 @@
-"""Double cantilever beam and end-notched flexure against beam theory; the whole comparison is `benchmarks.wood.fracture`."""
+"""Double cantilever beam and end-notched flexure against beam theory, as in `benchmarks.wood.fracture`."""
 
 from dataclasses import replace
 
