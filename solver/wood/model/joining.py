@@ -120,6 +120,30 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
     return min(params.cleavage, opens), min(params.shear_strength, slides)
 
 
+def _begins(own: np.ndarray, resolved_: np.ndarray, cost: np.ndarray, holds: np.ndarray) -> np.ndarray:
+    """Return the energy (b,) [J] at which bonds begin to give way, by the wood's own strength and the resolved one.
+
+    It ends where the square of separation is cost^2 over this: no farther than at `_MOST_GIVEN`, holds [J] at 1.
+    """
+    least = cost**2 / np.maximum(holds * _MOST_GIVEN**2, 1e-300)
+    found: np.ndarray = np.minimum(own, np.maximum(resolved_, least))
+    return found
+
+
+def _reached(
+    pairs: np.ndarray, s: np.ndarray, grid: np.ndarray, edge: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vertices of the first of each pair (m, 2) of rods, edges of the second beside them, and where (b,)."""
+    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
+    for p, q in pairs:
+        # rods are parallel at rest: the closest point lies at the same place along
+        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, s.shape[1] - 2)
+        vertex.append(grid[p])
+        on.append(edge[q][j])
+        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
+    return np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
+
+
 def bonded(
     params: WoodParams,
     points: np.ndarray,
@@ -142,17 +166,10 @@ def bonded(
     near = params.reach * float(np.sqrt(area(outline) / len(points)))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T)] if len(pairs) else np.zeros((0, 2), int)
-    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
     n = s.shape[1]
     # each pair is bonded from both sides: half of its crack each
     crack = np.repeat(np.tile(widths(points, pairs, outline, sawn_through(params)) / 2, 2), n)
-    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
-        # rods are parallel at rest: the closest point lies at the same place along
-        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, n - 2)
-        vertex.append(grid[p])
-        on.append(edge[q][j])
-        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
-    i, e, u = np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
+    i, e, u = _reached(np.concatenate([pairs, pairs[:, ::-1]]), s, grid, edge)
     middle, length, cosine = _lying(rest, rods, i, e, u)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
@@ -166,9 +183,6 @@ def bonded(
     per_opening = _NET / 2 / max(params.transverse, _NONE) * volume * strength**2
     per_shear = volume / max(params.shear, _NONE) * strength**2
     cleavage, shear_strength = resolved(params, params.length / (n - 1), outline)
-    # a bond must have given way before it is out of the way
-    least = torn**2 / np.maximum(0.5 * stretched * length * _MOST_GIVEN**2, 1e-300)
-    least_shear = shorn**2 / np.maximum(sheared * _MOST_GIVEN**2, 1e-300)
     return Bonds(
         i.astype(np.int32),
         e.astype(np.int32),
@@ -177,8 +191,8 @@ def bonded(
         stretched,
         sheared,
         cosine,
-        np.minimum(per_opening * params.cleavage**2, np.maximum(per_opening * cleavage**2, least)),
-        np.minimum(per_shear * params.shear_strength**2, np.maximum(per_shear * shear_strength**2, least_shear)),
+        _begins(per_opening * params.cleavage**2, per_opening * cleavage**2, torn, 0.5 * stretched * length),
+        _begins(per_shear * params.shear_strength**2, per_shear * shear_strength**2, shorn, sheared),
         torn,
         shorn,
         crack * part,
