@@ -6,6 +6,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 STORE  ?= demo
+STUDIO ?= studio
 PORT   ?= 8765
 
 VIEWER := service/viewer
@@ -30,11 +31,11 @@ $(PAGE): $(VIEWER)/package-lock.json $(wildcard $(VIEWER)/*.html $(VIEWER)/*.ts 
 ## page: build the web page that `wizen serve` shows at /; half a minute, and only when its sources changed
 page: $(PAGE)
 
-## demo: draw what comes with the package and serve it, before any run
+## demo: draw what comes with the package and serve it from a store of one's own, whose page may run jobs
 demo: $(STAMP)
 	$(BIN)/wizen table list --picture fruits.png
 	@$(MAKE) page || echo 'the page is not built (see above); the service answers without it'
-	env -u WIZEN_STORE XDG_DATA_HOME=$(abspath $(VENV))/none $(BIN)/wizen serve --port $(PORT)
+	$(BIN)/wizen serve --studio --store $(STUDIO) --port $(PORT)
 
 ## demo-map: run the six fruits of Fig. 7's right part, build their table, draw it and serve it; some minutes
 demo-map: $(STAMP)

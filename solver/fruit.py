@@ -20,7 +20,7 @@ from .lattice import azimuths, colatitudes, directions, lattice, window
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-__all__ = ["PRESETS", "Fruit", "azimuths", "colatitudes", "directions", "lattice", "window"]
+__all__ = ["PRESETS", "SIZES", "Fruit", "azimuths", "colatitudes", "directions", "lattice", "window"]
 
 
 #: Deepest dent of the outline that is accepted, in units of r1. Jujube 1 of Table 1 has 0.037; the columns of the
@@ -210,4 +210,19 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     "passionfruit": _preset((1.0,) * 8, (0.0, 0.0), 0.05, 30.0),
     "date": _preset((1, 0.756, 0.555, 0.5, 0.555, 0.756, 1, 0.5), (0.45, 0.14), 0.02),
     "pea": _preset((1, 0.956, 0.883, 0.852, 0.883, 0.956, 1, 0.822), (0.0, 0.0), 0.02),
+}
+
+#: Length of r1 [m], half the fresh fruit's length; a raisin is then 1.5 cm long at s = 0.3. A sphere is of any size.
+SIZES: Mapping[str, float] = {
+    "jujube1": 0.014,
+    "jujube2": 0.014,
+    "plum1": 0.022,
+    "plum2": 0.022,
+    "raisin": 0.0085,
+    "wolfberry": 0.009,
+    "potato": 0.045,
+    "banana": 0.09,
+    "passionfruit": 0.03,
+    "date": 0.02,
+    "pea": 0.004,
 }

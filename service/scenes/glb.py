@@ -106,7 +106,8 @@ def encode(
 ) -> bytes:
     """Return the file of the seen instances with their lattices; `held` are props by what they are.
 
-    unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of its content.
+    unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of its
+    content, and how long r1 is in its positions.
     """
     file = _File(compressor() if compress else None)
     meshes: list[Json] = []
@@ -128,7 +129,7 @@ def encode(
         material, looks = skins[name]
         packed = pack(kind.shape(int(size)), looks)
         made[k, size] = len(meshes), packed
-        meshes.append(_mesh(file, packed, indices[size], material, f"{kind.label} {size}"))
+        meshes.append(_mesh(file, packed, indices[size], material, kind.label, int(size)))
     if len(n):
         nodes = _instances(file, kinds, seen, groups, order, made)
     for prop in held.get("bowl", ()):
@@ -160,7 +161,7 @@ def _indices(file: _File, triangles: Array) -> int:
     return file.accessor(view, _USHORT if small else _UINT, "SCALAR", len(flat))
 
 
-def _mesh(file: _File, packed: Packed, indices: int, material: int, name: str) -> Json:
+def _mesh(file: _File, packed: Packed, indices: int, material: int, kind: str, size: int) -> Json:
     vertices, count = packed.vertices, len(packed.vertices)
     view = file.view(vertices, "ATTRIBUTES", _VERTICES)
     at = VERTEX.fields
@@ -172,7 +173,9 @@ def _mesh(file: _File, packed: Packed, indices: int, material: int, name: str) -
     }
     etag = hashlib.sha256(vertices.tobytes()).hexdigest()[:16]
     primitive = {"attributes": attributes, "indices": indices, "material": material}
-    return {"name": name, "primitives": [primitive], "extras": {"etag": etag}}
+    # with these, whoever has the file can put other stages of the kind in the place of this one
+    extras = {"etag": etag, "kind": kind, "colatitudes": size, "r1": 1 / packed.scale}
+    return {"name": f"{kind} {size}", "primitives": [primitive], "extras": extras}
 
 
 def _instances(

@@ -56,6 +56,12 @@ def animation(sequence: Sequence, options: Options) -> bytes:
     return file.bytes()
 
 
+def _white(sequence: Sequence) -> Json:
+    """Return what carries the vertices' colours: as rough as the first stage is on the mean, which is all it can be."""
+    rough = next(iter(sequence)).roughness
+    return {"metallicFactor": 0.0, "roughnessFactor": 0.6 if rough is None else round(float(rough.mean()), 3)}
+
+
 class _File:
     def __init__(self, sequence: Sequence, options: Options) -> None:
         self.sequence, self.options = sequence, options
@@ -65,8 +71,7 @@ class _File:
         self.images: list[Json] = []
         self.animations: list[Json] = []
         textured = bool(options.textures)
-        white = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
-        plain = white if sequence.coloured else _PLAIN
+        plain = _white(sequence) if sequence.coloured else _PLAIN
         names = [name or "skin" for name, _ in sequence.materials]
         self.materials: list[Json] = [] if textured else [{"name": n, "pbrMetallicRoughness": plain} for n in names]
         self.felt: int | None = None

@@ -40,7 +40,8 @@ def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
         raise Unavailable("USD needs the package usd-core.", advice=installing("usd")) from None
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, sequence.unit or 1.0)
+    if sequence.unit:
+        UsdGeom.SetStageMetersPerUnit(stage, sequence.unit)
     stage.SetTimeCodesPerSecond(options.fps)
     stage.SetFramesPerSecond(options.fps)
     stage.SetStartTimeCode(1)

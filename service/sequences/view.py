@@ -184,13 +184,22 @@ class Sequence:
             # a mesh of one's own is what the file is made of, and no parameter to be read
             "params": {name: value for name, value in self.params.items() if name != "mesh"},
             "stages": {"values": list(self.stages), "units": stage.get("units", "1"), "of": stage.get("long_name", "")},
-            "units": {"length": self.length},
+            "units": {"length": self.length, **({"metres": self.unit} if self.unit else {})},
         }
 
     @property
     def unit(self) -> float:
         """Metres per unit of length in the file; 0 where nobody knows."""
-        return float(self.run.attrs.get("metres_per_unit", 0.0)) / self.scale
+        said = self.run.attrs.get("metres_per_unit")
+        return float(self._metres if said is None else said) / self.scale
+
+    @cached_property
+    def _metres(self) -> float:
+        from solver import registry
+
+        name = str(self.run.attrs.get("solver", ""))
+        known = registry.get(name).metres(self.params) if name in registry.names() else None
+        return known or 0.0
 
     @property
     def length(self) -> str:

@@ -15,6 +15,7 @@ from ..arrays import Floats
 from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
+from .live import Live
 from .looks import Looks
 from .need import Need, Quality
 from .params import Params
@@ -63,7 +64,8 @@ class Solver:
     context, steps)`, which brings a surface on the lattice into the equilibrium next to it, or so many steps nearer,
     and returns what `run` returns of one stage, how far it `moved` and from which residual (`residual_placed`).
     `tolerances` are the worst of each quality over all that was. `clock` turns hours under given conditions into
-    stages.
+    stages. `live` begins a run that is acted upon while it goes.
+    stages. `sizes` are lengths of r1, or of the solver's own unit, in metres by preset, as such fruits are when fresh.
     """
 
     name: str
@@ -86,6 +88,8 @@ class Solver:
     error: Callable[[Any, Quality, float], float] | None = None
     relax: Callable[..., xr.Dataset] | None = None
     clock: Clock | None = None
+    live: Live | None = None
+    sizes: Mapping[str, float] = field(default_factory=dict)
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.
@@ -122,6 +126,24 @@ class Solver:
                 advice=f"Name stages: {self.stages.long_name} [{self.stages.units}].",
             )
         return self.clock.stages(hours, under, preset)
+
+    def metres(self, values: Mapping[str, Any]) -> float | None:
+        """Return the length of r1 [m] of what has these parameters, plain values by name; None where nobody knows.
+
+        Known are the sizes of presets: what has the fresh shape of one alone is as large as that. Where several have
+        one shape, all that a preset says must agree.
+        """
+        if not self.sizes or self.surface is None:
+            return None
+        fields = self.surface.fields
+        plain = self.params.model_validate({}).model_dump(mode="json")
+        shape = {name: values.get(name, plain[name]) for name in fields}
+        said = {name: self.parse({}, name).model_dump(mode="json") for name in self.presets}
+        alike = [name for name, full in said.items() if all(_same(full[f], shape[f]) for f in fields)]
+        if len({self.sizes.get(name) for name in alike}) > 1:
+            alike = [n for n in alike if all(_same(said[n][f], values.get(f, plain[f])) for f in self.presets[n])]
+        found = {self.sizes.get(name) for name in alike}
+        return found.pop() if len(found) == 1 else None
 
     def axis_units(self) -> dict[str, str]:
         """Return the units of the scalar axes, from the parameters' schema."""
@@ -243,6 +265,15 @@ class Solver:
         settled = self.settle(asked, of=(params,))
         result = self.relax(params, position, stage, settled, context or Context(), steps)
         return finish(result, self, params, settled)
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Return whether two plain values are the same, numbers to what text keeps of them."""
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(_same(a, b) for a, b in zip(one, other, strict=True))
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return math.isclose(one, other, rel_tol=1e-6, abs_tol=1e-9)
+    return bool(one == other)
 
 
 def finish(result: xr.Dataset, solver: Solver, params: Params, need: Need) -> xr.Dataset:

@@ -10,7 +10,7 @@ from .accuracy import expected_error
 from .looks import LOOKS
 from .names import ALL, DEFAULT
 from .params import DecayParams, Weather
-from .presets import PRESETS
+from .presets import PRESETS, SIZES
 from .surfaces.places import Wound
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ SOLVER = Solver(
     tolerances={"preview": 0.15, "default": 0.055},
     error=expected_error,
     presets=PRESETS,
+    sizes=SIZES,
     run=_run,
     cost=_cost,
     surface=SURFACE,

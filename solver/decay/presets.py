@@ -13,7 +13,7 @@ from typing import Any
 from .fields.colony import MOULDS, PAPER_MOULDS, PAPER_ROT, ROTS
 from .hyphae import FURS
 
-__all__ = ["ENVIRONMENTS", "PRESETS"]
+__all__ = ["ENVIRONMENTS", "PRESETS", "SIZES"]
 
 #: Transpiration coefficients by area [g/(m2 s MPa)], where Table 1's are implausible; sources in docs/decay.md.
 _TRANSPIRATION = {"orange": 1.72, "peach": 5.2}
@@ -88,6 +88,9 @@ _PAPER: Mapping[str, Mapping[str, Any]] = {
     "tomato": _fruit(123, 94, 0.9, 40, 50, (75, 1), "rhizopus", (0.70, 0.06, 0.03), _GREY, **_TOMATO),
 }
 
+#: Radius r1 [m] of a fruit of that weight.
+_SIZES = {"apple": 0.03, "orange": 0.033, "peach": 0.028, "pear": 0.034, "tomato": 0.028}
+
 #: Which species a fruit grows.
 _SPECIES = {
     "apple": "penicillium-expansum",
@@ -110,3 +113,6 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     },
     **{f"{fruit}-paper": values for fruit, values in _PAPER.items()},
 }
+
+#: Length of r1 [m] by preset.
+SIZES: Mapping[str, float] = {name: _SIZES[name.partition("-")[0]] for name in PRESETS}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..contract import Context, Cost, Need, Quality, Solver, StageAxis
 from ..fresh import SURFACE
-from ..fruit import PRESETS
+from ..fruit import PRESETS, SIZES
 from .drying import CLOCK
 from .looks import LOOKS
 from .params import DehydrationParams
@@ -101,6 +101,7 @@ SOLVER = Solver(
     looks=LOOKS,
     onset=onset,
     clock=CLOCK,
+    sizes=SIZES,
     relax=_relax,
     incidental=("seed", "imperfection", "imperfection_kind", "pattern", "mirrors"),
 )

@@ -95,6 +95,7 @@ def test_every_answer_is_as_declared(both: tuple[httpx.Client, Store]) -> None:
     page.get("result", f"{own}/result", params={"format": "json"})
     page.get("result", f"{own}/result", params={"format": "json", "fields": "stage,volume"})
     page.get("results", "/v1/results")
+    page.check("match", client.post("/v1/match", params={"table": "default"}, json={"roughness": 0.01}))
     (store.tables_dir / "default" / "current.json").write_text("{}")
     with client_of(store.root) as other:
         page.check("tables", other.get("/v1/tables"))

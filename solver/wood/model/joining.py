@@ -130,12 +130,12 @@ def _begins(own: np.ndarray, resolved_: np.ndarray, cost: np.ndarray, holds: np.
     return found
 
 
-def _reached(
-    pairs: np.ndarray, s: np.ndarray, grid: np.ndarray, edge: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the vertices of the first of each pair (m, 2) of rods, edges of the second beside them, and where (b,)."""
+def _closest(pairs: np.ndarray, s: np.ndarray, grid: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return vertices (b,) of each rod of a pair (m, 2), the edges (b,) of the other one that they are closest to, and
+    how far along those (b,).
+    """
     vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
-    for p, q in pairs:
+    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
         # rods are parallel at rest: the closest point lies at the same place along
         j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, s.shape[1] - 2)
         vertex.append(grid[p])
@@ -169,7 +169,7 @@ def bonded(
     n = s.shape[1]
     # each pair is bonded from both sides: half of its crack each
     crack = np.repeat(np.tile(widths(points, pairs, outline, sawn_through(params)) / 2, 2), n)
-    i, e, u = _reached(np.concatenate([pairs, pairs[:, ::-1]]), s, grid, edge)
+    i, e, u = _closest(pairs, s, grid, edge)
     middle, length, cosine = _lying(rest, rods, i, e, u)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")

@@ -1,0 +1,132 @@
+"""`POST /v1/match`: from a mesh, a mask or descriptors back to the parameters and the stage that come nearest."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from functools import partial
+from typing import Annotated, Any
+
+import anyio.to_thread
+from fastapi import APIRouter, Query, Request
+
+from .. import problems
+from ..errors import InvalidQuery, Overloaded, TimedOut, Wrong
+from ..settings import Settings
+from ..shapes.live import LiveTables
+from ..views.addresses import link
+from ..views.match import MatchPage
+
+__all__ = ["router"]
+
+router = APIRouter(tags=["match"])
+
+_TYPES = ("model/obj", "model/gltf-binary", "model/stl", "model/ply", "image/png")
+_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_NUMBERS: dict[str, Any] = {
+    "schema": {
+        "type": "object",
+        "description": "Descriptors by name: a number, or a number and its scatter",
+        "minProperties": 1,
+        "additionalProperties": {
+            "anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": 2}]
+        },
+    },
+    "examples": {"some": {"value": {"roughness": 0.04, "volume": [0.62, 0.01]}}},
+}
+#: A search uses all that one core gives for seconds: one at a time, and the next waits so long [s].
+_ONE, _WAIT = threading.Lock(), 10.0
+#: Share of the service's time-out after which a search is given up.
+_PATIENCE = 0.9
+
+
+@router.post(
+    "/v1/match",
+    summary="The shape that comes nearest",
+    responses=problems.responses(400, 404, 406, 413, 422, 500, 501, 503),
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {**dict.fromkeys(_TYPES, _BINARY), "application/json": _NUMBERS},
+        }
+    },
+)
+async def match(
+    request: Request,
+    size: Annotated[
+        float | None,
+        Query(gt=0, allow_inf_nan=False, description="Length of r1 in the target's unit (pixels of a mask); none: any"),
+    ] = None,
+    table: Annotated[str | None, Query(description="The table to search; none: all")] = None,
+    known: Annotated[
+        str,
+        Query(
+            pattern=r"^([A-Za-z0-9_]+:-?[0-9.eE+-]+(,[A-Za-z0-9_]+:-?[0-9.eE+-]+)*)?$",
+            max_length=2000,
+            description="What is known of it, as name:number with commas between",
+            examples=["te:0.035"],
+        ),
+    ] = "",
+) -> MatchPage:
+    """Answer with the parameters and the stage whose shape comes nearest to a mesh, a mask or descriptors.
+
+    Not the same wrinkles: the same outline, roughness, spectrum and slopes. The answer says how near it comes, how sure
+    each number is, and what else is as near. Of a mesh without `size` the form alone counts.
+    """
+    body = await request.body()
+    media = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    settings: Settings = request.app.state.settings
+    work = partial(_matched, body, media, size, table, _known(known), request.app.state.tables, settings.timeout)
+    page: MatchPage = await anyio.to_thread.run_sync(work)
+    for one in (page.best, *page.alternatives):
+        one.link = link(one.link)
+    return page
+
+
+def _known(text: str) -> dict[str, float]:
+    """Return the numbers that are known.
+
+    Raises:
+        InvalidQuery: one is named twice, or is no number.
+
+    """
+    found: dict[str, float] = {}
+    for pair in filter(None, text.split(",")):
+        name, _, value = pair.partition(":")
+        try:
+            number = float(value)
+        except ValueError:
+            raise InvalidQuery.of([Wrong("known", f"{value[:40]!r} is no number", "Write known=te:0.035.")]) from None
+        if name in found:
+            raise InvalidQuery.of([Wrong("known", f"{name[:40]} is given twice", "Give it once.")])
+        found[name] = number
+    return found
+
+
+def _matched(
+    body: bytes,
+    media: str,
+    size: float | None,
+    table: str | None,
+    known: Mapping[str, float],
+    tables: LiveTables,
+    timeout: float,
+) -> MatchPage:
+    # what reads and searches takes a while to import; the service starts without
+    from . import answer, targets
+
+    target = targets.read(body, targets.suffix_of(media), size)
+    end = time.monotonic() + _PATIENCE * timeout
+
+    def progress(share: float, what: str) -> None:
+        if time.monotonic() > end:
+            advice = "Ask again: what was looked at is kept. Or name a table, or say what is known."
+            raise TimedOut(f"the search took more than {_PATIENCE * timeout:.0f} s.", advice=advice)
+
+    if not _ONE.acquire(timeout=min(_WAIT, 0.5 * timeout)):
+        raise Overloaded("another search is under way.", advice="Ask again in some seconds.")
+    try:
+        return answer.match(target, tables, table, known, progress)
+    finally:
+        _ONE.release()
