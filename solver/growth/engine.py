@@ -18,7 +18,7 @@ from .. import shell
 from ..contract import Context, InvalidGeometry
 from ..geometry.crossings import crossings
 from .fresh import fresh
-from .history import History, Moment
+from .living.history import History, Moment
 from .matter import grown_further
 from .params import GrowthParams, Solid, present
 from .plastic import forgotten
