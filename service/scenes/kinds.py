@@ -120,13 +120,16 @@ def distinct(items: Sequence[Item], tables: LiveTables, highest: int) -> tuple[l
     kinds: list[Kind] = []
     rows: list[int] = []
     wrong: list[Wrong] = []
+    only: str | None = None
     for i, item in enumerate(items):
         key = (item.solver, item.preset, tuple(sorted(item.parameters.items())), item.stage, item.curve, item.shade)
         number = numbers.get(key)
         if number is None:
             numbers[key] = number = len(kinds)
             try:
-                kinds.append(_kind(item, tables, highest))
+                if item.solver is None and only is None:
+                    only = _only(tables)  # reads what all tables say of themselves: once
+                kinds.append(_kind(item, item.solver or only or "", tables, highest))
             except InvalidQuery as error:
                 wrong += [Wrong(f"items.{i}.{one.name}", one.detail, one.advice) for one in error.wrong]
             except (StoreError, SolverError, ServiceError) as error:
@@ -141,8 +144,8 @@ def distinct(items: Sequence[Item], tables: LiveTables, highest: int) -> tuple[l
     return kinds, rows
 
 
-def _kind(item: Item, tables: LiveTables, highest: int) -> Kind:
-    solver = vocabulary.solver_named(item.solver or _only(tables))
+def _kind(item: Item, name: str, tables: LiveTables, highest: int) -> Kind:
+    solver = vocabulary.solver_named(name)
     preset = preset_of(solver, item.preset)
     symbol = solver.stages.symbol
     said = {**item.parameters, symbol: item.first}

@@ -100,13 +100,14 @@ def main(zipped: str, address: str, token: str, out: str) -> None:
     seen["frames"] = len(read.frames)
     bpy.context.scene.frame_set(int(read.start + read.rate))
     by_keys = evaluated(run)
+    bpy.context.scene.frame_set(int(read.start))
+    seen["keys_moved"] = max(abs(a - b) for a, b in zip(by_keys, evaluated(run), strict=True))
     run.shape_key_clear()
     bpy.context.view_layer.objects.active = run
     bpy.ops.wizen.load(filepath=str(cache), how="CACHE")
     bpy.context.scene.frame_set(int(read.start + read.rate))
     by_cache = evaluated(run)
     seen["keys_against_cache"] = max(abs(a - b) for a, b in zip(by_keys, by_cache, strict=True))
-    seen["keys_moved"] = max(abs(a - b) for a, b in zip(by_keys, positions(run), strict=True))
     fruit.select_set(True)
     bpy.context.view_layer.objects.active = fruit
     try:
