@@ -79,11 +79,11 @@ def weights(file: _File, nodes: list[tuple[int, Kind]]) -> list[dict[str, Any]]:
             times = np.array([at for at, _ in kind.curve], "<f4")
             values: Floats = np.eye(len(times))[:, 1:]
             source = file.view(times, "ATTRIBUTES", None), file.view(values.astype("<f4").ravel(), "ATTRIBUTES", None)
-            ends = {"min": [float(times[0])], "max": [float(times[-1])]}
+            first, last = [float(times[0])], [float(times[-1])]
             ready[kind.curve] = len(samplers)
             samplers.append(
                 {
-                    "input": file.accessor(source[0], _FLOAT, "SCALAR", len(times), **ends),
+                    "input": file.accessor(source[0], _FLOAT, "SCALAR", len(times), min=first, max=last),
                     "output": file.accessor(source[1], _FLOAT, "SCALAR", values.size),
                     "interpolation": "LINEAR",
                 }

@@ -20,7 +20,7 @@ def bodies(count: int, bowl: tuple[float, float, float], seed: int) -> Bodies:
     tables = np.stack([1 + 0.15 * np.cos(3 * theta), 0.8 + 0.2 * np.sin(theta) * np.cos(2 * phi)])
     points = np.stack([(table[..., None] * directions(theta, phi)).reshape(-1, 3) for table in tables])
     kind, scale = np.arange(count) % 2, random.uniform(0.5, 1.0, count)
-    at = random.uniform(-0.9, 0.9, (count, 3)) + [0, 1.2 + 0.2 * count, 0]
+    at = random.uniform(-0.6, 0.6, (count, 3)) + np.array([0, 1.9 + 0.2 * count, 0])
     turn = np.ascontiguousarray(Rotation.random(count, random_state=seed).as_quat())
     mass = scale**3
     speed, spin = random.normal(0, 0.3, (2, count, 3))
