@@ -6,6 +6,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 STORE  ?= demo
+STUDIO ?= studio
 PORT   ?= 8765
 
 VIEWER := service/viewer
@@ -35,11 +36,11 @@ blender: $(STAMP)
 	mkdir -p dist
 	cd service/blender && $(abspath $(BIN))/python -m zipfile -c ../../dist/wizen-blender.zip *.toml *.py
 
-## demo: draw what comes with the package and serve it, before any run
+## demo: draw what comes with the package and serve it from a store of one's own, whose page may run jobs
 demo: $(STAMP)
 	$(BIN)/wizen table list --picture fruits.png
 	@$(MAKE) page || echo 'the page is not built (see above); the service answers without it'
-	env -u WIZEN_STORE XDG_DATA_HOME=$(abspath $(VENV))/none $(BIN)/wizen serve --port $(PORT)
+	$(BIN)/wizen serve --studio --store $(STUDIO) --port $(PORT)
 
 ## demo-map: run the six fruits of Fig. 7's right part, build their table, draw it and serve it; some minutes
 demo-map: $(STAMP)

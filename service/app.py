@@ -30,6 +30,8 @@ from .matching import routes as matching
 from .openapi import Documented, operation_id
 from .scenes import routes as scenes
 from .security import requires
+from .sessions import routes as sessions
+from .sessions.keeping import Sessions
 from .settings import Settings
 from .shapes import batch
 from .shapes import routes as shapes
@@ -56,12 +58,12 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     with at_signals(runner.halt):
         if runner.wanted:
             runner.start()
-            try:
-                yield
-            finally:
-                await anyio.to_thread.run_sync(runner.stop)
-        else:
+        try:
             yield
+        finally:
+            await app.state.sessions.close_all()
+            if runner.wanted:
+                await anyio.to_thread.run_sync(runner.stop)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -89,6 +91,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.tokens = Tokens(settings.store)
     # looking at jobs has threads of its own, so that listeners do not wait for shapes, nor shapes for them
     app.state.listeners, app.state.listening = Counter[str](), anyio.CapacityLimiter(2)
+    app.state.sessions = Sessions(settings)
     metrics = Metrics()
     problems.install(app)
     guards = [] if settings.public_read else [Depends(requires("read"))]
@@ -111,6 +114,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.include_router(catalogue.open_router, responses=problems.responses(414))
     for router in guarded:
         app.include_router(router, dependencies=guards, responses=declared)
+    app.include_router(sessions.router)
     app.include_router(jobs.writing, responses=problems.responses(414))
     routers = (*guarded, catalogue.open_router, jobs.writing)
     app.state.paths = sorted({route.path for router in routers for route in router.routes if isinstance(route, Route)})

@@ -112,8 +112,13 @@ def table(request: Request, name: str = Path(description="Name of a table; GET /
 @router.get("/v1/solvers", summary="All solvers", response_model=SolverList)
 def solvers() -> Json:
     """List the solvers."""
-    found = {name: registry.get(name).title for name in registry.names()}
-    return {"solvers": [{"name": n, "title": title, "href": link(f"/v1/solvers/{n}")} for n, title in found.items()]}
+    found = [registry.get(name) for name in registry.names()]
+    return {
+        "solvers": [
+            {"name": s.name, "title": s.title, "advance": s.looks.advance, "href": link(f"/v1/solvers/{s.name}")}
+            for s in found
+        ]
+    }
 
 
 @router.get(
@@ -147,8 +152,16 @@ def _solver(solver: Solver) -> Json:
             name: {"relative_error": solver.tolerances.get(name), "resolution": resolution}
             for name, resolution in solver.default_resolution.items()
         },
+        "session": _session(solver),
         "links": {"shapes": link(f"/v1/shapes/{solver.name}")},
     }
+
+
+def _session(solver: Solver) -> Json | None:
+    if solver.live is None:
+        return None
+    actions = {name: action.model_json_schema() for name, action in solver.live.actions.items()}
+    return {"address": link(f"/v1/sessions/{solver.name}"), "actions": actions, "fields": list(solver.live.fields)}
 
 
 def _bounds(axis: vocabulary.Axis) -> Json:

@@ -55,6 +55,14 @@ def serve(
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler whose workers run the jobs."),
     ] = None,
+    studio: Annotated[
+        bool,
+        typer.Option(
+            "--studio",
+            help="Print an address whose page may run jobs for a day. A store that is not there is made, with the "
+            "package's tables.",
+        ),
+    ] = False,
 ) -> None:
     """Serve the tables of a store over HTTP. What is not given comes from WIZEN_STORE, WIZEN_HOST, WIZEN_PORT,
     WIZEN_WORKERS and WIZEN_SCHEDULER.
@@ -63,26 +71,51 @@ def serve(
 
     wizen serve --store demo
 
+    wizen serve --studio --store mine
+
     wizen serve --store demo --host 0.0.0.0 --port 9000 --workers 4
 
     wizen serve --store /shared/fruits --scheduler tcp://10.0.0.1:8786
     """
+    own = (store or _own_store()) if studio else store
+    settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler)
+    secret = _fitted_out(settings.store) if studio else ""
+    listener = _listen(settings.host, settings.port)
+    _announce(settings, listener.getsockname()[1], secret)
+    _answer(settings, listener)
+
+
+def _announce(settings: Settings, port: int, secret: str) -> None:
+    from .commands.hints import hints
+
+    where = f"[{settings.host}]" if ":" in settings.host else settings.host
+    address = f"http://{where}:{port}"
+    note(f"serving {settings.store} at {address}")
+    if secret:
+        # behind the number sign: browsers send that to nobody
+        note(f"the studio: {address}/#token={secret}")
+    for line in hints(settings.store, address):
+        note(line)
+
+
+def _answer(settings: Settings, listener: socket.socket) -> None:
+    """Answer requests until the process is told to stop."""
     import uvicorn
 
     from .app import create_app
-    from .commands.hints import hints
     from .limits.connections import GuardedProtocol
+    from .limits.sockets import GuardedSocket
     from .shapes.compiling import Compiling
     from .stopping import PATIENCE
 
-    settings = _settings(store=store, host=host, port=port, workers=workers, scheduler=scheduler)
-    listener = _listen(settings.host, settings.port)
-    where = f"[{settings.host}]" if ":" in settings.host else settings.host
-    address = f"http://{where}:{listener.getsockname()[1]}"
-    note(f"serving {settings.store} at {address}")
-    for line in hints(settings.store, address):
-        note(line)
-    options: dict[str, Any] = {"log_level": "warning", "timeout_graceful_shutdown": PATIENCE, "http": GuardedProtocol}
+    options: dict[str, Any] = {
+        "log_level": "warning",
+        "timeout_graceful_shutdown": PATIENCE,
+        "http": GuardedProtocol,
+        "ws": GuardedSocket,
+        "ws_max_size": settings.max_body,
+        "ws_per_message_deflate": False,  # what is sent is differences, which compress to two thirds at best
+    }
     if settings.workers == 1:
         made = create_app(settings)
         with listener, _compiling(made.state.compiling):
@@ -130,6 +163,20 @@ def doctor(
         emit([finding._asdict() for finding in findings], True, lambda _: None)
     if any(finding.state == "bad" for finding in findings):
         raise typer.Exit(1)
+
+
+def _own_store() -> Path:
+    """Return where the store of one's own is, or would be."""
+    import platformdirs
+
+    named = os.environ.get("WIZEN_STORE")
+    return Path(named) if named else platformdirs.user_data_path("wizen") / "store"
+
+
+def _fitted_out(root: Path) -> str:
+    from .commands.studio import fit_out
+
+    return fit_out(root)
 
 
 @contextmanager

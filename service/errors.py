@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 __all__ = [
     "BatchTooLarge",
     "BodyTooLarge",
+    "EngineDied",
     "Forbidden",
     "InvalidQuery",
     "JobEnded",
@@ -22,11 +23,13 @@ __all__ = [
     "TimedOut",
     "TooCostly",
     "TooManyListeners",
+    "TooManySessions",
     "Unauthorized",
     "Unavailable",
     "Uncertain",
     "UncertainBatch",
     "UnfitFormat",
+    "UnknownSession",
     "UnknownSolver",
     "Wrong",
 ]
@@ -193,6 +196,24 @@ class Overloaded(ServiceError):
     """Too many shapes wait to be computed."""
 
     code = "overloaded"
+
+
+class TooManySessions(ServiceError):
+    """As many live sessions are open, or have cost as much, as may be."""
+
+    code = "too-many-sessions"
+
+
+class UnknownSession(ServiceError):
+    """No live session of that name."""
+
+    code = "unknown-session"
+
+
+class EngineDied(ServiceError):
+    """The process of a live engine has ended, or never began."""
+
+    code = "engine-died"
 
 
 class TooManyListeners(ServiceError):

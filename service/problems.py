@@ -24,7 +24,19 @@ from store import errors as stored
 
 from . import errors
 
-__all__ = ["MEDIA_TYPE", "STATUS", "URN", "Culprit", "Problem", "files", "install", "of", "responses", "unforeseen"]
+__all__ = [
+    "MEDIA_TYPE",
+    "STATUS",
+    "URN",
+    "Culprit",
+    "Problem",
+    "files",
+    "install",
+    "of",
+    "responses",
+    "told",
+    "unforeseen",
+]
 
 MEDIA_TYPE = "application/problem+json"
 URN = "urn:wizen:problem:"
@@ -76,6 +88,9 @@ STATUS: Mapping[type[Exception], int] = {
     errors.JobFailed: 409,
     errors.JobEnded: 409,
     errors.TooManyListeners: 429,
+    errors.TooManySessions: 429,
+    errors.UnknownSession: 404,
+    errors.EngineDied: 500,
 }
 
 _RETRY = {429: "10", 503: "5"}
@@ -112,6 +127,19 @@ class Problem(BaseModel):
     errors: list[Culprit] = Field(default_factory=list, description="Every wrong parameter")
     nearest: Nearest | None = Field(None, description="The table that comes nearest")
     links: dict[str, str] = Field(default_factory=dict, description="The run that answers: its address and its command")
+
+
+def told(error: Exception) -> dict[str, Any]:
+    """Return what a known exception says of itself where there is no request: to whoever is connected."""
+    status = next(STATUS[kind] for kind in type(error).__mro__ if kind in STATUS)
+    code = str(getattr(error, "code", "error"))
+    return {
+        "type": URN + code,
+        "title": code.replace("-", " ").capitalize(),
+        "status": status,
+        "detail": str(getattr(error, "message", error)),
+        "advice": str(getattr(error, "advice", "")),
+    }
 
 
 def of(error: Exception, scope: Scope) -> Response:

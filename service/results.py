@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, Field
 
+from store.errors import CorruptShard
 from store.store import Store
 from sweeps import results as stored
 from sweeps.errors import InvalidOption
@@ -39,6 +40,7 @@ class ResultList(BaseModel):
     results: list[ResultRow]
     total: int = Field(description="Rows of all pages")
     next: str | None = Field(description="Address of the next page, if there is one")
+    damaged: list[str] = Field(description="Keys of results that cannot be read, and are left out")
 
 
 @router.get("/v1/results", summary="All results", responses=problems.responses(414, 422, 503))
@@ -55,8 +57,9 @@ def results(
 ) -> ResultList:
     """List the stored results: one row per stage of each run, with its parameters and its numbers."""
     store: Store = request.app.state.tables.store
+    damaged: dict[str, CorruptShard] = {}
     try:
-        rows = stored.find(store, solver, where or (), sort, last)
+        rows = stored.find(store, solver, where or (), sort, last, damaged)
     except InvalidOption as error:
         name = "where" if "--where" in error.message else "sort" if sort and sort[1:] in error.message else "where"
         detail = error.message.removeprefix("--where ").rstrip(".")
@@ -67,7 +70,8 @@ def results(
         pairs: dict[str, Any] = {"solver": solver, "where": where, "sort": sort, "last": last or None}
         known = {name: value for name, value in pairs.items() if value is not None}
         following = link(f"/v1/results?{urlencode({**known, 'limit': limit, 'after': end}, doseq=True)}")
-    return ResultList(results=[_row(row) for row in rows[after:end]], total=len(rows), next=following)
+    page = [_row(row) for row in rows[after:end]]
+    return ResultList(results=page, total=len(rows), next=following, damaged=sorted(damaged))
 
 
 def _row(row: stored.Row) -> ResultRow:

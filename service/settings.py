@@ -89,6 +89,11 @@ class Settings(BaseSettings):
     max_job_bytes: float = Field(8e9, gt=0, description="Largest expected memory or result of one job [bytes]")
     max_listeners: int = Field(64, ge=1, description="Most open streams of job events")
     max_listeners_per_client: int = Field(8, ge=1, description="Most open streams of job events of one client")
+    max_sessions: int = Field(4, ge=0, description="Most live sessions, in each process; 0: none")
+    max_sessions_per_token: int = Field(2, ge=1, description="Most live sessions of one token, in each process")
+    session_idle: float = Field(900.0, gt=0, description="After how long without an input a live session ends [s]")
+    session_kept: float = Field(120.0, gt=0, description="How long a live session waits for a lost connection [s]")
+    session_seconds: float = Field(3600.0, gt=0, description="Most processor time of one live session [s]")
     page: Path = Field(BUILT, description="Directory of the built web page; `make page` makes it")
     metrics: bool = Field(True, description="Serve /metrics in Prometheus' text format")
 

@@ -167,7 +167,9 @@ register(
     grip_impulse=Quantity("N s", "impulse that each grip put in since the start", "J"),
     grip_moment=Quantity("N m s", "moment of impulse about its pivot that each grip put in since the start", "L"),
     fracture_energy=Quantity("J", "energy that breaks of rods and bonds took since the start", "E_f"),
-    crack_area=Quantity("m2", "area of the cracks along the grain, what is damaged by its share", "A_c"),
+    crack_area=Quantity(
+        "m2", "area of the cracks along the grain, what is damaged by the share of its energy that is spent", "A_c"
+    ),
     tip_position=Quantity("m", "mean position of the rods' far ends, weighted with their sections", "x_tip"),
     rod_position=Quantity("m", "positions of both ends of every edge of the rods", "x"),
     rod_cut=Quantity("1", "where an edge is cut, 0 to 1 from its first end; -1 where it is not", "c"),

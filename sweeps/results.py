@@ -15,13 +15,14 @@ from __future__ import annotations
 import json
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from solver import quantities, registry
 from solver.contract import SolverError
+from store import seal
 from store.errors import NO_DAMAGE, CorruptShard
 from store.store import Store
 
@@ -61,7 +62,12 @@ class Row(NamedTuple):
 
 
 def find(
-    store: Store, solver: str | None = None, where: Iterable[str] = (), sort: str | None = None, last: bool = False
+    store: Store,
+    solver: str | None = None,
+    where: Iterable[str] = (),
+    sort: str | None = None,
+    last: bool = False,
+    damaged: MutableMapping[str, CorruptShard] | None = None,
 ) -> list[Row]:
     """Return the rows that meet all conditions, sorted.
 
@@ -71,17 +77,24 @@ def find(
         where: NAME<VALUE and the like; several in one may be joined by commas.
         sort: a name; with a minus sign before it, the largest first. Rows without it come last.
         last: of each run, the last stage alone.
+        damaged: takes what is wrong with results that cannot be read, by key; the others are listed.
 
     Raises:
         InvalidOption: a condition that cannot be read, or a name that no result has.
-        CorruptShard: a result is damaged.
+        CorruptShard: a result is damaged, and `damaged` is not given.
 
     """
     conditions = [_condition(part) for text in where for part in text.split(",")]
     found: list[Row] = []
     for key in iter(store.keys()):
         path = store.shard_path(key)
-        rows = _rows(path, path.stat().st_mtime_ns)  # one that was damaged may have been replaced
+        try:
+            rows = _rows(path, path.stat().st_mtime_ns)  # one that was damaged may have been replaced
+        except CorruptShard as error:
+            if damaged is None:
+                raise
+            damaged[key] = error
+            continue
         found += rows[-1:] if last else rows
     _check([name for name, _, _ in conditions] + ([sort.removeprefix("-")] if sort else []), found)
     if solver is not None:
@@ -144,10 +157,13 @@ def resolve(store: Store, beginning: str) -> str:
 
 @lru_cache(maxsize=1 << 16)
 def _rows(path: Path, stamp: int) -> tuple[Row, ...]:
-    """Return the rows of one shard. Fields stay on the disk and its seal is not checked: `wizen show` does that."""
+    """Return the rows of one shard, whose seal is checked first: on a damaged one HDF5 may hang."""
     import xarray as xr
 
+    advice = "`wizen table verify` looks closer; delete the file and run the same sweep again."
     try:
+        if not seal.is_whole(path):
+            raise CorruptShard(f"{path} is damaged: its bytes are not those that were written.", advice)
         with xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as opened:
             stages = [float(stage) for stage in opened["stage"].values]
             numbers = {
@@ -160,7 +176,6 @@ def _rows(path: Path, stamp: int) -> tuple[Row, ...]:
     except NO_DAMAGE:
         raise
     except (OSError, KeyError, ValueError, RuntimeError) as error:
-        advice = "`wizen table verify` looks closer; delete the file and run the same sweep again."
         raise CorruptShard(f"{path} cannot be read ({type(error).__name__}: {error}).", advice) from error
     solver, version = str(attrs["solver"]), str(attrs["solver_version"])
     said = {**_scalars(solver, params), "quality": str(need.get("quality", ""))}

@@ -34,8 +34,7 @@ def _plan(name: str, count: int | None = None) -> Plan:
 
 def _run(plan: Plan, root: Path, executor: Any) -> Store:
     store = Store.open(root, create=True)
-    for part in plan.parts():
-        run_plan(part, store, executor)
+    run_plan(plan, store, executor)
     return store
 
 

@@ -20,12 +20,16 @@ _DRIBBLE = 5.0
 
 
 class Found(NamedTuple):
-    """What came of it: latencies [s] of answers with 200 and with 503, sorted, and how many broke or said else."""
+    """What came of it: latencies [s] of answers with 200 and with 503, sorted, and how many broke or said else.
+
+    `late` is how much later than it was due each was asked [s], sorted: the asker's own lack of a processor.
+    """
 
     good: list[float]
     refused: list[float]
     broken: int
     seconds: float
+    late: list[float]
 
     @property
     def rate(self) -> float:
@@ -83,10 +87,13 @@ class _Asker:
         self.good: list[float] = []
         self.refused: list[float] = []
         self.broken = 0
+        self.late: list[float] = []
 
-    async def ask(self) -> None:
+    async def ask(self, due: float | None = None) -> None:
         self.asked += 1
         path, begin = self.path(self.asked), time.perf_counter()
+        if due is not None:
+            self.late.append(begin - due)
         while self.idle and self.idle[-1].transport is None:
             self.idle.pop()
         try:
@@ -109,7 +116,7 @@ class _Asker:
         for line in self.idle:
             if line.transport is not None:
                 line.transport.close()
-        return Found(sorted(self.good), sorted(self.refused), self.broken, seconds)
+        return Found(sorted(self.good), sorted(self.refused), self.broken, seconds, sorted(self.late))
 
 
 async def closed_loop(port: int, path: Callable[[int], str], clients: int, seconds: float) -> Found:
@@ -132,7 +139,7 @@ async def open_loop(port: int, path: Callable[[int], str], rate: float, seconds:
     while (due := due + chance.expovariate(rate)) < begin + seconds:
         if (wait := due - time.perf_counter()) > 0:
             await asyncio.sleep(wait)
-        task = asyncio.ensure_future(asker.ask())
+        task = asyncio.ensure_future(asker.ask(due))
         under_way.add(task)
         task.add_done_callback(under_way.discard)
     if under_way:

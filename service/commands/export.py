@@ -96,7 +96,7 @@ def export(asked: _Asked) -> None:
     from ..sequences import Options, prepared
 
     chosen, out = _format(asked.format, asked.out, asked.result)
-    run = _read(asked.result, asked.store)
+    run = _shown(_read(asked.result, asked.store))
     options = Options.parse({"map": asked.map_, **{name: getattr(asked, name) for name in _SHARED}})
     sequence = prepared(run, options, asked.stage, chosen is None or chosen.single)
     bound = None
@@ -170,6 +170,20 @@ def _read(result: str, store: Path | None) -> xr.Dataset:
         raise InvalidOption(f"{result[:80]!r} is no file.", "Name a result file (.h5), or a key's --store.")
     opened = Store.open(store)
     return opened.get(resolve(opened, result))
+
+
+def _shown(run: xr.Dataset) -> xr.Dataset:
+    """Return a result that has a surface: where it was stored without one, it is solved again."""
+    from solver.contract import Context
+    from sweeps import tabled
+    from sweeps.commands.terminal import progress
+    from sweeps.surfaced import has_surface, surfaced
+
+    if has_surface(run):
+        return run
+    note("the result was stored without its surface: it is solved again, which takes as long as it took.")
+    with progress.one_run("solve") as observe, progress.stopping() as stop:
+        return surfaced(run, Context(observe, stop.is_set, shapes=tabled.shape)) or run
 
 
 def _written(sequence: Sequence, chosen: Export | None, options: Options) -> bytes:

@@ -8,6 +8,7 @@ all connections are taken, a newcomer displaces the one that has been longest ab
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections import Counter
 from functools import cache
 from typing import Any
@@ -21,12 +22,28 @@ from ..problems import MEDIA_TYPE, URN
 from ..settings import Settings
 from .clients import address
 
-__all__ = ["GuardedProtocol"]
+__all__ = ["GuardedProtocol", "forget", "taken"]
 
 #: Connections of each server by client.
 _clients: WeakKeyDictionary[ServerState, Counter[str]] = WeakKeyDictionary()
 #: Those of each server whose head has not come yet, the longest awaited first.
 _slow: WeakKeyDictionary[ServerState, dict[GuardedProtocol, None]] = WeakKeyDictionary()
+#: Counts the connections that this process has taken.
+_count = itertools.count(1)
+_taken = 0
+
+
+def taken() -> int:
+    """Return how many connections this process has taken so far."""
+    return _taken
+
+
+def forget(server: ServerState, client: str) -> None:
+    """Count one connection less of a client: it is lost, as HTTP or as what it became since (`sockets`)."""
+    counts = _clients[server]
+    counts[client] -= 1
+    if counts[client] <= 0:
+        del counts[client]
 
 
 @cache
@@ -49,6 +66,8 @@ class GuardedProtocol(HttpToolsProtocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take a connection, if there is room for one more."""
+        global _taken
+        _taken = next(_count)
         super().connection_made(transport)
         limits = self._limits
         counts = _clients.setdefault(self.server_state, Counter())
@@ -74,10 +93,7 @@ class GuardedProtocol(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget a connection."""
         self._stop_timer()
-        counts = _clients[self.server_state]
-        counts[self._name] -= 1
-        if counts[self._name] <= 0:
-            del counts[self._name]
+        forget(self.server_state, self._name)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:

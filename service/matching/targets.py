@@ -47,8 +47,10 @@ class Target(Protocol):
     kind: str
     parts: tuple[str, ...]
     about: dict[str, Any]
-    like: tuple[object, ...]
-    """What targets share that see shapes of tables alike"""
+
+    @property
+    def like(self) -> tuple[object, ...]:
+        """What targets share that see shapes of tables alike."""
 
     def seen(self, coarse: bool) -> Look:
         """Return what it is like, for the first look at a table or for the search."""

@@ -112,39 +112,13 @@ def encode(
     """Return the file of the seen instances with their lattices; `held` are props by what they are.
 
     unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of what it is
-    made of; of those that are `known` nothing but the etag is there.
+    made of; of those that are `known` no more is there. They say too how long r1 is in their positions.
     """
     file = _File(compressor() if compress else None)
-    meshes: list[Json] = []
     nodes: list[Json] = []
-    materials: list[Json] = []
-    skins: dict[tuple[str, float], tuple[int, Skin]] = {}
-    indices: dict[int, int] = {}  # of the lattices that are sent
     groups: Sequence[Array] = list(np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1).T)
     order = [np.flatnonzero((seen.kind == k) & (n == size) & (seen.mirrored == m)) for k, size, m in groups]
-    made: dict[tuple[int, int], tuple[int, float]] = {}
-    for k, size, _ in groups:
-        if (k, size) in made:
-            continue
-        kind = kinds[k]
-        name = (kind.shade[0], round(kind.dryness, 3))
-        if name not in skins:
-            skins[name] = len(materials), skin(kind.shade[1], kind.dryness)
-            materials.append(_material(kind.shade[0], skins[name][1]))
-        material, looks = skins[name]
-        tag, scale = moving.etag(kind, int(size)), kind.step
-        made[k, size] = len(meshes), scale
-        meshes.append({"name": f"{kind.label} {size}"})
-        if tag in known:
-            meshes[-1] |= _stub(file, material, tag)
-            continue
-        first, *later = (pack(one, looks, kind.extent) for one in (kind.shape(int(size)), *kind.later(int(size))))
-        if size not in indices:
-            indices[size] = _indices(file, mesh.triangles(int(size)))
-        meshes[-1] |= _mesh(file, first, indices[size], material, tag)
-        if later:
-            meshes[-1]["weights"] = [0.0] * len(later)
-            meshes[-1]["primitives"][0]["targets"] = moving.target_views(file, first, later)
+    meshes, materials, made = _meshes(file, kinds, groups, known)
     if len(n):
         nodes = _instances(file, kinds, seen, groups, order, made)
     changing = [(at, kinds[k]) for at, (k, _, _) in enumerate(groups) if kinds[k].curve]
@@ -172,6 +146,44 @@ def encode(
     return file.pack({key: value for key, value in document.items() if value != []})
 
 
+def _meshes(
+    file: _File, kinds: Sequence[Kind], groups: Sequence[Array], known: Collection[str]
+) -> tuple[list[Json], list[Json], dict[tuple[int, int], tuple[int, float]]]:
+    """Append the distinct lattices; return meshes, materials, and each mesh's number and step [r1]."""
+    meshes: list[Json] = []
+    materials: list[Json] = []
+    skins: dict[tuple[str, float], tuple[int, Skin]] = {}
+    indices: dict[int, int] = {}  # of the lattices that are sent
+    made: dict[tuple[int, int], tuple[int, float]] = {}
+    for k, size in ((int(k), int(size)) for k, size, _ in groups):
+        if (k, size) in made:
+            continue
+        kind = kinds[k]
+        name = (kind.shade[0], round(kind.dryness, 3))
+        if name not in skins:
+            skins[name] = len(materials), skin(kind.shade[1], kind.dryness)
+            materials.append(_material(kind.shade[0], skins[name][1]))
+        material, looks = skins[name]
+        made[k, size] = len(meshes), kind.step
+        tag = moving.etag(kind, size)
+        # with these, whoever has the file can put other stages of the kind in the place of this one
+        extras: Json = {"etag": tag, "kind": kind.label, "colatitudes": size, "r1": 1 / kind.step}
+        meshes.append({"name": f"{kind.label} {size}", "extras": extras})
+        if tag in known:
+            extras["known"] = True
+            meshes[-1]["primitives"] = [_stub(file, material)]
+            continue
+        first, *later = (pack(one, looks, kind.extent) for one in (kind.shape(size), *kind.later(size)))
+        if size not in indices:
+            indices[size] = _indices(file, mesh.triangles(size))
+        primitive = _primitive(file, first, indices[size], material)
+        meshes[-1]["primitives"] = [primitive]
+        if later:
+            meshes[-1]["weights"] = [0.0] * len(later)
+            primitive["targets"] = moving.target_views(file, first, later)
+    return meshes, materials, made
+
+
 def _indices(file: _File, triangles: Array) -> int:
     flat = triangles.ravel()
     small = int(flat.max()) < 0xFFFF
@@ -179,7 +191,7 @@ def _indices(file: _File, triangles: Array) -> int:
     return file.accessor(view, _USHORT if small else _UINT, "SCALAR", len(flat))
 
 
-def _mesh(file: _File, packed: Packed, indices: int, material: int, etag: str) -> Json:
+def _primitive(file: _File, packed: Packed, indices: int, material: int) -> Json:
     vertices, count = packed.vertices, len(packed.vertices)
     view = file.view(vertices, "ATTRIBUTES", _VERTICES)
     at = VERTEX.fields
@@ -189,11 +201,10 @@ def _mesh(file: _File, packed: Packed, indices: int, material: int, etag: str) -
         "NORMAL": file.accessor(view, _BYTE, "VEC3", count, at["normal"][1], normalized=True),
         "COLOR_0": file.accessor(view, _UBYTE, "VEC4", count, at["colour"][1], normalized=True),
     }
-    primitive = {"attributes": attributes, "indices": indices, "material": material}
-    return {"primitives": [primitive], "extras": {"etag": etag}}
+    return {"attributes": attributes, "indices": indices, "material": material}
 
 
-def _stub(file: _File, material: int, etag: str) -> Json:
+def _stub(file: _File, material: int) -> Json:
     """Return what stands for a mesh that the asker has: a triangle without extent."""
     empty = moving.known_vertices(VERTEX)
     at = VERTEX.fields
@@ -204,7 +215,7 @@ def _stub(file: _File, material: int, etag: str) -> Json:
         "POSITION": file.accessor(view, _SHORT, "VEC3", 3, at["position"][1], min=[0] * 3, max=[0] * 3),
         "NORMAL": file.accessor(view, _BYTE, "VEC3", 3, at["normal"][1], normalized=True),
     }
-    return {"primitives": [{"attributes": attributes, "material": material}], "extras": {"etag": etag, "known": True}}
+    return {"attributes": attributes, "material": material}
 
 
 def _instances(

@@ -173,7 +173,7 @@ def _only(tables: LiveTables) -> str:
         InvalidInput: there are none, or of several.
 
     """
-    found = sorted({tables.info(name).solver for name in tables.names()})
+    found = tables.solvers()
     if len(found) != 1:
         advice = f"Name one: {', '.join(found)}." if found else "Build a table first."
         raise InvalidInput(f"the tables are of {len(found)} solvers, and the item names none.", advice=advice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -52,9 +53,11 @@ def document(told: Told) -> dict[str, Any]:
     ends = np.searchsorted(told.everything.item[order], np.arange(len(told.scene.items) + 1))
     first: set[tuple[int, int]] = set()
     least = min(spent.values(), default=0.0)
+    # lists, since most items are one instance, of which arrays are slow to ask
+    one = _Ranks(told.shown.tolist(), told.found.why.tolist(), n.tolist(), wanted.tolist())
+    ranks, bounds = order.tolist(), ends.tolist()
     items = [
-        _item(told, i, order[ends[i] : ends[i + 1]], n, wanted, spent, least, first)
-        for i in range(len(told.scene.items))
+        _item(told, i, ranks[bounds[i] : bounds[i + 1]], one, spent, least, first) for i in range(len(told.scene.items))
     ]
     why = {text: int((told.found.why == code).sum()) for code, text in _WHY.items()}
     distinct = sorted(
@@ -88,19 +91,27 @@ def _by_lattice(kinds: Sequence[Kind]) -> dict[int, float]:
     return {n: min(values) for n, values in found.items()}
 
 
+class _Ranks(NamedTuple):
+    """By instance: whether it is shown, why not, its lattice, and the lattice that the screen asks for."""
+
+    shown: list[bool]
+    why: list[int]
+    n: list[int]
+    wanted: list[int]
+
+
 def _item(
     told: Told,
     i: int,
-    rows: Array,
-    n: Array,
-    wanted: Array,
+    rows: list[int],
+    ranks: _Ranks,
     spent: Mapping[int, float],
     least: float,
     first: set[tuple[int, int]],
 ) -> dict[str, Any]:
     one, k = told.scene.items[i], told.rows[i]
     kind = told.kinds[k]
-    if len(rows) == 1 and not told.shown[rows[0]]:
+    if len(rows) == 1 and not ranks.shown[rows[0]]:
         # most items of a large scene
         return {
             "name": one.name or kind.label,
@@ -110,17 +121,17 @@ def _item(
             "computed": [],
             "shared": 0,
             "reduced": 0,
-            "skipped": {_WHY[int(told.found.why[rows[0]])]: 1},
+            "skipped": {_WHY[ranks.why[rows[0]]]: 1},
             "lattices": {},
             "milliseconds_saved": round(least, 2),
         }
-    shown = rows[told.shown[rows]]
-    lattices, counts = np.unique(n[shown], return_counts=True)
-    computed = [int(size) for size in lattices if (k, int(size)) not in first]
+    shown = [row for row in rows if ranks.shown[row]]
+    lattices = sorted(Counter(ranks.n[row] for row in shown).items())
+    computed = [size for size, _ in lattices if (k, size) not in first]
     first |= {(k, size) for size in computed}
-    alone = sum(spent.get(int(size), least) for size in n[shown]) + least * (len(rows) - len(shown))
+    alone = sum(spent.get(size, least) * count for size, count in lattices) + least * (len(rows) - len(shown))
     used = sum(1e3 * kind.spent.get(size, 0.0) for size in computed)
-    left = {text: int((told.found.why[rows] == code).sum()) for code, text in _WHY.items()}
+    left = Counter(ranks.why[row] for row in rows)
     said: dict[str, Any] = {
         "name": one.name or kind.label,
         "table": kind.table.info.name,
@@ -128,12 +139,12 @@ def _item(
         "shown": len(shown),
         "computed": computed,
         "shared": max(len(shown) - len(computed), 0),
-        "reduced": int((n[shown] < wanted[shown]).sum()),
-        "skipped": {text: count for text, count in left.items() if count},
-        "lattices": {str(size): int(count) for size, count in zip(lattices, counts, strict=True)},
+        "reduced": sum(ranks.n[row] < ranks.wanted[row] for row in shown),
+        "skipped": {text: left[code] for code, text in _WHY.items() if left[code]},
+        "lattices": {str(size): count for size, count in lattices},
         "milliseconds_saved": round(max(alone - used, 0.0), 2),
     }
-    looked = [kind.shapes[int(size)] for size in lattices if int(size) in kind.shapes] or (
+    looked = [kind.shapes[size] for size, _ in lattices if size in kind.shapes] or (
         [kind.shapes[COARSE]] if COARSE in kind.shapes else []
     )
     if looked:

@@ -83,36 +83,35 @@ def hidden(camera: Camera, found: View, inner: Floats, outer: Floats) -> Array:
         return out
     u, v = 0.5 * columns + x / np.maximum(z, 1e-9) * per, 0.5 * rows - y / np.maximum(z, 1e-9) * per
     r = inner / np.maximum(z, 1e-9) * per
-    for i in seen[np.argsort(-r[seen], kind="stable")][:_HIDING]:
-        if r[i] < 1:
-            break
-        top, bottom = max(math.ceil(v[i] - r[i]), 0), min(math.floor(v[i] + r[i]), rows)
-        left, right = max(math.ceil(u[i] - r[i]), 0), min(math.floor(u[i] + r[i]), columns)
-        if top >= bottom or left >= right:
-            continue
+    ranked = seen[np.argsort(-r[seen], kind="stable")][:_HIDING]
+    ranked = ranked[r[ranked] >= 1]
+    tops, bottoms = _cells(np.ceil(v - r), np.floor(v + r), rows)
+    lefts, rights = _cells(np.ceil(u - r), np.floor(u + r), columns)
+    for i in ranked[(tops < bottoms)[ranked] & (lefts < rights)[ranked]]:
+        top, bottom, left, right = tops[i], bottoms[i], lefts[i], rights[i]
         # the corner of a cell that is farthest from the middle
         down = np.abs(np.arange(top, bottom) + 0.5 - v[i]) + 0.5
         along = np.abs(np.arange(left, right) + 0.5 - u[i]) + 0.5
         part = depth[top:bottom, left:right]
-        part[down[:, None] ** 2 + along**2 <= r[i] ** 2] = np.minimum(part, z[i])[
-            down[:, None] ** 2 + along**2 <= r[i] ** 2
-        ]
-    # the outline of a ball lies within this many slopes of its centre's
-    near = z - outer
-    for i in seen:
-        # the ball's silhouette, bounded: slopes of the sides of the box around it
-        s = outer[i]
-        us = [0.5 * columns + per * a for a in _slopes(x[i], z[i], s)]
-        vs = [0.5 * rows - per * a for a in _slopes(y[i], z[i], s)]
-        top, bottom = max(math.floor(min(vs)), 0), min(math.ceil(max(vs)), rows)
-        left, right = max(math.floor(min(us)), 0), min(math.ceil(max(us)), columns)
-        if top < bottom and left < right:
-            out[i] = bool(depth[top:bottom, left:right].max() < near[i])
+        np.minimum(part, z[i], out=part, where=down[:, None] ** 2 + along**2 <= r[i] ** 2)
+    # the square around a ball's outline
+    near, z, s = (z - outer)[seen], z[seen], outer[seen]
+    us = [0.5 * columns + per * a for a in _slopes(x[seen], z, s)]
+    vs = [0.5 * rows - per * a for a in _slopes(y[seen], z, s)]
+    lefts, rights = _cells(np.floor(us[0]), np.ceil(us[1]), columns)
+    tops, bottoms = _cells(np.floor(vs[1]), np.ceil(vs[0]), rows)
+    for k in np.flatnonzero((tops < bottoms) & (lefts < rights)):
+        out[seen[k]] = depth[tops[k] : bottoms[k], lefts[k] : rights[k]].max() < near[k]
     return out
 
 
-def _slopes(x: float, z: float, s: float) -> tuple[float, float]:
-    """Return the least and the largest slope x/z of a disc of radius s about (x, z), z > s: its tangents."""
-    root = s * math.sqrt(max(x * x + z * z - s * s, 0.0))
+def _cells(low: Floats, high: Floats, most: int) -> tuple[Array, Array]:
+    """Return bounds of cells (b), within a picture of so many."""
+    return np.clip(low, 0, most).astype(int), np.clip(high, 0, most).astype(int)
+
+
+def _slopes(x: Floats, z: Floats, s: Floats) -> tuple[Floats, Floats]:
+    """Return the least and the largest slope x/z of discs of radii s about (x, z), z > s: their tangents (b)."""
+    root = s * np.sqrt(np.maximum(x * x + z * z - s * s, 0.0))
     below = z * z - s * s
     return (x * z - root) / below, (x * z + root) / below

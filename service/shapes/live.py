@@ -49,6 +49,7 @@ class LiveTables:
         self._open: dict[str, _Open] = {}
         self._manifests: dict[str, tuple[Stamp, TableInfo]] = {}
         self._families: dict[str, tuple[Families, float]] = {}
+        self._solvers: tuple[tuple[str, ...], float] | None = None
         self._opening = threading.Lock()
         self._looking = threading.Lock()
         self._store: Store | None = None
@@ -149,6 +150,19 @@ class LiveTables:
             found = known[0]
         self._families[solver.name] = found, now
         return found
+
+    def solvers(self) -> tuple[str, ...]:
+        """Return the names of the solvers that have tables, sorted; looked at again at most every `interval` s.
+
+        Raises:
+            MissingStore: there is no store.
+            CorruptTable: a manifest is damaged, and no older generation is open.
+
+        """
+        now = time.monotonic()
+        if self._solvers is None or now - self._solvers[1] >= self._interval:
+            self._solvers = tuple(sorted({self._manifest(name).solver for name in self.names()})), now
+        return self._solvers[0]
 
     def is_open(self, name: str) -> bool:
         """Return whether `get` will find the table open."""

@@ -1,8 +1,9 @@
 """Shapes computed in the event loop take turns, in the order in which they were asked.
 
-Between two of them the loop makes a few passes: it takes new connections (uvloop one in each pass), reads requests and
-sends what the sockets take. Without turns, all that is read in one pass would be computed in a row, and a newcomer
-would wait for several such rows.
+Between two of them the loop makes a few passes: it takes new connections, reads requests and sends what the sockets
+take. Without turns, all that is read in one pass would be computed in a row, and a newcomer would wait for several such
+rows. uvloop takes one connection in a pass: as long as there come more, more passes are made, or a crowd of newcomers
+would queue before the door, where nobody is told that there is too much to do.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ import asyncio
 from types import TracebackType
 
 from ..errors import Overloaded
+from ..limits import connections
 
 __all__ = ["Turns"]
 
-
-#: Passes of the loop between two turns while others wait.
-_PASSES = 1
+#: Passes of the loop between two turns while others wait or come: that many after the last connection was taken, which
+#: shows a pass late, and at most so many in all. One that takes a connection and refuses its request costs a tenth of a
+#: shape.
+_PASSES, _MOST_PASSES = 2, 16
 
 
 class Turns:
@@ -25,6 +28,7 @@ class Turns:
     def __init__(self, most: int) -> None:
         self._most = most
         self._waiting = 0
+        self._taken = 0
         self._lock = asyncio.Lock()
 
     @property
@@ -54,10 +58,13 @@ class Turns:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Let the next one have his turn after a few passes of the loop."""
-        self._leave(_PASSES)
+        self._leave(0, 0)
 
-    def _leave(self, passes: int) -> None:
-        if self._waiting and passes:
-            asyncio.get_running_loop().call_soon(self._leave, passes - 1)
+    def _leave(self, passes: int, quiet: int) -> None:
+        taken, self._taken = self._taken, connections.taken()
+        has_come = self._taken > taken
+        quiet = 0 if has_come else quiet
+        if (self._waiting or has_come or passes) and quiet < _PASSES and passes < _MOST_PASSES:
+            asyncio.get_running_loop().call_soon(self._leave, passes + 1, quiet + 1)
         else:
             self._lock.release()

@@ -113,6 +113,7 @@ class SolverEntry(BaseModel):
 
     name: str
     title: str
+    advance: str = Field(description="The word for going along its stages, e.g. Dry")
     href: str
 
 
@@ -140,6 +141,7 @@ class StageAxis(BaseModel):
     units: str
     lowest: float
     highest: float
+    default: list[float] = Field(description="Stages of a run that names none")
 
 
 class Quality(BaseModel):
@@ -147,6 +149,14 @@ class Quality(BaseModel):
 
     relative_error: float | None = Field(description="As measured; null where it never was")
     resolution: int | None = Field(description="Colatitude samples of its lattice, where it has one")
+
+
+class SessionPage(BaseModel):
+    """A live engine (docs/sessions.md)."""
+
+    address: str = Field(description="WebSocket")
+    actions: dict[str, dict[str, Any]] = Field(description="JSON schema of what goes with each action")
+    fields: list[str] = Field(description="What may be shown beside the shape")
 
 
 class SolverPage(BaseModel):
@@ -165,4 +175,5 @@ class SolverPage(BaseModel):
     sizes: dict[str, float] = Field(description="Length of r1 by preset [m]; none where any size is right")
     looks: dict[str, Any] = Field(description="Colours by field, and labels and places for a page")
     qualities: dict[str, Quality]
+    session: SessionPage | None = Field(None, description="Where and how it is worked on live, if it can be")
     links: dict[str, str]

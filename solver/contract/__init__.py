@@ -7,6 +7,7 @@ progress, cancellation and randomness, and every failure is a `SolverError` that
 from .clock import Clock
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
+from .live import Live, LiveEngine
 from .looks import Fur, Label, Looks, Place, Shade, Skin
 from .need import Need, Quality, Region, Start
 from .params import Params
@@ -23,6 +24,8 @@ __all__ = [
     "InvalidGeometry",
     "InvalidInput",
     "Label",
+    "Live",
+    "LiveEngine",
     "Looks",
     "Need",
     "NotConverged",

@@ -15,6 +15,7 @@ from ..arrays import Floats
 from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
+from .live import Live
 from .looks import Looks
 from .need import Need, Quality
 from .params import Params
@@ -63,6 +64,7 @@ class Solver:
     context, steps)`, which brings a surface on the lattice into the equilibrium next to it, or so many steps nearer,
     and returns what `run` returns of one stage, how far it `moved` and from which residual (`residual_placed`).
     `tolerances` are the worst of each quality over all that was. `clock` turns hours under given conditions into
+    stages. `live` begins a run that is acted upon while it goes.
     stages. `sizes` are lengths of r1, or of the solver's own unit, in metres by preset, as such fruits are when fresh.
     """
 
@@ -86,6 +88,7 @@ class Solver:
     error: Callable[[Any, Quality, float], float] | None = None
     relax: Callable[..., xr.Dataset] | None = None
     clock: Clock | None = None
+    live: Live | None = None
     sizes: Mapping[str, float] = field(default_factory=dict)
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:

@@ -21,14 +21,18 @@ __all__ = ["GAP", "Apart", "Topology", "put_apart"]
 Doubles = NDArray[np.float64]
 Words = NDArray[np.int32]
 
-#: Gap, as a share of the smaller triangle's size (root of its area), at which evening out begins.
+#: Gap, as a share of the smaller triangle's size (the least of its heights), at which evening out begins. By the
+#: root of its area, needles around a pole would come near to those beside them.
 GAP = 0.01
 #: Share of it that is enough, in the first rounds and when they were not.
 _ENOUGH, _AT_LAST = 0.5, 0.02
-#: Way of a corner in each round, in overlaps with the gap added.
+#: Way of a corner in each round, in overlaps with the gap added; twice as far after each look at the whole surface, for
+#: slivers overlap by next to nothing however far they have to go.
 _WAY = 2.0
 #: Most rounds, and rounds between two looks at the whole surface.
 _ROUNDS, _STEPS = 240, 12
+#: How many points beyond what is pushed others are watched until the next look.
+_RINGS = 3
 
 
 class Topology(NamedTuple):
@@ -41,11 +45,15 @@ class Topology(NamedTuple):
     near: Words
 
     @classmethod
-    def of(cls, triangles: NDArray[np.integer], vertices: int) -> Topology:
-        """Return the topology of closed triangles on so many vertices."""
+    def of(cls, triangles: NDArray[np.integer], vertices: int, links: NDArray[np.integer] | None = None) -> Topology:
+        """Return the topology of closed triangles on so many vertices; `links` (m, 2) are more neighbours, each of the
+        second vertex for the first one.
+        """
         faces = np.ascontiguousarray(triangles, np.int32)
         # on a closed surface every neighbour is the next corner of exactly one triangle
         ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        if links is not None:
+            ends = np.concatenate([ends, links.astype(np.int32)])
         ends = ends[np.argsort(ends[:, 0], kind="stable")]
         first = np.concatenate([[0], np.cumsum(np.bincount(ends[:, 0], minlength=vertices))])
         return cls(faces, first.astype(np.int32), np.ascontiguousarray(ends[:, 1]))
@@ -70,25 +78,65 @@ def put_apart(x: Doubles, topology: Topology, rounds: int = _ROUNDS) -> Apart:
 @njit(cache=True, error_model="numpy", nogil=True)  # a service has others to answer meanwhile
 def _put_apart(x: Doubles, faces: Words, first: Words, near: Words, rounds: int) -> tuple[int, int, int]:
     began, spent = -1, 0
-    size, weight, way = np.empty(len(faces)), np.empty(0), np.empty(0)
+    size, weight, way = np.empty(len(faces)), np.zeros(len(x)), np.zeros(len(x))
+    moved = np.empty(0, np.bool_)
     while True:
-        some = candidates(x, faces, size)
+        # what did not move since the last look was out of contact then
+        some = candidates(x, faces, size, moved)
         if len(some) == 0:
             return max(began, 0), spent, 0
-        if began < 0:
-            weight, way = np.empty(len(x)), np.empty(len(x))
         found = pairs(x, faces, some, size)
         axes = np.zeros(len(found), np.int8)
-        active = _weigh(x, faces, found, axes, size, weight, _ENOUGH if spent < _STEPS else _AT_LAST)
+        active, pushed = _weigh(x, faces, found, axes, size, weight, spent)
         began = active if began < 0 else began
-        if active == 0 or spent >= rounds:
-            return began, spent, _count(x, faces, found) if active else 0
+        if active == 0:
+            return began, spent, 0
+        if spent >= rounds:
+            if len(moved) > 0:
+                found = pairs(x, faces, candidates(x, faces, size, moved[:0]), size)
+            return began, spent, _count(x, faces, found)
+        moved = np.zeros(len(x), np.bool_)
+        few, few_axes = _around(faces, found, axes, pushed, first, near)
         last = min(spent + _STEPS, rounds)
         while active > 0 and spent < last:
-            _spread(weight, way, first, near)
-            _step(x, way, first, near)
+            _step(x, _spread(weight, pushed, way, first, near), way, moved, first, near)
             spent += 1
-            active = _weigh(x, faces, found, axes, size, weight, _ENOUGH if spent < _STEPS else _AT_LAST)
+            weight[pushed] = 0
+            active, pushed = _weigh(x, faces, few, few_axes, size, weight, spent)
+        weight[pushed] = 0
+
+
+@njit(cache=True, error_model="numpy")
+def _around(
+    faces: Words, found: Words, axes: NDArray[np.int8], pushed: Words, first: Words, near: Words
+) -> tuple[Words, NDArray[np.int8]]:
+    """Return the pairs that some rounds may bring into contact: those a few points from what is pushed."""
+    is_near = np.zeros(len(first) - 1, np.bool_)
+    front = pushed
+    for _ in range(_RINGS):
+        count = 0
+        wider = np.empty(len(front) * 8, np.int32)
+        for v in front:
+            is_near[v] = True
+            for place in range(first[v], first[v + 1]):
+                w = near[place]
+                if not is_near[w]:
+                    is_near[w] = True
+                    if count == len(wider):
+                        wider = np.concatenate((wider, wider))
+                    wider[count] = w
+                    count += 1
+        front = wider[:count]
+    kept = np.empty(len(found), np.int64)
+    count = 0
+    for n in range(len(found)):
+        a, b = found[n, 0], found[n, 1]
+        for k in range(3):
+            if is_near[faces[a, k]] or is_near[faces[b, k]]:
+                kept[count] = n
+                count += 1
+                break
+    return found[kept[:count]], axes[kept[:count]]
 
 
 @njit(cache=True, error_model="numpy")
@@ -123,13 +171,15 @@ def _along(x: Doubles, faces: Words, a: int, b: int, axis: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _weigh(
-    x: Doubles, faces: Words, pairs: Words, axes: NDArray[np.int8], size: Doubles, weight: Doubles, enough: float
-) -> int:
-    """Fill the way (nv,) that each vertex may go, and return the number of pairs that ask for it; 0 if `enough` of
-    the gap stays everywhere.
+    x: Doubles, faces: Words, pairs: Words, axes: NDArray[np.int8], size: Doubles, weight: Doubles, spent: int
+) -> tuple[int, Words]:
+    """Fill the way (nv,), zero before, that each vertex may go after so many rounds; return the number of pairs that
+    ask for it, 0 if enough of the gap stays everywhere, and the vertices that have one.
     """
-    weight[:] = 0
+    enough = _ENOUGH if spent < _STEPS else _AT_LAST
+    far = _WAY * 2.0 ** min(spent // _STEPS, 8)
     active, is_enough = 0, True
+    pushed, count = np.empty(1024, np.int32), 0
     for n in range(len(pairs)):
         a, b = pairs[n, 0], pairs[n, 1]
         gap = GAP * min(size[a], size[b])
@@ -146,49 +196,61 @@ def _weigh(
         if overlap <= -gap:
             continue
         active += 1
-        way = _WAY * (overlap + gap)
+        way = far * (overlap + gap)
         is_enough = is_enough and overlap <= -enough * gap
-        for k in range(3):
-            weight[faces[a, k]] = max(weight[faces[a, k]], way)
-            weight[faces[b, k]] = max(weight[faces[b, k]], way)
-    return 0 if is_enough else active
+        if count + 6 > len(pushed):
+            pushed = np.concatenate((pushed, pushed))
+        for t in (a, b):
+            for k in range(3):
+                v = faces[t, k]
+                if weight[v] == 0:
+                    pushed[count] = v
+                    count += 1
+                weight[v] = max(weight[v], way)
+    return 0 if is_enough else active, pushed[:count]
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(weight: Doubles, way: Doubles, first: Words, near: Words) -> None:
-    """Give every vertex the longest way among its own and its neighbours'."""
-    way[:] = weight
-    for v in range(len(weight)):
-        if weight[v] > 0:
-            for place in range(first[v], first[v + 1]):
-                way[near[place]] = max(way[near[place]], weight[v])
+def _spread(weight: Doubles, pushed: Words, way: Doubles, first: Words, near: Words) -> Words:
+    """Give vertices the longest way among their own and their neighbours', zero before; return those that have one."""
+    who, count = np.empty(len(pushed) * 8, np.int32), 0
+    for v in pushed:
+        if count + 1 + first[v + 1] - first[v] > len(who):
+            who = np.concatenate((who, np.empty(len(who) + first[v + 1] - first[v] + 1, np.int32)))
+        if way[v] == 0:
+            who[count] = v
+            count += 1
+        way[v] = max(way[v], weight[v])
+        for place in range(first[v], first[v + 1]):
+            w = near[place]
+            if way[w] == 0:
+                who[count] = w
+                count += 1
+            way[w] = max(way[w], weight[v])
+    return who[:count]
 
 
 @njit(cache=True, error_model="numpy")
-def _step(x: Doubles, way: Doubles, first: Words, near: Words) -> None:
-    """Move vertices halfway to the mean of their neighbours, but no farther than their way."""
-    count = 0
-    for v in range(len(x)):
-        count += way[v] > 0
-    goal, who, place = np.empty((count, 3)), np.empty(count, np.int32), 0
-    for v in range(len(x)):
-        if way[v] <= 0:
-            continue
+def _step(x: Doubles, who: Words, way: Doubles, moved: NDArray[np.bool_], first: Words, near: Words) -> None:
+    """Move some vertices halfway to the mean of their neighbours, but no farther than their way, which is then zero."""
+    goal = np.empty((len(who), 3))
+    for n in range(len(who)):
+        v = who[n]
         square = 0.0
         for k in range(3):
             total = 0.0
-            for n in range(first[v], first[v + 1]):
-                total += x[near[n], k]
-            goal[place, k] = (total / (first[v + 1] - first[v]) - x[v, k]) / 2
-            square += goal[place, k] ** 2
+            for place in range(first[v], first[v + 1]):
+                total += x[near[place], k]
+            goal[n, k] = (total / (first[v + 1] - first[v]) - x[v, k]) / 2
+            square += goal[n, k] ** 2
         part = min(way[v] / math.sqrt(square), 1.0) if square > 0 else 0.0
         for k in range(3):
-            goal[place, k] = x[v, k] + part * goal[place, k]
-        who[place] = v
-        place += 1
-    for n in range(count):
+            goal[n, k] = x[v, k] + part * goal[n, k]
+    for n in range(len(who)):
+        v = who[n]
+        moved[v], way[v] = True, 0.0
         for k in range(3):
-            x[who[n], k] = goal[n, k]
+            x[v, k] = goal[n, k]
 
 
 @njit(cache=True, error_model="numpy")

@@ -21,10 +21,12 @@ __all__ = ["candidates", "pairs"]
 Doubles = NDArray[np.float64]
 Words = NDArray[np.int32]
 
-#: How far around a triangle others are looked for, as a share of its size (root of its area).
+#: How far around a triangle others are looked for, as a share of its size (the least of its heights).
 _AROUND = 0.1
-#: Sides of the cube around the origin reach to this, so that triangles over an edge are whole on one; and their cells.
-_WIDE, _CELLS = 1.3, 96
+#: Sides of the cube around the origin reach to this, so that triangles over an edge are whole on one.
+_WIDE = 1.3
+#: Cells along a side, over the root of the number of triangles, and at most.
+_FINE, _MOST = 0.75, 384
 
 
 @njit(cache=True, error_model="numpy")
@@ -36,7 +38,9 @@ def _look(x: Doubles, faces: Words, t: int, size: Doubles) -> bool:
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     volume = nx * x[a, 0] + ny * x[a, 1] + nz * x[a, 2]
     square = nx * nx + ny * ny + nz * nz
-    size[t] = math.sqrt(math.sqrt(square) / 2)
+    wx, wy, wz = vx - ux, vy - uy, vz - uz
+    longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
+    size[t] = math.sqrt(square / max(longest, 1e-300))
     if volume <= 0:
         return True
     square *= x[a, 0] ** 2 + x[a, 1] ** 2 + x[a, 2] ** 2
@@ -45,7 +49,7 @@ def _look(x: Doubles, faces: Words, t: int, size: Doubles) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _project(x: Doubles, faces: Words, t: int, side: int, box: NDArray[np.int64]) -> bool:
+def _project(x: Doubles, faces: Words, t: int, side: int, cells: int, box: NDArray[np.int64]) -> bool:
     """Fill `box` (2, 2) with the first and last cell that a triangle covers on a side of the cube around the origin, as
     seen from there; return False where it is not seen whole.
     """
@@ -62,11 +66,11 @@ def _project(x: Doubles, faces: Words, t: int, side: int, box: NDArray[np.int64]
     if low_u < -_WIDE or high_u > _WIDE or low_v < -_WIDE or high_v > _WIDE:
         return False
     # and the cells around, for what only comes near
-    scale = _CELLS / (2 * _WIDE)
+    scale = cells / (2 * _WIDE)
     box[0, 0] = max(int((low_u + _WIDE) * scale) - 1, 0)
-    box[0, 1] = min(int((high_u + _WIDE) * scale) + 1, _CELLS - 1)
+    box[0, 1] = min(int((high_u + _WIDE) * scale) + 1, cells - 1)
     box[1, 0] = max(int((low_v + _WIDE) * scale) - 1, 0)
-    box[1, 1] = min(int((high_v + _WIDE) * scale) + 1, _CELLS - 1)
+    box[1, 1] = min(int((high_v + _WIDE) * scale) + 1, cells - 1)
     return True
 
 
@@ -83,8 +87,23 @@ def _has_corner(x: Doubles, faces: Words, t: int, side: int) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def candidates(x: Doubles, faces: Words, size: Doubles) -> Words:
-    """Return the triangles that lie before or behind one that faces inwards; `size` (nt,) is filled."""
+def _mark(x: Doubles, faces: Words, some: Words, marked: NDArray[np.bool_]) -> bool:
+    """Mark the cells (6, n, n) of the cube that triangles cover; False where one is too large for that."""
+    box, cells = np.empty((2, 2), np.int64), marked.shape[1]
+    for n in range(len(some)):
+        for side in range(6):
+            if _project(x, faces, some[n], side, cells, box):
+                marked[side, box[0, 0] : box[0, 1] + 1, box[1, 0] : box[1, 1] + 1] = True
+            elif _has_corner(x, faces, some[n], side):
+                return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def candidates(x: Doubles, faces: Words, size: Doubles, moved: NDArray[np.bool_]) -> Words:
+    """Return the triangles that lie before or behind one that faces inwards, and one with a corner in `moved` (nv,);
+    where it is empty, each counts as moved. `size` (nt,) is filled.
+    """
     inward, count = np.empty(len(faces), np.int32), 0
     for t in range(len(faces)):
         if _look(x, faces, t, size):
@@ -92,19 +111,23 @@ def candidates(x: Doubles, faces: Words, size: Doubles) -> Words:
             count += 1
     if count == 0:
         return inward[:0]
-    marked = np.zeros((6, _CELLS, _CELLS), np.bool_)
+    cells = min(int(_FINE * math.sqrt(len(faces))) + 1, _MOST)
+    marked = np.zeros((6, cells, cells), np.bool_)
+    if not _mark(x, faces, inward[:count], marked):
+        return np.arange(len(faces)).astype(np.int32)
+    if len(moved) > 0:
+        others, count = np.empty(len(faces), np.int32), 0
+        for t in range(len(faces)):
+            if moved[faces[t, 0]] or moved[faces[t, 1]] or moved[faces[t, 2]]:
+                others[count] = t
+                count += 1
+        there = np.zeros((6, cells, cells), np.bool_)
+        if _mark(x, faces, others[:count], there):
+            marked &= there
     box = np.empty((2, 2), np.int64)
-    for n in range(count):
-        for side in range(6):
-            if _project(x, faces, inward[n], side, box):
-                for i in range(box[0, 0], box[0, 1] + 1):
-                    for j in range(box[1, 0], box[1, 1] + 1):
-                        marked[side, i, j] = True
-            elif _has_corner(x, faces, inward[n], side):  # too large: all are looked at
-                return np.arange(len(faces)).astype(np.int32)
     # the cell of each vertex on its own side
     sides, rows, columns = np.empty(len(x), np.int8), np.empty(len(x), np.int16), np.empty(len(x), np.int16)
-    scale = _CELLS / (2 * _WIDE)
+    scale = cells / (2 * _WIDE)
     for v in range(len(x)):
         side = 0
         for k in range(1, 3):
@@ -123,7 +146,7 @@ def candidates(x: Doubles, faces: Words, size: Doubles) -> Words:
             box[1, 0], box[1, 1] = min(columns[a], columns[b], columns[c]), max(columns[a], columns[b], columns[c])
             is_one = False
         else:
-            is_one = not _project(x, faces, t, side, box)
+            is_one = not _project(x, faces, t, side, cells, box)
         for i in range(box[0, 0], box[0, 1] + 1):
             for j in range(box[1, 0], box[1, 1] + 1):
                 is_one = is_one or marked[side, i, j]
@@ -144,24 +167,29 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
         for k in range(3):
             a, b, c = x[faces[t, 0], k], x[faces[t, 1], k], x[faces[t, 2], k]
             box[n, k], box[n, 3 + k] = min(a, b, c) - more, max(a, b, c) + more
-    # in strips across y, each swept along x
+    # in strips across y, each swept along x; what is walked through lies side by side in memory
     first_y, last_y = box[:, 1].min(), box[:, 4].max()
     strips = min(max(int(math.sqrt(count)) // 4, 1), 64)
     scale = strips / max(last_y - first_y, 1e-6)
     order = np.argsort(box[:, 0])
+    lows, highs, ends = np.empty(count, np.int32), np.empty(count, np.int32), np.zeros(strips + 1, np.int64)
+    for m in range(count):
+        n = order[m]
+        lows[m] = min(int((box[n, 1] - first_y) * scale), strips - 1)
+        highs[m] = min(int((box[n, 4] - first_y) * scale), strips - 1)
+        for strip in range(lows[m], highs[m] + 1):
+            ends[strip + 1] += 1
+    ends = np.cumsum(ends)
+    place, sorted_box, fill = np.empty(ends[-1], np.int32), np.empty((ends[-1], 6), np.float32), ends[:-1].copy()
+    first_strip = np.empty(ends[-1], np.int32)
+    for m in range(count):
+        for strip in range(lows[m], highs[m] + 1):
+            place[fill[strip]], first_strip[fill[strip]] = order[m], lows[m]
+            sorted_box[fill[strip]] = box[order[m]]
+            fill[strip] += 1
     found, room = np.empty((1024, 2), np.int32), 0
-    place, sorted_box = np.empty(count, np.int32), np.empty((count, 6), np.float32)
     for strip in range(strips):
-        low, high = first_y + strip / scale, first_y + (strip + 1) / scale
-        held = 0
-        for m in range(count):
-            n = order[m]
-            if box[n, 1] <= high and box[n, 4] >= low:
-                place[held] = n
-                for k in range(6):
-                    sorted_box[held, k] = box[n, k]
-                held += 1
-        for m in range(held):
+        for m in range(ends[strip], ends[strip + 1]):
             x1, y0, y1, z0, z1 = (
                 sorted_box[m, 3],
                 sorted_box[m, 1],
@@ -169,13 +197,13 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
                 sorted_box[m, 2],
                 sorted_box[m, 5],
             )
-            for o in range(m + 1, held):
+            for o in range(m + 1, ends[strip + 1]):
                 if sorted_box[o, 0] > x1:
                     break
                 if sorted_box[o, 1] > y1 or y0 > sorted_box[o, 4] or sorted_box[o, 2] > z1 or z0 > sorted_box[o, 5]:
                     continue
                 # a pair belongs to the strip in which both are met first
-                if strip > 0 and max(y0, sorted_box[o, 1]) < low:
+                if max(first_strip[m], first_strip[o]) != strip:
                     continue
                 if _neighbours(faces, some[place[m]], some[place[o]]):
                     continue

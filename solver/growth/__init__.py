@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..contract import Context, Cost, Need, Solver, StageAxis
+from ..contract import Context, Cost, Live, LiveEngine, Need, Quality, Solver, StageAxis
+from .actions import ACTIONS
 from .looks import CHANNELS, LOOKS
 from .params import GrowthParams
 from .presets import PRESETS
@@ -20,6 +21,12 @@ def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     from .run import run
 
     return run(params, need, context)
+
+
+def _live(params: GrowthParams, quality: Quality) -> LiveEngine:
+    from .live import GrowingLive
+
+    return GrowingLive(params, quality)
 
 
 def _cost(params: GrowthParams, need: Need) -> Cost:
@@ -43,4 +50,5 @@ SOLVER = Solver(
     looks=LOOKS,
     run=_run,
     cost=_cost,
+    live=Live(ACTIONS, _live, ("elastic_strain", *CHANNELS)),
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Generator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,9 @@ from .. import shell
 from ..contract import Context, InvalidGeometry
 from ..geometry.crossings import crossings
 from .fresh import fresh
+from .history import History, Moment
 from .matter import grown_further
-from .params import GrowthParams
+from .params import GrowthParams, Solid, present
 from .plastic import forgotten
 from .remeshing.remesh import remesh
 from .settling.active import Habit
@@ -32,12 +34,19 @@ from .tooling.placing import branched, started
 from .tooling.rates import grown, rates
 from .tooling.tools import Tool
 
-__all__ = ["Engine"]
+__all__ = ["Engine", "Undone"]
 
-#: Steps that can be undone so that the same way on gives the same bytes; beyond, the same to the residual.
-_EXACT = 30
+#: How long a solid was there that is taken away with the step in which it came [growth time].
+_INSTANT = 1e-9
 #: A mesh does not grow beyond this many times its first vertices.
 _MOST = 20
+
+
+class Undone(NamedTuple):
+    """What was gone back over, and where that began."""
+
+    taken: list[Moment]
+    present: Moment
 
 
 class Engine:
@@ -59,9 +68,8 @@ class Engine:
         """
         self.params, self.tolerance, self._most = params, tolerance, most
         self._material = shell.Material(params.thickness, params.poisson)
-        self._tools: list[Tool] = list(params.tools)
-        self._keeps = history
-        self._history: list[tuple[State, int, Tangent, Habit]] = []
+        self._tools, self._solids = list(params.tools), list(params.solids)
+        self._keeps, self._history = history, History()
         self._work: Generator[None, None, None] | None = None
         begun = params.mesh.shape() if params.mesh else start(params.shape, vertices, params.aspect)
         self.state = fresh(params, begun)
@@ -74,6 +82,8 @@ class Engine:
         self._longest = params.remesh * self.state.length
         self._largest = _MOST * len(self.state.x)
         self._tangent, self._habit = Tangent(self.state.mesh), Habit()
+        #: Those of before the step that is under way.
+        self._before = self._tangent, self._habit
         self._steps = 0
 
     @property
@@ -84,12 +94,43 @@ class Engine:
     @property
     def script(self) -> GrowthParams:
         """Return the parameters of which this run is the batch run."""
-        return self.params.model_copy(update={"tools": tuple(self._tools)})
+        return self.params.model_copy(update={"tools": tuple(self._tools), "solids": tuple(self._solids)})
 
-    def add(self, tool: Tool) -> None:
-        """Let a tool act from the next step on: its start is put there if it lies before."""
-        following = (self._steps + (self._work is not None)) * self.params.step
-        self._tools.append(tool.model_copy(update={"start": max(tool.start, following)}))
+    @property
+    def steps(self) -> int:
+        """Steps that are done."""
+        return self._steps
+
+    @property
+    def following(self) -> float:
+        """When the next step starts that has not begun."""
+        return (self._steps + (self._work is not None)) * self.params.step
+
+    def add(self, tool: Tool) -> int:
+        """Let a tool act from the next step on: its start is put there if it lies before. Returns its number."""
+        self._tools.append(tool.model_copy(update={"start": max(tool.start, self.following)}))
+        return len(self._tools) - 1
+
+    def change(self, number: int, tool: Tool) -> None:
+        """Put a tool into another's place, from which it differs from the next step on at the earliest."""
+        self._tools[number] = tool
+
+    def end(self, number: int) -> None:
+        """End a tool with the next step."""
+        tool = self._tools[number]
+        lasts = max(self.following - tool.start, _INSTANT)
+        self._tools[number] = tool.model_copy(update={"duration": min(tool.duration, lasts)})
+
+    def put(self, solid: Solid) -> int:
+        """Let a solid be there from the next step on. Returns its number."""
+        self._solids.append(solid.model_copy(update={"start": max(solid.start, self.following)}))
+        return len(self._solids) - 1
+
+    def take(self, number: int) -> None:
+        """Take a solid away with the next step."""
+        solid = self._solids[number]
+        lasted = max(self.following - solid.start, _INSTANT)
+        self._solids[number] = solid.model_copy(update={"duration": min(solid.duration, lasted)})
 
     def advance(self, budget: float, until: float = np.inf) -> bool:
         """Work for about `budget` seconds; return whether a step was completed. Goes no further than `until`.
@@ -112,22 +153,67 @@ class Engine:
                 self._work = None
                 completed = True
             except Exception:
-                self._work = None
+                self._give_up()
                 raise
         return completed
 
     def undo(self) -> bool:
-        """Go back by one step, and drop tools added since; return whether there was one."""
-        if self._work is not None:
-            # the step before the one under way is undone, and that one given up
-            self._work.close()
-            self._work = None
+        """Go back by one step, and drop tools and solids added since; return whether there was one.
+
+        Raises:
+            SolverError: what lay between a moment that was kept and that step does not come out again.
+
+        """
+        # the step before the one under way is undone, and that one given up
+        self._give_up()
+        steps = self._steps - 1
         if not self._history:
             return False
-        self.state, tools, self._tangent, self._habit = self._history.pop()
-        self._steps -= 1
-        del self._tools[tools:]
+        tools = next((moment.tools, moment.solids) for moment in reversed(self._history) if moment.steps <= steps)
+        self.back(steps)
+        if self._steps < steps:
+            self._tools, self._solids = list(tools[0]), list(tools[1])
+            while self._steps < steps:
+                self.advance(np.inf, until=steps * self.params.step)
         return True
+
+    def back(self, steps: int) -> Undone:
+        """Go back to where so many steps were done, or to the nearest moment before that was kept.
+
+        Returns what `forth` takes. From such a moment the way on is the same to the last bit.
+        """
+        self._give_up()
+        present = self._moment()
+        taken = self._history.back_to(steps) if steps < self._steps else []
+        if taken:
+            self._stand_at(taken[0])
+        return Undone(taken, present)
+
+    def forth(self, undone: Undone) -> None:
+        """Be again where `back` was called; whatever came after it is given up."""
+        self._give_up()
+        if undone.taken:
+            self._history.back_to(undone.taken[0].steps)
+        self._history.extend(undone.taken)
+        self._stand_at(undone.present)
+
+    def lay(self, tools: tuple[Tool, ...], solids: tuple[Solid, ...]) -> None:
+        """Let these be the tools and solids, which differ from what there was from the next step on at the earliest."""
+        self._tools, self._solids = list(tools), list(solids)
+
+    def _give_up(self) -> None:
+        """Leave the step off that is under way, without a trace."""
+        if self._work is not None:
+            self._work.close()
+            self._work = None
+            self._tangent, self._habit = self._before
+
+    def _moment(self) -> Moment:
+        return Moment(self._steps, self.state, tuple(self._tools), tuple(self._solids), self._tangent, self._habit)
+
+    def _stand_at(self, moment: Moment) -> None:
+        self._steps, self.state, tools, solids, self._tangent, self._habit = moment
+        self._tools, self._solids = list(tools), list(solids)
 
     def reach(self, time: float, context: Context) -> State:
         """Return the state at a growth time, settled by `stage.settled`; the run stays at the last whole step before.
@@ -136,45 +222,56 @@ class Engine:
             NotConverged, Unstable: as `advance`. Cancelled: the observer asked to stop.
 
         """
-        found = self._reached(time, context)
-        for nearer in settled(found, self.params, self.tolerance):
-            found = nearer
+        work = self.reaching(time)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                found: State = end.value
+                return found
             context.check_cancelled()
+
+    def reaching(self, time: float) -> Generator[None, None, State]:
+        """Do what `reach` does; yields after every piece of work."""
+        self._give_up()
+        found = yield from self._reached(time)
+        for nearer in settled(found, self.script, self.tolerance):
+            found = nearer
+            yield
         return found
 
-    def _reached(self, time: float, context: Context) -> State:
-        """Return the state at a growth time as the way on leaves it."""
+    def _reached(self, time: float) -> Generator[None, None, State]:
+        """Find the state at a growth time as the way on leaves it."""
         while (self._steps + 1) * self.params.step <= time + 1e-9:
-            for _ in self._step(self.params.step):
-                context.check_cancelled()
+            yield from self._step(self.params.step)
         rest = time - self._steps * self.params.step
         if rest <= 1e-9 and self._steps:
             return self.state
         # a step of its own, which leaves no trace
-        kept = self.state, list(self._history), self._tangent, self._habit, self._steps
+        kept = self.state, History(self._history), self._tangent, self._habit, self._steps
         self._tangent, self._habit = Tangent(self.state.mesh), Habit()
         try:
-            for _ in self._step(max(rest, 0.0)):
-                context.check_cancelled()
+            yield from self._step(max(rest, 0.0))
             return self.state
         finally:
             self.state, self._history, self._tangent, self._habit, self._steps = kept
 
     def _step(self, dt: float) -> Generator[None, None, None]:
         """Grow by dt and find the equilibrium; yields after every piece of work."""
-        before, tools = self.state, len(self._tools)
         # the way on from here is the same after an undo only with the same inverse
-        kept, self._tangent = (self._tangent, self._habit), self._tangent.copy()
+        kept = self._moment()
+        before, self._before, self._tangent = self.state, (self._tangent, self._habit), self._tangent.copy()
         meshed = yield from self._readied(before)
-        state = started(meshed, self._tools, self.params.step, self.params.seed)
+        state = started(meshed, kept.tools, self.params.step, self.params.seed)
         middle = state.time + dt / 2
-        acting = dict(enumerate(self._tools[:tools]))
+        acting = dict(enumerate(kept.tools))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         yield
         state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
         p = self.params
         tangent = self._tangent
-        energy = StepEnergy(state, self._material, p.pressure, p.solids, tangent, p.gravity, p.contact, p.bending)
+        solids = present(kept.solids, state.time)
+        energy = StepEnergy(state, self._material, p.pressure, solids, tangent, p.gravity, p.contact, p.bending)
         goal = self.tolerance * state.length
         yield
         first = yield from begun(energy, meshed, dt, goal, p, self._habit)
@@ -186,7 +283,7 @@ class Engine:
         state = branched(state, acting, self.params.seed)
         yield
         if self._keeps:
-            self._remember(before, tools, *kept)
+            self._history.remember(kept)
         self.state = state
         self._steps += 1
 
@@ -208,11 +305,3 @@ class Engine:
             self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
             self._habit = self._habit.remeshed(finer.mesh, changes)
         return finer
-
-    def _remember(self, before: State, tools: int, tangent: Tangent, habit: Habit) -> None:
-        """Keep what `undo` goes back to; inverses of the last steps only, for they are large."""
-        self._history.append((before, tools, tangent, habit))
-        if len(self._history) > _EXACT:
-            state, tools, old, _ = self._history[-_EXACT - 1]
-            old.inverse = None
-            self._history[-_EXACT - 1] = (state, tools, old, Habit())

@@ -24,4 +24,4 @@ def _paint(fields: Mapping[str, Array], _params: Mapping[str, Any]) -> Skin | No
     return Skin(colour, np.full(colour.shape[:-1], _ROUGHNESS))
 
 
-LOOKS = Looks(layers=CHANNELS, paint=_paint)
+LOOKS = Looks(layers=CHANNELS, paint=_paint, advance="Grow")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
@@ -14,7 +14,7 @@ from .shapes import Shape
 from .tooling.places import Place
 from .tooling.tools import HotSurface, Tool
 
-__all__ = ["Attachment", "Bending", "GrowthParams", "Plane", "Solid", "SolidBall", "SolidBox"]
+__all__ = ["Attachment", "Bending", "GrowthParams", "Plane", "Solid", "SolidBall", "SolidBox", "present"]
 
 
 Side = Annotated[float, Field(gt=0, le=100)]
@@ -31,7 +31,12 @@ class Attachment(_Model):
     axes: tuple[Literal["x", "y", "z"], ...] = Field(("x", "y", "z"), min_length=1, description="Held directions")
 
 
-class Plane(_Model):
+class _Solid(_Model):
+    start: float = Field(0.0, ge=0, le=1000, description="From when it is there [growth time]")
+    duration: float = Field(1000.0, gt=0, le=1000, description="How long it is there [growth time]")
+
+
+class Plane(_Solid):
     """A half-space that the surface cannot enter."""
 
     kind: Literal["plane"] = "plane"
@@ -39,7 +44,7 @@ class Plane(_Model):
     normal: tuple[float, float, float] = Field((0.0, 0.0, 1.0), description="Out of the solid [1]")
 
 
-class SolidBall(_Model):
+class SolidBall(_Solid):
     """A ball that the surface cannot enter."""
 
     kind: Literal["ball"] = "ball"
@@ -47,7 +52,7 @@ class SolidBall(_Model):
     radius: float = Field(1.0, gt=0, le=100, description="Radius [start shape's unit]")
 
 
-class SolidBox(_Model):
+class SolidBox(_Solid):
     """A box with rounded edges, its sides along the axes, that the surface cannot enter."""
 
     kind: Literal["box"] = "box"
@@ -65,6 +70,12 @@ class SolidBox(_Model):
 
 
 Solid = Annotated[Plane | SolidBall | SolidBox, Field(discriminator="kind")]
+
+
+def present(solids: Iterable[Solid], time: float) -> tuple[Solid, ...]:
+    """Return the solids that are there at the end of a step; one that starts with the step is."""
+    return tuple(s for s in solids if (s.start < time - 1e-9 or not s.start) and time <= s.start + s.duration + 1e-9)
+
 
 Bending = Literal["hinges", "mean_curvature"]
 

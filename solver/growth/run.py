@@ -10,17 +10,16 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from .. import shell
-from ..arrays import Floats
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..linalg import definite
 from ..meshes import Frame, changing
 from .engine import Engine
 from .looks import CHANNELS
-from .matter import coloured
 from .params import GrowthParams
 from .settings import choose
 from .settling.energy import elastic
-from .settling.stage import force_unit
+from .settling.stage import residual
+from .shown import shown
 from .state import State
 
 __all__ = ["run"]
@@ -56,10 +55,7 @@ def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
             state = engine.reach(stage, context)
             rows.append(_row(state, params, need, settings.tolerance, stage, time.perf_counter() - begun))
             if _MESH & set(need.fields):
-                fields = {"elastic_strain": _strain(state)} if "elastic_strain" in need.fields else {}
-                if set(CHANNELS) & set(need.fields):
-                    shown = dict(zip(CHANNELS, coloured(state, params.colours).T, strict=True))
-                    fields |= {name: shown[name] for name in CHANNELS if name in need.fields}
+                fields = shown(state, params.colours, need.fields)
                 frames.append(Frame(state.x, state.mesh.triangles, fields))
             context.report(stage / max(need.stages[-1], 1e-9), f"growth time {stage:g} settled")
     except SolverError as error:
@@ -73,11 +69,11 @@ def _row(
     state: State, params: GrowthParams, need: Need, tolerance: float, stage: float, seconds: float
 ) -> dict[str, Any]:
     material = shell.Material(params.thickness, params.poisson)
-    residual = state.forces * state.length / force_unit(state, material)
+    left = residual(state, params)
     row: dict[str, Any] = {
         "stage": stage,
-        "converged": residual <= tolerance,
-        "residual": residual,
+        "converged": left <= tolerance,
+        "residual": left,
         "iterations": state.iterations,
         "seconds": seconds,
     }
@@ -88,14 +84,6 @@ def _row(
     if "stored_energy" in need.fields:
         row["stored_energy"] = elastic(state, material, params.bending)
     return row
-
-
-def _strain(state: State) -> Floats:
-    """Return the mean elastic stretch less 1 of each vertex's triangles (n,)."""
-    t = state.mesh.triangles
-    ratio = np.sqrt(shell.areas(shell.metric(state.x, t)) / shell.areas(state.g)) - 1
-    count = np.bincount(t.ravel(), minlength=len(state.x))
-    return np.bincount(t.ravel(), np.repeat(ratio, 3), len(state.x)) / np.maximum(count, 1)
 
 
 def _dataset(rows: list[dict[str, Any]], frames: list[Frame], need: Need, params: GrowthParams) -> xr.Dataset:

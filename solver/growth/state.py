@@ -16,7 +16,7 @@ __all__ = ["Spot", "State"]
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A hot spot on its way: radius, how often it has split, its letter.
+    """A hot spot on its way: radius, how often it has split, its letter; or a stroke's dab, by its number.
 
     anchor: of the spot, and, where it has a heading, of a point ahead: so the heading turns with the surface.
     """
@@ -25,6 +25,7 @@ class Spot:
     radius: float
     splits: int = 0
     letter: str = ""
+    dab: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,11 +46,11 @@ _NUMBERS = (
 
 SOLVER = Solver(
     name="wood",
-    version="5",
+    version="6",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),
-    default_fields=("rod_cut", *_NUMBERS, "rod_position"),
+    default_fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),
     stages=StageAxis("t", "time", "s", 0.0, 60.0, (0.005, 0.01, 0.015, 0.02)),
     default_resolution={"preview": 32, "default": 64, "fine": 128},
     # largest error of a bundle's stiffness and first frequency against the beam's (docs/wood.md)

@@ -74,6 +74,8 @@ def soften(plan: Plan, bonds: Bonds, each: np.ndarray, mixing: float) -> tuple[i
             if damage <= bonds.damage[b]:
                 continue
             bonds.damage[b] = damage
+            # of its cost, what was spent: stress falls evenly, so this is how far separation has come
+            bonds.parted[b] = max(bonds.parted[b], min((now - begin) / (end - begin), 1.0))
             plan.law[p, KEEP, m] = 1.0 - damage
             damaged += 1
             if damage >= 1.0:

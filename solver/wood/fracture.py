@@ -38,19 +38,24 @@ class Breaks(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _hinges(rods: Rods, t: np.ndarray, theta: np.ndarray, reference: np.ndarray, turning: bool) -> np.ndarray:
-    """Return curvature [1/m] and twist [radian/m] (h, 2) of whole hinges."""
+def _hinges(
+    rods: Rods, t: np.ndarray, theta: np.ndarray, reference: np.ndarray, bow: np.ndarray, turning: bool
+) -> np.ndarray:
+    """Return curvature beyond that at rest [1/m] and twist [radian/m] (h, 2) of whole hinges."""
     out = np.zeros((len(rods.before), 2))
     for h in range(len(rods.before)):
         if rods.whole[h] == 0:
             continue
         p = rods.before[h]
         q = rods.after[h]
+        if turning:
+            # a curved axis is bent at rest, in a plane that its frames know
+            out[h, 0] = bow[h]
+            out[h, 1] = 2.0 * (theta[q] - theta[p] + reference[h]) / rods.span[h]
+            continue
         c = t[p, 0] * t[q, 0] + t[p, 1] * t[q, 1] + t[p, 2] * t[q, 2]
         # 2 tan(phi / 2) over half the span
         out[h, 0] = 4.0 * np.sqrt(max(1.0 - c, 0.0) / max(1.0 + c, 1e-9)) / rods.span[h]
-        if turning:
-            out[h, 1] = 2.0 * (theta[q] - theta[p] + reference[h]) / rods.span[h]
     return out
 
 
@@ -62,6 +67,7 @@ def overstress(
     strength: np.ndarray,
     theta: np.ndarray,
     reference: np.ndarray,
+    bow: np.ndarray,
     turning: bool,
     anywhere: bool,
     ratio: np.ndarray,
@@ -69,10 +75,11 @@ def overstress(
 ) -> float:
     """Write strain over strength (e,) of every edge and where it is highest (e,) [0 to 1]; return the highest.
 
-    Without `anywhere` an edge stands for the hinge at its first vertex (its place is 0), by Eq. 3.24. Twist lengthens
-    the outer fibre by sqrt(1 + (radius x twist)^2) (sec. 6.1).
+    Without `anywhere` an edge stands for the hinge at its first vertex (its place is 0), by Eq. 3.24. bow (h,): as
+    `twist.turn` writes it, read if `turning`. Twist
+    lengthens the outer fibre by sqrt(1 + (radius x twist)^2) (sec. 6.1).
     """
-    bent = _hinges(rods, t, theta, reference, turning)
+    bent = _hinges(rods, t, theta, reference, bow, turning)
     count = len(rods.a)
     ratio[:] = 0.0
     place[:] = 0.0

@@ -29,7 +29,9 @@ class Grain(_Part):
     """How stiffness and strength vary over the section and along the rods: a smooth field from the run's seed."""
 
     stiffness: float = Field(0.0, ge=0, le=0.5, description="Relative deviation of the stiffness [1]")
-    strength: float = Field(0.1, ge=0, le=0.5, description="Relative deviation of the strength [1]")
+    strength: float = Field(
+        0.1, ge=0, le=0.5, description="Relative deviation of the strength, distributed after Weibull [1]"
+    )
     along: float = Field(0.02, gt=1e-5, le=10, description="Correlation length along the rods [m]")
     across: float = Field(0.003, gt=1e-6, le=1, description="Correlation length across them [m]")
 

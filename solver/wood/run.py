@@ -106,7 +106,7 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
         "broken_bonds": state.bonds,
         "impulse": state.impulse.sum(0),
         "fracture_energy": state.spent,
-        "crack_area": float(wood.bonds.area @ wood.bonds.damage),
+        "crack_area": float(wood.bonds.area @ wood.bonds.parted),
         "body_impulse": state.impulse.copy(),
         "grip_impulse": state.gripped[:, :3].copy(),
         "grip_moment": state.gripped[:, 3:].copy(),
@@ -133,7 +133,7 @@ def _dataset(
 ) -> xr.Dataset:
     dims = {
         "impulse": ("stage", "component"),
-        "body_impulse": ("stage", "body", "component"),
+        "body_impulse": ("stage", "obstacle", "component"),
         "grip_impulse": ("stage", "grip", "component"),
         "grip_moment": ("stage", "grip", "component"),
         "tip_position": ("stage", "component"),

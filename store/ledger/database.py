@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from .. import seal
 from ..errors import CorruptLedger, ReadOnlyStore, StorageFailed, StorageFull
 from .filesystem import refuse_network
 
@@ -16,6 +17,8 @@ __all__ = ["Database"]
 
 #: Seconds to wait for another process's transaction; each lasts milliseconds.
 _PATIENCE = 60.0
+#: What a ledger takes at least when it is opened [bytes]: its index of the log.
+_LEAST = 1 << 15
 
 #: Connections inherited through a fork: SQLite forbids to use or to close them in the child.
 _inherited: list[sqlite3.Connection] = []
@@ -126,6 +129,8 @@ class Database:
             name = getattr(error, "sqlite_errorname", "")
             if name == "SQLITE_FULL":
                 raise StorageFull(f"there is no space left to write {self._path}.", "Free space and go on.") from error
+            if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_IOERR")):
+                self._ask_the_system()
             if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")):
                 raise ReadOnlyStore(f"{self._path} cannot be written.", "Name a store of your own.") from error
             if name.startswith("SQLITE_IOERR"):
@@ -134,6 +139,17 @@ class Database:
             if name in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
                 raise self._unreadable(f"is not a sound database ({error})") from error
             raise
+
+    def _ask_the_system(self) -> None:
+        """Write beside the ledger what it needs at least: SQLite keeps to itself what the system told it.
+
+        Raises:
+            StorageFull, StorageFailed, ReadOnlyStore: as the system says now.
+
+        """
+        with seal.scratch(self._path) as trial:
+            trial.write_bytes(bytes(_LEAST))
+            seal.sync(trial)
 
     def _unreadable(self, why: str) -> CorruptLedger:
         return CorruptLedger(

@@ -77,7 +77,7 @@ def even_out(
     if keep and n <= COARSE:
         found = put_apart(moved, topology)
     if n > COARSE:
-        coarse = even_out(whole, COARSE, before=before)
+        coarse = even_out(whole, max(COARSE, n // 2), before=before)
         if coarse.points is not None and coarse.poles is not None:
             moved[:-2] += _refine(coarse.points, coarse.poles, n).reshape(-1, 3)
             moved[-2:] += coarse.poles
@@ -90,7 +90,21 @@ def even_out(
 def _topology(n: int) -> Topology:
     from solver.geometry.apart import Topology
 
-    return Topology.of(closed_lattice(n), 2 * n * n + 2)
+    return Topology.of(closed_lattice(n), 2 * n * n + 2, _across_needles(n))
+
+
+def _across_needles(n: int) -> Array:
+    """Return neighbours (m, 2) along the circles next to the poles, as far as points lie apart from north to south.
+
+    There triangles are needles, and evening out from each point to the next takes hundreds of rounds.
+    """
+    links = []
+    for row, colatitude in enumerate(colatitudes(n)):
+        reach, step, column = 1 / np.sin(colatitude), 2, np.arange(2 * n)
+        while step <= min(reach, n - 1):
+            links += [np.stack([column, (column + way) % (2 * n)], axis=1) + 2 * n * row for way in (-step, step)]
+            step *= 2
+    return np.concatenate(links) if links else np.zeros((0, 2), int)
 
 
 def _refine(coarse: Array, poles: Array, n: int) -> Array:

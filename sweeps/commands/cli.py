@@ -126,7 +126,7 @@ def sweep(
     from ..planning.afford import afford
     from ..planning.plan import Plan
     from ..running import executors
-    from ..running.runner import run_plan
+    from ..running.runner import run_parts
     from .terminal import progress
     from .terminal.words import readers, report_document, show_report
 
@@ -138,12 +138,10 @@ def sweep(
         opened.keep_plan(read.name, plan.read_text(encoding="utf-8"))
         left_out = f", {read.skipped} impossible ones left out" if read.skipped else ""
         note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
-        reports = []
-        for part in read.parts():
-            with progress.stopping(progress.GIVEN_BACK) as stop, progress.sweep(part.name, readers(part)) as observe:
-                reports.append(run_plan(part, opened, pool, observe, stop=stop, again=retry_failed))
-            if reports[-1].stopped or (part is read.first and not reports[-1].complete):
-                break
+        with progress.stopping(progress.GIVEN_BACK) as stop:
+            reports = run_parts(
+                read, opened, pool, lambda part: progress.sweep(part.name, readers(part)), stop=stop, again=retry_failed
+            )
     report = next((r for r in reports if r.plan == read.name), reports[-1])
     document = report_document(report) | {"store": str(store), "skipped": read.skipped, "repeated": read.repeated}
     document["parts"] = [report_document(r) for r in reports]

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InvalidOption
-from .terminal.console import emit
+from .terminal.console import emit, note
 from .terminal.options import As_json, StorePath
 
 if TYPE_CHECKING:
+    from store.errors import CorruptShard
+
     from ..results import Row
 
 __all__ = ["add_to"]
@@ -43,6 +45,8 @@ def results(
 ) -> None:
     """List the results of a store: one row per stage of each run, with its parameters and its numbers.
 
+    Damaged results are named and left out; the exit code is 1 then.
+
     [bold]Examples[/bold]
 
     wizen results --store demo --where 'te<0.03' --sort=-roughness
@@ -55,7 +59,10 @@ def results(
 
     from .. import results as found
 
-    rows = found.find(Store.open(store), solver, where or (), sort, last)
+    damaged: dict[str, CorruptShard] = {}
+    rows = found.find(Store.open(store), solver, where or (), sort, last, damaged)
+    for error in damaged.values():
+        note(f"left out: {error}")
     known = found.columns(rows)
     chosen = known if names is None else [name.strip() for name in names.split(",")]
     unknown = [name for name in chosen if rows and name not in known]
@@ -69,22 +76,30 @@ def results(
         writer = csv.writer(sys.stdout)
         writer.writerow(chosen)
         writer.writerows([row.values.get(name, "") for name in chosen] for row in rows)
-        return
-    document = {"results": [{n: row.values[n] for n in chosen if n in row.values} for row in rows], "count": len(rows)}
+    else:
+        listed = [{n: _plain(row.values[n]) for n in chosen if n in row.values} for row in rows]
+        document = {"results": listed, "count": len(rows), "damaged": sorted(damaged)}
+        emit(document, as_json, lambda console: _show(console, rows, known, chosen if names is not None else None))
+    if damaged:
+        raise typer.Exit(1)
 
-    def shown(console: Any) -> None:
-        columns = chosen if names is not None else _telling(rows)
-        # not a grid, which cuts what does not fit: keys are there to be copied
-        lines = [columns, *([_cell(name, row.values.get(name)) for name in columns] for row in rows)]
-        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        for line in lines:
-            text = "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
-            console.print(text.rstrip(), markup=False)
-        left_out = len(known) - len(columns)
-        more = f"; {left_out} more columns with --csv, --json or --columns" if left_out else ""
-        console.print(f"{len(rows)} rows of {len({row.key for row in rows})} results{more}", markup=False)
 
-    emit(document, as_json, shown)
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it, which knows no NaN."""
+    return None if value != value else value
+
+
+def _show(console: Any, rows: list[Row], known: list[str], chosen: list[str] | None) -> None:
+    columns = _telling(rows) if chosen is None else chosen
+    # not a grid, which cuts what does not fit: keys are there to be copied
+    lines = [columns, *([_cell(name, row.values.get(name)) for name in columns] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        text = "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        console.print(text.rstrip(), markup=False)
+    left_out = len(known) - len(columns)
+    more = f"; {left_out} more columns with --csv, --json or --columns" if left_out else ""
+    console.print(f"{len(rows)} rows of {len({row.key for row in rows})} results{more}", markup=False)
 
 
 def show(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 __all__ = ["Event", "Failure", "Kind", "Report"]
 
@@ -48,6 +48,21 @@ class Report:
     cancelled: int
     seconds: float
     stopped: bool
+
+    @classmethod
+    def of(cls, plan: str, parts: Sequence[Report], total: int) -> Self:
+        """Return the report of several runs as one, of which some that belong to the `total` may not have begun."""
+        return cls(
+            plan=plan,
+            total=total,
+            solved=sum(part.solved for part in parts),
+            reused=sum(part.reused for part in parts),
+            failed=tuple(failure for part in parts for failure in part.failed),
+            waiting=sum(part.waiting for part in parts) + total - sum(part.total for part in parts),
+            cancelled=sum(part.cancelled for part in parts),
+            seconds=sum(part.seconds for part in parts),
+            stopped=any(part.stopped for part in parts),
+        )
 
     @property
     def complete(self) -> bool:

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, wait
+from contextlib import AbstractContextManager, nullcontext
 
 from store.ledger.jobs import JobSpec
 from store.store import Store
@@ -19,7 +20,7 @@ from ..planning.plan import Plan
 from .report import Event, Report
 from .run import Run
 
-__all__ = ["run_jobs", "run_plan", "run_queue"]
+__all__ = ["run_jobs", "run_parts", "run_plan", "run_queue"]
 
 #: Seconds for which a claimed job belongs to its runner without a sign of life.
 LEASE = 30.0
@@ -36,8 +37,32 @@ def run_plan(
     stop: threading.Event | None = None,
     again: bool = False,
 ) -> Report:
-    """Run a plan; see `run_jobs`."""
-    return run_jobs(plan.jobs(), store, executor, plan.name, observe, lease, stop, again)
+    """Run a plan with its pattern and its controls, and report of all of them together; see `run_jobs`."""
+    reports = run_parts(plan, store, executor, lambda part: nullcontext(observe), lease, stop, again)
+    return Report.of(plan.name, reports, sum(len(part.samples) for part in plan.parts()))
+
+
+def run_parts(
+    plan: Plan,
+    store: Store,
+    executor: Executor,
+    watch: Callable[[Plan], AbstractContextManager[Callable[[Event], None] | None]],
+    lease: float = LEASE,
+    stop: threading.Event | None = None,
+    again: bool = False,
+) -> list[Report]:
+    """Run the pattern that a plan's samples start from, the samples, and the controls; see `run_jobs`.
+
+    `watch` gives each part its observer. Samples whose pattern could not be solved are not tried: the last report is
+    the pattern's then. Nor is anything after a part that was stopped.
+    """
+    reports: list[Report] = []
+    for part in plan.parts():
+        with watch(part) as observe:
+            reports.append(run_jobs(part.jobs(), store, executor, part.name, observe, lease, stop, again))
+        if reports[-1].stopped or (part is plan.first and not reports[-1].complete):
+            break
+    return reports
 
 
 def run_jobs(

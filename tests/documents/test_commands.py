@@ -123,7 +123,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
     made = subprocess.run(["wizen", "table", "build", "--store", "demo"], cwd=at, env=_surroundings(), check=False)
     assert made.returncode == 0
     shutil.copytree(at / "demo", at / "held")
-    for name in ("orange.h5", "run.h5"):
+    for name in ("orange.h5", "run.h5", "eighth.h5"):
         shards.write(at / name, rotting(), "0" * 64)
     for name in ("patch.obj", "my.obj", "banana.glb"):
         trimesh.creation.icosphere(3).export(at / name)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import httpx
 import pytest
@@ -25,7 +25,11 @@ from store.store import Store
 
 from ..store.conftest import fill
 from ._asking import ROOT
+from ._browser import CHROMIUM, FLAGS
 from ._jobs import bearer
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 AXES = {"te": [0.02, 0.06], "gamma": [5.0, 20.0]}
 SHAPE = "/v1/shapes/dehydration"
@@ -37,8 +41,8 @@ def build(store: Store, name: str = "default", **options: Any) -> tables.TableIn
 
 
 @contextmanager
-def served(app: FastAPI) -> Iterator[httpx.Client]:
-    server = uvicorn.Server(uvicorn.Config(app, port=0, ws="none", log_config=None, access_log=False))
+def served(app: FastAPI, ws: Any = "none") -> Iterator[httpx.Client]:
+    server = uvicorn.Server(uvicorn.Config(app, port=0, ws=ws, log_config=None, access_log=False))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
@@ -123,3 +127,13 @@ def queue_only(store: Store) -> Iterator[httpx.Client]:
     with client_of(store.root, jobs_workers=0, max_jobs=4, max_jobs_per_token=3) as client:
         client.headers.update(bearer(store))
         yield client
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A Chromium without a window, for the tests of the page."""
+    api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install -e '.[browser]'")
+    with api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()

@@ -9,6 +9,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import httpx
@@ -20,6 +21,7 @@ from service.limits.admission import Load
 from service.limits.clients import address, client_of
 from service.limits.connections import GuardedProtocol
 from service.settings import Settings, page
+from service.shapes.turns import Turns
 
 from ._asking import ROOT, checked
 from .conftest import client_of as service_over
@@ -171,11 +173,10 @@ async def hello(scope: Any, receive: Any, send: Any) -> None:
         await send({"type": "http.response.body", "body": b"hi"})
 
 
-@pytest.fixture
-def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    monkeypatch.setattr(connections, "_settings", lambda: Settings(**LIMITS))
+@contextmanager
+def listening(app: Any, **more: Any) -> Iterator[int]:
     options: dict[str, Any] = {"http": GuardedProtocol, "ws": "none", "lifespan": "off", "log_config": None}
-    server = uvicorn.Server(uvicorn.Config(hello, port=0, **options))
+    server = uvicorn.Server(uvicorn.Config(app, port=0, **options, **more))
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:
@@ -183,6 +184,13 @@ def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     yield server.servers[0].sockets[0].getsockname()[1]
     server.should_exit = True
     thread.join()
+
+
+@pytest.fixture
+def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    monkeypatch.setattr(connections, "_settings", lambda: Settings(**LIMITS))
+    with listening(hello) as port:
+        yield port
 
 
 def talk(port: int, *pieces: bytes, pause: float = 0.0) -> bytes:
@@ -260,6 +268,30 @@ def test_a_newcomer_displaces_the_slowest(port: int) -> None:
     assert held[0].recv(4096).split()[1] in (b"503", b"408")  # on a busy machine its time may have been up before
     for line in held:
         line.close()
+
+
+def test_a_crowd_of_newcomers_is_taken_in_while_shapes_are_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """uvloop takes one connection in a pass of its loop: those who queue before the door are told nothing."""
+    pytest.importorskip("uvloop")
+    monkeypatch.setattr(connections, "_settings", Settings)
+    turns, before, seen = Turns(1000), connections.taken(), list[int]()
+
+    async def shape(scope: Any, receive: Any, send: Any) -> None:
+        async with turns:
+            seen.append(connections.taken() - before)
+            time.sleep(0.01)
+        await hello(scope, receive, send)
+
+    with listening(shape, loop="uvloop") as port:
+        crowd = [socket.create_connection(("127.0.0.1", port), timeout=10) for _ in range(40)]
+        for line in crowd:
+            line.sendall(HEAD + b"\r\n")
+        for line in crowd:
+            assert line.recv(4096).startswith(b"HTTP/1.1 200")
+            line.close()
+    # the door was open for all of them long before the last one had his turn
+    assert len(seen) == seen[-1] == 40
+    assert seen[len(seen) // 2] == 40
 
 
 def test_every_setting_is_documented() -> None:

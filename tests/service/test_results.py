@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+
 import httpx
 
+from store.store import Store
+
 from ._asking import checked
+from .conftest import client_of
 
 
 def test_pages_lead_to_all_results_once(client: httpx.Client) -> None:
@@ -17,6 +22,17 @@ def test_pages_lead_to_all_results_once(client: httpx.Client) -> None:
     assert len({(row["key"], row["stage"]) for row in found}) == len(found)
     assert [row["params"]["te"] for row in found] == sorted(row["params"]["te"] for row in found)
     assert {row["params"]["te"] for row in found} == {0.02, 0.06}
+
+
+def test_a_damaged_result_is_named_and_the_others_are_listed(own: Store) -> None:
+    victim = next(iter(own.keys()))
+    with own.shard_path(victim).open("r+b") as file:
+        file.seek(-3, os.SEEK_END)
+        file.write(b"abc")
+    with client_of(own.root) as client:
+        page = client.get("/v1/results?last=true").json()
+    assert page["damaged"] == [victim]
+    assert page["total"] == len(list(own.keys())) - 1 > 0
 
 
 def test_conditions(client: httpx.Client) -> None:

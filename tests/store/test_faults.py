@@ -17,7 +17,6 @@ import pytest
 from .conftest import ROOT
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="LD_PRELOAD is Linux's"),
     pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no gcc to make the shim"),
 ]
@@ -32,10 +31,15 @@ def shim(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-@pytest.mark.parametrize("operation", ["put", "build", "token", "claim"])
-def test_a_fault_at_every_change(operation: str, shim: Path, tmp_path: Path) -> None:
+OPERATIONS = ["put", "build", "token", "claim"]
+#: Every so many of an operation's changes are tried where time is short; together they still meet all kinds of calls.
+EVERY = {"put": 5, "build": 9, "token": 5, "claim": 13}
+
+
+def faults(operation: str, shim: Path, tmp_path: Path, every: int) -> int:
+    """Try them; return how many points there were."""
     done = subprocess.run(
-        [sys.executable, "-m", "tests.store._faults", operation, tmp_path, shim],
+        [sys.executable, "-m", "tests.store._faults", operation, tmp_path, shim, str(every)],
         cwd=ROOT,
         env={**os.environ, "LD_PRELOAD": str(shim)},
         capture_output=True,
@@ -43,9 +47,25 @@ def test_a_fault_at_every_change(operation: str, shim: Path, tmp_path: Path) -> 
         check=False,
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    found = json.loads(done.stdout)
+    said = json.loads(done.stdout)
+    found = said["found"]
     print(operation, found)
-    assert sum(found["killed before"].values()) >= 5, "the shim saw nothing"
+    assert not said["wrong"], "\n".join(said["wrong"])[-6000:]
     assert set(found["killed amid"]) == set(found["killed before"]) == {"killed"}
-    assert set(found["no space"]) == {"storage-full"}
-    assert set(found["broken"]) == {"storage-failed"}
+    # what comes after the last change that counts may fail unheard: the ledger's log stays, and is read by the next
+    assert "storage-full" in found["no space"]
+    assert set(found["no space"]) <= {"storage-full", "ok"}
+    assert "storage-failed" in found["broken"]
+    assert set(found["broken"]) <= {"storage-failed", "ok"}
+    return sum(sum(times.values()) for times in found.values())
+
+
+@pytest.mark.parametrize("operation", OPERATIONS)
+def test_faults_at_some_changes(operation: str, shim: Path, tmp_path: Path) -> None:
+    assert faults(operation, shim, tmp_path, EVERY[operation]) >= 8, "the shim saw nothing"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("operation", OPERATIONS)
+def test_a_fault_at_every_change(operation: str, shim: Path, tmp_path: Path) -> None:
+    assert faults(operation, shim, tmp_path, 1) >= 20, "the shim saw nothing"

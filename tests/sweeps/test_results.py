@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import xarray as xr
 from _command import document, wizen
 from conftest import Solves
 
+from store.errors import CorruptShard
 from store.store import Store
 from sweeps import results
 from sweeps.errors import InvalidOption
@@ -72,6 +74,28 @@ def test_rows_of_several_solvers_are_one_dataset(table: Path) -> None:
     assert np.isnan(both["te"].values[1])
     assert both["mesh_area"].values[1] == 3.0
     assert both["solver"].values.tolist() == ["shrinking", "growth"]
+
+
+def test_a_damaged_result_is_named_and_the_others_are_listed(table: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(table, tmp_path / "copy"))
+    store = Store.open(copy)
+    victim = next(iter(store.keys()))
+    path = store.shard_path(victim)
+    broken = bytearray(path.read_bytes())
+    broken[len(broken) // 2] ^= 1
+    path.write_bytes(broken)
+    with pytest.raises(CorruptShard, match=victim):
+        results.find(store)
+    damaged: dict[str, CorruptShard] = {}
+    assert len(results.find(store, damaged=damaged)) == 5 * 2
+    assert list(damaged) == [victim]
+    for option in ("--json", "--csv", "--columns=te"):
+        said = wizen("results", "--store", copy, option)
+        assert said.exit_code == 1
+        assert said.stderr.count(victim) == 1
+        assert "Traceback" not in said.stderr
+    assert document(wizen("results", "--store", copy, "--json"))["damaged"] == [victim]
+    assert wizen("results", "--store", table, "--json").exit_code == 0
 
 
 def test_one_result_by_the_beginning_of_its_key(table: Path) -> None:

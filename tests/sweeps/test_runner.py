@@ -98,6 +98,29 @@ def test_what_fails_is_tried_twice_and_put_aside(shrinking: Solves, store: Store
         assert partial["displacement"].attrs["units"] == "1"
 
 
+def test_a_plan_runs_with_its_pattern_and_its_controls(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    parts = [
+        write_plan(te, "[10]", name=name) for name, te in (("p", "[0.02]"), ("s", "[0.03, 0.04]"), ("c", "[0.05]"))
+    ]
+    first, samples, controls = map(Plan.load, parts)
+    plan = replace(samples, first=first, controls=controls)
+    with executors.serial() as workers:
+        report = run_plan(plan, store, workers)
+    assert (report.plan, report.total, report.solved, report.complete) == ("s", 4, 4, True)
+    assert [line.split()[0] for line in shrinking.lines()] == ["0.02", "0.03", "0.04", "0.05"]
+    assert {name: store.ledger.counts(name)["done"] for name in "psc"} == {"p": 1, "s": 2, "c": 1}
+
+
+def test_samples_wait_for_their_pattern(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    first = Plan.load(write_plan("[0.02]", "[10]", more='trouble = "refuses"', name="p"))
+    plan = replace(Plan.load(write_plan("[0.03, 0.04]", "[10]", name="s")), first=first)
+    with executors.serial() as workers:
+        report = run_plan(plan, store, workers)
+    assert (report.total, report.solved, len(report.failed), report.waiting) == (3, 0, 1, 2)
+    assert not report.complete
+    assert len(shrinking) == 1
+
+
 @pytest.mark.parametrize(
     ("trouble", "code", "solves"), [("refuses", "invalid-input", 1), ("crashes", "internal-error", 2)]
 )

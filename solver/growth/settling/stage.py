@@ -13,14 +13,14 @@ import numpy as np
 
 from ... import shell
 from ...contract import Unstable
-from ..params import GrowthParams
+from ..params import GrowthParams, present
 from ..state import State
 from .energy import StepEnergy
 from .minimise import Point, quasi_newton
 from .newton import newton
 from .tangent import Tangent
 
-__all__ = ["force_unit", "settled"]
+__all__ = ["force_unit", "residual", "settled"]
 
 #: How far Newton's last step may have moved a vertex, over the mean rest edge: a soft shape swings far on small forces.
 _NEAR = 0.003
@@ -31,6 +31,11 @@ _TURNS, _MOST = 30, 400
 def force_unit(state: State, material: shell.Material) -> float:
     """Return the force that residuals are measured in [mu l]: the lesser of a stretched edge's and a folded one's."""
     return state.length * min(1.0, material.flexural / state.length**2)
+
+
+def residual(state: State, params: GrowthParams) -> float:
+    """Return the largest force of a state over `force_unit`."""
+    return state.forces * state.length / force_unit(state, shell.Material(params.thickness, params.poisson))
 
 
 def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[State]:
@@ -49,7 +54,7 @@ def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[St
         state,
         material,
         params.pressure,
-        params.solids,
+        present(params.solids, state.time),
         Tangent(state.mesh),
         params.gravity,
         params.contact,

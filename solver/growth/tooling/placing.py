@@ -14,7 +14,7 @@ from ..anchors import Anchors, place
 from ..shapes import Mesh
 from ..state import Spot, State
 from .places import share
-from .tools import Apex, HotCurve, HotSpot, HotSurface, Tool
+from .tools import Apex, HotCurve, HotSpot, HotStroke, HotSurface, Tool
 
 __all__ = ["border", "branched", "started"]
 
@@ -39,6 +39,10 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
     mesh = Mesh(state.x, state.mesh.triangles)
     rim = border(state.mesh)
     for number, tool in enumerate(tools):
+        if isinstance(tool, HotStroke):
+            if tool.start <= state.time + step - 1e-9:
+                spots[number] = _dabs(tool, spots.get(number, ()), state.time, step, mesh)
+            continue
         if number in shares or number in spots or number in curves or tool.start > state.time + step - 1e-9:
             continue
         if isinstance(tool, HotSurface):
@@ -69,6 +73,18 @@ def branched(state: State, tools: Mapping[int, Tool], seed: int) -> State:
                 for child in (_written(state, spot, tool, chance) if tool.rules else _ring(state, spot, tool))
             )
     return replace(state, spots=spots)
+
+
+def _dabs(tool: HotStroke, laid: tuple[Spot, ...], time: float, step: float, mesh: Mesh) -> tuple[Spot, ...]:
+    """Return the dabs of a stroke that act in a step: those that lie there already, and new ones."""
+    there = {spot.dab: spot for spot in laid}
+    # their times rise: what is neither over nor to come is a run of them
+    times = np.array(tool.times or (0.0,) * len(tool.points)) + tool.start
+    first, last = np.searchsorted(times, [time + 1e-9 - tool.hold, time + step - 1e-9])
+    return tuple(
+        there.get(k) or Spot(place(np.array([tool.points[k]]), *mesh), tool.radius, dab=k)
+        for k in range(int(first), int(last))
+    )
 
 
 def _first(tool: HotSpot, mesh: Mesh) -> Spot:

@@ -12,7 +12,7 @@ from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..state import State
 from .reach import within
-from .tools import HotCurve, HotSpot, HotSurface, Tool, intensities
+from .tools import HotCurve, HotSpot, HotStroke, HotSurface, Tool, intensities
 
 __all__ = ["Rates", "grown", "rates"]
 
@@ -41,9 +41,15 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
             some, share, along = _surface(state, tool, number, time)
         elif isinstance(tool, HotCurve):
             some, share, along = _curve(state, tool, state.curves[number].at(state.x, state.mesh.triangles), since)
+        elif isinstance(tool, HotStroke):
+            some, share, along = _stroke(state, tool, number, time)
         else:
             some, share, along = _spots(state, tool, number, time)
         first, second = np.log(_stretches(state, tool, number))
+        if isinstance(tool, HotStroke):
+            # a brush that goes nowhere grows the same area, all round
+            still = ~along.any(axis=1)
+            first, second = np.where(still, (first + second) / 2, first), np.where(still, (first + second) / 2, second)
         share = strength * share
         v = _in_rest_frame(state, along, some)
         strain[some] += _tensor(share * first, share * second, v)
@@ -177,6 +183,23 @@ def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Ints,
     axis = axis - (normal @ axis)[:, None] * normal
     turn = np.radians(tool.angle + tool.turning * (time - tool.start))
     return some, share, np.cos(turn) * axis + np.sin(turn) * np.cross(normal, axis)
+
+
+def _stroke(state: State, tool: HotStroke, number: int, time: float) -> tuple[Ints, Floats, Floats]:
+    """Return where a stroke acts, how much, and along which way: that of the dab that acts most."""
+    triangles, x = state.mesh.triangles, state.x
+    whole, ways = np.zeros(len(x)), np.zeros((len(x), 3))
+    for spot in state.spots[number]:
+        if not 0 <= time - tool.laid(spot.dab) < tool.hold:
+            continue
+        away = np.linalg.norm(x - spot.anchor.at(x, triangles)[0], axis=1)
+        near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
+        value = _kernel(tool.kernel, away[near] / spot.radius)
+        stronger = value > whole[near]
+        whole[near[stronger]] = value[stronger]
+        ways[near[stronger]] = tool.ways[spot.dab] if tool.ways else 0.0
+    some, share = _corners(state, whole)
+    return some, share, ways[triangles[some]].mean(axis=1)
 
 
 def _kernel(name: str, r: Floats) -> Floats:

@@ -16,13 +16,26 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from ...arrays import Floats
 from .places import Place
 
-__all__ = ["Apex", "HotCurve", "HotSpot", "HotSurface", "Tool", "intensities", "intensity"]
+__all__ = [
+    "Apex",
+    "HotCurve",
+    "HotSpot",
+    "HotStroke",
+    "HotSurface",
+    "Kernel",
+    "Point",
+    "Stretch",
+    "Tool",
+    "intensities",
+    "intensity",
+]
 
 #: Control points of a curve that is made about an apex.
 _AROUND = 24
 
 Stretch = Annotated[float, Field(ge=0.1, le=10)]
 Point = tuple[float, float, float]
+Kernel = Literal["smooth", "flat", "cone"]
 
 
 class _Tool(BaseModel):
@@ -51,7 +64,7 @@ class HotSpot(_Tool):
     kind: Literal["spot"] = "spot"
     at: Point = Field(description="Where, the nearest point of the surface [start shape's unit]")
     radius: float = Field(0.4, gt=0, le=100, description="Radius of influence [start shape's unit]")
-    kernel: Literal["smooth", "flat", "cone"] = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
+    kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
     stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the frame [1]")
     frame: Point = Field((1.0, 0.0, 0.0), description="Direction of the first stretch, as projected on the surface [1]")
     angle: float = Field(0.0, ge=-360, le=360, description="Turns the frame about the normal [degree]")
@@ -150,15 +163,47 @@ class HotSurface(_Tool):
     )
 
 
-Tool = Annotated[HotSpot | HotCurve | HotSurface, Field(discriminator="kind")]
+class HotStroke(_Tool):
+    """A brush that is drawn over the surface: dabs that grow along its way, one after the other."""
+
+    kind: Literal["stroke"] = "stroke"
+    points: tuple[Point, ...] = Field(
+        min_length=1, max_length=20_000, description="Dabs; the nearest points of the surface [start shape's unit]"
+    )
+    ways: tuple[Point, ...] = Field(
+        (), max_length=20_000, description="Direction of the brush at each dab; none, or 0: the same all round [1]"
+    )
+    times: tuple[float, ...] = Field(
+        (), max_length=20_000, description="When each dab is laid, after the start, rising; none: all at once [time]"
+    )
+    hold: float = Field(1000.0, gt=0, le=1000, description="How long each dab acts; half a step at least [growth time]")
+    radius: float = Field(0.3, gt=0, le=100, description="Radius of influence [start shape's unit]")
+    kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
+    stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the way of the brush [1]")
+
+    @model_validator(mode="after")
+    def _matching(self) -> Self:
+        for name in ("ways", "times"):
+            if getattr(self, name) and len(getattr(self, name)) != len(self.points):
+                raise ValueError(f"{name}: give one for each dab ({len(self.points)}), or none")
+        if any(a > b for a, b in pairwise(self.times)):
+            raise ValueError("the times of a stroke must not fall")
+        return self
+
+    def laid(self, dab: int) -> float:
+        """Return when a dab is laid [growth time]."""
+        return self.start + (self.times[dab] if self.times else 0.0)
 
 
-def intensity(tool: HotSpot | HotCurve | HotSurface, time: float) -> float:
+Tool = Annotated[HotSpot | HotCurve | HotSurface | HotStroke, Field(discriminator="kind")]
+
+
+def intensity(tool: Tool, time: float) -> float:
     """Return the intensity of a tool at a growth time, 0 outside its duration."""
     return float(intensities(tool, np.array([time - tool.start]))[0])
 
 
-def intensities(tool: HotSpot | HotCurve | HotSurface, since: Floats) -> Floats:
+def intensities(tool: Tool, since: Floats) -> Floats:
     """Return the intensities at times since the start, of places with clocks of their own; 0 outside the duration."""
     when, value = np.array(tool.activation).T
     return np.where((since >= 0) & (since < tool.duration), np.interp(since, when, value), 0.0)

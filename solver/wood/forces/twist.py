@@ -92,8 +92,12 @@ def turn(
     d: np.ndarray,
     theta: np.ndarray,
     reference: np.ndarray,
+    bent: np.ndarray,
 ) -> float:
-    """Add forces of bending and twist to f (v, 3) [N] and torque (e,) [N m]; return their energy [J]."""
+    """Add forces of bending and twist to f (v, 3) [N] and torque (e,) [N m]; return their energy [J].
+
+    Writes the curvature beyond that at rest to bent (h,) [1/m].
+    """
     energy = 0.0
     for h in range(len(rods.before)):
         if rods.whole[h] == 0:
@@ -120,6 +124,7 @@ def turn(
         k2 = -0.5 * (_dot(p1, kb) + _dot(q1, kb))
         o1 = k1 - turns.kappa[h, 0]
         o2 = k2 - turns.kappa[h, 1]
+        bent[h] = 2.0 * np.sqrt(o1 * o1 + o2 * o2) / rods.span[h]
         stiff = rods.alpha[h] / rods.span[h]
         tight = turns.beta[h] / rods.span[h]
         tau = theta[q] - theta[p] + reference[h] - turns.tau[h]

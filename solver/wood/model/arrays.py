@@ -46,6 +46,7 @@ class Bonds(NamedTuple):
     shorn: np.ndarray  # (b,) by shear alone: G_IIc times it [J]
     area: np.ndarray  # (b,) of the crack that it stands for [m2]
     damage: np.ndarray  # (b,) 0 whole, 1 broken
+    parted: np.ndarray  # (b,) of its crack, what is there: the share of its cost that was spent
     on: np.ndarray  # (b,) uint8: 1 whole, 2 broken, but still in the way of what it joined, 0 gone
 
 

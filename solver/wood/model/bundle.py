@@ -57,7 +57,7 @@ class _Layout(NamedTuple):
 
 def _strength(points: np.ndarray, field: Field, params: WoodParams) -> np.ndarray:
     """Return the strain that each place (...) of the straight bundle bears."""
-    strength = params.strain_limit * field.factor(points, params.grain.strength)
+    strength = params.strain_limit * field.strength(points, params.grain.strength)
     for notch in params.notches:
         inside = np.abs(points[..., 0] - notch.position) <= notch.width / 2
         # a ring cut in: the load a section bears goes with its area

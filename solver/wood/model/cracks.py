@@ -10,6 +10,8 @@ tomography (Shepp and Vardi 1982): so none becomes negative.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -21,8 +23,13 @@ __all__ = ["widths"]
 _WAYS, _LINES, _ROUNDS = 24, 4.0, 60
 
 
-def widths(points: np.ndarray, pairs: np.ndarray, outline: np.ndarray) -> np.ndarray:
-    """Return the width (n,) [m] of crack that each pair (n, 2) of rods at points (k, 2) [m] holds together."""
+def widths(
+    points: np.ndarray, pairs: np.ndarray, outline: np.ndarray, lines: Sequence[tuple[int, float]] = ()
+) -> np.ndarray:
+    """Return the width (n,) [m] of crack that each pair (n, 2) of rods at points (k, 2) [m] holds together.
+
+    lines (0: y, 1: z; value [m]): where saw cuts begin a crack, whose cost is met before all others'.
+    """
     if not len(pairs):
         return np.zeros(0)
     first, second = points[pairs[:, 0]], points[pairs[:, 1]]
@@ -48,4 +55,8 @@ def widths(points: np.ndarray, pairs: np.ndarray, outline: np.ndarray) -> np.nda
         ratio = np.where(now > 0, wanted / np.where(now > 0, now, 1.0), 1.0)
         update = (crossed.T @ ratio) / seen
         found *= np.where(update > 0, update, 1.0)
+        for c, at in lines:
+            own = (first[:, c] < at) != (second[:, c] < at)
+            wide = float(chords(outline, np.eye(2)[c][None], np.array([at]))[0])
+            found[own] *= wide / max(float(found[own].sum()), 1e-300)
     return found

@@ -11,16 +11,20 @@ from .arrays import Bodies, Bonds, Rods
 from .cracks import widths
 from .curves import held
 from .grain import Field
-from .outline import area, corners
+from .outline import area, corners, sawn_through
 from .slopes import leaning
 
-__all__ = ["bodied", "bonded", "sloped"]
+__all__ = ["bodied", "bonded", "resolved", "sloped"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
 _NET = 3.0
 #: Modulus [Pa] that stands for none.
 _NONE = 1e-9
+#: Edges on the length over which wood gives way ahead of a crack.
+_ZONE = 5.5
+#: Strain and slope at which a bond must have given way, however coarse rods are.
+_MOST_GIVEN = 0.4
 #: Points of contact on what is as long as the narrowest body is wide; the fewest and the most on an edge. Under a
 #: cylinder pressed in by a sixth of its radius, 8 make the force uneven by 1 %, 4 by 5 %.
 _POINTS, _FEWEST, _MOST = 8, 4, 256
@@ -100,6 +104,36 @@ def _along(s: np.ndarray) -> np.ndarray:
     return own
 
 
+def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[float, float]:
+    """Return the strengths [Pa] across and along the grain at which bonds `edge` [m] apart begin to give way.
+
+    Ahead of a crack's tip wood gives way over a length that follows from stiffness, toughness and strength: between
+    two slender halves t thick over (E G_Ic t^3 / s^2)^(1/4) if it opens, over (E G_IIc t / s^2)^(1/2) if it slides
+    (Cox and Marshall 1994). Where fewer than `_ZONE` edges lie on it, no bond feels the tip's stress, and the crack
+    stays far beyond what it bears, to run all at once. A lower strength makes the zone longer, and changes nothing of
+    what the crack costs (Turon et al. 2007).
+    """
+    way = np.linalg.norm(np.roll(outline, -1, 0) - outline, axis=1).sum()
+    thick, zone = 2 * area(outline) / float(way), _ZONE * edge
+    opens = (params.stiffness * params.toughness * thick**3) ** 0.5 / zone**2
+    slides = (params.stiffness * params.toughness_sliding * thick) ** 0.5 / zone
+    return min(params.cleavage, opens), min(params.shear_strength, slides)
+
+
+def _closest(pairs: np.ndarray, s: np.ndarray, grid: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return vertices (b,) of each rod of a pair (m, 2), the edges (b,) of the other one that they are closest to, and
+    how far along those (b,).
+    """
+    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
+    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
+        # rods are parallel at rest: the closest point lies at the same place along
+        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, s.shape[1] - 2)
+        vertex.append(grid[p])
+        on.append(edge[q][j])
+        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
+    return np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
+
+
 def bonded(
     params: WoodParams,
     points: np.ndarray,
@@ -122,37 +156,40 @@ def bonded(
     near = params.reach * float(np.sqrt(area(outline) / len(points)))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T)] if len(pairs) else np.zeros((0, 2), int)
-    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
     n = s.shape[1]
     # each pair is bonded from both sides: half of its crack each
-    crack = np.repeat(np.tile(widths(points, pairs, outline) / 2, 2), n)
-    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
-        # rods are parallel at rest: the closest point lies at the same place along
-        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, n - 2)
-        vertex.append(grid[p])
-        on.append(edge[q][j])
-        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
-    i, e, u = np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
+    crack = np.repeat(np.tile(widths(points, pairs, outline, sawn_through(params)) / 2, 2), n)
+    i, e, u = _closest(pairs, s, grid, edge)
     middle, length, cosine = _lying(rest, rods, i, e, u)
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
     part = _along(s).ravel()[np.searchsorted(grid.ravel(), i)]
     volume = area(outline) * params.length * part / max(float(part.sum()), 1e-300)
     stiff = grain.factor(middle, params.grain.stiffness)
-    strength = strong.factor(middle, params.grain.strength)
+    strength = strong.strength(middle, params.grain.strength)
+    stretched = _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff
+    sheared = params.shear * volume * stiff
+    torn, shorn = (g * crack * part * strength**2 for g in (params.toughness, params.toughness_sliding))
+    per_opening = _NET / 2 / max(params.transverse, _NONE) * volume * strength**2
+    per_shear = volume / max(params.shear, _NONE) * strength**2
+    cleavage, shear_strength = resolved(params, params.length / (n - 1), outline)
+    # a bond must have given way before it is out of the way
+    least = torn**2 / np.maximum(0.5 * stretched * length * _MOST_GIVEN**2, 1e-300)
+    least_shear = shorn**2 / np.maximum(sheared * _MOST_GIVEN**2, 1e-300)
     return Bonds(
         i.astype(np.int32),
         e.astype(np.int32),
         u,
         length,
-        _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff,
-        params.shear * volume * stiff,
+        stretched,
+        sheared,
         cosine,
-        _NET / 2 * params.cleavage**2 / max(params.transverse, _NONE) * volume * strength**2,
-        params.shear_strength**2 / max(params.shear, _NONE) * volume * strength**2,
-        params.toughness * crack * part * strength**2,
-        params.toughness_sliding * crack * part * strength**2,
+        np.minimum(per_opening * params.cleavage**2, np.maximum(per_opening * cleavage**2, least)),
+        np.minimum(per_shear * params.shear_strength**2, np.maximum(per_shear * shear_strength**2, least_shear)),
+        torn,
+        shorn,
         crack * part,
+        np.zeros(len(i)),
         np.zeros(len(i)),
         np.ones(len(i), np.uint8),
     )

@@ -44,6 +44,7 @@ class Scratch(NamedTuple):
     speed: np.ndarray
     push: np.ndarray
     power: np.ndarray
+    bent: np.ndarray  # (h,) curvature beyond that at rest, of rods that resist twist [1/m]
     light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]
     found: np.ndarray  # of the plan's parts (p, 4): energies [J] of stretching, bending, bonds; bound of `rods.strain`
     rubbing: Rubbing

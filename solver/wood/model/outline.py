@@ -11,7 +11,7 @@ from ...contract import InvalidGeometry
 from ..params import WoodParams
 from .section import areas, balanced, place
 
-__all__ = ["Standing", "area", "chords", "corners", "inside", "stand"]
+__all__ = ["Standing", "area", "chords", "corners", "inside", "sawn_through", "stand"]
 
 #: Corners of the polygon that stands for a disk, of the disk's area.
 _DISK = 96
@@ -76,12 +76,15 @@ def chords(outline: np.ndarray, normal: np.ndarray, offset: np.ndarray) -> np.nd
 def stand(params: WoodParams, generator: np.random.Generator) -> Standing:
     """Return where rods stand: in a disk as the thesis has them, in a polygon evened out to cells of one size.
 
+    What a saw cut along the grain divides is evened out on each side of it: cells that lie across it would make one
+    side thicker than the other, and both stiffer than they are.
+
     Raises:
         InvalidGeometry: two rods stand at the same place.
 
     """
-    if params.outline:
-        return _even(corners(params), params.rods, generator)
+    if params.outline or sawn_through(params):
+        return _even(corners(params), params.rods, generator, sawn_through(params))
     points, least = place(params.rods, params.radius, generator)
     if not least > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
@@ -89,7 +92,29 @@ def stand(params: WoodParams, generator: np.random.Generator) -> Standing:
     return Standing(balanced(points, section, params.radius), section, least)
 
 
-def _even(outline: np.ndarray, rods: int, generator: np.random.Generator) -> Standing:
+def sawn_through(params: WoodParams) -> list[tuple[int, float]]:
+    """Return the lines (0: y, 1: z; value [m]) in the section along which saw cuts part it from rim to rim."""
+    outline, found = corners(params), set()
+    low, high = outline.min(0), outline.max(0)
+    for cut in params.cuts:
+        for c in (0, 1):
+            at, other = cut.low[c + 1], 1 - c
+            across = cut.low[other + 1] <= low[other] and cut.high[other + 1] >= high[other]
+            if cut.low[0] < cut.high[0] and at == cut.high[c + 1] and low[c] < at < high[c] and across:
+                found.add((c, at))
+    return sorted(found)
+
+
+def _shared(rods: int, size: np.ndarray) -> np.ndarray:
+    """Return how many of the rods each part gets by its size, at least one each (largest remainders)."""
+    share = rods * size / size.sum()
+    found: np.ndarray = np.maximum(np.floor(share).astype(int), 1)
+    for n in np.argsort(found - share, kind="stable")[: max(rods - int(found.sum()), 0)]:
+        found[n] += 1
+    return found
+
+
+def _even(outline: np.ndarray, rods: int, generator: np.random.Generator, lines: list[tuple[int, float]]) -> Standing:
     """Return rods at the centroids of their cells: so the section's second moments are kept without more ado."""
     low, wide = outline.min(0), np.ptp(outline, axis=0)
     share = area(outline) / float(wide.prod())
@@ -98,16 +123,27 @@ def _even(outline: np.ndarray, rods: int, generator: np.random.Generator) -> Sta
     steps = np.arange(1, count + 1)[:, None] * np.array([0.7548776662466927, 0.5698402909980532])
     fine = low + wide * ((0.5 + steps) % 1)
     fine = fine[inside(outline, fine)]
+    side = sum((2**n * (fine[:, c] > at) for n, (c, at) in enumerate(lines)), np.zeros(len(fine), int))
+    parts = [fine[side == n] for n in np.unique(side)]
+    found = [
+        _cells(part, own, generator)
+        for part, own in zip(parts, _shared(rods, np.array([len(p) for p in parts])), strict=True)
+    ]
+    points, size = (np.concatenate(values) for values in zip(*found, strict=True))
+    if size.min() == 0:
+        raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a larger outline.")
+    many = len(points) > 1
+    least = float(np.asarray(cKDTree(points).query(points, 2)[0])[:, 1].min()) if many else float(wide.min())
+    own = size * (area(outline) / len(fine))
+    return Standing(points - own @ points / own.sum(), own, least)
+
+
+def _cells(fine: np.ndarray, rods: int, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Return the centroids (rods, 2) [m] of cells of one size, and how many of the points `fine` (n, 2) each has."""
     points = fine[generator.choice(len(fine), rods, replace=False)]
     for _ in range(_ROUNDS):
         owner = cKDTree(points).query(fine)[1]
         size = np.bincount(owner, minlength=rods)
         moved = np.column_stack([np.bincount(owner, fine[:, c], rods) for c in range(2)])
         points = np.where(size[:, None] > 0, moved / np.maximum(size, 1)[:, None], points)
-    owner = cKDTree(points).query(fine)[1]
-    size = np.bincount(owner, minlength=rods)
-    if size.min() == 0:
-        raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a larger outline.")
-    least = float(np.asarray(cKDTree(points).query(points, 2)[0])[:, 1].min()) if rods > 1 else float(wide.min())
-    own = size * (area(outline) / len(fine))
-    return Standing(points - own @ points / own.sum(), own, least)
+    return points, np.bincount(cKDTree(points).query(fine)[1], minlength=rods)

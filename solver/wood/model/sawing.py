@@ -34,6 +34,7 @@ def sawn(params: WoodParams, rest: np.ndarray, rods: Rods, bonds: Bonds) -> None
     for cut in params.cuts:
         through = _through(rest[bonds.i], on, cut)
         bonds.damage[through] = 1.0
+        bonds.parted[through] = 1.0
         bonds.on[through] = 2
 
 

@@ -66,6 +66,7 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((r, 3)),
         np.zeros((r, 3)),
         np.zeros(2),
+        np.zeros(len(wood.rods.before)),
         wood.motion.mass.copy(),
         np.zeros((len(plan.part) - 1, 4)),
         Rubbing(np.zeros((0, 2), np.int32), np.zeros(4)),

@@ -93,6 +93,7 @@ def _fill(
             motion.d,
             motion.theta,
             motion.reference,
+            scratch.bent,
         )
     books[CONTACT] = 0.0
     if len(bodies.kind) > 0:

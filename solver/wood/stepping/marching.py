@@ -44,6 +44,7 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
         wood.strength,
         m.theta,
         m.reference,
+        scratch.bent,
         wood.turning,
         anywhere,
         ratio,

@@ -91,6 +91,7 @@ def _bears(state: State, params: WoodParams, time: float) -> None:
         wood.strength,
         m.theta,
         m.reference,
+        scratch.bent,
         False,
         params.fracture == "stress",
         ratio,

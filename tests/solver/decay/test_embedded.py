@@ -9,6 +9,7 @@ from solver.decay import SOLVER, DecayParams
 from solver.decay.body import embedded
 from solver.decay.body.solid import volumes
 from solver.decay.body.stuffing import boundary, pieces, stuffed
+from solver.decay.fields.system import laid
 from solver.decay.surfaces.surface import lay
 from solver.geometry.inside import inside
 from solver.geometry.nearest import nearest
@@ -124,6 +125,16 @@ def test_a_rotten_banana_rests_on_its_floor() -> None:
     assert float(found.least_jacobian.min()) > 0
     assert 0.8 < float(found.density[1]) < 1.15
     assert np.array_equal(found.triangle.values, mesh.faces)
+
+
+def test_flesh_reaches_as_low_as_its_mesh() -> None:
+    """Points of the flesh lie within the mesh: what rests on the floor is what they stand for."""
+    params = SOLVER.parse({"mesh": given(bent()), "body": "quasi-static"}, preset="apple")
+    surface = laid(params, 12)
+    flesh = embedded.Embedded(params, surface, 3)
+    lowest = surface.points[:, 1].min()
+    assert flesh.solid.points[:, 1].min() > lowest + 1e-4
+    assert (flesh.solid.points[:, 1] + flesh.hanging).min() == pytest.approx(lowest, abs=1e-12)
 
 
 def test_what_cannot_hold_flesh_says_so_and_where(monkeypatch: pytest.MonkeyPatch) -> None:

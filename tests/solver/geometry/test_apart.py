@@ -8,6 +8,7 @@ import pytest
 from solver.arrays import Floats
 from solver.geometry.apart import Topology, put_apart
 from solver.geometry.crossings import crossings
+from solver.geometry.inward import candidates, pairs
 from solver.lattice import closed_lattice, directions, lattice
 
 N = 24
@@ -72,3 +73,32 @@ def test_no_jump_where_contact_begins(topology: Topology) -> None:
     before, steps = (np.linalg.norm(np.diff(found, axis=0), axis=2).max(axis=1) for found in (given, after))
     assert np.abs(after - given).max() > 0.01
     assert steps.max() < 3 * before.max()
+
+
+def test_what_did_not_move_is_not_looked_at_again(topology: Topology) -> None:
+    """Candidates are limited to what lies before or behind a triangle that moved."""
+    x, size = sphere(0.4), np.empty(len(topology.triangles))
+    everything = candidates(x, topology.triangles, size, np.empty(0, bool))
+    moved = np.zeros(len(x), bool)
+    always = candidates(x, topology.triangles, size, moved)  # those whose cells cannot be told
+    assert len(always) < 0.2 * len(everything)
+    moved[topology.triangles[everything[0]]] = True
+    some = candidates(x, topology.triangles, size, moved)
+    assert len(always) < len(some) < 0.5 * len(everything)
+    assert np.isin(some, everything).all()
+    assert everything[0] in some
+
+
+def test_pairs_are_those_of_all_boxes_that_touch(topology: Topology) -> None:
+    x, faces, size = sphere(0.4), topology.triangles, np.empty(len(topology.triangles))
+    some = candidates(x, faces, size, np.empty(0, bool))
+    found = {tuple(sorted(pair)) for pair in pairs(x, faces, some, size).tolist()}
+    corners = x[faces[some]]
+    more = 0.1 * size[some, None] + 1e-6
+    low, high = (corners.min(axis=1) - more).astype("f4"), (corners.max(axis=1) + more).astype("f4")
+    touch = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    apart = ~(faces[some][:, None, :, None] == faces[some][None, :, None, :]).any(axis=(2, 3))
+    first, second = np.nonzero(np.triu(touch & apart, 1))
+    expected = {tuple(sorted(pair)) for pair in zip(some[first].tolist(), some[second].tolist(), strict=True)}
+    assert len(expected) > 100
+    assert found == expected

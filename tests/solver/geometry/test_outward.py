@@ -29,7 +29,7 @@ def test_it_is_whole_where_nothing_faces_inwards(height: float, slide: float) ->
     triangles = closed_lattice(24).astype(np.int32)
     points = wavy(height, slide)
     whole = np.concatenate([points.reshape(-1, 3), ends(points)])
-    found = candidates(whole, triangles, np.empty(len(triangles)))
+    found = candidates(whole, triangles, np.empty(len(triangles)), np.empty(0, bool))
     assert faces_outward(points, ends(points)) == (len(found) == 0)
     assert faces_outward(points.astype("f4"), ends(points).astype("f4")) == (len(found) == 0)
 

@@ -7,7 +7,8 @@ from solver.wood import SOLVER
 from solver.wood.cohesion import soften
 from solver.wood.fracture import sawed
 from solver.wood.model.bundle import lay
-from solver.wood.model.outline import area, chords, corners
+from solver.wood.model.joining import resolved
+from solver.wood.model.outline import area, chords, corners, sawn_through
 from solver.wood.model.plan import KEEP
 from solver.wood.model.state import scratch_for
 
@@ -59,7 +60,8 @@ def test_damage_does_not_heal_and_begins_at_the_strength():
 
 
 def test_coarse_bonds_are_weaker_and_as_tough():
-    wood = lay(SOLVER.parse({**WEAK, "cleavage": 1e8}), 6)
+    # edges so short that they resolve any strength
+    wood = lay(SOLVER.parse({**WEAK, "cleavage": 1e8}), 600)
     b, plan = wood.bonds, scratch_for(wood).plan
     zero = np.zeros(len(b.i))
     assert (b.opens > b.torn).all()
@@ -133,3 +135,38 @@ def test_a_saw_cut_across_the_grain_parts_the_rods_that_it_passes():
     assert parents + gone == passed
     assert split == parents + 2 * gone
     assert wood.motion.mass.sum() == pytest.approx(whole.motion.mass.sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("rods", [24, 96])
+def test_a_plank_sawn_along_has_halves_of_the_beam_s_stiffness_and_a_crack_of_its_width(rods):
+    """A b h and b h^3 / 12 of each half; rods that lay across the cut made them 1.26 times as stiff at 24."""
+    cut = {"low": (0.1, -1, 0), "high": (1, 1, 0)}
+    params = SOLVER.parse({"rods": rods, "vertices": 4, "cuts": [cut], **PLANK, **PLAIN})
+    assert sawn_through(params) == [(1, 0.0)]
+    wood = lay(params, 4)
+    points = wood.motion.x[wood.grid[:, 1]][:, 1:]
+    own = np.pi * wood.rods.radius[np.searchsorted(wood.rod, np.arange(len(points)))] ** 2
+    for half in (points[:, 1] > 0, points[:, 1] < 0):
+        z, a = points[half, 1], own[half]
+        assert a.sum() == pytest.approx(1e-4, rel=1e-3)
+        second = a @ (z - a @ z / a.sum()) ** 2 + (a**2).sum() / (4 * np.pi)
+        assert second == pytest.approx(0.01 * 0.01**3 / 12, rel=0.06)
+    b, x = wood.bonds, wood.motion.x
+    apart = (x[b.i, 2] > 0) != (x[wood.rods.a[b.j], 2] > 0)
+    assert b.area[apart].sum() == pytest.approx(0.01 * params.length, rel=1e-9)
+
+
+def test_cuts_that_part_nothing_from_rim_to_rim_move_no_rods():
+    aside = [{"low": (0, 0, 0), "high": (1, 1, 0)}, {"low": (0.1, -1, -1), "high": (0.1, 1, 0)}]
+    assert sawn_through(SOLVER.parse({"cuts": aside, **PLANK})) == []
+
+
+def test_strength_of_coarse_rods_is_what_their_edges_resolve():
+    params = SOLVER.parse(PLANK)
+    outline = corners(params)
+    # t = 2 A / perimeter
+    thick = 2 * 2e-4 / 0.06
+    assert resolved(params, 1e-3, outline) == (4e6, 8e6)
+    opens, slides = resolved(params, 0.01, outline)
+    assert (10e9 * 250 * thick**3 / opens**2) ** 0.25 == pytest.approx(5.5 * 0.01)
+    assert (10e9 * 700 * thick / slides**2) ** 0.5 == pytest.approx(5.5 * 0.01)

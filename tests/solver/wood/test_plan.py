@@ -148,7 +148,9 @@ def test_the_bound_of_strain_is_above_what_it_bounds_and_near(seed):
     state, count = begin(wood), len(wood.rods.a)
     ratio, place, m = np.zeros(count), np.zeros(count), wood.motion
     t, inverse = state.scratch.t, state.scratch.inverse
-    top = overstress(wood.rods, t, inverse, wood.strength, m.theta, m.reference, False, True, ratio, place)
+    top = overstress(
+        wood.rods, t, inverse, wood.strength, m.theta, m.reference, state.scratch.bent, False, True, ratio, place
+    )
     assert top <= state.scratch.found[:, 3].max() * (1 + 1e-6) < 1.5 * top
     for p in range(len(state.scratch.found)):
         own = ratio[state.scratch.plan.part[p] : state.scratch.plan.part[p + 1]]

@@ -1,7 +1,7 @@
 // Sliders for a table's axes and its stage: symbol, units and ranges are the catalogue's.
 
 import { button, digits, el, withUnits } from "./dom";
-import type { Look } from "./looks";
+import type { Look } from "../view/looks";
 import { at, clamp, shareOf, type Scale } from "./state";
 
 const STEPS = 400;
@@ -15,6 +15,7 @@ export class Slider {
     readonly scale: Scale,
     look: Look,
     changed: (value: number) => void,
+    refused: (said: string) => void,
   ) {
     const word = look.labels[scale.name] ?? { symbol: scale.name, name: scale.name };
     const id = `axis-${scale.name}`;
@@ -52,6 +53,8 @@ export class Slider {
       const value = Number.isFinite(given) ? clamp(scale, given) : at(scale, Number(this.range.value) / STEPS);
       this.set(value);
       changed(value);
+      const range = `${digits(scale.lowest)} to ${withUnits(scale.highest, scale.units)}`;
+      if (Number.isFinite(given) && value !== given) refused(`${word.name}: ${digits(given)} is out of range, this table holds ${range}.`);
     });
   }
 

@@ -1,20 +1,18 @@
 // How far to trust a shape: what its answer says of itself, in words. What nobody knows is not shown.
 
-import type { About } from "./api";
-import { digits, el } from "./dom";
+import type { Verdict } from "../house";
+import type { About } from "../service/shapes";
+import { counted, digits, el, terms } from "./dom";
 
-interface Verdict {
-  level: "good" | "fair" | "poor";
-  text: string;
-  why: string;
-}
-
-function verdict(about: About): Verdict {
+export function verdict(about: About): Verdict {
   if (!about.inside) {
     return { level: "poor", text: "outside the runs", why: "No runs surround this point: the shape is a guess." };
   }
   if (about.exact && about.stage.value === 0) {
     return { level: "good", text: "the fresh shape, exact", why: "It follows from the parameters alone." };
+  }
+  if (about.tier === "relaxed") {
+    return { level: "good", text: "relaxed until forces balance", why: "The solver settled what the table gave: an equilibrium, near the looked-up one." };
   }
   if (about.exact) {
     return about.converged
@@ -43,8 +41,11 @@ const MEASURES: Record<string, [string, (value: number) => string]> = {
   corr: ["Pattern, off by", percent],
 };
 
+/** How an answer came about, in words. */
+export const tierOf = (about: About): string =>
+  ({ table: `looked up, ${about.method}`, relaxed: "relaxed by the solver", run: "run by the solver" })[about.tier] ?? about.tier;
+
 export function showTrust(root: HTMLElement, about: About, speed: string): void {
-  const { level, text, why } = verdict(about);
   const rows: [string, string | Node][] = [["Nearest run", digits(about.nearest)]];
   rows.push(["Between runs", about.inside ? "yes" : "no"]);
   for (const [name, [word, say]] of Object.entries(MEASURES)) {
@@ -55,16 +56,13 @@ export function showTrust(root: HTMLElement, about: About, speed: string): void 
   rows.push(["Settled", about.converged ? "yes" : "not every stage it is made of"]);
   rows.push(["Made of", bars(about.weights)]);
   rows.push(["Answered in", speed]);
-  root.replaceChildren(
-    el("p", { class: `badge ${level}`, title: why }, text),
-    el("dl", {}, ...rows.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)])),
-  );
+  root.replaceChildren(terms(rows));
 }
 
 /** One bar per stored run, as long as its weight. */
 function bars(weights: Record<string, number>): HTMLElement {
   const own = Object.entries(weights).filter(([, weight]) => weight > 1e-4);
-  const text = own.length === 1 ? "1 run" : `${own.length} runs`;
+  const text = counted(own.length);
   const row = el("span", { class: "weights" });
   for (const [key, weight] of own) {
     const bar = el("i", { title: `${percent(weight)} of run ${key.slice(0, 8)}` });
@@ -75,9 +73,9 @@ function bars(weights: Record<string, number>): HTMLElement {
 }
 
 export function showFacts(root: HTMLElement, about: About): void {
-  const rows = Object.values(about.descriptors).flatMap(({ value, units, long_name }) => [
-    el("dt", {}, long_name),
-    el("dd", {}, units === "1" ? digits(value) : `${digits(value)} ${units}`),
+  const rows = Object.values(about.descriptors).map(({ value, units, long_name }): [string, string] => [
+    long_name,
+    units === "1" ? digits(value) : `${digits(value)} ${units}`,
   ]);
-  root.replaceChildren(el("dl", {}, ...rows));
+  root.replaceChildren(terms(rows));
 }

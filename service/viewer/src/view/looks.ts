@@ -19,6 +19,8 @@ export interface Place {
 }
 
 export interface Look {
+  /** Fields that make its colours. */
+  layers: string[];
   labels: Record<string, { symbol: string; name: string }>;
   /** The word for going along the stage axis. */
   advance: string;

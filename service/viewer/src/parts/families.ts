@@ -1,20 +1,15 @@
 // What can be asked for, family by family, each with its picture: the way from one table to another.
 
-import type { Family } from "./api";
-import { el } from "./dom";
+import { relative } from "../service/http";
+import type { Family } from "../service/shapes";
+import { counted, el, worded } from "./dom";
 
-/** Words for a family's name: "jujube1" is "jujube 1"; the table that is there by default is named by its preset. */
-const worded = (family: Family): string =>
-  (family.name === "default" ? (family.presets[0] ?? family.name) : family.name)
-    .replace(/-\d+$/, "")
-    .replace(/([a-z])(\d)/g, "$1 $2")
-    .replace(/[-_]/g, " ");
-
-/** "1 run", "8 runs". */
-export const counted = (runs: number): string => `${runs} ${runs === 1 ? "run" : "runs"}`;
+/** Words for a family: the table that is there by default is named by its preset. */
+export const titled = (family: Family): string =>
+  worded((family.name === "default" ? (family.presets[0] ?? family.name) : family.name).replace(/-\d+$/, ""));
 
 /** The axes of a family with their ends, "te 0.03 to 0.04"; what tells it from others of its name if it has none. */
-const ranges = (family: Family): string[] =>
+export const ranges = (family: Family): string[] =>
   Object.entries(family.axes)
     .filter(([, axis]) => axis.values.length > 1)
     .map(([name, { values }]) => `${name} ${Math.min(...values)}\u2013${Math.max(...values)}`);
@@ -22,12 +17,12 @@ const ranges = (family: Family): string[] =>
 export function familyChoice(all: Family[], current: string, chosen: (family: Family) => void): HTMLElement {
   const row = el("div", { class: "families", role: "group", "aria-label": "Family" });
   for (const family of all) {
-    const picture = el("img", { src: family.links.thumbnail.replace(/^\//, ""), alt: "", width: "72", height: "72", loading: "lazy" });
+    const picture = el("img", { src: relative(family.links.thumbnail), alt: "", width: "72", height: "72", loading: "lazy" });
     const made = el("button", { type: "button", "aria-pressed": String(family.name === current), "data-family": family.name });
     const over = ranges(family);
     const held = over.length ? `${counted(family.samples)} over ${over.join(" and ")}` : counted(family.samples);
     made.title = `${family.name}: ${held}, ${family.quality ?? "unknown"} quality`;
-    made.append(picture, el("span", {}, worded(family)), el("small", {}, over.join(", ") || counted(family.samples)));
+    made.append(picture, el("span", {}, titled(family)), el("small", {}, over.join(", ") || counted(family.samples)));
     made.addEventListener("click", () => chosen(family));
     row.append(made);
   }

@@ -3,18 +3,21 @@
 import { BufferAttribute, BufferGeometry, Mesh } from "three";
 import type { Skin } from "./looks";
 import { SkinMaterial } from "./skin";
+import type { Subject } from "./studio";
 import { normals, relief, triangles, vertexCount } from "./surface";
 
 const REACH = 0.5; // [radian] what counts as the surroundings of a wrinkle
 const EASE = 45; // [ms] after which a third of the way to a new shape is left
 
-export class Fruit extends Mesh<BufferGeometry, SkinMaterial> {
+export class Fruit extends Mesh<BufferGeometry, SkinMaterial> implements Subject {
+  readonly object = this;
+  readonly height = 1.8;
   private n = 0;
   private target: Float32Array = new Float32Array(0);
   private moving = false;
   private skin: Skin | undefined;
   private dryness = 0;
-  private height = 0.05;
+  private depth = 0.05;
 
   constructor() {
     super(new BufferGeometry(), new SkinMaterial());
@@ -57,10 +60,17 @@ export class Fruit extends Mesh<BufferGeometry, SkinMaterial> {
     return true;
   }
 
+  frozen(): Fruit {
+    const copy = new Fruit();
+    if (this.skin) copy.wear(this.skin, this.dryness);
+    if (this.n) copy.show(this.target.slice(), this.n, false);
+    return copy;
+  }
+
   wear(skin: Skin, dryness: number): void {
     this.skin = skin;
     this.dryness = dryness;
-    this.material.wear(skin, dryness, this.height);
+    this.material.wear(skin, dryness, this.depth);
   }
 
   private array(name: string): Float32Array {
@@ -99,7 +109,7 @@ export class Fruit extends Mesh<BufferGeometry, SkinMaterial> {
     let square = 0;
     for (const h of heights) square += h * h;
     // almost smooth skins have no furrows to speak of
-    this.height = Math.max(0.018, Math.sqrt(square / heights.length));
+    this.depth = Math.max(0.018, Math.sqrt(square / heights.length));
     for (const name of ["position", "normal", "relief"]) this.geometry.getAttribute(name).needsUpdate = true;
     let lowest = Infinity;
     for (let k = 1; k < position.length; k += 3) lowest = Math.min(lowest, position[k]);

@@ -1,6 +1,7 @@
 // Where the page stands: a table, a point on its axes with the stage, a skin. The address bar carries it along.
 
-import type { Point, Solver, Table } from "./api";
+import type { Point, Table } from "../service/shapes";
+import type { Solver, Values } from "../service/solvers";
 
 export interface Scale {
   name: string;
@@ -62,21 +63,12 @@ export function presetsIn(table: Table, solver: Solver): Record<string, Point> {
 }
 
 /** A preset in the words of the query axes; a list may have more entries than axes, the first ones being fixed. */
-function flat(preset: Record<string, number | number[]>, solver: Solver): Point {
+function flat(preset: Values, solver: Solver): Point {
   const out: Point = {};
   for (const [field, value] of Object.entries(preset)) {
     const axes = solver.params.properties[field]?.axes ?? [];
-    const values = Array.isArray(value) ? value : [value];
+    const values = (Array.isArray(value) ? value : [value]) as number[];
     axes.forEach((axis, i) => (out[axis] = values[values.length - axes.length + i]));
   }
   return out;
-}
-
-export function fromHash(): Record<string, string> {
-  return Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
-}
-
-export function toHash(words: URLSearchParams, point: Point): void {
-  for (const [name, value] of Object.entries(point)) words.set(name, String(Number(value.toPrecision(4))));
-  history.replaceState(null, "", `#${words}`);
 }

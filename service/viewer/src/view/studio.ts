@@ -13,33 +13,48 @@ import {
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
+  type Object3D,
   PCFShadowMap,
   PerspectiveCamera,
   PMREMGenerator,
   PlaneGeometry,
+  Raycaster,
   Scene,
   Spherical,
+  Vector2,
   Vector3,
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import type { Fruit } from "./fruit";
 
 const HOME = new Spherical(6.3, 1.24, 0.55);
 const TARGET = new Vector3(0, 0.86, 0);
 
+/** What can stand on the table. */
+export interface Subject {
+  readonly object: Object3D;
+  /** How tall it is, where the fruit of radius 1 is about 1.8. */
+  readonly height: number;
+  /** Move on by milliseconds; true while there is more to do. */
+  step(milliseconds: number): boolean;
+  /** A copy that stays as it is now, to compare with. */
+  frozen(): Object3D;
+}
+
 export class Studio {
-  private readonly renderer: WebGLRenderer;
+  readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera(25, 1, 0.5, 40);
   private readonly controls: OrbitControls;
+  private readonly target = TARGET.clone();
+  private subject: Subject | undefined;
+  private pinned: Object3D | undefined;
   private scheduled = false;
   private last = 0;
+  /** Told of a click on the shape: the ray's first hit in the coordinates of the subject's object. */
+  picked: ((at: Vector3) => void) | undefined;
 
-  constructor(
-    private readonly canvas: HTMLCanvasElement,
-    private readonly fruit: Fruit,
-  ) {
+  constructor(private readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.toneMapping = ACESFilmicToneMapping;
@@ -49,7 +64,7 @@ export class Studio {
     this.renderer.shadowMap.autoUpdate = false; // the lights stand still: only a new shape casts another shadow
     this.scene.environment = softBoxes(this.renderer);
     this.scene.environmentIntensity = 0.62;
-    this.scene.add(...lights(), table(), fruit);
+    this.scene.add(...lights(), table());
 
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enablePan = false;
@@ -58,18 +73,54 @@ export class Studio {
     this.controls.minDistance = 2.4;
     this.controls.maxDistance = 12;
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
-    this.controls.target.copy(TARGET);
     this.controls.addEventListener("change", () => this.invalidate());
     canvas.addEventListener("keydown", (event) => this.key(event));
     canvas.addEventListener("dblclick", () => this.home());
+    listenToClicks(canvas, (x, y) => this.pick(x, y));
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement as Element);
     this.home();
     this.resize();
   }
 
+  /** Put something on the table in place of what stood there; nothing clears it. */
+  stand(subject: Subject | undefined): void {
+    if (this.subject) this.scene.remove(this.subject.object);
+    this.subject = subject;
+    if (subject) this.scene.add(subject.object);
+    this.aim();
+    this.reshaped();
+  }
+
+  /** Keep what is shown beside what comes; without anything to keep, show one alone again. */
+  pin(keep: boolean): void {
+    if (this.pinned) this.scene.remove(this.pinned);
+    this.pinned = keep ? this.subject?.frozen() : undefined;
+    if (this.pinned) this.scene.add(this.pinned);
+    this.resize();
+    this.reshaped();
+  }
+
+  /** Look at the middle of what stands there. */
+  aim(): void {
+    const height = this.subject?.height ?? 0;
+    const offset = this.camera.position.clone().sub(this.target);
+    this.target.y = height ? 0.48 * height : TARGET.y;
+    this.camera.position.copy(this.target).add(offset);
+    this.controls.target.copy(this.target);
+    this.controls.update();
+    this.invalidate();
+  }
+
   /** Back to where the camera started. */
   home(): void {
     this.place(HOME.clone());
+  }
+
+  /** Go round what stands there by an angle [radian]. */
+  turn(by: number): void {
+    const where = new Spherical().setFromVector3(this.camera.position.clone().sub(this.target));
+    where.theta += by;
+    this.place(where);
   }
 
   /** Draw soon; the loop sleeps as long as nothing moves. */
@@ -85,26 +136,77 @@ export class Studio {
     this.invalidate();
   }
 
+  /** Draw something alone, as small as a stamp, into another canvas. */
+  portrait(subject: Subject, into: HTMLCanvasElement): void {
+    const [width, height] = [into.width, into.height];
+    const [shown, kept] = [this.subject, this.pinned];
+    const ratio = this.renderer.getPixelRatio();
+    for (const one of [shown?.object, kept]) if (one) one.visible = false;
+    this.scene.add(subject.object);
+    const camera = new PerspectiveCamera(25, width / height, 0.5, 40);
+    const middle = new Vector3(0, 0.48 * subject.height, 0);
+    camera.position.setFromSpherical(new Spherical(5.6, 1.2, 0.55)).add(middle);
+    camera.lookAt(middle);
+    this.renderer.setPixelRatio(1);
+    this.renderer.setSize(width, height, false);
+    this.renderer.shadowMap.needsUpdate = true;
+    this.renderer.render(this.scene, camera);
+    into.getContext("2d")?.drawImage(this.canvas, 0, 0);
+    this.scene.remove(subject.object);
+    for (const one of [shown?.object, kept]) if (one) one.visible = true;
+    this.renderer.setPixelRatio(ratio);
+    this.resize();
+    this.reshaped();
+  }
+
   private frame(now: number): void {
     this.scheduled = false;
     const passed = Math.min(50, now - this.last || 16);
     this.last = now;
-    if (this.fruit.step(passed)) this.reshaped();
+    if (this.subject?.step(passed)) this.reshaped();
     if (this.controls.update()) this.invalidate();
-    this.renderer.render(this.scene, this.camera);
+    if (this.pinned) this.both(this.pinned, this.subject?.object);
+    else this.renderer.render(this.scene, this.camera);
     this.canvas.dataset.frames = String(this.renderer.info.render.frame);
+  }
+
+  /** What was kept on the left, what changes on the right: one camera, each with its own shadow. */
+  private both(left: Object3D, right: Object3D | undefined): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement as HTMLElement;
+    const half = Math.floor(width / 2);
+    this.renderer.setScissorTest(true);
+    for (const [own, other, x] of [[left, right, 0], [right, left, half]] as const) {
+      if (own) own.visible = true;
+      if (other) other.visible = false;
+      this.renderer.setViewport(x, 0, half, height);
+      this.renderer.setScissor(x, 0, half, height);
+      this.renderer.shadowMap.needsUpdate = true;
+      this.renderer.render(this.scene, this.camera);
+    }
+    for (const one of [left, right]) if (one) one.visible = true;
+    this.renderer.setScissorTest(false);
+    this.renderer.setViewport(0, 0, width, height);
+  }
+
+  private pick(x: number, y: number): void {
+    if (!this.picked || !this.subject || this.pinned) return;
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2(2 * x - 1, 1 - 2 * y), this.camera);
+    const [hit] = ray.intersectObject(this.subject.object, true);
+    if (hit) this.picked(this.subject.object.worldToLocal(hit.point.clone()));
   }
 
   private place(where: Spherical): void {
     where.phi = Math.min(Math.max(where.phi, 0.05), this.controls.maxPolarAngle);
     where.radius = Math.min(Math.max(where.radius, this.controls.minDistance), this.controls.maxDistance);
-    this.camera.position.setFromSpherical(where).add(TARGET);
+    this.controls.target.copy(this.target);
+    this.camera.position.setFromSpherical(where).add(this.target);
     this.controls.update();
     this.invalidate();
   }
 
   private key(event: KeyboardEvent): void {
-    const where = new Spherical().setFromVector3(this.camera.position.clone().sub(TARGET));
+    const where = new Spherical().setFromVector3(this.camera.position.clone().sub(this.target));
     const moves: Record<string, () => void> = {
       ArrowLeft: () => (where.theta -= 0.12),
       ArrowRight: () => (where.theta += 0.12),
@@ -121,15 +223,27 @@ export class Studio {
   }
 
   private resize(): void {
-    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement as HTMLElement;
-    if (!width || !height) return;
-    this.renderer.setSize(width, height, false);
+    const { clientWidth, clientHeight: height } = this.canvas.parentElement as HTMLElement;
+    if (!clientWidth || !height) return;
+    this.renderer.setSize(clientWidth, height, false);
+    const width = this.pinned ? Math.floor(clientWidth / 2) : clientWidth;
     this.camera.aspect = width / height;
     // the fruit fills the shorter side
     this.camera.fov = width < height ? (2 * Math.atan(Math.tan((25 * Math.PI) / 360) / this.camera.aspect) * 180) / Math.PI : 25;
     this.camera.updateProjectionMatrix();
     this.invalidate();
   }
+}
+
+/** Clicks that turn nothing: where they were, as shares of the canvas. */
+function listenToClicks(canvas: HTMLCanvasElement, clicked: (x: number, y: number) => void): void {
+  let from = [0, 0];
+  canvas.addEventListener("pointerdown", (event) => (from = [event.clientX, event.clientY]));
+  canvas.addEventListener("pointerup", (event) => {
+    if (Math.hypot(event.clientX - from[0], event.clientY - from[1]) > 4) return;
+    const box = canvas.getBoundingClientRect();
+    clicked((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+  });
 }
 
 function lights(): Light[] {

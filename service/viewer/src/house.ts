@@ -1,0 +1,113 @@
+// What all rooms share: the table in the studio, the caption below the shape, the panel, complaints, the address bar.
+
+import { button, byId, el } from "./parts/dom";
+import { Problem } from "./service/http";
+import { Studio, type Subject } from "./view/studio";
+
+export type Words = Record<string, string>;
+/** A room opens in the house and returns what closes it. */
+export type Room = (house: House, words: Words) => Promise<() => void>;
+
+/** How far to trust what is shown, in a few words. */
+export interface Verdict {
+  level: "good" | "fair" | "poor";
+  text: string;
+  why: string;
+}
+
+export class House {
+  readonly canvas = byId<HTMLCanvasElement>("view");
+  readonly panel = byId("panel");
+  readonly wall = byId("wall");
+  private readonly what = el("p", { class: "what" });
+  private readonly badge = el("p", { class: "badge" });
+  private readonly tier = el("p", { class: "tier" });
+  private readonly beside = byId("beside");
+  private readonly tools = byId("tools");
+  private readonly problem = byId("problem");
+  private readonly compare: HTMLButtonElement;
+  private made: Studio | undefined;
+  private said = "";
+  private compared = false;
+
+  constructor() {
+    this.compare = button("Compare", () => this.pin(!this.compared), { "aria-pressed": "false", title: "Keep this shape on the left, and go on changing on the right" });
+    byId("caption").replaceChildren(this.what, this.badge, this.tier);
+    this.tools.append(this.compare, button("Reset view", () => this.studio.home()));
+  }
+
+  /** The studio, built when a room first draws. */
+  get studio(): Studio {
+    this.made ??= new Studio(this.canvas);
+    return this.made;
+  }
+
+  stand(subject: Subject | undefined): void {
+    this.studio.stand(subject);
+    this.compare.disabled = !subject && !this.compared;
+  }
+
+  /** Say what is shown, how it came about and how far to trust it. */
+  say(title: string, tier: string, verdict: Verdict | undefined): void {
+    this.said = [title, tier].filter(Boolean).join(" · ");
+    this.what.textContent = title;
+    this.tier.textContent = tier;
+    this.badge.className = `badge ${verdict?.level ?? ""}`;
+    this.badge.textContent = verdict?.text ?? "";
+    this.badge.title = verdict?.why ?? "";
+    this.badge.hidden = !verdict;
+  }
+
+  complain(error: unknown): void {
+    if (error instanceof DOMException && error.name === "AbortError") return;
+    const own = error instanceof Problem;
+    const detail = own ? error.detail : "This page met an error that it did not foresee.";
+    this.problem.replaceChildren(el("strong", {}, detail), " ", own ? error.advice : String(error));
+    this.problem.hidden = false;
+  }
+
+  content(): void {
+    this.problem.hidden = true;
+  }
+
+  /** Empty, for the next room. */
+  clear(): void {
+    this.content();
+    this.panel.replaceChildren();
+    this.panel.scrollTop = 0;
+    this.wall.replaceChildren();
+    this.wall.hidden = true;
+    document.body.classList.remove("walled");
+    this.say("", "", undefined);
+    this.canvas.removeAttribute("data-shown");
+    if (this.made) {
+      this.made.picked = undefined;
+      this.stand(undefined);
+    }
+  }
+
+  /** Cover the studio with something else, such as a gallery. */
+  cover(...children: Node[]): void {
+    this.wall.replaceChildren(...children);
+    this.wall.hidden = false;
+    document.body.classList.add("walled");
+  }
+
+  private pin(on: boolean): void {
+    this.compared = on;
+    this.studio.pin(on);
+    this.compare.setAttribute("aria-pressed", String(on));
+    this.compare.textContent = on ? "Stop comparing" : "Compare";
+    this.beside.hidden = !on;
+    this.beside.textContent = on ? this.said : "";
+  }
+}
+
+export function fromHash(): Words {
+  return Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+}
+
+/** Let the address bar say where the page stands, without a step in its history. */
+export function keep(words: Words): void {
+  history.replaceState(null, "", `#${new URLSearchParams(words)}`);
+}

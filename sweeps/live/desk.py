@@ -1,0 +1,325 @@
+"""One engine and what is asked of it, message by message; knows no connection (docs/sessions.md)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Generator, Mapping
+from typing import Any, NamedTuple
+
+from solver.contract import InvalidInput, LiveEngine, Params, Quality, Solver, SolverError
+from solver.contract.words import SHORT
+from solver.meshes import Frame
+
+from .frames import EXACT, MORE, Encoder, Told
+from .script import command, toml
+
+__all__ = ["Desk", "problem"]
+
+#: Frames that a client may have without having said that it took them in, and seconds between two of them.
+_WINDOW, _BETWEEN = 2, 1 / 30
+#: Seconds of work between two looks at what has come.
+_SLICE = 0.01
+_QUALITIES = ("preview", "default", "fine")
+
+
+class _Waiting(NamedTuple):
+    """An input that the geometry holds once so many steps are done; processor time when it was taken [s]."""
+
+    stage: float
+    id: int
+    taken: float
+
+
+def problem(error: SolverError) -> dict[str, Any]:
+    """Return an error in the words of a problem (RFC 9457), but for its status."""
+    title = error.code.replace("-", " ").capitalize()
+    return {"type": f"urn:wizen:problem:{error.code}", "title": title, "detail": error.message, "advice": error.advice}
+
+
+class Desk:
+    """Takes messages, works, and says and shows what comes of it."""
+
+    def __init__(
+        self,
+        solver: Solver,
+        params: Params,
+        quality: Quality,
+        fields: tuple[str, ...],
+        say: Callable[[dict[str, Any]], None],
+        show: Callable[[bytes], None],
+    ) -> None:
+        """Begin.
+
+        Raises:
+            InvalidInput: the solver offers no engine, or cannot begin with these parameters.
+
+        """
+        if solver.live is None:
+            raise InvalidInput(f"{solver.name} offers no live engine.", advice="Run it as a job.")
+        unknown = [name for name in fields if name not in solver.live.fields]
+        if unknown:
+            known = ", ".join(solver.live.fields) or "none"
+            raise InvalidInput(f"no field {unknown[0]!r} can be shown.", advice=f"Known: {known}.")
+        self._solver, self._live, self._fields, self._say, self._show = solver, solver.live, fields, say, show
+        self._engine: LiveEngine = solver.live.open(params, quality)
+        self._encoder = Encoder()
+        self._until, self._pace, self._since = 0.0, math.inf, (time.monotonic(), 0.0)
+        self._waiting: list[_Waiting] = []
+        self._settling: Generator[None, None, tuple[Frame, float]] | None = None
+        self._exact: tuple[Frame, float] | None = None
+        self._unseen: set[int] = set()
+        self._sent, self._input = 0.0, 0
+        #: Whether there is something to show, and whether the client has what is there but for roundings.
+        self._is_new, self._is_rough = True, False
+        self._told: dict[str, Any] = {}
+        self.held = False
+
+    def begin_again(self, more: Mapping[str, Any]) -> None:
+        """Speak with a client that holds nothing; `more`: what it is told besides."""
+        self._encoder.forget()
+        self._unseen.clear()
+        self._told, self._is_new = {}, True
+        stages, engine = self._solver.stages, self._engine
+        opened = {
+            "say": "opened",
+            "solver": self._solver.name,
+            "version": self._solver.version,
+            "stage": {"symbol": stages.symbol, "units": stages.units},
+            "step": engine.step,
+            "quality": engine.quality,
+            "fields": list(self._fields),
+            "actions": list(self._live.actions),
+        }
+        self._say({**opened, **more})
+        self._state()
+
+    def take(self, message: Mapping[str, Any]) -> None:
+        """Do what a message says, or say what is wrong with it."""
+        if message.get("do") == "seen":
+            self._unseen.discard(message.get("frame", 0))
+            return
+        number = message.get("id")
+        try:
+            if type(number) is not int or not 0 < number < 2**32:
+                number = None
+                raise InvalidInput("id: a message has a whole number above 0.", advice='Send {"do": ..., "id": 1}.')
+            said = self._done(message, number)
+        except SolverError as error:
+            self._say({"say": "error", "id": number, "problem": problem(error)})
+        else:
+            self._say({"say": "done", "id": number, **said})
+        self._state()
+
+    def _done(self, message: Mapping[str, Any], number: int) -> Mapping[str, Any]:
+        values = {name: value for name, value in message.items() if name not in ("do", "id")}
+        what = message.get("do")
+        if not isinstance(what, str) or (what not in _OWN and what not in self._live.actions):
+            known = ", ".join([*_OWN, *self._live.actions])
+            raise InvalidInput(f"there is nothing to do by the name {SHORT.repr(what)}.", advice=f"Known: {known}.")
+        if what in _OWN:
+            _check(what, values)
+            said: Mapping[str, Any] | None = getattr(self, f"_do_{what}")(number, **values)
+            return said or {}
+        found = self._engine.do(self._live.parse(what, values))
+        self._leave_settling()
+        grown = self._engine.following + self._engine.step
+        self._until = max(self._until, grown)
+        self._wait(number, grown)
+        return found
+
+    def _do_play(self, number: int, until: Any = None, pace: Any = None) -> None:
+        end, fastest = _number("until", until), _number("pace", pace)
+        if end <= self._engine.stage or fastest <= 0:
+            raise InvalidInput(
+                f"until and pace are numbers, beyond {self._engine.stage:g} and above 0.", advice="Or leave them out."
+            )
+        self._engine.begin()
+        self._leave_settling()
+        self._until, self._pace = min(end, self._solver.stages.highest), fastest
+        self._since = time.monotonic(), self._engine.stage
+        self._wait(number, self._engine.following + self._engine.step)
+
+    def _do_pause(self, number: int) -> None:
+        self._until, self._pace = self._engine.following, math.inf
+
+    def _do_undo(self, number: int) -> None:
+        if not self._engine.undo():
+            raise InvalidInput("there is nothing to undo.", advice="`state` says how many gestures there are.")
+        self._jumped(number)
+
+    def _do_redo(self, number: int) -> None:
+        if not self._engine.redo():
+            raise InvalidInput("there is nothing to bring again.", advice="Whatever is done ends it.")
+        self._jumped(number)
+
+    def _do_quality(self, number: int, quality: Any = None) -> None:
+        if quality not in _QUALITIES:
+            raise InvalidInput(f"there is no quality {quality!r}.", advice=f"Known: {', '.join(_QUALITIES)}.")
+        self._engine.refine(quality)
+        self._jumped(number)
+
+    def _jumped(self, number: int) -> None:
+        """The shape is another one, perhaps after the way back that is owed."""
+        self._leave_settling()
+        self._until, self._pace, self._is_new = 0.0, math.inf, True
+        self._waiting.clear()
+        self._wait(number, self._engine.owed)
+
+    def _do_settle(self, number: int) -> None:
+        if self._engine.owed > self._engine.stage + 1e-9:
+            raise InvalidInput("the shape is still on its way.", advice="Wait until `working` is false.")
+        self._until = self._engine.stage
+        self._leave_settling()
+        self._settling = self._engine.settled(self._fields)
+        self._wait(number, self._engine.stage)
+
+    def _do_save(self, number: int) -> Mapping[str, Any]:
+        return self.saved()
+
+    def _do_whole(self, number: int) -> None:
+        self._encoder.forget()
+        self._unseen.clear()
+        self._is_new = True
+
+    def saved(self) -> dict[str, Any]:
+        """Return the session as a parameter file."""
+        engine, solver = self._engine, self._solver
+        # while the way back is owed, what counts is where it leads
+        stage = max(engine.stage, engine.owed)
+        text = toml(solver, engine.script, stage, engine.quality)
+        told = {"toml": text, "stage": stage, "quality": engine.quality}
+        return told | {"command": command(solver, stage, engine.quality)}
+
+    def _wait(self, number: int, stage: float) -> None:
+        self._waiting.append(_Waiting(stage, number, time.process_time()))
+
+    def _leave_settling(self) -> None:
+        if self._settling is not None:
+            self._settling.close()
+        self._settling = self._exact = None
+
+    @property
+    def _goal(self) -> float:
+        """How far to work now."""
+        if self._engine.owed > self._engine.stage + 1e-9:
+            return self._engine.owed
+        begun, stage = self._since
+        if math.isinf(self._pace):
+            return self._until
+        return min(self._until, stage + self._pace * (time.monotonic() - begun))
+
+    @property
+    def _works(self) -> bool:
+        """Whether there is more to grow, now or when its time has come."""
+        end = max(self._engine.owed, self._until)
+        return self._settling is not None or self._engine.stage + self._engine.step <= end + 1e-9
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether `work` has something to do at once."""
+        if self.held:
+            return False
+        due = self._engine.stage + self._engine.step <= self._goal + 1e-9
+        return self._settling is not None or due or (self._may_show and self._has_news)
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether `work` will have something to do when time has passed."""
+        return not self.held and (self._works or self._has_news)
+
+    def work(self) -> None:
+        """Work for a hundredth of a second, and show what came of it."""
+        if self.held:
+            return
+        try:
+            if self._settling is not None:
+                self._settle()
+            elif self._engine.stage + self._engine.step <= self._goal + 1e-9:
+                self._is_new |= self._engine.advance(_SLICE, self._goal)
+        except SolverError as error:
+            self._until, self._settling, self._is_new = self._engine.stage, None, True
+            last = max((w.id for w in self._waiting), default=None)
+            self._waiting.clear()
+            self._say({"say": "error", "id": last, "problem": problem(error)})
+        if self._may_show and self._has_news:
+            self._send()
+        self._state()
+
+    def _settle(self) -> None:
+        assert self._settling is not None
+        end = time.perf_counter() + _SLICE
+        while time.perf_counter() < end:
+            try:
+                next(self._settling)
+            except StopIteration as found:
+                self._settling, self._exact = None, found.value
+                return
+
+    @property
+    def _has_news(self) -> bool:
+        return self._is_new or self._exact is not None or (self._is_rough and not self._works)
+
+    @property
+    def _may_show(self) -> bool:
+        return len(self._unseen) < _WINDOW and time.monotonic() - self._sent >= _BETWEEN
+
+    def _send(self) -> None:
+        """Send the present state, or the settled one."""
+        stage = self._engine.stage
+        frame, residual = self._exact or (self._engine.frame(self._fields), self._engine.residual)
+        held = [w for w in self._waiting if w.stage <= stage + 1e-9]
+        self._waiting = [w for w in self._waiting if w.stage > stage + 1e-9]
+        spent = 1e3 * (time.process_time() - min(w.taken for w in held)) if held else 0.0
+        self._input = max((w.id for w in held), default=self._input)
+        more = self._works
+        flags = (EXACT if self._exact else 0) | (MORE if more else 0)
+        told = Told(stage, residual, self._input, spent, flags)
+        # at rest the client gets every digit
+        self._show(self._encoder.frame(frame, told, exact=not more))
+        self._unseen.add(self._encoder.number)
+        self._sent, self._is_new, self._is_rough, self._exact = time.monotonic(), False, more, None
+
+    def _state(self) -> None:
+        """Say how things stand, if anything but the time has changed."""
+        engine = self._engine
+        until = max(self._until, engine.owed)
+        told = {
+            "until": until,
+            "working": self._works,
+            "undo": engine.gestures,
+            "redo": engine.undone,
+            "quality": engine.quality,
+        }
+        if told != self._told:
+            self._told = told
+            self._say({"say": "state", "time": engine.stage, **told})
+
+
+#: What every session understands, and the names of what goes with it.
+_OWN: Mapping[str, tuple[str, ...]] = {
+    "play": ("until", "pace"),
+    "pause": (),
+    "undo": (),
+    "redo": (),
+    "quality": ("quality",),
+    "settle": (),
+    "save": (),
+    "whole": (),
+}
+
+
+def _check(what: str, values: Mapping[str, Any]) -> None:
+    strange = [name for name in values if name not in _OWN[what]]
+    if strange:
+        known = ", ".join(_OWN[what]) or "nothing"
+        raise InvalidInput(f"{what} does not take {strange[0]!r}.", advice=f"It takes {known}.")
+
+
+def _number(name: str, value: Any) -> float:
+    """Return a number, infinite where there is none."""
+    if value is None:
+        return math.inf
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InvalidInput(f"{name}: {value!r} is no number.", advice="Or leave it out.")
+    return float(value)

@@ -1,0 +1,282 @@
+"""All rooms of the built page in a real browser, at three sizes, over a `wizen serve --studio` that runs their jobs."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+import httpx
+import pytest
+
+from ._browser import MARKS, ROOT, Visit, serving
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+AXE = ROOT / "service" / "viewer" / "node_modules" / "axe-core" / "axe.min.js"
+SIZES = {"desktop": (1440, 900), "tablet": (1024, 768), "phone": (390, 844)}
+ROOMS = {
+    "gallery": "room=gallery",
+    "dry": "s=0.2",
+    "rot": "room=decay",
+    "grow": "room=growth",
+    "break": "room=wood",
+    "scene": "room=scene&rule=scatter&count=9",
+}
+#: Small runs, so that rooms of jobs have something to show.
+RUNS: tuple[dict[str, Any], ...] = (
+    {
+        "solver": "decay",
+        "preset": "apple",
+        "need": {"stages": [0, 2, 4], "quality": "preview", "fields": ["position", "rot", "mould", "rotten_share"]},
+    },
+    {"solver": "growth", "preset": "mushroom", "need": {"stages": [0.25, 0.5], "quality": "preview"}},
+    {
+        "solver": "wood",
+        "preset": "twig",
+        "params": {"rods": 7, "vertices": 10},
+        "need": {
+            "stages": [0.005, 0.01, 0.02],
+            "quality": "preview",
+            "fields": ["mesh_position", "inside", "body", "body_impulse", "broken_bonds"],
+        },
+    },
+)
+
+pytestmark = MARKS
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The studio's address, with its token, over a store in which `RUNS` are done."""
+    data = tmp_path_factory.mktemp("data")
+    with serving(data, "--studio", "--store", str(data / "store")) as address:
+        root, secret = address.split("/#token=")
+        allowed = {"Authorization": f"Bearer {secret}"}
+        for run in RUNS:
+            job = httpx.post(f"{root}/v1/jobs", json=run, headers=allowed, timeout=60).raise_for_status().json()
+            with httpx.stream("GET", f"{root}{job['links']['events']}", timeout=300) as events:
+                last = [line for line in events.iter_lines() if line.startswith("data: ")][-1]
+            assert json.loads(last.removeprefix("data: "))["state"] == "done"
+        yield address
+
+
+def at(studio: str, words: str) -> str:
+    return f"{studio}&{words}"
+
+
+def arrived(visit: Visit, room: str) -> None:
+    """Wait until a room shows what it is for."""
+    if room == "gallery":
+        visit.page.locator(".cards li").first.wait_for()
+    else:
+        visit.shown()
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.timeout(300)
+def test_every_room_fits_every_screen_and_everybody(browser: Browser, studio: str, room: str, size: str) -> None:
+    width, height = SIZES[size]
+    # the checker is a script of its own, which the page's policy rightly refuses
+    visit = Visit(browser, viewport={"width": width, "height": height}, bypass_csp=True)
+    visit.page.goto(at(studio, ROOMS[room]))
+    arrived(visit, room)
+    assert "token" not in visit.page.url
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
+    tab = visit.page.locator("#rooms [aria-current]")
+    assert tab.count() == 1
+    if room != "gallery":
+        # how far to trust it is in sight without scrolling, and so is how it came about
+        for one in (".badge", ".tier"):
+            box = visit.page.locator(one).bounding_box()
+            assert box is not None
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= width
+            assert 0 <= box["y"] <= height - box["height"]
+        view = visit.page.locator("#view").bounding_box()
+        assert view is not None
+        assert view["height"] > 0.4 * height
+    visit.page.add_script_tag(path=AXE)
+    found = visit.page.evaluate("async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])")
+    assert found == []
+    assert visit.hosts() == {urlsplit(studio).netloc}
+    assert visit.complaints == []
+    visit.page.close()
+
+
+def test_rooms_are_reached_by_keys_alone(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1000, "height": 700})
+    visit.page.goto(at(studio, "s=0.2"))
+    visit.shown()
+    names = []
+    for _ in range(6):
+        visit.page.keyboard.press("Tab")
+        names.append(visit.page.evaluate("document.activeElement.textContent"))
+    assert names == ["Gallery", "Dry", "Rot", "Grow", "Break", "Scene"]
+    for _ in range(2):
+        visit.page.keyboard.press("Shift+Tab")
+    visit.page.keyboard.press("Enter")
+    visit.shown("shown.of")
+    assert "mushroom" in visit.page.locator("#caption").inner_text()
+    scrub = visit.page.locator("#scrub")
+    scrub.focus()
+    visit.page.keyboard.press("Home")
+    assert visit.shown("shown.of && shown.stage == 0.25")
+    assert visit.complaints == []
+    visit.page.close()
+
+
+@pytest.mark.timeout(300)
+def test_a_run_is_asked_for_followed_shown_and_taken_away(browser: Browser, studio: str, tmp_path: Path) -> None:
+    visit = Visit(browser, viewport={"width": 1200, "height": 800})
+    page = visit.page
+    page.goto(at(studio, "room=decay&preset=apple"))
+    visit.shown("shown.of")
+    page.get_by_label("Temperature", exact=True).fill("99")
+    assert "99 is out of range, -10 to 60 degC" in page.locator("#controls").inner_text()
+    assert page.get_by_role("button", name="Run", exact=True).is_disabled()
+    page.get_by_label("Temperature", exact=True).fill("10")
+    page.get_by_role("textbox", name=re.compile("^Stages")).fill("1, 500")
+    assert "500 is out of range, 0 to 120 day" in page.locator("#controls").inner_text()
+    page.get_by_role("textbox", name=re.compile("^Stages")).fill("1, 3")
+    command = page.locator("#actions code").inner_text()
+    assert "--set 'temperature=10'" in command
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.get_by_text(re.compile(r"Done in [\d.]+ s\.|of 2 stages")).first.wait_for(timeout=120_000)
+    visit.shown("shown.of == 2 && shown.stage == 3")
+    # what the page shows is what the service has: the very run, and the command that makes it
+    (job,) = parse_qs(urlsplit(page.url).fragment)["job"]
+    root = studio.split("/#")[0]
+    found = httpx.get(f"{root}/v1/jobs/{job}", timeout=60).json()
+    assert (found["params"]["temperature"], found["need"]["stages"]) == (10, [1, 3])
+    assert re.search(r"apple, changed, t = 3 day", page.locator("#caption").inner_text())
+    assert page.get_by_role("img", name=re.compile("at 3 day")).count() >= 1
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download GLB").click()
+    assert download.value.path().read_bytes()[:4] == b"glTF"
+    page.get_by_text("Map", exact=True).click()
+    page.wait_for_function("() => document.querySelector('.map').naturalWidth === 512")
+    said = json.loads(
+        subprocess.run(
+            ["wizen", *_words(command, tmp_path / "apple.h5"), "--json"], check=True, capture_output=True, cwd=tmp_path
+        ).stdout
+    )
+    assert said["params"] == found["params"]
+    assert visit.complaints == []
+    page.close()
+
+
+def _words(command: str, out: Path) -> list[str]:
+    """Return the words of a shown command, its output elsewhere."""
+    import shlex
+
+    words = shlex.split(command)
+    assert words[0] == "wizen"
+    return [*words[1:-1], str(out)]
+
+
+def test_a_wound_is_put_where_the_shape_is_clicked(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1200, "height": 800})
+    visit.page.goto(at(studio, "room=decay&preset=apple"))
+    visit.shown("shown.of")
+    visit.page.get_by_role("button", name="Place wounds").click()
+    box = visit.page.locator("#view").bounding_box()
+    assert box is not None
+    visit.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    visit.page.get_by_text("Added at colatitude").wait_for()
+    assert visit.page.get_by_text("Wounds (3)").count() == 1
+    wounds = json.loads(re.search(r"'wounds=(\[.*?\])'", visit.page.locator("#actions code").inner_text())[1])
+    # the camera looks from above, from between x and z
+    assert 40 < wounds[2]["colatitude"] < 110
+    assert 0 < wounds[2]["azimuth"] < 90
+    visit.page.close()
+
+
+def test_breaking_has_a_load_curve_in_newtons(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1200, "height": 800})
+    visit.page.goto(at(studio, "room=wood"))
+    visit.shown("shown.of == 3")
+    said = visit.page.get_by_role("img", name=re.compile(r"^Load: mean force")).get_attribute("aria-label")
+    (most,) = re.findall(r"at most ([\d.e-]+)", said)
+    root = studio.split("/#")[0]
+    jobs = httpx.get(f"{root}/v1/jobs", params={"state": "done"}, timeout=60).json()["jobs"]
+    (job,) = [one for one in jobs if one["solver"] == "wood"]
+    got = httpx.get(f"{root}/v1/jobs/{job['id']}/fields", params={"names": "stage,body_impulse"}, timeout=60).json()[
+        "fields"
+    ]
+    times, impulses = got["stage"]["values"], got["body_impulse"]["values"]
+    sizes = [0.0, *(sum(x * x for x in one[0]) ** 0.5 for one in impulses)]
+    forces = [abs(b - a) / (t - s) for a, b, s, t in zip(sizes, sizes[1:], [0.0, *times], times, strict=False)]
+    assert float(most) == pytest.approx(max(forces), rel=1e-3)
+    visit.page.close()
+
+
+def test_two_shapes_stand_side_by_side(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1000, "height": 640})
+    visit.page.goto(at(studio, "s=0.2"))
+    visit.shown("shown.n >= 192")
+    visit.page.get_by_role("button", name="Compare").click()
+    assert "s = 0.2" in visit.page.locator("#beside").inner_text()
+    visit.page.get_by_role("link", name="Rot").click()
+    visit.shown("shown.of")
+    assert "s = 0.2" in visit.page.locator("#beside").inner_text()
+    assert "apple" in visit.page.locator("#caption").inner_text()
+    visit.page.get_by_role("button", name="Stop comparing").click()
+    assert visit.page.locator("#beside").is_hidden()
+    assert visit.complaints == []
+    visit.page.close()
+
+
+@pytest.mark.timeout(300)
+def test_a_thousand_fruits_dry_together(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 700, "height": 500})
+    visit.page.goto(at(studio, "room=scene&rule=scatter&count=1000&stage=0.1"))
+    assert visit.shown("shown.copies", 120_000)["copies"] == 1000
+    before = visit.picture()
+    visit.page.locator("#dry").focus()
+    visit.page.keyboard.press("End")
+    assert visit.shown("shown.stage == 0.3", 120_000)["copies"] == 1000
+    assert "dried in place" in visit.page.locator(".badge").inner_text()
+    assert visit.picture() != before
+    scenes = [url for url in visit.asked if "/v1/scenes" in url]
+    assert len(scenes) == 1  # the shapes alone were asked for anew
+    visit.page.get_by_label("jujube 1").fill("5000")
+    visit.page.get_by_label("jujube 1").press("Enter")
+    assert "out of range, 1 to 1000" in visit.page.get_by_role("alert").inner_text()
+    assert visit.complaints == []
+    visit.page.close()
+
+
+def test_the_gallery_leads_to_what_it_shows(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1000, "height": 700})
+    visit.page.goto(at(studio, "room=gallery"))
+    visit.page.get_by_role("link", name=re.compile("^apple a run")).click()
+    assert visit.shown("shown.of")["of"] >= 2
+    visit.page.get_by_role("link", name="Gallery").click()
+    visit.page.get_by_role("link", name=re.compile("^raisin live")).click()
+    visit.shown("shown.n")
+    assert "raisin" in visit.page.locator("#caption").inner_text()
+    visit.page.get_by_role("link", name="Gallery").click()
+    visit.page.get_by_role("link", name=re.compile("^potato not computed")).click()
+    visit.page.get_by_text("not computed yet").wait_for()
+    assert "--preset potato" in visit.page.locator("#actions code").inner_text()
+    assert visit.complaints == []
+    visit.page.close()
+
+
+def test_numbers_outside_of_a_table_are_said_to_be(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1000, "height": 700})
+    visit.page.goto(at(studio, "s=0.2&te=0.035&gamma=20"))
+    visit.shown("shown.n >= 192")
+    exactly = visit.page.get_by_label("Skin thickness, exactly")
+    exactly.fill("0.5")
+    exactly.press("Enter")
+    visit.page.get_by_text("0.5 is out of range, this table holds 0.03 to 0.04 r1").wait_for()
+    assert visit.shown("shown.te == 0.04")
+    visit.page.close()
