@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Cost", "Solver", "StageAxis", "finish"]
 
+#: Distance [r1] within which two fresh surfaces are of one fruit: its skin may be thicker or thinner.
+_ALIKE = 0.04
 _QUALITIES: tuple[Quality, ...] = ("preview", "default", "fine")
 
 
@@ -130,18 +132,21 @@ class Solver:
     def metres(self, values: Mapping[str, Any]) -> float | None:
         """Return the length of r1 [m] of what has these parameters, plain values by name; None where nobody knows.
 
-        Known are the sizes of presets: what has the fresh shape of one alone is as large as that. Where several have
-        one shape, all that a preset says must agree.
+        Known are the sizes of presets: what has the fresh shape of one alone, but for its skin, is as large as that.
+        Where several have one shape, all that a preset says must agree.
         """
-        if not self.sizes or self.surface is None:
-            return None
-        fields = self.surface.fields
         plain = self.params.model_validate({}).model_dump(mode="json")
-        shape = {name: values.get(name, plain[name]) for name in fields}
+        asked = self.fresh({**plain, **values}) if self.sizes else None
+        if asked is None:
+            return None
         said = {name: self.parse({}, name).model_dump(mode="json") for name in self.presets}
-        alike = [name for name, full in said.items() if all(_same(full[f], shape[f]) for f in fields)]
+        angles = np.meshgrid(np.linspace(0, np.pi, 9), np.linspace(0, 2 * np.pi, 8, endpoint=False), indexing="ij")
+        points = asked.points(*angles)
+        shapes = {name: self.fresh(full) for name, full in said.items()}
+        alike = [name for name, one in shapes.items() if one and np.abs(one.points(*angles) - points).max() < _ALIKE]
         if len({self.sizes.get(name) for name in alike}) > 1:
-            alike = [n for n in alike if all(_same(said[n][f], values.get(f, plain[f])) for f in self.presets[n])]
+            full = {**plain, **values}
+            alike = [n for n in alike if all(_same(said[n].get(f), full.get(f)) for f in self.presets[n])]
         found = {self.sizes.get(name) for name in alike}
         return found.pop() if len(found) == 1 else None
 
