@@ -166,6 +166,17 @@ register(
     body_impulse=Quantity("N s", "impulse that each rigid body received from the rods since the start", "J"),
     grip_impulse=Quantity("N s", "impulse that each grip put in since the start", "J"),
     grip_moment=Quantity("N m s", "moment of impulse about its pivot that each grip put in since the start", "L"),
+    body_force=Quantity("N", "mean force of the rods on each rigid body since the stage before", "F"),
+    body_shift=Quantity("m", "mean way of each rigid body from its place at time 0, since the stage before", "u"),
+    grip_force=Quantity("N", "mean force that each grip put in since the stage before", "F"),
+    grip_torque=Quantity("N m", "mean moment about its pivot that each grip put in since the stage before", "M"),
+    grip_shift=Quantity("m", "mean way of each grip from its place at time 0, since the stage before", "u"),
+    fragments=Quantity("1", "pieces that hang together by whole rods and bonds", "n_f"),
+    fragment_mass=Quantity("kg", "masses of the 32 heaviest fragments, the heaviest first; 0 where there is none", "m"),
+    fragment_place=Quantity("m", "middles of mass of the 32 heaviest fragments; 0 where there is none", "x_f"),
+    fragment_length=Quantity(
+        "m", "lengths of the 32 heaviest fragments where they are longest; 0 where there is none", "l_f"
+    ),
     fracture_energy=Quantity("J", "energy that breaks of rods and bonds took since the start", "E_f"),
     crack_area=Quantity(
         "m2", "area of the cracks along the grain, what is damaged by the share of its energy that is spent", "A_c"

@@ -112,6 +112,22 @@ def _json(made: Made) -> bytes:
     return (json.dumps(made.document, indent=2, allow_nan=False) + "\n").encode()
 
 
+def _csv(made: Made) -> bytes:
+    from . import curves
+
+    assert made.run is not None
+    return curves.as_csv(made.run)
+
+
+def _svg(made: Made) -> bytes:
+    from . import curves
+
+    assert made.run is not None
+    return curves.as_svg(made.run)
+
+
+#: What is made of numbers by stage.
+_CURVES = {".csv": Encoder((), _csv, runs=True), ".svg": Encoder((), _svg, runs=True)}
 _OURS = {
     ".json": Encoder((), _json),
     ".npz": Encoder(("position",), _npz),
@@ -121,7 +137,7 @@ _OURS = {
 
 def suffixes(run: bool) -> dict[str, Encoder | None]:
     """Return what can be written, by suffix; `.h5` (no encoder) holds whole runs only."""
-    known: dict[str, Encoder | None] = {".h5": None} if run else {}
+    known: dict[str, Encoder | None] = {".h5": None, **_CURVES} if run else {}
     more = {s: encoder for s, encoder in added().items() if s not in _OURS and (run or not encoder.runs)}
     return {**known, **_OURS, **more}
 

@@ -44,26 +44,28 @@ class Flexure:
 
         def stress(slip: np.ndarray) -> np.ndarray:
             soft = np.maximum(self.strength * (last - np.abs(slip)) / (last - first), 0.0)
-            return np.sign(slip) * np.minimum(stiff * np.abs(slip), soft)
+            found: np.ndarray = np.sign(slip) * np.minimum(stiff * np.abs(slip), soft)
+            return found
 
         def moment(x: np.ndarray) -> np.ndarray:
-            return np.minimum(x, 2 * s - x) / 2
+            found: np.ndarray = np.minimum(x, 2 * s - x) / 2
+            return found
+
+        def slopes(x: np.ndarray, y: np.ndarray, p: np.ndarray) -> np.ndarray:
+            slip = (6 * p[0] * moment(x) / h - 8 * y[1]) / (self.along * b * h)
+            return np.stack([slip, -b * stress(y[0])])
+
+        def ends(left: np.ndarray, right: np.ndarray, _: np.ndarray) -> np.ndarray:
+            return np.array([left[0] + tip, left[1], right[1]])
 
         x = np.unique(np.concatenate([np.linspace(crack, 2 * s, 161), np.linspace(crack, s, 121)]))
         y, p = np.zeros((2, len(x))), np.ones(1)
-        fine, found = np.linspace(0, 2 * s, 4001), [(0.0, 0.0)]
+        fine, tip, found = np.linspace(0, 2 * s, 4001), 0.0, [(0.0, 0.0)]
         for tip in (*np.linspace(0, first, _ELASTIC)[1:], *np.geomspace(first, _LAST * last, _SOFT)[1:]):
-            done = solve_bvp(
-                lambda x, y, p: np.stack(
-                    [6 * p[0] * moment(x) / (self.along * b * h**2) - 8 * y[1] / (self.along * b * h),
-                     -b * stress(y[0])]
-                ),
-                lambda left, right, p, tip=tip: np.array([left[0] + tip, left[1], right[1]]),
-                x, y, p=p, tol=1e-3, max_nodes=20_000,
-            )  # fmt: skip
+            done = solve_bvp(slopes, ends, x, y, p=p, tol=1e-3, max_nodes=20_000)
             if not done.success:
                 raise RuntimeError(f"no state with a slip of {tip:.3g} m: {done.message}")
-            x, y, p = done.x, done.y, done.p
+            x, y, p = done.x, done.y, np.asarray(done.p)
             force = np.where(fine < crack, 0.0, np.interp(fine, x, y[1]))
             bent = (p[0] * moment(fine) - force * h) / (self.along * b * h**3 / 6)
             sag = np.trapezoid(bent * moment(fine), fine) + 3 * p[0] * s / (10 * self.shear * b * h)

@@ -42,6 +42,15 @@ _NUMBERS = (
     "fracture_energy",
     "crack_area",
     "tip_position",
+    "body_force",
+    "body_shift",
+    "grip_force",
+    "grip_torque",
+    "grip_shift",
+    "fragments",
+    "fragment_mass",
+    "fragment_place",
+    "fragment_length",
 )
 
 SOLVER = Solver(

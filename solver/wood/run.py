@@ -14,9 +14,11 @@ from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
 from .contact.listing import law
 from .fracture import sawed
+from .loads import READ, SUMS, measured
 from .model.bundle import lay
 from .model.state import Wood
 from .params import WoodParams
+from .pieces import pieces
 from .settings import choose
 from .stepping.marching import explicit
 from .stepping.moment import Reached
@@ -29,6 +31,7 @@ __all__ = ["run"]
 #: Energy that may be missing from the balance of a sound stage, over the largest energy of the run.
 _BALANCE = {"preview": 0.05, "default": 0.01, "fine": 0.003}
 _MESH = frozenset({"mesh_position", "inside", "body"})
+_PIECES = frozenset({"fragments", "fragment_mass", "fragment_place", "fragment_length"})
 
 
 def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
@@ -80,17 +83,17 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
             for reached in marching:
                 if skin is not None:
                     frames.append(among(skin.frame(reached.state.wood), params, reached.time))
-                rows.append(_row(reached, laid, need, time.perf_counter() - begun))
+                rows.append(_row(reached, laid, params, need, time.perf_counter() - begun))
                 context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
-            error.partial = _dataset(rows, frames, wood, need, attrs)
+            error.partial = _dataset(rows, frames, wood, params, need, attrs)
             error.last_stage = rows[-1]["stage"]
         raise
-    return _dataset(rows, frames, wood, need, attrs)
+    return _dataset(rows, frames, wood, params, need, attrs)
 
 
-def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, Any]:
+def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: float) -> dict[str, Any]:
     """Return what is wanted of a stage."""
     state = reached.state
     wood = state.wood
@@ -118,30 +121,49 @@ def _row(reached: Reached, laid: Wood, need: Need, seconds: float) -> dict[str, 
         found["rod_position"] = wood.motion.x[ends].astype(need.dtype)
     if "rod_cut" in need.fields:
         found["rod_cut"] = wood.cut[real].astype(need.dtype)
+    if not _PIECES.isdisjoint(need.fields):
+        found |= pieces(wood, params)
+    # forces are differences of sums, which go when they have been read
+    wanted = {*need.fields, *(SUMS[name] for name in need.fields if name in SUMS)}
     return {
         "stage": reached.time,
         "residual": reached.error,
         "converged": reached.sound,
         "iterations": state.steps,
         "seconds": seconds,
-        **{name: value for name, value in found.items() if name in need.fields},
+        **{name: value for name, value in found.items() if name in wanted},
     }
 
 
 def _dataset(
-    rows: list[dict[str, Any]], frames: list[Frame], wood: Wood, need: Need, attrs: dict[str, Any]
+    rows: list[dict[str, Any]],
+    frames: list[Frame],
+    wood: Wood,
+    params: WoodParams,
+    need: Need,
+    attrs: dict[str, Any],
 ) -> xr.Dataset:
     dims = {
         "impulse": ("stage", "component"),
         "body_impulse": ("stage", "obstacle", "component"),
         "grip_impulse": ("stage", "grip", "component"),
         "grip_moment": ("stage", "grip", "component"),
+        **dict.fromkeys(("body_force", "body_shift"), ("stage", "obstacle", "component")),
+        **dict.fromkeys(("grip_force", "grip_torque", "grip_shift"), ("stage", "grip", "component")),
+        "fragment_mass": ("stage", "fragment"),
+        "fragment_place": ("stage", "fragment", "component"),
+        "fragment_length": ("stage", "fragment"),
         "tip_position": ("stage", "component"),
         "rod_position": ("stage", "rod_edge", "end", "component"),
         "rod_cut": ("stage", "rod_edge"),
     }
     data: dict[str, Any] = {}
+    for name in READ:
+        if name in need.fields:
+            data[name] = (dims[name], measured(name, rows, params))
     for name in rows[0]:
+        if name in SUMS.values() and name not in need.fields:
+            continue
         values = np.array([row[name] for row in rows])
         if name != "stage":
             data[name] = (dims.get(name, ("stage",)), values.astype(np.int8) if name == "converged" else values)

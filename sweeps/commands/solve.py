@@ -83,8 +83,8 @@ class _Asked:
 def solve(asked: _Asked) -> None:
     """Run a solver once, here and now, without a store.
 
-    --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, shapes as .obj or .glb, and all stages as
-    a clip: .glb, .usda, .usdc.
+    --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, shapes as .obj or .glb, all stages as a
+    clip: .glb, .usda, .usdc, and numbers by stage as a table, .csv, or drawn, .svg.
 
     [bold]Examples[/bold]
 
@@ -99,6 +99,8 @@ def solve(asked: _Asked) -> None:
     wizen solve dehydration --preset raisin --quality preview --hours 24,48,96 --out sunny.glb
 
     wizen solve growth --params examples/growth/c-pumpkin.toml --out pumpkin.png
+
+    wizen solve wood --params examples/wood/knee.toml --quality preview --out knee.csv
     """
     from solver.contract import budget
     from store import shards

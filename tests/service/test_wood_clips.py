@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -92,3 +93,28 @@ def test_a_whole_run_keeps_its_surface_and_tells_bodies_apart(tmp_path: Path) ->
     assert "body" in run.data_vars
     assert run["body_impulse"].dims == ("stage", "obstacle", "component")
     assert set(np.unique(run["body"].values)) == {0.0, 1.0}
+
+
+def test_curves_come_as_a_table_and_as_a_drawing(tmp_path: Path) -> None:
+    """A bar drawn by a grip: what stands in the file is E A / L, read by nobody of ours."""
+    path = tmp_path / "bar.toml"
+    path.write_text(
+        "rods = 5\nvertices = 6\nfracture = 'none'\ndamping = 2000.0\n"
+        "grips = [{ low = [0.149, -1, -1], high = [1, 1, 1], path = [{ time = 0 }, "
+        "{ time = 0.004, shift = [1e-5, 0, 0] }] }]\n"
+    )
+    words = ("solve", "wood", "--params", str(path), "--stages", "0.003,0.0035,0.004", "--quality", "fine", "--out")
+    wizen(*words, str(tmp_path / "bar.csv"))
+    with (tmp_path / "bar.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["stage [s]"]) for row in rows] == [0.003, 0.0035, 0.004]
+    last = {name: float(value) for name, value in rows[-1].items()}
+    assert last["grip_shift 0 x [m]"] == pytest.approx(0.9375e-5)
+    stiff = last["grip_force 0 x [N]"] / last["grip_shift 0 x [m]"]
+    assert stiff == pytest.approx(10e9 * np.pi * 1e-4 / 0.15, rel=0.05)
+    assert last["fragments [1]"] == 1
+    assert last["fragment_mass 0 [kg]"] == pytest.approx(600 * np.pi * 1e-4 * 0.15, rel=1e-3)
+    wizen(*words, str(tmp_path / "bar.svg"))
+    drawn = (tmp_path / "bar.svg").read_text()
+    assert drawn.lstrip().startswith("<?xml")
+    assert "<path" in drawn

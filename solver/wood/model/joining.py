@@ -120,6 +120,16 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
     return min(params.cleavage, opens), min(params.shear_strength, slides)
 
 
+def _begins(own: np.ndarray, resolved_: np.ndarray, cost: np.ndarray, holds: np.ndarray) -> np.ndarray:
+    """Return the energy (b,) [J] at which bonds begin to give way, by the wood's own strength and the resolved one.
+
+    It ends where the square of separation is cost^2 over this: no farther than at `_MOST_GIVEN`, holds [J] at 1.
+    """
+    least = cost**2 / np.maximum(holds * _MOST_GIVEN**2, 1e-300)
+    found: np.ndarray = np.minimum(own, np.maximum(resolved_, least))
+    return found
+
+
 def _closest(pairs: np.ndarray, s: np.ndarray, grid: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return vertices (b,) of each rod of a pair (m, 2), the edges (b,) of the other one that they are closest to, and
     how far along those (b,).
@@ -173,9 +183,6 @@ def bonded(
     per_opening = _NET / 2 / max(params.transverse, _NONE) * volume * strength**2
     per_shear = volume / max(params.shear, _NONE) * strength**2
     cleavage, shear_strength = resolved(params, params.length / (n - 1), outline)
-    # a bond must have given way before it is out of the way
-    least = torn**2 / np.maximum(0.5 * stretched * length * _MOST_GIVEN**2, 1e-300)
-    least_shear = shorn**2 / np.maximum(sheared * _MOST_GIVEN**2, 1e-300)
     return Bonds(
         i.astype(np.int32),
         e.astype(np.int32),
@@ -184,8 +191,8 @@ def bonded(
         stretched,
         sheared,
         cosine,
-        np.minimum(per_opening * params.cleavage**2, np.maximum(per_opening * cleavage**2, least)),
-        np.minimum(per_shear * params.shear_strength**2, np.maximum(per_shear * shear_strength**2, least_shear)),
+        _begins(per_opening * params.cleavage**2, per_opening * cleavage**2, torn, 0.5 * stretched * length),
+        _begins(per_shear * params.shear_strength**2, per_shear * shear_strength**2, shorn, sheared),
         torn,
         shorn,
         crack * part,
