@@ -69,7 +69,7 @@ class Visit:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
 
-    def shown(self, condition: str = "true", timeout: float = 60_000) -> dict[str, Any]:
+    def shown(self, condition: str = "true", timeout: float = 180_000) -> dict[str, Any]:
         """Return what is shown as soon as it meets a condition on `shown`: n, the stage and the axes."""
         script = "() => { const t = document.getElementById('view').dataset.shown; if (!t) return false; "
         script += f"const shown = JSON.parse(t); return ({condition}) && t; }}"

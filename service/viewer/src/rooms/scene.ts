@@ -11,6 +11,7 @@ import { solver } from "../service/solvers";
 import { Crowd } from "../view/crowd";
 
 const MOST = 1000;
+const AGAIN = 3000; // [ms] until shapes are asked for again that did not come
 const RULES: [string, string][] = [
   ["bowl", "in a bowl (falls until it rests)"],
   ["pile", "in a pile (falls until it rests)"],
@@ -93,7 +94,10 @@ class Many {
     this.asking = new Latest<number, Float32Array[]>(
       (stage) => this.looked(stage),
       (points, stage) => this.reshaped(points, stage),
-      (error) => house.complain(error),
+      (error) => {
+        house.complain(error);
+        setTimeout(() => !this.closed && this.asking.put(this.stage), AGAIN);
+      },
     );
   }
 
@@ -242,6 +246,7 @@ class Many {
 
   private reshaped(points: Float32Array[], stage: number): void {
     const { crowd, house } = this;
+    house.content();
     if (!crowd || this.closed || points.length !== crowd.lattices.length) return;
     for (const [i, one] of crowd.lattices.entries()) crowd.reshape(one, points[i]);
     house.studio.reshaped();

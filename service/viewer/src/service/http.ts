@@ -43,7 +43,10 @@ export const allowed = (more: RequestInit = {}): RequestInit => ({
   cache: "no-store",
 });
 
-export async function get(path: string, options: RequestInit = {}): Promise<Response> {
+/** Waits before a busy service is asked again [ms]; after them its refusal is shown. */
+const WAITS = [700, 1500, 3000, 5000];
+
+export async function get(path: string, options: RequestInit = {}, tries = 0): Promise<Response> {
   let response: Response;
   try {
     response = await fetch(path, options);
@@ -55,6 +58,10 @@ export async function get(path: string, options: RequestInit = {}): Promise<Resp
   const body = await response.json().catch(() => ({}));
   if (response.status === 401) secret = ""; // asked for again
   const kind = String(body.type ?? "").replace("urn:wizen:problem:", "");
+  if (kind === "overloaded" && tries < WAITS.length && !options.signal?.aborted) {
+    await new Promise((done) => setTimeout(done, WAITS[tries]));
+    return get(path, options, tries + 1);
+  }
   const detail = body.detail ?? `The service answered ${response.status}.`;
   throw new Problem(detail, body.advice ?? "", kind, response.status, body.errors ?? []);
 }
