@@ -15,7 +15,7 @@ PAGE   := $(VIEWER)/dist/index.html
 NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
 
-.PHONY: demo demo-map page test test-clients test-processor test-slow mutants bench docs stress lint format clean constraints
+.PHONY: blender demo demo-map page test test-clients test-processor test-slow mutants bench docs stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -30,6 +30,11 @@ $(PAGE): $(VIEWER)/package-lock.json $(wildcard $(VIEWER)/*.html $(VIEWER)/*.ts 
 
 ## page: build the web page that `wizen serve` shows at /; half a minute, and only when its sources changed
 page: $(PAGE)
+
+## blender: the extension for Blender 4.2 and later as a zip, which Blender installs from disk
+blender: $(STAMP)
+	mkdir -p dist
+	cd service/blender && $(abspath $(BIN))/python -m zipfile -c ../../dist/wizen-blender.zip *.toml *.py
 
 ## demo: draw what comes with the package and serve it from a store of one's own, whose page may run jobs
 demo: $(STAMP)

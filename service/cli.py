@@ -103,19 +103,9 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
     import uvicorn
 
     from .app import create_app
-    from .limits.connections import GuardedProtocol
-    from .limits.sockets import GuardedSocket
     from .shapes.compiling import Compiling
-    from .stopping import PATIENCE
 
-    options: dict[str, Any] = {
-        "log_level": "warning",
-        "timeout_graceful_shutdown": PATIENCE,
-        "http": GuardedProtocol,
-        "ws": GuardedSocket,
-        "ws_max_size": settings.max_body,
-        "ws_per_message_deflate": False,  # what is sent is differences, which compress to two thirds at best
-    }
+    options = _protocols(settings)
     if settings.workers == 1:
         made = create_app(settings)
         with listener, _compiling(made.state.compiling):
@@ -130,6 +120,22 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
             os.environ[f"WIZEN_{name.upper()}"] = str(getattr(settings, name))
     with _compiling(Compiling()):
         uvicorn.run("service.app:app", host=settings.host, port=port, workers=settings.workers, **options)
+
+
+def _protocols(settings: Settings) -> dict[str, Any]:
+    """Return how uvicorn is to speak."""
+    from .limits.connections import GuardedProtocol
+    from .limits.sockets import GuardedSocket
+    from .stopping import PATIENCE
+
+    return {
+        "log_level": "warning",
+        "timeout_graceful_shutdown": PATIENCE,
+        "http": GuardedProtocol,
+        "ws": GuardedSocket,
+        "ws_max_size": settings.max_body,
+        "ws_per_message_deflate": False,  # what is sent is differences, which compress to two thirds at best
+    }
 
 
 @app.command()

@@ -45,7 +45,11 @@ class Settings(BaseSettings):
     head_timeout: float = Field(10.0, gt=0, description="Longest time that a request's head may take to arrive [s]")
     max_head: int = Field(32768, ge=1024, description="Longest head of a request: its line and headers [bytes]")
     max_headers: int = Field(100, ge=8, description="Most headers of a request")
-    max_connections: int = Field(2048, ge=1, description="Most open connections, in each process")
+    max_connections: int = Field(
+        8192,
+        ge=1,
+        description="Most open connections, in each process: as far as the system's limit on open files allows",
+    )
     max_connections_per_client: int = Field(
         256, ge=1, description="Most open connections from one address, in each process; a proxy counts as one client"
     )

@@ -17,6 +17,8 @@ __all__ = ["Found", "closed_loop", "hold", "open_loop", "run"]
 
 #: The slow ones send a byte that often [s].
 _DRIBBLE = 5.0
+#: From how many addresses is asked: a crowd, no single client.
+_ADDRESSES = 32
 
 
 class Found(NamedTuple):
@@ -101,7 +103,8 @@ class _Asker:
                 line = self.idle.pop()
             else:
                 loop = asyncio.get_running_loop()
-                line = (await loop.create_connection(_Line, "127.0.0.1", self.port))[1]
+                source = f"127.2.0.{self.asked % _ADDRESSES + 1}", 0
+                line = (await loop.create_connection(_Line, "127.0.0.1", self.port, local_addr=source))[1]
             status = await line.ask(path)
         except OSError:
             status = 0

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import resource
 from collections import Counter
 from functools import cache
 from typing import Any
@@ -28,9 +29,28 @@ __all__ = ["GuardedProtocol", "forget", "taken"]
 _clients: WeakKeyDictionary[ServerState, Counter[str]] = WeakKeyDictionary()
 #: Those of each server whose head has not come yet, the longest awaited first.
 _slow: WeakKeyDictionary[ServerState, dict[GuardedProtocol, None]] = WeakKeyDictionary()
+#: Files that the process has open beside its connections: tables, the ledger, pipes.
+_OTHER_FILES = 256
+#: Seconds for which a connection that is one too many may stay without a word.
+_LINGER = 0.5
 #: Counts the connections that this process has taken.
 _count = itertools.count(1)
 _taken = 0
+
+
+@cache
+def _most(wanted: int) -> int:
+    """Return how many connections there may be, with the limit on open files raised as far as that takes.
+
+    Beyond it the system refuses connections by itself, and again and again, without a word to anybody.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    needed = wanted + _OTHER_FILES
+    if soft != resource.RLIM_INFINITY and soft < needed:
+        soft = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        return max(min(wanted, soft - _OTHER_FILES), 1)
+    return wanted
 
 
 def taken() -> int:
@@ -62,6 +82,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self._head = 0
         self._in_head = True
         self._refused = False
+        self._full = ""
         self._timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -75,12 +96,16 @@ class GuardedProtocol(HttpToolsProtocol):
         self._name = address(self.client[0]) if self.client else ""
         counts[self._name] += 1
         if self._name and counts[self._name] > limits.max_connections_per_client:
-            most = limits.max_connections_per_client
-            self._refuse(503, "too-many-connections", f"{most} connections of this client are open already.")
-        elif len(self.connections) > limits.max_connections and not self._displace():
-            self._refuse(503, "too-many-connections", f"{limits.max_connections} connections are open already.")
+            self._one_too_many(f"{limits.max_connections_per_client} connections of this client are open already.")
+        elif len(self.connections) > _most(limits.max_connections) and not self._displace():
+            self._one_too_many(f"{_most(limits.max_connections)} connections are open already.")
         else:
             self._await_head()
+
+    def _one_too_many(self, why: str) -> None:
+        """Say why when something has come: what is closed unread resets the connection, and the answer is lost."""
+        self._full = why
+        self._timer = self.loop.call_later(_LINGER, self._too_slow)
 
     def _displace(self) -> bool:
         """Let the connection go that has been longest about its head; return whether there was one."""
@@ -99,6 +124,9 @@ class GuardedProtocol(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         """Parse what has come, unless the head is too long by now."""
         if self._refused:
+            return
+        if self._full:
+            self._refuse(503, "too-many-connections", self._full)
             return
         if self._in_head:
             self._head += len(data)

@@ -113,15 +113,15 @@ def of_surface(points: Array, unit: float | None) -> Signature:
     Points lie so densely that some are next to the outline everywhere.
     """
     x = np.asarray(points, float)
-    rows, radii = [], []
+    rows, extents = [], []
     for right, up in _sides():
         flat = np.stack([x @ right, x @ up], axis=1)
         r, area = _around(flat)
-        radii.append(np.sqrt(area / np.pi))
-        rows.append(_features(r / radii[-1]))
+        extents.append(np.sqrt(area / np.pi))
+        rows.append(_features(r / extents[-1]))
     values = np.array(rows)
     spread = np.hypot(values.std(axis=0, ddof=1), _LEAST)
-    sizes = np.log(radii)
+    sizes = np.log(extents)
     found = _signature(values.mean(axis=0), spread, float(np.exp(sizes.mean())), unit)
     if unit is not None:
         found.scatter[0] = np.hypot(sizes.std(ddof=1), 0.01)
@@ -156,7 +156,7 @@ def _around(flat: Floats) -> tuple[Floats, float]:
 
 
 def _features(r: Floats) -> Floats:
-    """Return logarithms of amplitudes by band, skewness and slopes of an outline's radii (rays,)."""
+    """Return logarithms of amplitudes by band, skewness and slopes of an outline's radius (rays,)."""
     waves = np.abs(np.fft.rfft(r)) ** 2 * 2 / len(r) ** 2
     power = np.add.reduceat(waves[: _BANDS[-1]], _BANDS[:-1])
     fine = np.fft.rfft(r)

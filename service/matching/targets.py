@@ -144,7 +144,7 @@ class _Mesh:
         }
         self.parts = self._seen[False].parts
         self._n = int(_LATTICES[np.argmin(abs(np.log(_LATTICES / np.sqrt(0.5 * len(points)))))])
-        self.like = self.kind, unit is None, self._n
+        self.like: tuple[object, ...] = self.kind, unit is None, min(self._n, COARSE)
         self.about = {"vertices": len(points), "triangles": len(triangles), "radius": self._seen[False].radius}
 
     def seen(self, coarse: bool) -> Look:
@@ -165,7 +165,7 @@ class _Mask:
         mask = outline.read(data)
         found = outline.of_mask(mask, unit)
         self._seen, self.parts = Look(found.values, found.scatter), found.parts
-        self.like = self.kind, unit is None
+        self.like: tuple[object, ...] = self.kind, unit is None
         self.about = {"pixels": int(mask.sum()), "radius": found.radius}
 
     def seen(self, coarse: bool) -> Look:
@@ -198,7 +198,7 @@ class _Numbers:
         if wrong:
             raise InvalidQuery.of(wrong)
         self.parts = tuple(numbers)
-        self.like = self.kind, *numbers
+        self.like: tuple[object, ...] = self.kind, *numbers
         self._seen = Look(*np.array(list(numbers.values())).T)
         self.about = {name: value for name, (value, _) in numbers.items()}
 

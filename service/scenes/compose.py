@@ -72,7 +72,8 @@ def make(scene: Scene, tables: LiveTables, highest: int, to: str = "glb", compre
         levels = detail.choose(scene.budget, kinds, visible.kind, pixels, compress, share)
         if encoder is None:
             break
-        data = encoder(kinds, visible, levels.n, held, scene.unit, compress)
+        more = {"known": frozenset(scene.known)} if to == "glb" else {}
+        data = encoder(kinds, visible, levels.n, held, scene.unit, compress, **more)
         if scene.budget.bytes is None or len(data) <= scene.budget.bytes:
             break
         share = 0.8 * levels.share

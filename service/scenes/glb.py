@@ -6,10 +6,9 @@ A mirror image is the same mesh below a node that mirrors; its instances are tur
 
 from __future__ import annotations
 
-import hashlib
 import json
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from solver.arrays import Array, Floats
 
 from ..formats import mesh
 from ..formats.about import GENERATOR
-from . import props
+from . import moving, props
 from .kinds import Kind
 from .meshes import VERTEX, Packed, Skin, pack, skin
 from .placing import Instances, Prop
@@ -102,36 +101,28 @@ class _File:
 
 
 def encode(
-    kinds: Sequence[Kind], seen: Instances, n: Array, held: Mapping[str, Sequence[Prop]], unit: float, compress: bool
+    kinds: Sequence[Kind],
+    seen: Instances,
+    n: Array,
+    held: Mapping[str, Sequence[Prop]],
+    unit: float,
+    compress: bool,
+    known: Collection[str] = (),
 ) -> bytes:
     """Return the file of the seen instances with their lattices; `held` are props by what they are.
 
-    unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of its
-    content, and how long r1 is in its positions.
+    unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of what it is
+    made of; of those that are `known` no more is there. They say too how long r1 is in their positions.
     """
     file = _File(compressor() if compress else None)
-    meshes: list[Json] = []
     nodes: list[Json] = []
-    materials: list[Json] = []
-    skins: dict[tuple[str, float], tuple[int, Skin]] = {}
-    indices = {size: _indices(file, mesh.triangles(int(size))) for size in np.unique(n)}
     groups: Sequence[Array] = list(np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1).T)
     order = [np.flatnonzero((seen.kind == k) & (n == size) & (seen.mirrored == m)) for k, size, m in groups]
-    made: dict[tuple[int, int], tuple[int, Packed]] = {}
-    for k, size, _ in groups:
-        if (k, size) in made:
-            continue
-        kind = kinds[k]
-        name = (kind.shade[0], round(kind.dryness, 3))
-        if name not in skins:
-            skins[name] = len(materials), skin(kind.shade[1], kind.dryness)
-            materials.append(_material(kind.shade[0], skins[name][1]))
-        material, looks = skins[name]
-        packed = pack(kind.shape(int(size)), looks)
-        made[k, size] = len(meshes), packed
-        meshes.append(_mesh(file, packed, indices[size], material, kind.label, int(size)))
+    meshes, materials, made = _meshes(file, kinds, groups, known)
     if len(n):
         nodes = _instances(file, kinds, seen, groups, order, made)
+    changing = [(at, kinds[k]) for at, (k, _, _) in enumerate(groups) if kinds[k].curve]
+    animations = moving.weights(file, changing)
     for prop in held.get("bowl", ()):
         nodes.append(props.bowl(file, meshes, materials, prop))
     used = {_INSTANCING} if len(n) else set()
@@ -150,8 +141,47 @@ def encode(
         "extensionsRequired": required,
         "meshes": meshes,
         "materials": materials,
+        "animations": animations,
     }
     return file.pack({key: value for key, value in document.items() if value != []})
+
+
+def _meshes(
+    file: _File, kinds: Sequence[Kind], groups: Sequence[Array], known: Collection[str]
+) -> tuple[list[Json], list[Json], dict[tuple[int, int], tuple[int, float]]]:
+    """Append the distinct lattices; return meshes, materials, and each mesh's number and step [r1]."""
+    meshes: list[Json] = []
+    materials: list[Json] = []
+    skins: dict[tuple[str, float], tuple[int, Skin]] = {}
+    indices: dict[int, int] = {}  # of the lattices that are sent
+    made: dict[tuple[int, int], tuple[int, float]] = {}
+    for k, size in ((int(k), int(size)) for k, size, _ in groups):
+        if (k, size) in made:
+            continue
+        kind = kinds[k]
+        name = (kind.shade[0], round(kind.dryness, 3))
+        if name not in skins:
+            skins[name] = len(materials), skin(kind.shade[1], kind.dryness)
+            materials.append(_material(kind.shade[0], skins[name][1]))
+        material, looks = skins[name]
+        made[k, size] = len(meshes), kind.step
+        tag = moving.etag(kind, size)
+        # with these, whoever has the file can put other stages of the kind in the place of this one
+        extras: Json = {"etag": tag, "kind": kind.label, "colatitudes": size, "r1": 1 / kind.step}
+        meshes.append({"name": f"{kind.label} {size}", "extras": extras})
+        if tag in known:
+            extras["known"] = True
+            meshes[-1]["primitives"] = [_stub(file, material)]
+            continue
+        first, *later = (pack(one, looks, kind.extent) for one in (kind.shape(size), *kind.later(size)))
+        if size not in indices:
+            indices[size] = _indices(file, mesh.triangles(size))
+        primitive = _primitive(file, first, indices[size], material)
+        meshes[-1]["primitives"] = [primitive]
+        if later:
+            meshes[-1]["weights"] = [0.0] * len(later)
+            primitive["targets"] = moving.target_views(file, first, later)
+    return meshes, materials, made
 
 
 def _indices(file: _File, triangles: Array) -> int:
@@ -161,7 +191,7 @@ def _indices(file: _File, triangles: Array) -> int:
     return file.accessor(view, _USHORT if small else _UINT, "SCALAR", len(flat))
 
 
-def _mesh(file: _File, packed: Packed, indices: int, material: int, kind: str, size: int) -> Json:
+def _primitive(file: _File, packed: Packed, indices: int, material: int) -> Json:
     vertices, count = packed.vertices, len(packed.vertices)
     view = file.view(vertices, "ATTRIBUTES", _VERTICES)
     at = VERTEX.fields
@@ -171,11 +201,21 @@ def _mesh(file: _File, packed: Packed, indices: int, material: int, kind: str, s
         "NORMAL": file.accessor(view, _BYTE, "VEC3", count, at["normal"][1], normalized=True),
         "COLOR_0": file.accessor(view, _UBYTE, "VEC4", count, at["colour"][1], normalized=True),
     }
-    etag = hashlib.sha256(vertices.tobytes()).hexdigest()[:16]
-    primitive = {"attributes": attributes, "indices": indices, "material": material}
-    # with these, whoever has the file can put other stages of the kind in the place of this one
-    extras = {"etag": etag, "kind": kind, "colatitudes": size, "r1": 1 / packed.scale}
-    return {"name": f"{kind} {size}", "primitives": [primitive], "extras": extras}
+    return {"attributes": attributes, "indices": indices, "material": material}
+
+
+def _stub(file: _File, material: int) -> Json:
+    """Return what stands for a mesh that the asker has: a triangle without extent."""
+    empty = moving.known_vertices(VERTEX)
+    at = VERTEX.fields
+    assert at is not None
+    empty["normal"][:, 1] = 127
+    view = file.view(empty, "ATTRIBUTES", _VERTICES)
+    attributes = {
+        "POSITION": file.accessor(view, _SHORT, "VEC3", 3, at["position"][1], min=[0] * 3, max=[0] * 3),
+        "NORMAL": file.accessor(view, _BYTE, "VEC3", 3, at["normal"][1], normalized=True),
+    }
+    return {"attributes": attributes, "material": material}
 
 
 def _instances(
@@ -184,14 +224,14 @@ def _instances(
     seen: Instances,
     groups: Sequence[Array],
     order: Sequence[Array],
-    made: Mapping[tuple[int, int], tuple[int, Packed]],
+    made: Mapping[tuple[int, int], tuple[int, float]],
 ) -> list[Json]:
     """Append translations, rotations and scales of all instances, and return the nodes that draw them."""
     row = np.concatenate(order)
     mirrored = seen.mirrored[row][:, None]
     move = seen.centre[row] * np.where(mirrored, [-1, 1, 1], 1)
     turn = seen.turn[row] * np.where(mirrored, [1, -1, -1, 1], 1)
-    scales = np.repeat([made[k, size][1].scale for k, size, _ in groups], [len(one) for one in order])
+    scales = np.repeat([made[k, size][1] for k, size, _ in groups], [len(one) for one in order])
     grow = np.repeat((seen.scale[row] * scales)[:, None], 3, axis=1)
     views: tuple[tuple[int, int, str, int, Json], ...] = (
         (file.view(move.astype("<f4"), "ATTRIBUTES", None), _FLOAT, "VEC3", 12, {}),

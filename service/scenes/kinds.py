@@ -24,6 +24,7 @@ from ..shapes.asking import beyond, choose, preset_of, words_of
 from ..shapes.live import LiveTables
 from ..shapes.query import parse
 from .errors import InvalidScene
+from .meshes import STEPS
 from .request import Item
 
 __all__ = ["COARSE", "Kind", "distinct"]
@@ -36,7 +37,10 @@ _WITHIN = 0.9
 
 @dataclass(eq=False)
 class Kind:
-    """One shape of one table: its point, its stage, its skin, and what of it has been computed."""
+    """One shape of one table: its point, its stage, its skin, and what of it has been computed.
+
+    `curve` are seconds and stages, the first of which is the stage; empty where nothing changes.
+    """
 
     solver: Solver
     table: ShapeTable
@@ -44,6 +48,7 @@ class Kind:
     stage: float
     shade: tuple[str, Shade]
     label: str
+    curve: tuple[tuple[float, float], ...] = ()
     shapes: dict[int, Shape] = field(default_factory=dict)
     spent: dict[int, float] = field(default_factory=dict)
 
@@ -55,6 +60,13 @@ class Kind:
             self.spent[n] = time.thread_time() - start
         return self.shapes[n]
 
+    def later(self, n: int) -> list[Shape]:
+        """Return the shapes on the curve after the first, on the lattice of n colatitudes."""
+        start = time.thread_time()
+        found = [self.table.at(self.point, stage, resolution=n) for _, stage in self.curve[1:]]
+        self.spent[n] = self.spent.get(n, 0.0) + time.thread_time() - start
+        return found
+
     @cached_property
     def coarse(self) -> Floats:
         """Points (v, 3) of the coarse lattice and the poles [r1]."""
@@ -65,7 +77,24 @@ class Kind:
     def reach(self) -> tuple[float, float]:
         """Radii of balls about the origin: within the shape, and around it [r1]."""
         r = np.linalg.norm(self.coarse, axis=1)
-        return _WITHIN * float(r.min()), 1.03 * float(r.max())
+        low, high = float(r.min()), float(r.max())
+        for shape in self.later(COARSE):
+            r = np.linalg.norm(mesh.vertices(*mesh.surface(shape)), axis=1)
+            low, high = min(low, float(r.min())), max(high, float(r.max()))
+        return _WITHIN * low, 1.03 * high
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest coordinate [r1] that counts when positions are rounded: that of the fresh shape, which needs no
+        look-up and which drying does not pass.
+        """
+        angles = np.meshgrid(np.linspace(0, np.pi, 17), np.linspace(0, 2 * np.pi, 32, endpoint=False), indexing="ij")
+        return 1.08 * float(np.abs(self.table.fresh(self.point).points(*angles)).max())
+
+    @property
+    def step(self) -> float:
+        """Length [r1] of one step of a rounded position."""
+        return self.extent / STEPS
 
     @property
     def dryness(self) -> float:
@@ -91,13 +120,16 @@ def distinct(items: Sequence[Item], tables: LiveTables, highest: int) -> tuple[l
     kinds: list[Kind] = []
     rows: list[int] = []
     wrong: list[Wrong] = []
+    only: str | None = None
     for i, item in enumerate(items):
-        key = (item.solver, item.preset, tuple(sorted(item.parameters.items())), item.stage, item.shade)
+        key = (item.solver, item.preset, tuple(sorted(item.parameters.items())), item.stage, item.curve, item.shade)
         number = numbers.get(key)
         if number is None:
             numbers[key] = number = len(kinds)
             try:
-                kinds.append(_kind(item, tables, highest))
+                if item.solver is None and only is None:
+                    only = _only(tables)  # reads what all tables say of themselves: once
+                kinds.append(_kind(item, item.solver or only or "", tables, highest))
             except InvalidQuery as error:
                 wrong += [Wrong(f"items.{i}.{one.name}", one.detail, one.advice) for one in error.wrong]
             except (StoreError, SolverError, ServiceError) as error:
@@ -112,20 +144,26 @@ def distinct(items: Sequence[Item], tables: LiveTables, highest: int) -> tuple[l
     return kinds, rows
 
 
-def _kind(item: Item, tables: LiveTables, highest: int) -> Kind:
-    solver = vocabulary.solver_named(item.solver or _only(tables))
+def _kind(item: Item, name: str, tables: LiveTables, highest: int) -> Kind:
+    solver = vocabulary.solver_named(name)
     preset = preset_of(solver, item.preset)
     symbol = solver.stages.symbol
-    said = {**item.parameters, symbol: item.stage}
+    said = {**item.parameters, symbol: item.first}
     found = choose(tables.families(solver), said, symbol, preset)
     table = tables.get(found.name)
     words = words_of(solver, table, highest)
     query = parse([(k, repr(v)) for k, v in said.items()], words, [], found.filled, beyond(found, words))
     if query.outside:
         raise InvalidQuery.of(query.outside)
+    low, high = words.stages
+    for at, stage in item.curve:
+        if not low <= stage <= high:
+            detail = f"{stage:g} at {at:g} s is off the table's {words.say(symbol)}"
+            raise InvalidQuery.of([Wrong("curve", detail, f"Take stages from {words.say(symbol)}.")])
     table.fresh(query.point)  # says what no shape can be
-    label = f"{item.preset or table.info.name} {symbol}={item.stage:g}"
-    return Kind(solver, table, dict(query.point), query.stage, _shade(solver, item), label)
+    last = f"..{item.curve[-1][1]:g}" if item.curve else ""
+    label = f"{item.preset or table.info.name} {symbol}={item.first:g}{last}"
+    return Kind(solver, table, dict(query.point), query.stage, _shade(solver, item), label, item.curve)
 
 
 def _only(tables: LiveTables) -> str:

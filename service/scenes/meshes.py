@@ -13,14 +13,14 @@ from store.shape import Shape
 
 from ..formats import mesh
 
-__all__ = ["VERTEX", "Packed", "Skin", "linear", "pack", "relief", "skin"]
+__all__ = ["STEPS", "VERTEX", "Packed", "Skin", "linear", "pack", "relief", "skin"]
 
 #: One vertex: 16 bytes, multiples of four as accessors want them.
 VERTEX = np.dtype([("position", "<i2", 4), ("normal", "i1", 4), ("colour", "u1", 4)])
 #: Height [r1] over the smoothed shape from furrow to ridge, and the share of ridge where it is smooth.
 _DEEP, _FLAT = 0.05, 0.6
 #: Largest coordinate as a number: half a step is 1.2e-4 of the radius. More bits would be noise, and half the file.
-_STEPS = 4095
+STEPS = 4095
 #: Shades from furrow to ridge.
 _SHADES = 32
 
@@ -77,12 +77,14 @@ def relief(position: Array, normal: Array) -> Floats:
     return np.asarray(np.einsum("ijk,ijk->ij", position - smooth, normal))
 
 
-def pack(shape: Shape, looks: Skin) -> Packed:
-    """Return a shape's closed mesh, 2 n^2 + 2 vertices, quantised."""
+def pack(shape: Shape, looks: Skin, reach: float | None = None) -> Packed:
+    """Return a shape's closed mesh, 2 n^2 + 2 vertices, quantised; `reach` [r1] is the largest coordinate that counts,
+    None: the shape's own.
+    """
     position, ends = mesh.surface(shape)
     lattice, poles = mesh.normals(position)
     points, normal = mesh.vertices(position, ends), mesh.vertices(lattice, poles)
-    scale = float(np.abs(points).max()) / _STEPS
+    scale = (float(np.abs(points).max()) if reach is None else reach) / STEPS
     height = relief(position, lattice)
     # a smoothed round body lies within it: only what stands out of the mean is ridge
     height = height - np.median(height)

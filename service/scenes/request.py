@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
@@ -25,6 +26,7 @@ MOST = 20_000
 MOST_ITEMS = 20_000
 
 Vector = tuple[float, float, float]
+Etag = Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
 Length = Annotated[float, Field(gt=0, le=1e6)]
 
 
@@ -90,7 +92,10 @@ class Item(_Strict):
     solver: str | None = Field(None, description="Whose shapes; none: of the one that the tables are of")
     preset: str | None = Field(None, description="A fruit by its name; `wizen presets` lists them")
     parameters: dict[str, float] = Field({}, description="By axis, over the preset's")
-    stage: float = Field(description="Stage, as the solver counts them")
+    stage: float | None = Field(None, description="Stage, as the solver counts them; or a curve instead")
+    curve: tuple[tuple[float, float], ...] = Field(
+        (), max_length=64, description="Stages over time: pairs of seconds and stage, at least two, times rising from 0"
+    )
     name: str = Field("", max_length=80, description="What the report calls it")
     size: Length = Field(1.0, description="Length of r1 [scene unit]")
     count: int = Field(1, ge=1, description="How many individuals")
@@ -102,6 +107,11 @@ class Item(_Strict):
 
     @model_validator(mode="after")
     def _stands(self) -> Self:
+        if (self.stage is None) == (not self.curve):
+            raise ValueError("an item has either a stage or a curve of stages: write one of them")
+        times = [at for at, _ in self.curve]
+        if self.curve and (len(times) < 2 or times[0] < 0 or any(b <= a for a, b in pairwise(times))):
+            raise ValueError("a curve has two or more pairs [seconds, stage], and its times rise, from 0 or later")
         if self.transforms and self.place is not None:
             raise ValueError("transforms and place exclude each other: keep one of them")
         if self.transforms and self.count not in (1, len(self.transforms)):
@@ -109,6 +119,13 @@ class Item(_Strict):
         if self.vary and self.seed is None:
             raise ValueError("vary needs a seed")
         return self
+
+    @property
+    def first(self) -> float:
+        """The stage to begin with."""
+        if self.stage is not None:
+            return self.stage
+        return self.curve[0][1]
 
     @property
     def instances(self) -> int:
@@ -134,6 +151,9 @@ class Scene(_Strict):
     unit: float = Field(1.0, gt=0, le=1e3, description="Length of the scene's unit [m]")
     props: bool = Field(True, description="Bowls and the floor are in the file too")
     cull: bool = Field(True, description="Leave out what the camera does not see")
+    known: tuple[Etag, ...] = Field(
+        (), max_length=20_000, description="glb: etags of meshes that the asker has; they are named and not sent"
+    )
 
     @model_validator(mode="after")
     def _placed(self) -> Self:

@@ -17,6 +17,7 @@ from .. import problems
 from ..errors import InvalidQuery, Wrong
 from ..settings import Settings
 from ..shapes.live import LiveTables
+from ..views.scene import ScenePage
 from .request import FORMATS, Scene, parse
 
 if TYPE_CHECKING:
@@ -54,7 +55,8 @@ def _maker() -> Callable[..., Made]:
 
 _SCHEMA = Scene.model_json_schema()
 _BODY = _inlined(_SCHEMA, _SCHEMA.get("$defs", {}))
-_TYPES: dict[str, Any] = {media_type: {} for media_type, _ in FORMATS.values()}
+_TYPES = [media_type for name, (media_type, _) in FORMATS.items() if name != "json"]
+_REPORT = {"schema": {"$ref": "#/components/schemas/ScenePage"}}
 
 
 @router.post(
@@ -62,7 +64,11 @@ _TYPES: dict[str, Any] = {media_type: {} for media_type, _ in FORMATS.values()}
     summary="Many shapes as one scene",
     response_class=Response,
     responses={
-        200: {"description": "The scene", "content": problems.files(_TYPES)},
+        200: {
+            "model": ScenePage,
+            "description": "The scene, or its report",
+            "content": {**problems.files(_TYPES), FORMATS["json"][0]: _REPORT},
+        },
         **problems.responses(400, 404, 406, 413, 422, 500, 501, 503),
     },
     openapi_extra={"requestBody": {"content": {"application/json": {"schema": _BODY}}}},

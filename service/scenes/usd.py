@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array
+from store.shape import Shape
 
 from ..errors import Unavailable
 from ..formats import mesh
 from . import props
 from .kinds import Kind
 from .meshes import Skin, pack, skin
+from .moving import FPS
 from .placing import Instances, Prop
 
 __all__ = ["usda", "usdc"]
@@ -49,6 +51,12 @@ def _encode(
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, unit)
+    moments = [seconds for kind in kinds for seconds, _ in kind.curve]
+    if moments:
+        stage.SetTimeCodesPerSecond(FPS)
+        stage.SetFramesPerSecond(FPS)
+        stage.SetStartTimeCode(FPS * min(moments))
+        stage.SetEndTimeCode(FPS * max(moments))
     root = UsdGeom.Xform.Define(stage, "/scene")
     stage.SetDefaultPrim(root.GetPrim())
     materials: dict[str, Any] = {}
@@ -85,18 +93,30 @@ def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, bound:
 
     material, looks = bound
     shape = kind.shape(n)
-    points = mesh.vertices(*mesh.surface(shape))
-    normal = mesh.vertices(*mesh.normals(mesh.surface(shape)[0]))
+    across = np.array([-1 if mirrored else 1, 1, 1], np.float32)
+    surfaces = [_surface(one, across) for one in (shape, *kind.later(n))]
     colour = pack(shape, looks).vertices["colour"][:, :3] / 255 * looks.base
-    triangles = mesh.triangles(n)
-    if mirrored:
-        across = np.array([-1, 1, 1], np.float32)
-        points, normal = points * across, normal * across
-        triangles = triangles[:, ::-1]
-    _mesh(stage, path, points, normal, triangles, material)
+    triangles = mesh.triangles(n)[:, :: -1 if mirrored else 1]
+    found = _mesh(stage, path, *surfaces[0], triangles, material)
+    for (seconds, _), (points, normal) in zip(kind.curve, surfaces, strict=False):
+        found.GetPointsAttr().Set(_vectors(points), FPS * seconds)
+        found.GetNormalsAttr().Set(_vectors(normal), FPS * seconds)
+        found.GetExtentAttr().Set(_vectors(np.stack([points.min(axis=0), points.max(axis=0)])), FPS * seconds)
     paint = UsdGeom.Mesh.Get(stage, path).CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
     paint.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(colour, np.float32)))
     stage.GetPrimAtPath(path).SetDisplayName(kind.label)
+
+
+def _surface(shape: Shape, across: Array) -> tuple[Array, Array]:
+    """Return vertices and their normals (v, 3), or those of the mirror image."""
+    position, poles = mesh.surface(shape)
+    return mesh.vertices(position, poles) * across, mesh.vertices(*mesh.normals(position)) * across
+
+
+def _vectors(values: Array) -> Any:
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values, np.float32))
 
 
 def _mesh(stage: Any, path: str, points: Array, normal: Array, triangles: Array, material: Any) -> Any:

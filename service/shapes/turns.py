@@ -19,7 +19,7 @@ __all__ = ["Turns"]
 #: Passes of the loop between two turns while others wait or come: that many after the last connection was taken, which
 #: shows a pass late, and at most so many in all. One that takes a connection and refuses its request costs a tenth of a
 #: shape.
-_PASSES, _MOST_PASSES = 2, 16
+_PASSES, _MOST_PASSES = 2, 4
 
 
 class Turns:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import difflib
 import reprlib
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from .errors import InvalidInput
 
@@ -37,10 +37,13 @@ def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     for item in error.errors():
         where = ".".join(str(p) for p in item["loc"])
         if item["type"] == "extra_forbidden":
-            # a name within a group is none of the fields, so that none of them is what was meant
-            near = difflib.get_close_matches(where, list(fields), n=1) if len(item["loc"]) == 1 else []
+            within = list(fields) if len(item["loc"]) == 1 else _within(fields, item["loc"])
+            near = difflib.get_close_matches(str(item["loc"][-1]), within, n=1)
             strange |= not near and len(item["loc"]) == 1
-            parts.append(f"unknown name {SHORT.repr(where)}" + (f"; did you mean {near[0]!r}?" if near else ""))
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            if within and not near and len(item["loc"]) > 1:
+                hint = f"; known there: {', '.join(within)}"
+            parts.append(f"unknown name {SHORT.repr(where)}{hint}")
         else:
             message = item["msg"].removeprefix("Value error, ")
             got = item.get("input")
@@ -49,3 +52,25 @@ def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     if strange:
         parts.append(f"known: {', '.join(sorted(fields))}")
     return "; ".join(parts)
+
+
+def _within(fields: Mapping[str, Any], place: tuple[int | str, ...]) -> list[str]:
+    """Return the names that there are where a wrong one was found, in a group within the fields."""
+    first = fields.get(str(place[0]))
+    models = _models(getattr(first, "annotation", None))
+    for step in place[1:-1]:
+        if isinstance(step, int):
+            continue
+        inner = [model.model_fields[step].annotation for model in models if step in model.model_fields]
+        if inner:
+            models = [model for annotation in inner for model in _models(annotation)]
+        else:  # what tells the forms of a union apart
+            models = [m for m in models if any(field.default == step for field in m.model_fields.values())]
+    return sorted({name for model in models for name in model.model_fields})
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """Return the models that an annotation names, in whatever containers."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models(part)]

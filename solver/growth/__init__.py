@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Live, LiveEngine, Need, Quality, Solver, StageAxis
-from .actions import ACTIONS
+from .living.actions import ACTIONS
 from .looks import CHANNELS, LOOKS
 from .params import GrowthParams
 from .presets import PRESETS
@@ -24,7 +24,7 @@ def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
 
 
 def _live(params: GrowthParams, quality: Quality) -> LiveEngine:
-    from .live import GrowingLive
+    from .living.live import GrowingLive
 
     return GrowingLive(params, quality)
 

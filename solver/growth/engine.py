@@ -18,14 +18,15 @@ from .. import shell
 from ..contract import Context, InvalidGeometry
 from ..geometry.crossings import crossings
 from .fresh import fresh
-from .history import History, Moment
+from .living.history import History, Moment
 from .matter import grown_further
 from .params import GrowthParams, Solid, present
 from .plastic import forgotten
-from .remeshing.remesh import remesh
+from .remeshing.remesh import MOST, remesh
 from .settling.active import Habit
 from .settling.energy import StepEnergy
 from .settling.equilibrium import balanced, begun
+from .settling.impossible import check_held, check_outward, enclosed
 from .settling.stage import settled
 from .settling.tangent import Tangent
 from .shapes import start
@@ -38,8 +39,6 @@ __all__ = ["Engine", "Undone"]
 
 #: How long a solid was there that is taken away with the step in which it came [growth time].
 _INSTANT = 1e-9
-#: A mesh does not grow beyond this many times its first vertices.
-_MOST = 20
 
 
 class Undone(NamedTuple):
@@ -79,8 +78,10 @@ class Engine:
                 f"the start shape passes through itself in {through} pairs of triangles.",
                 advice="Mend the shape, or grow it with contact = 0.",
             )
+        #: Of a closed surface.
+        self._volume = 0.0 if len(self.state.mesh.border) else enclosed(begun)
         self._longest = params.remesh * self.state.length
-        self._largest = _MOST * len(self.state.x)
+        self._largest = MOST * len(self.state.x)
         self._tangent, self._habit = Tangent(self.state.mesh), Habit()
         #: Those of before the step that is under way.
         self._before = self._tangent, self._habit
@@ -238,6 +239,7 @@ class Engine:
         for nearer in settled(found, self.script, self.tolerance):
             found = nearer
             yield
+        check_outward(found, self._volume, self.state.time, self.params)
         return found
 
     def _reached(self, time: float) -> Generator[None, None, State]:
@@ -280,6 +282,8 @@ class Engine:
         forces = point.gradient / state.length
         drift = (point.x - state.x) / dt if dt else None
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
+        check_held(energy, state, goal, before.time)
+        check_outward(state, self._volume, before.time, p)
         state = branched(state, acting, self.params.seed)
         yield
         if self._keeps:

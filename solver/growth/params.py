@@ -195,3 +195,14 @@ class GrowthParams(Params):
         description="Whether a part that grows settles alone where the rest stays in balance; not with contact",
         json_schema_extra=_units("1"),
     )
+
+    @model_validator(mode="after")
+    def _held(self) -> Self:
+        held = {axis for one in self.attached for axis in one.axes}
+        loose = [axis for axis, weight in zip("xyz", self.gravity, strict=True) if weight and axis not in held]
+        if loose and not self.solids:
+            raise ValueError(
+                f"nothing holds the sheet along {', '.join(loose)}, where gravity pulls: it would fall without end; "
+                "attach a part of it, or put a solid below"
+            )
+        return self

@@ -17,6 +17,7 @@ from . import onset as cli_onset
 from . import queue as cli_queue
 from . import refine as cli_refine
 from . import results as cli_results
+from . import session as cli_session
 from . import shapes as cli_shapes
 from . import solve as cli_solve
 from . import tables as cli_tables
@@ -96,6 +97,7 @@ def presets(as_json: As_json = False) -> None:
 
 
 cli_solve.add_to(app)
+cli_session.add_to(app)
 
 
 @app.command()

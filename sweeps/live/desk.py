@@ -20,6 +20,8 @@ __all__ = ["Desk", "problem"]
 _WINDOW, _BETWEEN = 2, 1 / 30
 #: Seconds of work between two looks at what has come.
 _SLICE = 0.01
+#: Seconds without work after which the client gets every digit.
+_REST = 0.3
 _QUALITIES = ("preview", "default", "fine")
 
 
@@ -72,14 +74,16 @@ class Desk:
         self._sent, self._input = 0.0, 0
         #: Whether there is something to show, and whether the client has what is there but for roundings.
         self._is_new, self._is_rough = True, False
+        self._worked = 0.0
         self._told: dict[str, Any] = {}
-        self.held = False
+        #: Whether nobody looks: until `begin_again`, and while a connection is lost.
+        self.held = True
 
     def begin_again(self, more: Mapping[str, Any]) -> None:
         """Speak with a client that holds nothing; `more`: what it is told besides."""
         self._encoder.forget()
         self._unseen.clear()
-        self._told, self._is_new = {}, True
+        self._told, self._is_new, self.held = {}, True, False
         stages, engine = self._solver.stages, self._engine
         opened = {
             "say": "opened",
@@ -226,7 +230,17 @@ class Desk:
     @property
     def is_waiting(self) -> bool:
         """Whether `work` will have something to do when time has passed."""
-        return not self.held and (self._works or self._has_news)
+        return not self.held and (self._works or self._has_news or self._is_rough)
+
+    def finish(self) -> None:
+        """Work until nothing is left to do; nobody looks on."""
+        self.held = False
+        while self._works:
+            self._unseen.clear()
+            self.work()
+            if self._pace < math.inf:
+                time.sleep(_SLICE / 2)
+        self._exact, self.held = None, True
 
     def work(self) -> None:
         """Work for a hundredth of a second, and show what came of it."""
@@ -237,6 +251,7 @@ class Desk:
                 self._settle()
             elif self._engine.stage + self._engine.step <= self._goal + 1e-9:
                 self._is_new |= self._engine.advance(_SLICE, self._goal)
+                self._worked = time.monotonic()
         except SolverError as error:
             self._until, self._settling, self._is_new = self._engine.stage, None, True
             last = max((w.id for w in self._waiting), default=None)
@@ -258,7 +273,11 @@ class Desk:
 
     @property
     def _has_news(self) -> bool:
-        return self._is_new or self._exact is not None or (self._is_rough and not self._works)
+        return self._is_new or self._exact is not None or (self._is_rough and self._rests)
+
+    @property
+    def _rests(self) -> bool:
+        return not self._works and time.monotonic() - self._worked >= _REST
 
     @property
     def _may_show(self) -> bool:
@@ -272,13 +291,12 @@ class Desk:
         self._waiting = [w for w in self._waiting if w.stage > stage + 1e-9]
         spent = 1e3 * (time.process_time() - min(w.taken for w in held)) if held else 0.0
         self._input = max((w.id for w in held), default=self._input)
-        more = self._works
-        flags = (EXACT if self._exact else 0) | (MORE if more else 0)
+        rough = self._exact is None and not self._rests
+        flags = (EXACT if self._exact else 0) | (MORE if rough else 0)
         told = Told(stage, residual, self._input, spent, flags)
-        # at rest the client gets every digit
-        self._show(self._encoder.frame(frame, told, exact=not more))
+        self._show(self._encoder.frame(frame, told, exact=not rough))
         self._unseen.add(self._encoder.number)
-        self._sent, self._is_new, self._is_rough, self._exact = time.monotonic(), False, more, None
+        self._sent, self._is_new, self._is_rough, self._exact = time.monotonic(), False, rough, None
 
     def _state(self) -> None:
         """Say how things stand, if anything but the time has changed."""

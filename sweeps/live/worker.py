@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 __all__ = ["main", "packet"]
 
 #: Seconds between two looks at the clock where work waits for its time, and between two words on what was spent.
-_TICK, _SPENT = 0.004, 1.0
+_TICK, _SPENT = 0.004, 0.25
 
 
 def packet(letter: bytes, content: bytes) -> bytes:
@@ -83,7 +83,7 @@ def main() -> None:
 
 def _serve(desk: Any, came: queue.SimpleQueue[tuple[bytes, Any] | None], out: _Out) -> None:
     """Take what comes, work in between."""
-    said = time.process_time()
+    said = -_SPENT
     while True:
         while True:
             try:
@@ -109,7 +109,6 @@ def _take(desk: Any, found: tuple[bytes, Any], out: _Out) -> None:
     elif message == "save":
         out.json(b"A", desk.saved())
     else:
-        desk.held = False
         desk.begin_again(message)
 
 

@@ -105,4 +105,4 @@ def test_the_first_folded_shape_on_a_new_machine(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_serve_has_it_compiled_before_anybody_asks(tmp_path: Path) -> None:
     with cold(tmp_path, "-m", "service.cli", "serve", "--port", "0"):
-        until(lambda: any((tmp_path / "cache").rglob("*_put_apart*.nbc")), 300)
+        until(lambda: any((tmp_path / "cache").rglob("*_put_apart*.nbc")), 1800)

@@ -21,9 +21,7 @@ SKINS = (0.01, 0.02, 0.03, 0.04)
 FRUITS = ("raisin", "wolfberry", "jujube1", "jujube2", "plum1", "plum2")
 
 #: Figure -> skin -> values of its other axis that no table in the package holds; and the fruits of Table 1.
-MISSING: dict[str, dict[float, tuple[float, ...]]] = {
-    "fig10": {0.01: (0.6, 0.7, 0.8, 0.9)},
-}
+MISSING: dict[str, dict[float, tuple[float, ...]]] = {}
 MISSING_FRUITS: tuple[str, ...] = ()
 
 

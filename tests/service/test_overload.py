@@ -5,6 +5,8 @@ from __future__ import annotations
 import heapq
 import random
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections import Counter
@@ -296,3 +298,16 @@ def test_a_crowd_of_newcomers_is_taken_in_while_shapes_are_computed(monkeypatch:
 
 def test_every_setting_is_documented() -> None:
     assert (ROOT / "docs" / "settings.md").read_text() == page(), "python -m service.settings > docs/settings.md"
+
+
+def test_there_are_no_more_connections_than_files() -> None:
+    code = (
+        "import resource; from service.limits import connections as c\n"
+        "resource.setrlimit(resource.RLIMIT_NOFILE, (300, {hard}))\n"
+        "print(c._most(600), resource.getrlimit(resource.RLIMIT_NOFILE)[0])"
+    )
+    for hard, said in ((1000, ["600", "856"]), (400, ["144", "400"])):
+        done = subprocess.run(
+            [sys.executable, "-c", code.format(hard=hard)], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.split() == said

@@ -7,7 +7,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -58,11 +58,12 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 def engines() -> set[int]:
-    return {
-        child.pid
-        for child in psutil.Process().children(recursive=True)
-        if child.is_running() and "sweeps.live.worker" in " ".join(child.cmdline())
-    }
+    found = set()
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.NoSuchProcess):  # gone, or about to
+            if "sweeps.live.worker" in " ".join(child.cmdline()):
+                found.add(child.pid)
+    return found
 
 
 def mesh(saved: dict[str, Any], folder: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -273,11 +274,8 @@ def test_a_lost_connection_is_taken_up_again_and_goes_on(live: Served) -> None:
 
 
 def test_a_client_that_answers_no_frames_gets_two_and_then_the_newest(live: Served) -> None:
-    client = (
-        live.client(acknowledges=False)
-        if False
-        else Client(live.url, acknowledges=False, token=live.token, params={**BALL, "step": 0.01}, quality="preview")
-    )
+    params = {**BALL, "step": 0.01}
+    client = Client(live.url, acknowledges=False, token=live.token, params=params, quality="preview")
     client.opened()
     client.ask("add", tool={"kind": "spot", "at": [0, 0, 1], "stretch": [1.5, 1.5]})
     client.ask("play", until=0.3)
@@ -336,7 +334,7 @@ def test_quality_grows_the_same_script_on_another_mesh(live: Served) -> None:
 
 def test_sessions_that_nobody_uses_end(tmp_path: Path) -> None:
     """Silent ones with what was made; those whose client died after a while; and none outlives the service."""
-    with serving(tmp_path / "store", session_idle=3.0, session_kept=1.0) as found:
+    with serving(tmp_path / "store", session_idle=8.0, session_kept=1.0) as found:
         silent, lost = found.client(), found.client()
         for one in (silent, lost):
             assert one.opened()["say"] == "opened"
@@ -359,13 +357,10 @@ def test_sessions_that_nobody_uses_end(tmp_path: Path) -> None:
 
 def test_seconds_of_sessions_count(tmp_path: Path) -> None:
     with serving(tmp_path / "store", max_seconds_per_token=0.01) as found:
-        client = found.client({**BALL, "step": 0.01})
-        client.opened()
-        client.do("add", tool={"kind": "spot", "at": [0, 0, 1], "stretch": [1.5, 1.5]})
-        client.ask("play")
-        end = time.monotonic() + 60
-        while time.monotonic() < end and client.frames[-1:] and client.frames[-1]["stage"] < 1.0:
-            client.receive()
+        client = found.client()
+        assert client.opened()["say"] == "opened"
+        client.do("brush", at=[1, 0, 0])
+        client.rest()
         problem, closed = refused(found.client())
         assert closed == 4429
         assert "spent" in problem["detail"]

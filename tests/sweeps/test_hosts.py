@@ -7,13 +7,16 @@ process alone has the ledger.
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Self
 
 import pytest
 from conftest import Solves
@@ -87,6 +90,34 @@ def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
     return [child.pid for child in below if "spawn_main" in " ".join(child.cmdline())]
 
 
+class Partitions(threading.Thread):
+    """Takes the wire of one host or another away and gives it back, most of the time soon; counts how often."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self._over, self._chance, self.count = threading.Event(), random.Random(1), 0
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._over.set()
+        self.join()
+
+    def run(self) -> None:
+        while not self._over.wait(self._chance.uniform(0.05, 0.2)):
+            wire = f"wire{self._chance.choice([2, 3])}"
+            self._set(wire, "down")
+            time.sleep(3.0 if self.count % 25 == 24 else self._chance.uniform(0.02, 0.3))
+            self._set(wire, "up")
+            self.count += 1
+
+    @staticmethod
+    def _set(wire: str, state: str) -> None:
+        subprocess.run(["ip", "-n", NAMES[0], "link", "set", wire, state], check=False)
+
+
 Running = list[subprocess.Popen[bytes]]
 
 
@@ -125,22 +156,26 @@ def wait_for_shards(store: Store, count: int) -> None:
 def test_two_hundred_jobs_over_hosts(
     hosts: None, shrinking: Solves, store: Store, write_plan: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Workers of both hosts are killed, then the scheduler is: no job is lost, and nothing is told from a local run."""
+    """Wires fail all the time, workers of both hosts are killed, then the scheduler is: no job is lost, and nothing is
+    told from a local run.
+    """
     pytest.importorskip("distributed")
     thick = [round(0.02 + 0.001 * i, 3) for i in range(20)]
     many = write_plan(str(thick), str(list(range(10, 60, 5))), more="pause = 0.02")
     scheduler = f"tcp://{ADDRESS.format(1)}:8786"
     sweep = ("service.cli", "sweep", str(many), "--store", str(store.root), "--scheduler", scheduler, "--json")
     running = cluster(tmp_path, store, 1)
+    partitions = Partitions()
     try:
         sweeping = start(NAMES[0], tmp_path / "sweep1.log", *sweep)
         running.append(sweeping)
-        # once each worker has had some, those of both hosts are killed; their nannies start others
-        wait_for_shards(store, 20)
-        for process in running[1:3]:
-            for pid in workers_of(process):
-                os.kill(pid, 9)
-        wait_for_shards(store, 60)
+        with partitions:
+            # once each worker has had some, those of both hosts are killed; their nannies start others
+            wait_for_shards(store, 20)
+            for process in running[1:3]:
+                for pid in workers_of(process):
+                    os.kill(pid, 9)
+            wait_for_shards(store, 60)
         running[0].kill()
         assert sweeping.wait(timeout=400) not in (0, -9)
         said = (tmp_path / "sweep1.log").read_text()
@@ -153,9 +188,13 @@ def test_two_hundred_jobs_over_hosts(
     try:
         sweeping = start(NAMES[0], tmp_path / "sweep2.log", *sweep)
         running.append(sweeping)
-        assert sweeping.wait(timeout=1200) == 0, (tmp_path / "sweep2.log").read_text()
+        with Partitions() as more:
+            assert sweeping.wait(timeout=1200) == 0, (tmp_path / "sweep2.log").read_text()
     finally:
         end(running)
+    print(f"{partitions.count} and {more.count} partitions")
+    assert partitions.count > 5
+    assert more.count > 5
     found = {run.attrs["key"]: run for run in store.results()}
     assert len(found) == 200
     assert store.ledger.counts() == {"wanted": 0, "running": 0, "done": 200, "failed": 0, "cancelled": 0}

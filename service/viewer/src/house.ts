@@ -81,7 +81,8 @@ export class House {
     this.say("", "", undefined);
     this.canvas.removeAttribute("data-shown");
     if (this.made) {
-      this.made.picked = undefined;
+      this.made.picked = this.made.stroke = undefined;
+      this.canvas.classList.remove("aiming");
       this.stand(undefined);
     }
   }

@@ -43,6 +43,7 @@ const hasTables = (entry: Entry, all: Table[]): boolean => all.some((table) => t
 async function opened(room: string, words: Words, entries: Entry[], all: Table[]): Promise<Room> {
   if (room === GALLERY) return (await import("./rooms/gallery")).gallery(entries);
   if (room === SCENE) return (await import("./rooms/scene")).scene;
+  if (words.live) return (await import("./rooms/live")).live(room);
   const own = all.filter((table) => table.solver === room || table.complaint);
   if (own.length && !words.run) return (await import("./rooms/table")).table(own);
   return (await import("./rooms/job")).job(room, own.length > 0);

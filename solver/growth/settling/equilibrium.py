@@ -13,6 +13,7 @@ from ..params import GrowthParams
 from ..state import State
 from .active import Habit, Settled, settle
 from .energy import StepEnergy, ahead
+from .impossible import check_near
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
 from .newton import newton
 
@@ -22,6 +23,8 @@ __all__ = ["balanced", "begun"]
 _WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients}
 #: Steps after which quasi-Newton has stalled, and Newton's method takes over: its factorisations are no small pieces.
 _STALLED = 400
+#: Thickness over edges beyond which a sheet is no shell of its triangles.
+_THICK = 2.0
 #: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
 _NUDGE, _WAVES = 0.2, (1, 2, 4)
 
@@ -62,6 +65,8 @@ def balanced(
                 break
             if not np.isfinite(point.gradient):
                 raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=last)
+            if energy.load is not None:
+                check_near(state, point.x, last)
             if spent > most:
                 break
             yield
@@ -73,11 +78,17 @@ def balanced(
     if not (point.gradient <= goal or point.gradient <= energy.rounding(point.x)):
         raise NotConverged(
             f"no equilibrium at growth time {state.time:g}: residual {point.gradient / state.length:.1e}.",
-            advice="Take a shorter step or a thicker sheet.",
+            advice=_advice(params, state),
             last_stage=last,
             residual=point.gradient / state.length,
         )
     return point, spent
+
+
+def _advice(params: GrowthParams, state: State) -> str:
+    if params.thickness > _THICK * state.length:
+        return "Take a shorter step, or a thinner sheet: this one is much thicker than its triangles are wide."
+    return "Take a shorter step or a thicker sheet."
 
 
 def _down(energy: StepEnergy, begin: Floats, way: str) -> Iterator[Point]:

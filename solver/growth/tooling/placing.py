@@ -21,6 +21,8 @@ __all__ = ["border", "branched", "started"]
 
 #: Control points of a curve about an apex; and how far ahead a heading is marked, over the spot's radius.
 _AROUND, _AHEAD = 24, 0.2
+#: Cosine of the angle to the normal, 6 degrees, within which a frame is none.
+_STEEP = 0.9945
 
 
 def border(mesh: shell.Topology) -> Ints:
@@ -38,6 +40,7 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
     shares, spots, curves = dict(state.shares), dict(state.spots), dict(state.curves)
     mesh = Mesh(state.x, state.mesh.triangles)
     rim = border(state.mesh)
+    later = state.time > 1e-9
     for number, tool in enumerate(tools):
         if isinstance(tool, HotStroke):
             if tool.start <= state.time + step - 1e-9:
@@ -50,10 +53,12 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
             if tool.later is not None:
                 shares[number] = np.stack([shares[number], share(tool.later, mesh, rim, seed + number)], -1)
         elif isinstance(tool, HotCurve):
-            points = np.array(tool.points) if tool.apex is None else _about(tool.apex, spots, mesh)
-            curves[number] = place(points, *mesh)
+            if tool.apex is None:
+                curves[number] = _on(number, "a point", np.array(tool.points), tool.radius, mesh, later)
+            else:
+                curves[number] = place(_about(tool.apex, spots, mesh), *mesh)
         else:
-            spots[number] = (_first(tool, mesh),)
+            spots[number] = (_first(number, tool, mesh, later),)
     return replace(state, shares=shares, spots=spots, curves=curves)
 
 
@@ -87,8 +92,47 @@ def _dabs(tool: HotStroke, laid: tuple[Spot, ...], time: float, step: float, mes
     )
 
 
-def _first(tool: HotSpot, mesh: Mesh) -> Spot:
-    anchor = place(np.array([tool.at]), *mesh)
+def _on(number: int, what: str, points: Floats, reach: float, mesh: Mesh, later: bool) -> Anchors:
+    """Return the nearest points of the surface to points that a tool begins at.
+
+    Raises:
+        InvalidInput: they are not on it: further off than the tool reaches, or than the shape may have moved meanwhile.
+
+    """
+    anchors = place(points, *mesh)
+    there = anchors.at(*mesh)
+    away = np.linalg.norm(there - points, axis=1)
+    far = int(away.argmax())
+    if away[far] > (max(reach, float(np.ptp(mesh.x, axis=0).max())) if later else reach):
+        near = ", ".join(f"{value:.3g}" for value in there[far])
+        raise InvalidInput(
+            f"tool {number}: {what} lies {away[far]:.3g} off the surface, further than it reaches ({reach:g}).",
+            advice=f"The nearest point of the surface is ({near}).",
+        )
+    return anchors
+
+
+def _check_frame(number: int, tool: HotSpot, anchor: Anchors, mesh: Mesh) -> None:
+    """Refuse a frame that stands on the surface, where along and across differ.
+
+    Raises:
+        InvalidInput: it has no direction along the surface.
+
+    """
+    frame = np.array(tool.frame)
+    size = float(np.linalg.norm(frame))
+    if tool.stretch[0] != tool.stretch[1] and abs(_normal(anchor, mesh) @ frame) >= _STEEP * size:
+        side, _ = _plane(_normal(anchor, mesh), np.eye(3)[int(np.argmin(np.abs(frame)))])
+        along = ", ".join(f"{value:.2g}" for value in side)
+        raise InvalidInput(
+            f"tool {number}: its frame {tool.frame} stands on the surface there: it has no direction along it.",
+            advice=f"Give a direction along the surface, such as ({along}).",
+        )
+
+
+def _first(number: int, tool: HotSpot, mesh: Mesh, later: bool) -> Spot:
+    anchor = _on(number, "the spot", np.array([tool.at]), tool.radius, mesh, later)
+    _check_frame(number, tool, anchor, mesh)
     if not tool.rules:
         return Spot(anchor, tool.radius)
     centre, normal = anchor.at(*mesh)[0], _normal(anchor, mesh)

@@ -18,7 +18,7 @@ import time
 __all__ = ["end_soon", "guard", "leave"]
 
 #: Seconds that a command gets to stop by itself; two seconds after the signal it has ended.
-_PATIENCE = 1.3
+_PATIENCE = 0.9
 _ENDING = frozenset({signal.SIGINT, signal.SIGTERM})
 _heard = threading.Event()
 

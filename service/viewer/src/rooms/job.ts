@@ -79,7 +79,7 @@ class Work {
     this.seen.hidden = true;
     this.stopped();
     house.panel.replaceChildren(
-      el("p", { id: "subject" }, solver.title, ...(this.looked ? [" · ", el("a", { href: `#room=${solver.name}` }, "look up instead")] : [])),
+      el("p", { id: "subject" }, solver.title, ...(this.looked ? [" · ", el("a", { href: `#room=${solver.name}` }, "look up instead")] : []), ...(solver.session ? [" · ", el("a", { href: `#room=${solver.name}&live=1` }, "work on it live")] : [])),
       this.seen,
       el(
         "section",

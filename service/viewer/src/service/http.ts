@@ -27,6 +27,10 @@ export const token = {
   get known(): boolean {
     return secret !== "";
   },
+  /** For a WebSocket, whose opening carries no headers. */
+  get secret(): string {
+    return secret;
+  },
   set(text: string): void {
     secret = text.trim();
   },

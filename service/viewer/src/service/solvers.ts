@@ -49,6 +49,8 @@ export interface Solver {
   preset_stages: Record<string, number[]>;
   looks: Look;
   qualities: Record<string, { relative_error: number | null; resolution: number | null }>;
+  /** Where and how it is worked on live, if it can be. */
+  session?: { address: string; actions: Record<string, Parameters>; fields: string[] } | null;
 }
 
 export interface Entry {

@@ -53,6 +53,8 @@ export class Studio {
   private last = 0;
   /** Told of a click on the shape: the ray's first hit in the coordinates of the subject's object. */
   picked: ((at: Vector3) => void) | undefined;
+  /** A brush: while there is one, dragging over the shape paints instead of turning it. */
+  stroke: { dab(at: Vector3): void; end(): void } | undefined;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
@@ -77,6 +79,7 @@ export class Studio {
     canvas.addEventListener("keydown", (event) => this.key(event));
     canvas.addEventListener("dblclick", () => this.home());
     listenToClicks(canvas, (x, y) => this.pick(x, y));
+    this.listenToStrokes();
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement as Element);
     this.home();
     this.resize();
@@ -188,12 +191,53 @@ export class Studio {
     this.renderer.setViewport(0, 0, width, height);
   }
 
-  private pick(x: number, y: number): void {
-    if (!this.picked || !this.subject || this.pinned) return;
+  /** Where the middle of the view meets the shape, in its object's coordinates. */
+  middle(): Vector3 | undefined {
+    return this.hit(0.5, 0.5);
+  }
+
+  private hit(x: number, y: number): Vector3 | undefined {
+    if (!this.subject || this.pinned) return undefined;
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(2 * x - 1, 1 - 2 * y), this.camera);
-    const [hit] = ray.intersectObject(this.subject.object, true);
-    if (hit) this.picked(this.subject.object.worldToLocal(hit.point.clone()));
+    const [found] = ray.intersectObject(this.subject.object, true);
+    return found && this.subject.object.worldToLocal(found.point.clone());
+  }
+
+  private pick(x: number, y: number): void {
+    const at = this.picked && this.hit(x, y);
+    if (at) this.picked?.(at);
+  }
+
+  private listenToStrokes(): void {
+    const { canvas } = this;
+    let painting = false;
+    const place = (event: PointerEvent): Vector3 | undefined => {
+      const box = canvas.getBoundingClientRect();
+      return this.hit((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+    };
+    // before the controls, so that they do not begin to turn
+    canvas.addEventListener(
+      "pointerdown",
+      (event) => {
+        const at = this.stroke && place(event);
+        painting = at !== undefined;
+        this.controls.enabled = !painting;
+        if (at) this.stroke?.dab(at);
+      },
+      { capture: true },
+    );
+    canvas.addEventListener("pointermove", (event) => {
+      const at = painting ? place(event) : undefined;
+      if (at) this.stroke?.dab(at);
+    });
+    for (const end of ["pointerup", "pointercancel", "pointerleave"]) {
+      canvas.addEventListener(end, () => {
+        if (painting) this.stroke?.end();
+        painting = false;
+        this.controls.enabled = true;
+      });
+    }
   }
 
   private place(where: Spherical): void {

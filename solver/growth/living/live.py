@@ -8,17 +8,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel
 
-from ..contract import InvalidInput, Quality, SolverError
-from ..meshes import Frame
+from ...contract import InvalidInput, Quality, SolverError
+from ...meshes import Frame
+from ..anchors import place
+from ..engine import Engine, Undone
+from ..params import GrowthParams, Solid
+from ..settings import choose
+from ..settling.stage import residual
+from ..shown import shown
+from ..state import State
+from ..tooling.tools import HotStroke, Point, Tool
 from .actions import Add, Brush, End, Lift, Put
-from .anchors import place
-from .engine import Engine, Undone
-from .params import GrowthParams, Solid
-from .settings import choose
-from .settling.stage import residual
-from .shown import shown
-from .state import State
-from .tooling.tools import HotStroke, Point, Tool
 
 __all__ = ["GrowingLive"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .params import Solid
-from .settling.active import Habit
-from .settling.tangent import Tangent
-from .state import State
-from .tooling.tools import Tool
+from ..params import Solid
+from ..settling.active import Habit
+from ..settling.tangent import Tangent
+from ..state import State
+from ..tooling.tools import Tool
 
 __all__ = ["History", "Moment"]
 

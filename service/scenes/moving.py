@@ -1,0 +1,92 @@
+"""Shapes of a scene over time, and those that the asker has already.
+
+A curve of stages is a morph target for each knot after the first, and weights that fade in straight lines from knot to
+knot: what the table gives between two knots is not asked for. A mesh that is known already is left out of the file: in
+its place stands one flat triangle, and its etag says which it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.arrays import Array, Floats
+
+from ..formats.about import GENERATOR
+from .kinds import Kind
+
+if TYPE_CHECKING:
+    from .glb import _File
+    from .meshes import Packed
+
+__all__ = ["FPS", "etag", "known_vertices", "target_views", "weights"]
+
+#: Frames of a second, where a format counts frames.
+FPS = 24.0
+_BYTE, _SHORT, _FLOAT = 5120, 5122, 5126
+#: A target: what is added to positions and to normals; both are padded to four bytes.
+_TARGET = np.dtype([("position", "<i2", 4), ("normal", "i1", 4)])
+
+
+def etag(kind: Kind, n: int) -> str:
+    """Return what names the mesh of a kind on a lattice: what it is made of, so that it need not be made."""
+    said = {
+        "by": GENERATOR,
+        "table": kind.table.digest,
+        "at": sorted(kind.point.items()),
+        "stages": [kind.stage, *(stage for _, stage in kind.curve)],
+        "n": int(n),
+        "shade": kind.shade[0],
+    }
+    return hashlib.sha256(json.dumps(said).encode()).hexdigest()[:16]
+
+
+def known_vertices(vertex: np.dtype[Any]) -> Array:
+    """Return the vertices of the triangle that stands for a mesh which the asker has."""
+    return np.zeros(3, vertex)
+
+
+def target_views(file: _File, base: Packed, later: list[Packed]) -> list[dict[str, int]]:
+    """Append the morph targets of a mesh and return them, as steps of the quantised base."""
+    found = []
+    for one in later:
+        steps = np.zeros(len(base.vertices), _TARGET)
+        gone = one.vertices["position"].astype(int) - base.vertices["position"]
+        turned = one.vertices["normal"].astype(int) - base.vertices["normal"]
+        steps["position"] = np.clip(gone, -32767, 32767)
+        steps["normal"] = np.clip(turned, -127, 127)
+        view = file.view(steps, "ATTRIBUTES", 34962)
+        low, high = (getattr(steps["position"][:, :3], which)(axis=0).tolist() for which in ("min", "max"))
+        found.append(
+            {
+                "POSITION": file.accessor(view, _SHORT, "VEC3", len(steps), 0, min=low, max=high),
+                "NORMAL": file.accessor(view, _BYTE, "VEC3", len(steps), 8, normalized=True),
+            }
+        )
+    return found
+
+
+def weights(file: _File, nodes: list[tuple[int, Kind]]) -> list[dict[str, Any]]:
+    """Return the animation of nodes whose kinds have curves, as glTF lists it; none without."""
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    ready: dict[tuple[tuple[float, float], ...], int] = {}
+    for node, kind in nodes:
+        if kind.curve not in ready:
+            times = np.array([at for at, _ in kind.curve], "<f4")
+            values: Floats = np.eye(len(times))[:, 1:]
+            source = file.view(times, "ATTRIBUTES", None), file.view(values.astype("<f4").ravel(), "ATTRIBUTES", None)
+            first, last = [float(times[0])], [float(times[-1])]
+            ready[kind.curve] = len(samplers)
+            samplers.append(
+                {
+                    "input": file.accessor(source[0], _FLOAT, "SCALAR", len(times), min=first, max=last),
+                    "output": file.accessor(source[1], _FLOAT, "SCALAR", values.size),
+                    "interpolation": "LINEAR",
+                }
+            )
+        channels.append({"sampler": ready[kind.curve], "target": {"node": node, "path": "weights"}})
+    return [{"name": "stages", "samplers": samplers, "channels": channels}] if channels else []

@@ -1,0 +1,135 @@
+"""Scenes over time, and scenes asked for again: morph targets, samples, and meshes that are not sent twice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.scenes.compose import make
+from service.scenes.errors import InvalidScene
+from service.scenes.request import parse
+from service.shapes.live import LiveTables
+from solver.registry import surface
+from store import starter
+from store.lookup import ShapeTable
+
+from .._gltf import parsed
+from ._reading import array
+from .test_scenes import CAMERA, complaints
+
+TABLES = LiveTables(starter.ROOT, 60.0)
+CURVE = [[0.5, 0.0], [2.0, 0.1], [3.0, 0.25]]
+ITEM: dict[str, Any] = {"preset": "raisin", "curve": CURVE, "transforms": [{"position": [1, 0, 0]}, {"scale": 0.5}]}
+
+
+def made(items: list[dict[str, Any]], to: str = "glb", compress: bool = False, **more: Any) -> Any:
+    return make(parse({"camera": CAMERA, "items": items, **more}), TABLES, 512, to, compress)
+
+
+def own(stage: float, n: int) -> np.ndarray:
+    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at({}, stage, resolution=n)
+    assert shape.position is not None
+    assert shape.poles is not None
+    return np.concatenate([shape.position.reshape(-1, 3), shape.poles])
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_each_knot_of_a_curve_is_the_tables_shape_at_its_time(compress: bool) -> None:
+    if compress:
+        pytest.importorskip("meshoptimizer")
+    scene = made([{**ITEM, "transforms": [{}]}], compress=compress)
+    document, binary = parsed(scene.data)
+    [mesh] = document["meshes"]
+    [(node, data)] = [(i, one) for i, one in enumerate(document["nodes"]) if "mesh" in one]
+    grow = array(document, binary, data["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"])[0]
+    [primitive] = mesh["primitives"]
+    base = array(document, binary, primitive["attributes"]["POSITION"]).astype(float)
+    n = scene.report["detail"]["lattices"][0]
+    assert mesh["weights"] == [0, 0]
+    for (_, stage), target in zip(CURVE, [None, *primitive["targets"]], strict=True):
+        steps = 0 if target is None else array(document, binary, target["POSITION"]).astype(float)
+        assert np.abs((base + steps) * grow - own(stage, n)).max() < 4e-4
+    [animation] = document["animations"]
+    [channel] = animation["channels"]
+    assert channel["target"] == {"node": node, "path": "weights"}
+    sampler = animation["samplers"][channel["sampler"]]
+    assert array(document, binary, sampler["input"]).ravel().tolist() == [0.5, 2, 3]
+    assert array(document, binary, sampler["output"]).reshape(3, 2).tolist() == [[0, 0], [1, 0], [0, 1]]
+
+
+def test_usd_samples_prototypes_over_time(tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom
+
+    scene = made([{**ITEM, "seed": 3}], "usdc")
+    path = tmp_path / "scene.usdc"
+    path.write_bytes(scene.data)
+    assert complaints(path) == []
+    stage = Usd.Stage.Open(str(path))
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetTimeCodesPerSecond()) == (12, 72, 24)
+    found = UsdGeom.Mesh(stage.GetPrimAtPath("/scene/fruits/prototypes/shape0"))
+    assert found.GetPointsAttr().GetTimeSamples() == [12, 48, 72]
+    points = np.array(found.GetPointsAttr().Get(72))
+    n = int(np.sqrt((len(points) - 2) / 2))
+    assert np.abs(np.abs(points) - np.abs(own(0.25, n))).max() < 1e-5
+
+
+def test_a_camera_that_moved_gets_what_it_lacks() -> None:
+    still = {"preset": "jujube1", "stage": 0.2, "transforms": [{"position": [-2, 0, 0]}]}
+    items = [{**ITEM, "transforms": [{"position": [2, 0, 0]}]}, still]
+    first = made(items)
+    document, _ = parsed(first.data)
+    tags = [one["extras"]["etag"] for one in document["meshes"]]
+    assert len(set(tags)) == 2
+    again = made(items, known=tags)
+    document, _ = parsed(again.data)
+    assert [one["extras"]["etag"] for one in document["meshes"]] == tags
+    assert all(one["extras"]["known"] for one in document["meshes"])
+    assert len(again.data) < 0.05 * len(first.data)
+    nearer = {**CAMERA, "position": [-1, 0, 6]}
+    moved = make(parse({"camera": nearer, "items": items, "known": tags}), TABLES, 512, "glb", False)
+    fresh = [one for one in parsed(moved.data)[0]["meshes"] if not one["extras"].get("known")]
+    assert fresh
+    assert not {one["extras"]["etag"] for one in fresh} & set(tags)
+    assert [place(again.data, node) for node in (0, 1)] == [place(first.data, node) for node in (0, 1)]
+
+
+def place(data: bytes, node: int) -> list[list[float]]:
+    """Where a node's instances are, and their scales: what a mesh that is known already has to be drawn with."""
+    document, binary = parsed(data)
+    said = document["nodes"][node]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]
+    return [array(document, binary, said[name]).ravel().tolist() for name in ("TRANSLATION", "ROTATION", "SCALE")]
+
+
+def test_known_meshes_are_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    items = [{"preset": "plum2", "stage": 0.15, "transforms": [{}]}]
+    first = made(items)
+    tags = [one["extras"]["etag"] for one in parsed(first.data)[0]["meshes"]]
+    asked: list[int] = []
+    plain = ShapeTable.at
+
+    def at(self: ShapeTable, *words: Any, **more: Any) -> Any:
+        asked.append(more["resolution"])
+        return plain(self, *words, **more)
+
+    monkeypatch.setattr(ShapeTable, "at", at)
+    made(items, known=tags)
+    assert max(asked, default=0) <= 16  # what is seen is told from the coarse one
+
+
+@pytest.mark.parametrize(
+    ("item", "why"),
+    [
+        ({"preset": "raisin", "transforms": [{}]}, "either a stage or a curve"),
+        ({**ITEM, "stage": 0.1}, "either a stage or a curve"),
+        ({**ITEM, "curve": [[0, 0.1]]}, "two or more"),
+        ({**ITEM, "curve": [[1, 0.1], [1, 0.2]]}, "times rise"),
+        ({**ITEM, "curve": [[0, 0.1], [1, 0.9]]}, "off the table"),
+    ],
+)
+def test_curves_that_mean_nothing_are_refused(item: dict[str, Any], why: str) -> None:
+    with pytest.raises(InvalidScene, match=why):
+        made([item])

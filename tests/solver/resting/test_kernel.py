@@ -1,0 +1,59 @@
+"""The kernel of falling bodies against its plain twin, body by body, step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from solver.lattice import directions, lattice
+from solver.resting.kernel import radius_at, step
+
+from ._twin import Bodies, radius
+
+
+def bodies(count: int, bowl: tuple[float, float, float], seed: int) -> Bodies:
+    """Bumpy bodies of two kinds, close to each other and to the ground."""
+    random = np.random.default_rng(seed)
+    n = 12
+    theta, phi = lattice(n)
+    tables = np.stack([1 + 0.15 * np.cos(3 * theta), 0.8 + 0.2 * np.sin(theta) * np.cos(2 * phi)])
+    points = np.stack([(table[..., None] * directions(theta, phi)).reshape(-1, 3) for table in tables])
+    kind, scale = np.arange(count) % 2, random.uniform(0.5, 1.0, count)
+    at = random.uniform(-0.6, 0.6, (count, 3)) + np.array([0, 1.9 + 0.2 * count, 0])
+    turn = np.ascontiguousarray(Rotation.random(count, random_state=seed).as_quat())
+    mass = scale**3
+    speed, spin = random.normal(0, 0.3, (2, count, 3))
+    reach = scale * tables.max(axis=(1, 2))[kind] * 1.01
+    return Bodies(
+        at, turn, speed, spin, kind, scale, tables, points, reach, mass, 0.4 * mass * scale**2, np.array(bowl), 0.4
+    )
+
+
+@pytest.mark.parametrize("bowl", [(0.0, 0.0, 0.0), (2.5, 0.2, 2.0)])
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_steps_are_those_of_the_twin(count: int, bowl: tuple[float, float, float]) -> None:
+    h, drag = 0.02, 0.1
+    found, truth = bodies(count, bowl, count), bodies(count, bowl, count)
+    for _ in range(160):
+        fastest = step(
+            found.at, found.turn, found.speed, found.spin, found.kind, found.scale, found.tables, found.points,
+            found.reach, found.mass, found.inertia, found.bowl, h, drag, found.friction, 1,
+        )  # fmt: skip
+        expected = truth.step(h, drag)
+        assert fastest == pytest.approx(expected, rel=1e-7, abs=1e-9)
+        for name in ("at", "turn", "speed", "spin"):
+            np.testing.assert_allclose(getattr(found, name), getattr(truth, name), rtol=1e-6, atol=1e-8)
+        # which of two points is the deepest hangs on rounding in the end: each step begins from the same
+        for name in ("at", "turn", "speed", "spin"):
+            getattr(truth, name)[:] = getattr(found, name)
+    assert truth.contacts > 5
+
+
+def test_radii_between_directions_are_the_twin_s() -> None:
+    random = np.random.default_rng(0)
+    table = random.uniform(0.5, 1.5, (9, 18))
+    x = random.normal(size=(500, 3))
+    r = np.linalg.norm(x, axis=1)
+    found = [radius_at(table, *one, size) for one, size in zip(x, r, strict=True)]
+    np.testing.assert_allclose(found, radius(table, x / r[:, None]), rtol=1e-12)
