@@ -204,7 +204,7 @@ def main(meshes: list[str]) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     meshes = ["DCB:24:33:0", "ENF:24:35:0", "DCB:24:17:0", "DCB:24:33:1", "DCB:96:33:0", "ENF:24:69:0", "DCB:24:65:0"]
-    meshes += ["DCB:24:33:2", "ENF:24:35:1", "ENF:96:35:0"]
+    meshes += ["DCB:24:33:2", "ENF:24:35:1"]
     parser.add_argument(
         "meshes", nargs="*", default=meshes, metavar="TEST:RODS:VERTICES:SEED", help="default: %(default)s"
     )

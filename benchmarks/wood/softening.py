@@ -58,7 +58,8 @@ class Flexure:
         def ends(left: np.ndarray, right: np.ndarray, _: np.ndarray) -> np.ndarray:
             return np.array([left[0] + tip, left[1], right[1]])
 
-        x = np.unique(np.concatenate([np.linspace(crack, 2 * s, 161), np.linspace(crack, s, 121)]))
+        # rounded, or places that differ by their last digit would be apart
+        x = np.unique(np.round(np.concatenate([np.linspace(crack, 2 * s, 161), np.linspace(crack, s, 121)]), 9))
         y, p = np.zeros((2, len(x))), np.ones(1)
         fine, tip, found = np.linspace(0, 2 * s, 4001), 0.0, [(0.0, 0.0)]
         for tip in (*np.linspace(0, first, _ELASTIC)[1:], *np.geomspace(first, _LAST * last, _SOFT)[1:]):

@@ -23,6 +23,8 @@ _NET = 3.0
 _NONE = 1e-9
 #: Edges on the length over which wood gives way ahead of a crack.
 _ZONE = 5.5
+#: The least share of its strength that a coarse bundle keeps.
+_LEAST = 0.25
 #: Strain and slope at which a bond must have given way, however coarse rods are.
 _MOST_GIVEN = 0.4
 #: Points of contact on what is as long as the narrowest body is wide; the fewest and the most on an edge. Under a
@@ -111,13 +113,14 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
     two slender halves t thick over (E G_Ic t^3 / s^2)^(1/4) if it opens, over (E G_IIc t / s^2)^(1/2) if it slides
     (Cox and Marshall 1994). Where fewer than `_ZONE` edges lie on it, no bond feels the tip's stress, and the crack
     stays far beyond what it bears, to run all at once. A lower strength makes the zone longer, and changes nothing of
-    what the crack costs (Turon et al. 2007).
+    what the crack costs (Turon et al. 2007); but never so low that bundles without a crack fall apart.
     """
     way = np.linalg.norm(np.roll(outline, -1, 0) - outline, axis=1).sum()
     thick, zone = 2 * area(outline) / float(way), _ZONE * edge
     opens = (params.stiffness * params.toughness * thick**3) ** 0.5 / zone**2
     slides = (params.stiffness * params.toughness_sliding * thick) ** 0.5 / zone
-    return min(params.cleavage, opens), min(params.shear_strength, slides)
+    own = (params.cleavage, params.shear_strength)
+    return min(own[0], max(opens, _LEAST * own[0])), min(own[1], max(slides, _LEAST * own[1]))
 
 
 def _begins(own: np.ndarray, resolved_: np.ndarray, cost: np.ndarray, holds: np.ndarray) -> np.ndarray:

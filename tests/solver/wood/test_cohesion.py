@@ -167,6 +167,7 @@ def test_strength_of_coarse_rods_is_what_their_edges_resolve():
     # t = 2 A / perimeter
     thick = 2 * 2e-4 / 0.06
     assert resolved(params, 1e-3, outline) == (4e6, 8e6)
-    opens, slides = resolved(params, 0.01, outline)
-    assert (10e9 * 250 * thick**3 / opens**2) ** 0.25 == pytest.approx(5.5 * 0.01)
-    assert (10e9 * 700 * thick / slides**2) ** 0.5 == pytest.approx(5.5 * 0.01)
+    opens, slides = resolved(params, 0.005, outline)
+    assert (10e9 * 250 * thick**3 / opens**2) ** 0.25 == pytest.approx(5.5 * 0.005)
+    assert (10e9 * 700 * thick / slides**2) ** 0.5 == pytest.approx(5.5 * 0.005)
+    assert resolved(params, 0.1, outline) == (1e6, 2e6)
