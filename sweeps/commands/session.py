@@ -77,7 +77,7 @@ def _driven(
     failed: list[SolverError] = []
 
     def say(told: dict[str, Any]) -> None:
-        if told["say"] in ("done", "error"):
+        if told["say"] in ("done", "saved", "error"):
             typer.echo(json.dumps({k: v for k, v in told.items() if k != "toml"}))
         if told["say"] == "error":
             problem = told["problem"]

@@ -112,7 +112,7 @@ class Desk:
         except SolverError as error:
             self._say({"say": "error", "id": number, "problem": problem(error)})
         else:
-            self._say({"say": "done", "id": number, **said})
+            self._say({"say": "saved" if message.get("do") == "save" else "done", "id": number, **said})
         self._state()
 
     def _done(self, message: Mapping[str, Any], number: int) -> Mapping[str, Any]:

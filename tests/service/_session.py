@@ -55,7 +55,7 @@ class Client:
         self.send(do=do, id=self.number, **values)
         while True:
             said = self.receive()
-            if said and said.get("id") == self.number and said["say"] in ("done", "error"):
+            if said and said.get("id") == self.number and said["say"] in ("done", "saved", "error"):
                 return said
 
     def until(self, what: Any, seconds: float = 300.0) -> None:

@@ -327,6 +327,7 @@ def test_quality_grows_the_same_script_on_another_mesh(live: Served) -> None:
     assert client.frames[-1]["vertices"] > 2 * coarse["vertices"]
     assert client.frames[-1]["stage"] == coarse["stage"]
     saved = client.ask("save")
+    assert saved["say"] == "saved"
     assert saved["quality"] == "default"
     client.send(do="close")
     client.close()
