@@ -38,6 +38,17 @@ def test_a_flat_sheet_feels_no_contact_however_thick():
         assert not gradient.any()
 
 
+def test_a_rolled_sheet_feels_no_contact_however_thick():
+    """Where it is not flat, what is near at rest is looked at, and feels nothing until it is half as near."""
+    engine = Engine(GrowthParams.parse({"shape": "disc", "thickness": 0.3, "imperfection": 0}), 150)
+    x, radius = engine.state.x, 0.6
+    rolled = np.stack([radius * np.sin(x[:, 0] / radius), x[:, 1], radius * (1 - np.cos(x[:, 0] / radius))], axis=1)
+    touching = Touching(replace(engine.state, x=rolled), 0.3, 1.0, np.ones(len(x)))
+    gradient = np.zeros_like(x)
+    assert len(touching.pairs.stencils) > 100
+    assert touching.energy(rolled, gradient) == 0.0
+
+
 def test_a_strip_that_curls_up_stays_outside_itself():
     """Its rest curvature is that of one and a half turns: free, its ends would pass through each other."""
     curl = {
