@@ -75,6 +75,9 @@ EXPECTED: dict[type[Exception], int] = {
     errors.UnfitFormat: 422,
     errors.Unavailable: 501,
     errors.BatchTooLarge: 413,
+    errors.UnknownSession: 404,
+    errors.TooManySessions: 429,
+    errors.EngineDied: 500,
 }
 
 

@@ -83,6 +83,7 @@ def mesh(saved: dict[str, Any], folder: Path) -> tuple[np.ndarray, np.ndarray]:
     return found.vertices, found.triangles
 
 
+@pytest.mark.slow
 def test_a_mushroom_is_painted_and_replayed_to_the_same_bytes(live: Served, tmp_path: Path) -> None:
     """Strokes about the tip of a stem, one of them taken back, a curve that makes the cap, a box; then the file."""
     client = live.client(STEM, fields=["elastic_strain"])
@@ -333,6 +334,7 @@ def test_quality_grows_the_same_script_on_another_mesh(live: Served) -> None:
     client.close()
 
 
+@pytest.mark.slow
 def test_sessions_that_nobody_uses_end(tmp_path: Path) -> None:
     """Silent ones with what was made; those whose client died after a while; and none outlives the service."""
     with serving(tmp_path / "store", session_idle=8.0, session_kept=1.0) as found:

@@ -115,7 +115,7 @@ def test_without_history_the_way_is_the_same_and_there_is_none_back():
 @pytest.mark.parametrize("shape", ["sphere", "disc"])
 def test_slices_undo_and_remeshing_leave_the_same_bytes(shape):
     """Also on a leaf, where parts do not do: every step ends at the residual."""
-    tools = [SPOT | {"stretch": (1.06, 1.06), "at": (0.5, 0.2, 1.0)}]
+    tools = [SPOT | {"stretch": (1.06, 1.06), "at": (0.5, 0.2, 1.0 if shape == "sphere" else 0.0)}]
     values = {"shape": shape, "curved": shape == "sphere", "active": True, "remesh": 1.15, "tools": tools}
     live, batch = engine(500, 0, **values), engine(500, 8, **values)
     begun = len(live.state.x)

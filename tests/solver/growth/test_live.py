@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from solver.contract import InvalidInput, Need
 from solver.growth import SOLVER
@@ -14,6 +15,14 @@ from solver.growth.living import history
 from solver.growth.living.live import GrowingLive
 from solver.growth.params import GrowthParams
 from solver.growth.tooling.tools import HotStroke
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """As sessions have it, and as batch runs do: BLAS sums in another order on two."""
+    with threadpool_limits(1, user_api="blas"):
+        yield
+
 
 BALL = {"thickness": 0.1, "tools": [], "step": 0.05}
 
