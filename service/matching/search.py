@@ -83,7 +83,7 @@ def search(target: Target, ranges: Sequence[Range], progress: Progress = lambda 
     for k, one in enumerate(ranges):
         progress(0.6 * k / len(ranges), f"table {one.table.info.name}")
         for point, stage in _places(one):
-            look = _first_look(target, one.table, point, stage)
+            look = _first_look(target, one, point, stage)
             looked += 1
             away = _distance(target.seen(True), look)
             if np.isfinite(away):
@@ -125,8 +125,10 @@ def _within(one: Range, point: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def _first_look(target: Target, table: ShapeTable, point: Mapping[str, float], stage: float) -> Look:
-    if target.kind == "descriptors":
+def _first_look(target: Target, one: Range, point: Mapping[str, float], stage: float) -> Look:
+    table = one.table
+    # only what the table itself holds is kept: numbers that askers name have no end
+    if target.kind == "descriptors" or one.held or one.stage != table.reach:
         return target.of(table, point, stage, True)
     seen = _kept.setdefault(table, {})
     key = (*target.like, tuple(sorted(point.items())), stage)

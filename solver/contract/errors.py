@@ -67,7 +67,7 @@ class InvalidGeometry(InvalidInput):
 
 
 class OverBudget(InvalidInput):
-    """A run that is expected to take more time or memory than it may; raised before any work."""
+    """A run that takes more time or memory than it may: before any work where that can be foreseen, else on the way."""
 
     code = "over-budget"
 
