@@ -101,8 +101,9 @@ class Session:
         """A client has gone, in peace or not: the engine rests until one comes back."""
         if self._client is client:
             self._client, self.left = None, time.monotonic()
-            with contextlib.suppress(OSError):
-                await self._send(b"C", "hold")
+            with contextlib.suppress(TimeoutError, OSError):
+                async with asyncio.timeout(_SAVING):  # an engine that is behind takes nothing in
+                    await self._send(b"C", "hold")
 
     async def take(self, message: dict[str, Any]) -> None:
         """Hand a client's message on.
@@ -128,8 +129,8 @@ class Session:
         if not self.has_died:
             self._saved = asyncio.get_running_loop().create_future()
             with contextlib.suppress(TimeoutError, OSError):
-                await self._send(b"C", "save")
                 async with asyncio.timeout(_SAVING):
+                    await self._send(b"C", "save")
                     saved = await self._saved
         with contextlib.suppress(Exception):
             async with asyncio.timeout(_READING):

@@ -19,6 +19,8 @@ __all__ = ["main", "packet"]
 
 #: Seconds between two looks at the clock where work waits for its time, and between two words on what was spent.
 _TICK, _SPENT = 0.004, 0.25
+#: Messages that may wait: who sends more is made to wait as well, and fills no memory.
+_MOST = 64
 
 
 def packet(letter: bytes, content: bytes) -> bytes:
@@ -26,7 +28,7 @@ def packet(letter: bytes, content: bytes) -> bytes:
     return struct.pack("<Ic", len(content), letter) + content
 
 
-def _read(stream: BinaryIO, into: queue.SimpleQueue[tuple[bytes, Any] | None]) -> None:
+def _read(stream: BinaryIO, into: queue.Queue[tuple[bytes, Any] | None]) -> None:
     while len(head := stream.read(5)) == 5:
         length, letter = struct.unpack("<Ic", head)
         into.put((letter, json.loads(stream.read(length))))
@@ -49,7 +51,7 @@ def main() -> None:
     """Begin as the first message says, then work until the input ends."""
     # what numerical code prints must not come between packets
     out, sys.stdout = _Out(sys.stdout.buffer), sys.stderr
-    came: queue.SimpleQueue[tuple[bytes, Any] | None] = queue.SimpleQueue()
+    came: queue.Queue[tuple[bytes, Any] | None] = queue.Queue(_MOST)
     threading.Thread(target=_read, args=(sys.stdin.buffer, came), daemon=True).start()
     first = came.get()
     if first is None:
@@ -81,7 +83,7 @@ def main() -> None:
         pass
 
 
-def _serve(desk: Any, came: queue.SimpleQueue[tuple[bytes, Any] | None], out: _Out) -> None:
+def _serve(desk: Any, came: queue.Queue[tuple[bytes, Any] | None], out: _Out) -> None:
     """Take what comes, work in between."""
     said = -_SPENT
     while True:
