@@ -2,7 +2,7 @@
 
 import { Box3, BufferAttribute, type BufferGeometry, Group, InstancedMesh, Matrix4, Mesh, type Object3D, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import type { Subject } from "./studio";
+import { copied, type Subject } from "./studio";
 import { normals } from "./surface";
 
 const SIZE = 2.7; // what the longest side is scaled to
@@ -64,11 +64,7 @@ export class Crowd implements Subject {
   }
 
   frozen(): Object3D {
-    const copy = this.object.clone(true);
-    copy.traverse((one) => {
-      if (one instanceof Mesh) one.geometry = one.geometry.clone();
-    });
-    return copy;
+    return copied(this.object);
   }
 
   dispose(): void {

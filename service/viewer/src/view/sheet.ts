@@ -2,7 +2,7 @@
 
 import { Box3, BufferAttribute, BufferGeometry, DoubleSide, Group, Mesh, MeshPhysicalMaterial, type Object3D, Vector3 } from "three";
 import type { Surface } from "../service/sessions";
-import type { Subject } from "./studio";
+import { copied, type Subject } from "./studio";
 
 const SIZE = 1.7;
 
@@ -52,11 +52,7 @@ export class Sheet implements Subject {
   }
 
   frozen(): Object3D {
-    const copy = this.object.clone(true);
-    copy.traverse((one) => {
-      if (one instanceof Mesh) one.geometry = one.geometry.clone();
-    });
-    return copy;
+    return copied(this.object);
   }
 
   dispose(): void {

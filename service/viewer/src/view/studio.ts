@@ -16,8 +16,8 @@ import {
   type Object3D,
   PCFShadowMap,
   PerspectiveCamera,
-  PMREMGenerator,
   PlaneGeometry,
+  PMREMGenerator,
   Raycaster,
   Scene,
   Spherical,
@@ -360,4 +360,13 @@ function softBoxes(renderer: WebGLRenderer): Scene["environment"] {
   const texture = generator.fromScene(room, 0.03).texture;
   generator.dispose();
   return texture;
+}
+
+/** A copy that stays as it is while the original goes on. */
+export function copied(object: Object3D): Object3D {
+  const copy = object.clone(true);
+  copy.traverse((one) => {
+    if (one instanceof Mesh) one.geometry = one.geometry.clone();
+  });
+  return copy;
 }
