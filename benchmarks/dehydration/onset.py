@@ -1,6 +1,6 @@
-"""The onset of the exact references by road: python -m benchmarks.dehydration.onset [--quality Q] [--full] [--fruits].
+"""The onset of the exact references by road: python -m benchmarks.dehydration.onset --help.
 
-Error is that of s_cr, relative to the reference; seconds are those of one call on this machine. With --elliptic instead:
+Error is that of s_cr, relative to the reference; seconds are those of one call on this machine. With --elliptic: only
 spheres and Table 1's fruits with elliptic equators by the road of fruits of any shape (a record of its own, kept after
 each run; --finer adds the fruits at quality fine, which their default's error is measured against).
 """
@@ -52,7 +52,7 @@ def fruits(quality: str) -> list[dict[str, Any]]:
         params = SOLVER.parse({}, name)
         assert isinstance(params, DehydrationParams)
         for method in ("exact", "linear"):
-            found = onset(params, quality=quality, method=method)  # type: ignore[arg-type]
+            found = onset(params, quality=quality, method=method)
             rows.append({"preset": name, **found.summary()})
             print(
                 f"{name:10} {method:7} s_cr {found.s_cr:.5f} m {found.wavenumber} degree {found.degree} "
@@ -64,7 +64,7 @@ def fruits(quality: str) -> list[dict[str, Any]]:
 
 def _by_the_full_road(params: DehydrationParams, name: str, quality: str, exact: float | None) -> dict[str, Any]:
     begin = time.process_time()
-    found = onset(params, road="full", quality=quality)  # type: ignore[arg-type]
+    found = onset(params, road="full", quality=quality)
     assert found.s_cr is not None
     error = found.s_cr / exact - 1 if exact else None
     row = {"fruit": name, "quality": quality, **found.summary(), "error": error, "cpu": time.process_time() - begin}
@@ -84,9 +84,9 @@ def elliptic(finer: bool) -> None:
             rows.append(_by_the_full_road(params, name, "default", case["s_cr"]))
     for quality in ("default", *["fine"] * finer):
         for name in ELLIPTIC:
-            params = SOLVER.parse({}, name)
-            assert isinstance(params, DehydrationParams)
-            rows.append(_by_the_full_road(params, name, quality, None))
+            fruit = SOLVER.parse({}, name)
+            assert isinstance(fruit, DehydrationParams)
+            rows.append(_by_the_full_road(fruit, name, quality, None))
             keep("dehydration-onset-full", rows, "dehydration")
 
 

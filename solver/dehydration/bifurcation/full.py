@@ -233,7 +233,7 @@ class _Search:
         middles, _, widths = self.places
         near = np.linalg.norm(middles - patch.centre, axis=1)
         across, along = widths[near <= max(patch.radius, near.min())].max(axis=0)
-        size = len(self.states.whole.mesh.quad_of[0]) * max(across, along / CRESTS)
+        size = len(self.states.whole.mesh.quad_of[0]) * float(max(across, along / CRESTS))
         return max(2 * math.ceil(size * per_wavelength / self.resolved / 2), 4)
 
     def _repeated(
@@ -270,7 +270,8 @@ class _Search:
     def _path(self, model: Model, coarser: Look | None) -> tuple[Path, BaseState]:
         if self.method == "linear":
             return self.states.fresh_path(model)
-        return self.states.path(model, self.below, coarser and (coarser.state, coarser.path.velocity))
+        known = None if coarser is None else (coarser.state, coarser.path.velocity)
+        return self.states.path(model, self.below, known)
 
     def _seen(
         self, model: Model, path: Path, wanted: Mapping[tuple[int, ...], Floats | None], done: float
