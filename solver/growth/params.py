@@ -170,11 +170,9 @@ class GrowthParams(Params):
         (), max_length=20, description="What is held", json_schema_extra=_units("1")
     )
     solids: tuple[Solid, ...] = Field((), max_length=20, description="Static solids", json_schema_extra=_units("1"))
-    contact: float = Field(
-        0.0,
-        ge=0,
-        le=1,
-        description="Distance that parts keep from each other, the thickness, say; 0: they pass through",
+    contact: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None,
+        description="Distance that parts keep from each other; not given: the thickness; 0: they pass through",
         json_schema_extra=_units("start shape's unit"),
     )
     step: float = Field(
@@ -192,7 +190,7 @@ class GrowthParams(Params):
     )
     active: bool = Field(
         False,
-        description="Whether a part that grows settles alone where the rest stays in balance; not with contact",
+        description="Whether a part that grows settles alone where the rest stays in balance; not where parts touch",
         json_schema_extra=_units("1"),
     )
 

@@ -80,7 +80,7 @@ def test_a_shape_that_passes_through_itself_is_refused_unless_it_may(monkeypatch
     with pytest.raises(InvalidGeometry, match="passes through itself") as caught:
         Engine(GrowthParams.parse({"shape": "disc", "contact": 0.05}), 50)
     assert "contact = 0" in caught.value.advice
-    Engine(GrowthParams.parse({"shape": "disc"}), 50)
+    Engine(GrowthParams.parse({"shape": "disc", "contact": 0.0}), 50)
 
 
 def test_energy_never_rises_in_contact():
