@@ -16,7 +16,7 @@ from ..state import State
 __all__ = ["Touching", "touches"]
 
 #: Room for moves, at first and at most, and for the change of an edge, over the mean rest edge.
-_FAR, _FURTHEST, _CHANGE = 0.4, 2.0, 0.12
+_FAR, _FURTHEST, _CHANGE = 0.2, 1.0, 0.12
 #: Share of a step up to a touch that is taken.
 _SHORT = 0.9
 #: How much further than their reach stencils are apart that are coupled in second derivatives already.
