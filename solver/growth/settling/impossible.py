@@ -80,6 +80,6 @@ def check_outward(state: State, volume: float, last: float, params: GrowthParams
         advice = "Less suction, or a thicker sheet" if params.pressure < 0 else "Shorter steps, or slower growth"
         raise Unstable(
             f"the surface has turned inside out by growth time {state.time:g}: it encloses {now:.3g}.",
-            advice=f"{advice}; with `contact` it cannot pass through itself.",
+            advice=f"{advice}; with contact = {params.thickness:g} it cannot pass through itself, and takes its time.",
             last_stage=last,
         )
