@@ -23,6 +23,7 @@ from uvicorn.server import ServerState
 
 from ..problems import MEDIA_TYPE, URN
 from ..settings import Settings
+from . import waited
 from .clients import address
 from .waiting import Waiting
 
@@ -132,6 +133,8 @@ class GuardedProtocol(HttpToolsProtocol):
         """Forget a connection."""
         self._no_longer_wait()
         forget(self.server_state, self._name)
+        if self.cycle is not None:
+            waited.end(self.cycle.scope)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
