@@ -229,7 +229,8 @@ def _speeds(
     return fastest
 
 
-@njit(cache=True, error_model="numpy")
+# takes seconds: other threads of a service go on
+@njit(cache=True, error_model="numpy", nogil=True)
 def step(
     at: Floats, turn: Floats, speed: Floats, spin: Floats, kind: Ints, scale: Floats, tables: Floats, points: Floats,
     reach: Floats, mass: Floats, inertia: Floats, bowl: Floats, h: float, drag: float, friction: float, count: int,

@@ -57,6 +57,13 @@ class Skin(BaseModel):
     joining: float = Field(
         0.7, ge=0, le=1, description="Share that it joins of what its place shrinks beyond that: rot takes skin too [1]"
     )
+    slack: float = Field(
+        0.2,
+        ge=0,
+        le=0.6,
+        description="Most of the skin's lengths that the body may leave to be folded; beyond, it shrinks too: "
+        "deeper folds close, and skin that dries gives way; a choice [1]",
+    )
     depth: float = Field(0.1, ge=0.01, le=1, description="Depth of the flesh that holds the skin [r1]")
 
 
