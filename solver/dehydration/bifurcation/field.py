@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import sph_harm_y
+from scipy.special import sph_legendre_p_all
 
 from ...arrays import Floats
 from ..implicit import Model
@@ -59,8 +59,7 @@ def dominant(heights: Callable[[Floats], Floats], highest: int) -> tuple[int, in
     points = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
     waves = np.fft.rfft(heights(points.reshape(-1, 3)).reshape(theta.shape), axis=1)[:, : highest + 1]
     power = np.zeros((highest + 1, highest + 1))
+    harmonics = sph_legendre_p_all(highest, highest, colatitude)[0]
     for m in range(highest + 1):
-        degrees = np.arange(m, highest + 1)
-        harmonics = sph_harm_y(degrees[:, None], m, colatitude[None, :], 0.0).real
-        power[m:, m] = np.abs((harmonics * weights) @ waves[:, m]) ** 2 * (1 if m == 0 else 2)
+        power[m:, m] = np.abs((harmonics[m:, m] * weights) @ waves[:, m]) ** 2 * (1 if m == 0 else 2)
     return int(power.sum(axis=1).argmax()), int(power.sum(axis=0).argmax())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import sph_harm_y
+from scipy.special import sph_legendre_p_all
 
 from ...arrays import Complexes, Floats
 from ...fruit import colatitudes
@@ -27,10 +27,9 @@ def quadrature(resolution: int) -> Floats:
 @lru_cache(maxsize=4)
 def _legendre(resolution: int, degree: int) -> Floats:
     """Return orthonormal Y_lm(colatitude, 0) as (m, l, resolution); zero where l < m."""
-    theta = colatitudes(resolution)
-    table = np.zeros((degree + 1, degree + 1, resolution))
-    for m in range(degree + 1):
-        table[m, m:] = sph_harm_y(np.arange(m, degree + 1)[:, None], m, theta[None, :], 0.0).real
+    # one recurrence for all, to the bit what `sph_harm_y` gives one by one; -m and a derivative's axis are left out
+    every = sph_legendre_p_all(degree, degree, colatitudes(resolution))[0][:, : degree + 1]
+    table = np.ascontiguousarray(every.transpose(1, 0, 2))
     table.flags.writeable = False
     return table
 
