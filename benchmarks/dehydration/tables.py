@@ -39,6 +39,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-buckled whole": _whole,
         "dehydration-buckled eighths": _eighths,
         "dehydration-scaling": _scaling,
+        "dehydration-speed": _speed,
         "dehydration-skips": _skips,
     }
     return makers[f"{record['name']} {part}".strip()](record)
@@ -109,6 +110,25 @@ def _fruits(record: Row) -> str:
         for name, row in exact.items()
     ]  # fmt: skip
     return markdown(("fruit", "s_cr", "m", "degree", "seconds", "Eq. 11", "its degree"), lines)
+
+
+def _speed(record: Row) -> str:
+    """What each run took, by element and step, and the shares of its parts."""
+    lines = []
+    for row in record["runs"]:
+        each = row["cpu"] / (row["steps"] * row["elements"])
+        shares = [f"{100 * part / row['seconds']:.0f} %" for part in row["parts"].values()]
+        part = "eighth" if row["mirrors"] == "xyz" else "whole"
+        settled = f"{sum(row['converged'])} of {len(row['converged'])}"
+        name = f"{row['quality']}, te {row['te']:g}, {part}"
+        lines.append(
+            [
+                name, str(row["elements"]), str(row["steps"]), f"{row['cpu']:.3g}",
+                f"{1e9 * each:.0f}", *shares, settled,
+            ]
+        )  # fmt: skip
+    head = ("run", "elements", "steps", "processor seconds", "ns per element and step")
+    return markdown((*head, *record["runs"][0]["parts"], "stages settled"), lines)
 
 
 def _full(record: Row) -> str:
