@@ -15,6 +15,7 @@ itself was late, which says whether it had a processor when it wanted one.
 from __future__ import annotations
 
 import argparse
+import statistics
 import subprocess
 import threading
 from pathlib import Path
@@ -73,6 +74,10 @@ def twice(process: subprocess.Popen[str], port: int, kind: str, seconds: float, 
     row = {"kind": kind, "seconds": seconds, "peak": peak, "before": before.rate, "after": after.rate, **said(over)}
     row |= {"goodput": over.rate / peak, "goodput_by_processor": 2 * each[1] / (each[0] + each[2])}
     row |= {"asked": 2 * before.rate / peak, "memory_mb": [seen[0], max(seen), seen[-1]]}
+    # every half minute; and what it grew by from the middle on, of means over a tenth of the time
+    part = max(len(seen) // 10, 1)
+    grown = statistics.mean(seen[-part:]) - statistics.mean(seen[len(seen) // 2 :][:part])
+    row |= {"memory_series_mb": seen[::30], "grown_mb": grown}
     print(
         f"{kind}: peak {peak:.0f} /s ({before.rate:.0f}, {after.rate:.0f}); at {row['asked']:.1f} times that goodput "
         f"{row['goodput']:.0%}, by processor time {row['goodput_by_processor']:.0%}, p99 {row['p99_ms']:.0f} ms; "
@@ -103,16 +108,32 @@ def main() -> None:
 def overloaded(options: argparse.Namespace) -> None:
     """Measure overload, and keep what came of it."""
     with serving() as (process, port):
-        rows = [twice(process, port, kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS]
-        rows += [twice(process, port, next(iter(KINDS)), options.flat, options.rounds)] if options.flat else []
+        rounds = [(kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS]
+        rounds += [(next(iter(KINDS)), options.flat, options.rounds)] if options.flat else []
+        rows: list[dict[str, Any]] = []
+        for kind, seconds, turn in rounds:
+            rows.append(twice(process, port, kind, seconds, turn))
+            report(rows)  # after each: whatever ends a long run, what was measured is kept
+
+
+def report(rows: list[dict[str, Any]]) -> None:
+    """Keep the record."""
     head = ["asked for", "for", "peak", "asked over peak", "goodput over peak", "by processor time", "p99 of answers"]
-    head += ["refused", "of them within 100 ms", "broken", "asker late, p99", "memory at first, most, at last"]
+    head += [
+        "refused",
+        "of them within 100 ms",
+        "broken",
+        "asker late, p99",
+        "memory at first, most, at last",
+        "grown in the second half",
+    ]
     cells = [
         [
             row["kind"], f"{row['seconds']:.0f} s", f"{row['peak']:.0f} /s", f"{row['asked']:.1f}",
             f"{row['goodput']:.2f}", f"{row['goodput_by_processor']:.2f}",
             f"{row['p99_ms']:.0f} ms", str(row["refused"]), f"{100 * row['refused_in_100_ms']:.1f} %",
             str(row["broken"]), f"{row['late_p99_ms']:.0f} ms", ", ".join(f"{m:.0f}" for m in row["memory_mb"]) + " MB",
+            f"{row['grown_mb']:+.1f} MB" if "grown_mb" in row else "",
         ]
         for row in rows
     ]  # fmt: skip

@@ -10,6 +10,7 @@ import httpx
 import numpy as np
 
 from service.scenes import placing
+from solver import resting
 from store import starter
 
 from .._asking import checked
@@ -33,12 +34,12 @@ made: list[Any] = []
 
 
 def watch(monkeypatch: Any) -> None:
-    class Watched(placing.resting.Pouring):
+    class Watched(resting.Pouring):
         def __init__(self, *values: Any) -> None:
             super().__init__(*values)
             made.append(self)
 
-    monkeypatch.setattr(placing.resting, "Pouring", Watched)
+    monkeypatch.setattr(resting, "Pouring", Watched)
 
 
 def stands_still(pouring: Any) -> float:
