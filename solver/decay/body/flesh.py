@@ -59,7 +59,7 @@ class Skin(BaseModel):
         0.7, ge=0, le=1, description="Share that it joins of what its place shrinks beyond that: rot takes skin too [1]"
     )
     slack: float = Field(
-        0.2,
+        0.15,
         ge=0,
         le=0.6,
         description="Most of the skin's lengths that the body may leave to be folded; beyond, it shrinks too: "
