@@ -24,6 +24,7 @@ from solver.quantities import QUANTITIES
 from . import seal
 from .blending import asking, methods
 from .blending.blend import Blend, Blender
+from .blending.methods.thin import Mixture
 from .blending.methods.weights import Samples
 from .blending.neighbours import SAME, Weighted
 from .errors import CorruptTable, OutsideTable
@@ -192,12 +193,13 @@ class ShapeTable:
         how, patch = methods.parse(method), window.on(n)
         point = np.array(list(values.values())) if self._samples is not None else None
         near, stages = self._near(point, how, m, eta), self._bracket(s)
+        mixed = self._blender.mix(point, near, tuple(_stored(stages)), how)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
         if max_error is not None:
             trust.refuse(expected, max_error, inside, self._judged)
         exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
-        found, crossings = self._fields(fields, patch, values, self._blend(point, near, stages, how, n), exact)
+        found, crossings = self._fields(fields, patch, values, self._blend(point, mixed, stages, how, n), exact)
         colatitude, azimuth = _angles(n)
         return Shape(
             colatitude=colatitude[patch.rows],
@@ -208,7 +210,7 @@ class ShapeTable:
             stage=s,
             parameters=self.info.complete(values),
             descriptors=self._describe(near, stages),
-            weights={self._keys[i]: float(w) for i, w in zip(near.samples, near.weights, strict=True)},
+            weights=self._weights(near, mixed, stages),
             nearest=near.nearest,
             inside=inside,
             exact=exact,
@@ -272,7 +274,8 @@ class ShapeTable:
         if self._samples is None or stage not in self.stages:
             raise OutsideTable("nothing can be left out there.", "Name a stored stage of a table with several samples.")
         others, j = self._samples.without(i, how.weighting), self.stages.index(stage)
-        blend = self._blender(self._samples.values[i], others.samples, others.weights, {j: 1.0}, how)
+        point = self._samples.values[i]
+        blend = self._blender(point, self._blender.mix(point, others, (j,), how, i), {j: 1.0}, how)
         found = _synthesize(blend, WHOLE.on(resolution or self.resolution), None, True)[1]
         assert found is not None
         return found
@@ -296,7 +299,7 @@ class ShapeTable:
     def _expect(self, near: Weighted, stages: Mapping[int, float], method: methods.Method) -> dict[str, float] | None:
         if stages.keys() == {_FRESH} or (near.nearest == 0.0 and len(stages) == 1):
             return dict.fromkeys(Measures._fields, 0.0)
-        if self._trust is None or self._trust.method != str(method):
+        if self._trust is None or not self._trust.knows(str(method)):
             return None
         return self._trust.expect(near, _stored(stages))
 
@@ -318,11 +321,19 @@ class ShapeTable:
         return [(i, j, w * t) for i, w in zip(near.samples, near.weights, strict=True) for j, t in stored]
 
     def _blend(
-        self, point: Array | None, near: Weighted, stages: Mapping[int, float], method: methods.Method, n: int
+        self, point: Array | None, mixed: Mixture, stages: Mapping[int, float], method: methods.Method, n: int
     ) -> Callable[[], Blend]:
         # waves that the lattice cannot hold are not even read
         band = min(self.resolution, n)
-        return lambda: self._blender(point, near.samples, near.weights, _stored(stages), method, band)
+        return lambda: self._blender(point, mixed, _stored(stages), method, band)
+
+    def _weights(self, near: Weighted, mixed: Mixture, stages: Mapping[int, float]) -> dict[str, float]:
+        """Return what each result counts: over both stages, where it does not count the same at both."""
+        shares = np.array(list(_stored(stages).values()))
+        samples, weights = near.samples, near.weights
+        if len(shares):
+            samples, weights = mixed.samples, mixed.weights @ (shares / shares.sum())
+        return {self._keys[i]: float(w) for i, w in zip(samples, weights, strict=True)}
 
     def _describe(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
         stored = _stored(stages)

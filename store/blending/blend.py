@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -17,7 +17,9 @@ from ..surfaces.packed import Stored
 from ..surfaces.window import Patch
 from .methods import Method, bands, envelope, poles
 from .methods.cells import Cells
+from .methods.thin import Mixture, Thin, outer
 from .methods.weights import Samples
+from .neighbours import Weighted
 
 __all__ = ["Blend", "Blender", "complex_view", "powers"]
 
@@ -65,21 +67,23 @@ class Blender:
         self._samples = samples
         self._given = power
 
+    def mix(
+        self, query: Array | None, near: Weighted, stages: Sequence[int], method: Method, without: int | None = None
+    ) -> Mixture:
+        """Return what each sample near a point counts at stored stages; `without` one, as if it were not there."""
+        if method.weighting != "thin" or query is None or self._samples is None:
+            return outer(near, len(stages))
+        return self._thin.mix(near, self._samples.scale(query), stages, without)
+
     def __call__(
-        self,
-        query: Array | None,
-        samples: Array,
-        weights: Array,
-        stages: Mapping[int, float],
-        method: Method,
-        band: int | None = None,
+        self, query: Array | None, mixed: Mixture, stages: Mapping[int, float], method: Method, band: int | None = None
     ) -> Blend:
         """Blend samples at stored stages (place -> weight; what is missing to 1 is the fresh shape's).
 
         `query` is the point that the corrections aim at. Waves beyond `band` are left out.
         """
-        chosen, places = tuple(samples.tolist()), tuple(stages)
-        parts = np.multiply.outer(weights, list(stages.values())).ravel()
+        chosen, places, shares = tuple(mixed.samples.tolist()), tuple(stages), np.array(list(stages.values()))
+        parts = (mixed.weights * shares).ravel()
         waves = self._mean(chosen, places, parts, band)
         if len(parts) <= 1 or not method.corrections or query is None:
             # one sample at one stage, or on its way there from the fresh shape: nothing was lost
@@ -89,10 +93,13 @@ class Blender:
         total = None
         if "LL" in method.corrections:
             mean = _form(parts, cell.power)
-            gains = targets.gains(known.scale(query), samples, weights, dict(stages), mean)
+            lossy = float(mixed.lossy @ shares / shares.sum())
+            whole = targets.gains(known.scale(query), mixed.samples, mixed.weights, dict(stages), mean)
+            # where patterns agree their mean has the bands it should have, and a fit to all of the table knows less
+            gains = whole**lossy
             factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
             poles.multiply(waves, factor, targets.highest)
-            total = float((gains**2 * mean).sum())
+            total = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
         if "env" not in method.corrections:
             return Blend(waves)
         ratio = envelope.factor(_form(parts, cell.local), parts @ cell.amplitude, total)
@@ -104,6 +111,11 @@ class Blender:
     def power(self) -> Array:
         """Power by degree (sample, stage, l) of the displacement's three components together."""
         return self._given if self._given is not None else powers(self._stored)
+
+    @cached_property
+    def _thin(self) -> Thin:
+        assert self._samples is not None
+        return Thin(self._stored, self._samples)
 
     @cached_property
     def _tools(self) -> tuple[bands.Targets, Cells, Samples]:

@@ -15,7 +15,7 @@ from solver.contract import Fresh
 from solver.lattice import lattice
 
 from ..blending.blend import Blend, Blender, complex_view
-from ..blending.methods import Method, parse
+from ..blending.methods import DEFAULT, Method, parse
 from ..blending.methods.weights import Samples
 from ..blending.neighbours import Weighted
 from ..errors import OutsideTable, TooUncertain
@@ -45,11 +45,11 @@ def leave_one_out(blender: Blender, stored: Stored, samples: Samples, shapes: li
     """
     rows = []
     for i, shape in enumerate(shapes):
-        others, start = samples.without(i, method.weighting), fresh(shape)
+        others, start, point = samples.without(i, method.weighting), fresh(shape), samples.values[i]
         rows.append(
             [
                 compare(
-                    surface_of(blender(samples.values[i], others.samples, others.weights, {j: 1.0}, method), start),
+                    surface_of(blender(point, blender.mix(point, others, (j,), method, i), {j: 1.0}, method), start),
                     surface_of(Blend(complex_view(stored[i, j])), start),
                 )
                 for j in range(stored.shape[1])
@@ -83,6 +83,9 @@ def _dot(a: Array, b: Array) -> float:
 _NOTHING = 1e-9
 #: Share of errors that the expected one covers.
 COVERED = 0.9
+#: The default method of older tables, which hold its errors: the default's are no larger, those of runs held out and of
+#: samples (records dehydration-held-out, dehydration-calibration).
+_FORMER = "linear+LL+env"
 
 
 def foretold(found: Array, method: str, samples: Samples) -> tuple[Array, Array]:
@@ -110,6 +113,10 @@ class Trust:
         own = own * np.maximum(np.quantile(ratios, COVERED, axis=0), 1.0)
         # side by side: the errors by stage, and the spacing
         self._rows = np.column_stack([own.reshape(len(own), -1), samples.spacing])
+
+    def knows(self, method: str) -> bool:
+        """Return whether the table knows what errors of that method to expect."""
+        return method == self.method or (method == DEFAULT and self.method == _FORMER)
 
     def expect(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
         """Return what errors of each measure hardly exceed: nothing at a sample, most of them a whole spacing away."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import xarray as xr
 from scipy.special import sph_harm_y
@@ -18,6 +20,7 @@ from .conftest import GAMMA, STAGES, TE, _spec, question
 N = 32
 
 
+@lru_cache(maxsize=64)
 def pattern(seed: int, middle: float, rms: float) -> np.ndarray:
     """Return radial wrinkles (N, 2N) of random phases around a degree."""
     rng = np.random.default_rng(seed)
@@ -28,16 +31,27 @@ def pattern(seed: int, middle: float, rms: float) -> np.ndarray:
         for order in range(degree + 1):
             turn = rng.uniform(0, 2 * np.pi)
             field += size * rng.standard_normal() * sph_harm_y(degree, order, theta, phi + turn).real
-    return field * rms / np.sqrt((harmonics.area(N) * field**2).sum())
+    found: np.ndarray = field * rms / np.sqrt((harmonics.area(N) * field**2).sum())
+    found.flags.writeable = False
+    return found
 
 
-def wrinkled(store: Store, onset: float = 0.0) -> dict[tuple[float, float], np.ndarray]:
-    """Fill a store with patterns that have nothing in common but how rough and how fine they are."""
+def own(i: int, j: int, shared: float = 0.0) -> np.ndarray:
+    """Return the radial wrinkles (N, 2N) of a sample at s = 1, of which it has a `shared` part with all others."""
+    rms = 0.9 * TE[i]
+    alone = pattern(10 * i + j, 0.3 / TE[i], rms)
+    return shared * pattern(99, 0.3 / TE[1], rms) + (1 - shared**2) ** 0.5 * alone if shared else alone
+
+
+def wrinkled(store: Store, onset: float = 0.0, shared: float = 0.0) -> dict[tuple[float, float], np.ndarray]:
+    """Fill a store with patterns that have nothing in common but how rough and how fine they are, and what they
+    `shared`.
+    """
     theta, phi = lattice(N)
     fields = {}
     for i, te in enumerate(TE):
         for j, gamma in enumerate(GAMMA):
-            radial = pattern(10 * i + j, 0.3 / te, 0.9 * te)
+            radial = own(i, j, shared)
             u = np.stack([(max(s - onset, 0) * radial - 0.5 * s)[..., None] * directions(theta, phi) for s in STAGES])
             params, need = question(te=te, gamma=gamma, resolution=N)
             coords = {"stage": list(STAGES), "colatitude": colatitudes(N), "azimuth": azimuths(N)}

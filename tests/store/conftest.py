@@ -146,3 +146,14 @@ def rough(tmp_path_factory: pytest.TempPathFactory) -> ShapeTable:
     wrinkled(store)
     tables.build(store, SOLVER)
     return ShapeTable.open(store, surfaces=registry.surface)
+
+
+@pytest.fixture(scope="module")
+def alike(tmp_path_factory: pytest.TempPathFactory) -> ShapeTable:
+    """Return a table like `rough` whose patterns share more than half of their power; do not change it."""
+    from ._wrinkled import wrinkled
+
+    store = Store.open(tmp_path_factory.mktemp("alike"), create=True)
+    wrinkled(store, shared=0.8)
+    tables.build(store, SOLVER)
+    return ShapeTable.open(store, surfaces=registry.surface)

@@ -26,7 +26,7 @@ from store.surfaces.measures import Measures
 from ._wrinkled import N, grid, pattern, wrinkled
 from .conftest import GAMMA, STAGES, TE, fill
 
-CORRECTED = ("linear+LL", "linear+env", "linear+LL+env", "idw+LL+env", "scattered+LL+env")
+CORRECTED = ("linear+LL", "linear+env", "linear+LL+env", "thin+LL+env", "idw+LL+env", "scattered+LL+env")
 
 
 def found(table: ShapeTable, te: float, gamma: float, stage: float, method: str, n: int = N) -> np.ndarray:
@@ -129,9 +129,11 @@ def test_gains_are_exact_for_equal_spectra() -> None:
     targets = Targets(power, samples)
     mean = add_up(power[0, 0], targets.bands)
     near = samples.weigh("linear", np.array([0.03, 30.0]), 6, 2.0)
-    gains = targets.gains(samples.scale(np.array([0.03, 30.0])), near.samples, near.weights, {0: 1.0}, mean)
+    gains = targets.gains(samples.scale(np.array([0.03, 30.0])), near.samples, near.weights[:, None], {0: 1.0}, mean)
     np.testing.assert_allclose(gains, 1, atol=1e-6)
-    halved = targets.gains(samples.scale(np.array([0.03, 30.0])), near.samples, near.weights, {0: 1.0}, mean / 4)
+    halved = targets.gains(
+        samples.scale(np.array([0.03, 30.0])), near.samples, near.weights[:, None], {0: 1.0}, mean / 4
+    )
     np.testing.assert_allclose(halved, 2, rtol=0.01)
 
 
@@ -278,7 +280,7 @@ def test_each_place_has_its_own_factor_and_the_total_is_settled_elsewhere() -> N
     assert ratio[faint] == pytest.approx(2, rel=0.02)
     assert ratio[~faint] == pytest.approx(1, rel=0.02)
     for total in (1e-4, 1e-2):
-        settled = envelope.factor(mean, wanted, total).ravel()
+        settled = envelope.factor(mean, wanted, envelope.Total(total, total)).ravel()
         # the mean square of all, (1 + 1/4) / 2, is what the total is spread over
         assert settled[faint] == pytest.approx(2 * np.sqrt(0.625), rel=0.03)
         assert settled[~faint] == pytest.approx(np.sqrt(0.625), rel=0.03)

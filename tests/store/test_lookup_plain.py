@@ -15,24 +15,29 @@ from store.blending.methods import bands, cells, envelope, poles
 from store.lookup import ShapeTable
 from store.surfaces import harmonics, spectra
 
+from ._thin import NODES, mixture
+from .conftest import GAMMA, TE
+
 QUERY, STAGE = {"te": 0.033, "gamma": 14.0}, 0.17
-TERMS = 8  # four corners at two stages
 
 
-def plain(table: ShapeTable, n: int) -> tuple[np.ndarray, np.ndarray]:
+def plain(table: ShapeTable, n: int, shared: float) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (n, 2n, 3) and poles (2, 3) of the default method."""
     samples, stored, blender = table._samples, table._spectra, table._blender
     assert samples is not None
-    near = samples.weigh("linear", np.array(list(QUERY.values())), 6, 2.0)
-    stages = table._bracket(STAGE)
-    terms = [(i, j, w * t) for i, w in zip(near.samples, near.weights, strict=True) for j, t in stages.items()]
-    assert len(terms) == TERMS
+    stages, (own, part) = table._bracket(STAGE), mixture(QUERY["te"], QUERY["gamma"], shared)
+    places = {tuple(table.sample(i).values()): i for i in range(len(NODES))}
+    numbered = [(places[TE[i], GAMMA[j]], w) for (i, j), w in zip(NODES, own, strict=True) if w]
+    taken, weights = np.array([i for i, _ in numbered]), np.array([w for _, w in numbered])
+    terms = [(i, j, w * t) for i, w in numbered for j, t in stages.items()]
+    assert len(terms) == (18 if shared else 8)  # all nodes or four corners, at two stages
     full = sum(w * complex_view(stored[i, j]).astype(complex) for i, j, w in terms)
     assert isinstance(full, np.ndarray)
     targets = bands.Targets(blender.power, samples)
     mean = bands.add_up(harmonics.power(harmonics.degrees(full)).sum(axis=0), targets.bands)
     point = samples.scale(np.array(list(QUERY.values())))
-    gains = targets.gains(point, near.samples, near.weights, stages, mean)
+    whole = targets.gains(point, taken, np.stack([weights, weights], axis=1), stages, mean)
+    gains = whole ** (1 - part)
 
     cut = slice(min(n, table.resolution) + 1)
     waves = full[:, cut, cut].copy()
@@ -43,9 +48,10 @@ def plain(table: ShapeTable, n: int) -> tuple[np.ndarray, np.ndarray]:
     poles.multiply(waves, np.interp(degree, knots, [1, *sharp, sharp[-1]]), targets.highest)
 
     local = cells._local(full[None])[0, 0]
-    own = [np.sqrt(cells._local(complex_view(stored[i, j]).astype(complex)[None])[0, 0]) for i, j, _ in terms]
-    wanted = sum(w * amplitude for (_, _, w), amplitude in zip(terms, own, strict=True))
-    ratio = envelope.factor(local, np.asarray(wanted), float((gains**2 * mean).sum()))
+    sizes = [np.sqrt(cells._local(complex_view(stored[i, j]).astype(complex)[None])[0, 0]) for i, j, _ in terms]
+    wanted = sum(w * amplitude for (_, _, w), amplitude in zip(terms, sizes, strict=True))
+    settled = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
+    ratio = envelope.factor(local, np.asarray(wanted), settled)
     wave = spectra.spectrum(ratio)
     low = harmonics.degrees(full)[..., :3, :3]
     envelope.take_low(waves, low)
@@ -60,9 +66,11 @@ def plain(table: ShapeTable, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("n", [8, 12, 32, 64, 90])
-def test_the_default_is_what_it_is_said_to_be(rough: ShapeTable, n: int) -> None:
-    shape = rough.at(QUERY, STAGE, resolution=n)
-    position, ends = plain(rough, n)
+@pytest.mark.parametrize("shared", [0.0, 0.8])
+def test_the_default_is_what_it_is_said_to_be(rough: ShapeTable, alike: ShapeTable, n: int, shared: float) -> None:
+    table = alike if shared else rough
+    shape = table.at(QUERY, STAGE, resolution=n)
+    position, ends = plain(table, n, shared)
     assert shape.method == methods.DEFAULT
     assert shape.position is not None
     assert shape.poles is not None

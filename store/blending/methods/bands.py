@@ -70,7 +70,7 @@ class Targets:
         # what quantiles and back do to a sample's own spectrum is undone in the same proportion
         back = np.array([self._shares(row) for row in quantiles])
         true = (own + even) / (own + even).sum(axis=-1, keepdims=True)
-        self._mended = true / back.reshape(true.shape)
+        self._mended = np.log(true / back.reshape(true.shape))
         self._quantiles = quantiles.reshape(*true.shape[:-1], -1)
         self._points = samples.points
         self._known = lru_cache(maxsize=64)(self._known_of)
@@ -81,7 +81,7 @@ class Targets:
     def gains(self, point: Array, samples: Array, weights: Array, stages: dict[int, float], mean: Array) -> Array:
         """Return the factor (bands,) on amplitudes for a weighted mean that has power `mean` (bands,).
 
-        `point` (axes,) is the query among `Samples.points`.
+        `point` (axes,) is the query among `Samples.points`; `weights` are (samples, stages).
         """
         amplitudes = np.sqrt(self._powers(point, tuple(samples.tolist()), weights, tuple(stages)))
         wanted = (np.array(list(stages.values())) @ amplitudes) ** 2
@@ -92,23 +92,23 @@ class Targets:
     def _powers(self, point: Array, samples: tuple[int, ...], weights: Array, stages: tuple[int, ...]) -> Array:
         """Return the powers (stages, bands) wanted at stored stages."""
         known = self._known(samples, stages)
-        mean = weights @ known.rows
-        points, totals, moved, mended = (mean[part] for part in known.parts)
-        step = known.slopes @ (point - points)
-        total = np.exp(totals + step[: len(stages)])
-        moved = moved.reshape(len(stages), -1) + step[len(stages) :, None]
-        shares = np.array([self._shares(row) for row in moved])
-        shares *= mended.reshape(shares.shape)
+        mean = (weights.T[:, None] @ known.rows)[:, 0]
+        points, totals, moved, mended = (mean[:, part] for part in known.parts)
+        step = np.einsum("kja,ja->kj", known.slopes, point - points)
+        total = np.exp(totals[:, 0] + step[0])
+        # weights that are negative may turn quantiles round
+        moved = np.maximum.accumulate(moved, axis=1) + step[1, :, None]
+        shares = np.array([self._shares(row) for row in moved]) * np.exp(mended)
         found: Array = np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
         return found
 
     def _known_of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> _Known:
-        at = np.array(samples)[:, None], np.array(stages)
-        columns = [self._points[at[0][:, 0]], self._total[at], self._quantiles[at], self._mended[at]]
-        rows = [part.reshape(len(samples), -1) for part in columns]
-        ends = np.cumsum([0, *(row.shape[1] for row in rows)]).tolist()
-        slopes = np.concatenate([self._total_slope[at[1]], self._centroid_slope[at[1]]])
-        return _Known(np.concatenate(rows, axis=1), tuple(itertools.starmap(slice, pairwise(ends))), slopes)
+        i, j = np.array(samples), np.array(stages)[:, None]
+        points = np.broadcast_to(self._points[i], (len(stages), *self._points[i].shape))
+        rows = [points, self._total[i, j][..., None], self._quantiles[i, j], self._mended[i, j]]
+        ends = np.cumsum([0, *(row.shape[-1] for row in rows)]).tolist()
+        slopes = np.stack([self._total_slope[j[:, 0]], self._centroid_slope[j[:, 0]]])
+        return _Known(np.concatenate(rows, axis=-1), tuple(itertools.starmap(slice, pairwise(ends))), slopes)
 
     def _shares(self, quantiles: Array) -> Array:
         """Return the shares (bands,) of a distribution given by its quantiles; no band is quite empty."""
@@ -123,8 +123,8 @@ class Targets:
 
 
 class _Known(NamedTuple):
-    """What is known at some samples: `rows` (samples, ...) of which `parts` are their points, and at some stages their
-    totals, quantiles and mended shares; and the `slopes` (2 * stages, axes) of totals and centroids.
+    """What is known at some stages of some samples: `rows` (stages, samples, ...) of which `parts` are their points,
+    totals, quantiles and mended shares; and the `slopes` (2, stages, axes) of totals and centroids.
     """
 
     rows: Array

@@ -7,8 +7,9 @@ smooth factor on the wrinkles; the shape of the fruit keeps its own.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ...surfaces.harmonics import legendre
 from ...surfaces.window import Patch
 from .cells import COARSE
 
-__all__ = ["apply", "at_poles", "factor", "take_low"]
+__all__ = ["Total", "apply", "at_poles", "factor", "take_low"]
 
 
 #: Share of the mean square below which a place counts as smooth, and the power [r1^2] of nothing.
@@ -28,21 +29,30 @@ _FAINT, _NOTHING = 1e-2, 1e-10
 _MOST = 3.0
 
 
-def factor(mean: Array, wanted: Array, total: float | None = None) -> Array:
+class Total(NamedTuple):
+    """Mean squares of the wrinkles: what they are after LL, and what they are to be."""
+
+    found: float
+    wanted: float
+
+
+def factor(mean: Array, wanted: Array, total: Total | None = None) -> Array:
     """Return the factor on the wrinkles at the places of the coarse lattice (12, 24); between them it is a series.
 
     `mean` (places,) is the local mean square of the weighted mean, `wanted` the local amplitude it should have. With
-    a `total` (mean square) both are scaled to it first: power has been settled, only its places are left to.
+    a `total` both are scaled to it first: how much there is of wrinkles is settled, only their places are left to.
     """
     area = _area()
-    mean, wanted = np.maximum(mean, 0), wanted * wanted
-    wanted_total = float(area @ wanted)
+    # weights that are negative make amplitudes so
+    mean, wanted = np.maximum(mean, 0), np.maximum(wanted, 0) ** 2
+    wanted_total, more = float(area @ wanted), 1.0
     if total is not None:
-        mean = mean * (total / (float(area @ mean) + _NOTHING))
-        share = total / (wanted_total + _NOTHING)
+        more = math.sqrt((total.wanted + _NOTHING) / (total.found + _NOTHING))
+        mean = mean * (total.found / (float(area @ mean) + _NOTHING))
+        share = total.found / (wanted_total + _NOTHING)
         wanted, wanted_total = wanted * share, wanted_total * share
     least = _FAINT * wanted_total + _NOTHING
-    ratio = np.sqrt((wanted + least) / (mean + least))
+    ratio = more * np.sqrt((wanted + least) / (mean + least))
     found: Array = np.minimum(np.maximum(ratio, 1 / _MOST), _MOST).reshape(COARSE, 2 * COARSE)
     return found
 

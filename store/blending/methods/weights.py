@@ -2,7 +2,7 @@
 takes all.
 
 `idw` is the paper's: inverse distance in parameters scaled to 0..1 (Eq. 13-14), among the nearest m; it jumps where
-the set of the nearest changes, and so does `nearest`. `linear` and `scattered` are continuous everywhere.
+the set of the nearest changes, and so does `nearest`. `linear`, `scattered` and `thin` are continuous everywhere.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ from solver.arrays import Array
 from ..neighbours import SAME, Neighbours, Weighted
 
 __all__ = ["Samples"]
+
+#: Weightings that are `linear` on grids; what `thin` makes of it is in `thin`.
+_LINEAR = ("linear", "thin")
 
 
 class Samples:
@@ -58,7 +61,7 @@ class Samples:
             return self._idw.weigh(query, m, eta)
         if weighting == "nearest":
             return self._idw.weigh(query, 1, eta)
-        if weighting == "linear" and self._grid is not None:
+        if weighting in _LINEAR and self._grid is not None:
             found = self._grid.weigh(self.scale(query))
         else:
             found = self._scattered(self.scale(query), m, eta)
@@ -101,7 +104,7 @@ class Samples:
         """
         if len(self.points) == 1:
             raise ValueError("a single sample cannot be predicted from others")
-        if weighting == "linear" and self._grid is not None:
+        if weighting in _LINEAR and self._grid is not None:
             found = self._grid.without(i)
             if found is not None:
                 return found
