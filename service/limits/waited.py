@@ -8,7 +8,7 @@ where it runs: threads are given the context of the request that began them.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -42,7 +42,7 @@ def begin(scope: MutableMapping[str, Any]) -> Iterator[Wait]:
         _wait.reset(token)
 
 
-def end(scope: MutableMapping[str, Any]) -> None:
+def end(scope: Mapping[str, Any]) -> None:
     """Wait no more: whoever asked has left."""
     if (wait := scope.get(_NAME)) is not None:
         wait.over.set()
