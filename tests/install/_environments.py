@@ -54,13 +54,17 @@ class Environment:
         done = subprocess.run([*pip, *options, str(wheel)], cwd=at, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
 
+    @staticmethod
+    def variables() -> dict[str, str]:
+        """Return our variables without those that would lead a command to another wizen."""
+        return {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "WIZEN_"))}
+
     def run(self, *words: str, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
         """Run a command of the environment: `python` or `wizen`."""
-        kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "WIZEN_"))}
         return subprocess.run(
             [str(self.bin / words[0]), *words[1:]],
             cwd=cwd,
-            env=kept | variables,
+            env=self.variables() | variables,
             capture_output=True,
             text=True,
             check=False,

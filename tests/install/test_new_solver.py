@@ -41,7 +41,7 @@ def _served(environment: Environment, at: Path) -> Iterator[str]:
     log = at / "serve.log"
     with log.open("w") as said:
         command = [environment.bin / "wizen", "serve", "--store", "store", "--port", "0"]
-        server = subprocess.Popen(command, cwd=at, stdout=said, stderr=said)
+        server = subprocess.Popen(command, cwd=at, env=environment.variables(), stdout=said, stderr=said)
     found: list[str] = []
 
     def ready() -> bool:

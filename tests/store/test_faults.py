@@ -33,7 +33,7 @@ def shim(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 OPERATIONS = ["put", "build", "token", "claim"]
 #: Every so many of an operation's changes are tried where time is short; together they still meet all kinds of calls.
-EVERY = {"put": 3, "build": 9, "token": 2, "claim": 13}
+EVERY = {"put": 3, "build": 17, "token": 2, "claim": 25}
 
 
 def faults(operation: str, shim: Path, tmp_path: Path, every: int) -> int:
