@@ -1,12 +1,15 @@
-"""The onset of the exact references by road: python -m benchmarks.dehydration.onset [--quality Q] [--full] [--fruits].
+"""The onset of the exact references by road: python -m benchmarks.dehydration.onset --help.
 
-Error is that of s_cr, relative to the reference; seconds are those of one call on this machine.
+Error is that of s_cr, relative to the reference; seconds are those of one call on this machine. With --elliptic: only
+spheres and Table 1's fruits with elliptic equators by the road of fruits of any shape (a record of its own, kept after
+each run; --finer adds the fruits at quality fine, which their default's error is measured against).
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +19,7 @@ from solver.dehydration.bifurcation import onset
 
 REFERENCE = Path(__file__).parents[2] / "tests" / "solver" / "core_shell_sphere.json"
 AXISYMMETRIC = ("raisin", "wolfberry", "jujube1", "jujube2")
-
+ELLIPTIC = ("plum2", "plum1")
 
 #: The sphere that the road of fruits of any shape is tried on: stone, te, gamma.
 _SPHERE = (0.4, 0.04, 10)
@@ -49,7 +52,7 @@ def fruits(quality: str) -> list[dict[str, Any]]:
         params = SOLVER.parse({}, name)
         assert isinstance(params, DehydrationParams)
         for method in ("exact", "linear"):
-            found = onset(params, quality=quality, method=method)  # type: ignore[arg-type]
+            found = onset(params, quality=quality, method=method)
             rows.append({"preset": name, **found.summary()})
             print(
                 f"{name:10} {method:7} s_cr {found.s_cr:.5f} m {found.wavenumber} degree {found.degree} "
@@ -59,12 +62,45 @@ def fruits(quality: str) -> list[dict[str, Any]]:
     return rows
 
 
+def _by_the_full_road(params: DehydrationParams, name: str, quality: str, exact: float | None) -> dict[str, Any]:
+    begin = time.process_time()
+    found = onset(params, road="full", quality=quality)
+    assert found.s_cr is not None
+    error = found.s_cr / exact - 1 if exact else None
+    row = {"fruit": name, "quality": quality, **found.summary(), "error": error, "cpu": time.process_time() - begin}
+    del row["ties"]
+    print({key: row[key] for key in ("fruit", "quality", "s_cr", "error", "seconds", "cpu")}, flush=True)
+    return row
+
+
+def elliptic(finer: bool) -> None:
+    """Keep the onsets that only the road of fruits of any shape finds, and spheres by it, after each of them."""
+    rows: list[dict[str, Any]] = []
+    for case in json.loads(REFERENCE.read_text())["bifurcation"]:
+        stone, te, gamma = (case[name] for name in ("stone_radius", "exocarp_thickness", "gamma"))
+        if te == _SPHERE[1]:
+            params = DehydrationParams.parse({"stone": (stone, stone), "te": te, "gamma": gamma})
+            name = f"sphere, stone {stone:g}, te {te:g}, gamma {gamma:g}"
+            rows.append(_by_the_full_road(params, name, "default", case["s_cr"]))
+    for quality in ("default", *["fine"] * finer):
+        for name in ELLIPTIC:
+            fruit = SOLVER.parse({}, name)
+            assert isinstance(fruit, DehydrationParams)
+            rows.append(_by_the_full_road(fruit, name, quality, None))
+            keep("dehydration-onset-full", rows, "dehydration")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quality", default="default", choices=("preview", "default", "fine"))
     parser.add_argument("--full", action="store_true", help="one sphere by the road of fruits of any shape, too")
     parser.add_argument("--fruits", action="store_true", help="the axisymmetric fruits of Table 1, too")
+    parser.add_argument("--elliptic", action="store_true", help="only fruits of any shape, and spheres as if they were")
+    parser.add_argument("--finer", action="store_true", help="with --elliptic: at quality fine, too (minutes)")
     asked = parser.parse_args()
+    if asked.elliptic:
+        elliptic(asked.finer)
+        return
     cases = json.loads(REFERENCE.read_text())["bifurcation"]
     rows = [row for case in cases for row in measure(case, asked.quality, asked.full)]
     for road in ("radial", "meridional"):

@@ -35,6 +35,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-claims": _claims,
         "dehydration-onset roads": _roads,
         "dehydration-onset fruits": _fruits,
+        "dehydration-onset-full": _full,
         "dehydration-buckled whole": _whole,
         "dehydration-buckled eighths": _eighths,
         "dehydration-scaling": _scaling,
@@ -108,6 +109,25 @@ def _fruits(record: Row) -> str:
         for name, row in exact.items()
     ]  # fmt: skip
     return markdown(("fruit", "s_cr", "m", "degree", "seconds", "Eq. 11", "its degree"), lines)
+
+
+def _full(record: Row) -> str:
+    """Spheres with their error, and fruits of any shape with what a finer mesh makes of them where it was run."""
+    fine = {row["fruit"]: row["s_cr"] for row in record["runs"] if row["quality"] == "fine"}
+    lines = []
+    for row in record["runs"]:
+        finer = fine.get(row["fruit"]) if row["quality"] != "fine" else None
+        against = "" if finer is None else f"{100 * (row['s_cr'] / finer - 1):+.2f} % (fine)"
+        off = f"{100 * row['error']:+.2f} %" if row["error"] is not None else against
+        size = row["settings"]
+        lines.append(
+            [
+                row["fruit"], row["quality"], f"{row['s_cr']:.5f}", off, str(row["degree"]), str(size["stacks"]),
+                str(size["unknowns"]), f"{row['cpu']:.0f}",
+            ]
+        )  # fmt: skip
+    head = ("fruit", "quality", "s_cr", "off by", "degree", "columns", "unknowns", "processor seconds")
+    return markdown(head, lines)
 
 
 def _whole(record: Row) -> str:

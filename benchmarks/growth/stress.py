@@ -180,7 +180,7 @@ CASES: dict[str, Callable[[], str]] = {
         [_surface(where=_LEAF, stretch=(1.2, 1.0))], 40_000, 0.2, shape="disc", thickness=0.02, curved=False
     ),
 }
-SLOW = ("a leaf of 40 000 vertices",)
+SLOW = ("a leaf of 40 000 vertices", "plasticity with remeshing")
 
 
 if __name__ == "__main__":

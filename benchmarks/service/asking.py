@@ -1,4 +1,4 @@
-"""Requests that do not wait for each other's answers, and connections that never get to ask: what overload is made of.
+"""Requests that do not wait for each other's answers: what overload is made of.
 
 Everything runs in one event loop, on sockets of its own, cheap enough to leave the server its core.
 """
@@ -13,10 +13,8 @@ from typing import Any, NamedTuple
 
 import uvloop
 
-__all__ = ["Found", "closed_loop", "hold", "open_loop", "run"]
+__all__ = ["Found", "closed_loop", "open_loop", "run"]
 
-#: The slow ones send a byte that often [s].
-_DRIBBLE = 5.0
 #: From how many addresses is asked: a crowd, no single client.
 _ADDRESSES = 32
 
@@ -148,54 +146,6 @@ async def open_loop(port: int, path: Callable[[int], str], rate: float, seconds:
     if under_way:
         await asyncio.wait(under_way, timeout=60)
     return asker.found(time.perf_counter() - begin)
-
-
-class _Slow(asyncio.Protocol):
-    """Sends a head byte by byte, and starts anew when it is let go."""
-
-    def __init__(self, again: Callable[[], None]) -> None:
-        self._again = again
-        self._timer: Any = None
-        self._transport: Any = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = transport
-        self._transport.write(b"GET / HTTP/1.1\r\nX-Slow: ")
-        self._dribble()
-
-    def _dribble(self) -> None:
-        self._timer = asyncio.get_running_loop().call_later(_DRIBBLE * random.uniform(0.5, 1.5), self._dribble)
-        self._transport.write(b"a")
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._timer.cancel()
-        self._again()
-
-
-async def hold(port: int, count: int, per_address: int = 200) -> None:
-    """Hold so many slow connections, from addresses of their own, until cancelled."""
-    loop, chance = asyncio.get_running_loop(), random.Random(1)
-    trying: set[asyncio.Task[None]] = set()
-
-    def begin(source: str, pause: float) -> None:
-        task = loop.create_task(one(source, pause))
-        trying.add(task)
-        task.add_done_callback(trying.discard)
-
-    async def one(source: str, pause: float) -> None:
-        def again() -> None:
-            begin(source, chance.uniform(0.5, 1.5))
-
-        await asyncio.sleep(pause)
-        try:
-            await loop.create_connection(lambda: _Slow(again), "127.0.0.1", port, local_addr=(source, 0))
-        except OSError:
-            again()
-
-    for i in range(count):
-        address = i // per_address
-        begin(f"127.1.{address // 250}.{address % 250 + 1}", chance.uniform(0, 5.0))
-    await asyncio.sleep(1e9)
 
 
 def run(asking: object) -> Found:

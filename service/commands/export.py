@@ -43,7 +43,9 @@ class _Asked:
     colour: Annotated[
         str | None, typer.Option("--colour", help="auto (skin, rot, mould), none, or a field's name.")
     ] = None
-    textures: Annotated[int | None, typer.Option("--textures", help="GLB: colours as pictures of N pixels.")] = None
+    textures: Annotated[int | None, typer.Option("--textures", help="GLB, USDZ: colours as pictures of N pixels.")] = (
+        None
+    )
     threads: Annotated[
         int | None, typer.Option("--threads", help="GLB, USD: N threads of mould at most, as cards or curves.")
     ] = None
@@ -75,9 +77,9 @@ _SHARED = ("colour", "textures", "threads", "size", "low", "high", "scale", "fps
 def export(asked: _Asked) -> None:
     """Write a result for Blender, Houdini, Maya, 3ds Max or a browser. docs/formats.md shows how to open each.
 
-    All stages: .glb (animated), .usdc, .usda, .pc2, .mdd, .ply.zip, .obj.zip. One stage, the last unless --stage says
-    which: .obj, .ply, .png (16-bit map of a field) and .exr (maps of all). Caches move a mesh with the result's own
-    vertices: write it with --stage FIRST --out fruit.obj.
+    All stages: .glb (animated), .usdc, .usda, .usdz (with textures), .pc2, .mdd, .ply.zip, .obj.zip. One stage, the
+    last unless --stage says which: .obj, .ply, .png (16-bit map of a field) and .exr (maps of all). Caches move a mesh
+    with the result's own vertices: write it with --stage FIRST --out fruit.obj.
 
     [bold]Examples[/bold]
 

@@ -134,4 +134,4 @@ class Admission:
 
 
 def _is_work(path: str) -> bool:
-    return path.startswith("/v1/shapes") or path.endswith("/result")
+    return path.startswith(("/v1/shapes", "/v1/scenes", "/v1/match")) or path.endswith("/result")

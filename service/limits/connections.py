@@ -2,7 +2,8 @@
 
 uvicorn's parser takes heads of any length at any pace. Nobody who is honest sends a head of 32 kB, or needs ten seconds
 for it; whoever does either is told so and let go, so that slow and silent connections cannot use up the service. Where
-all connections are taken, a newcomer displaces the one that has been longest about its head.
+all connections are taken, a newcomer displaces the one that has been longest about its head. What becomes of crowds of
+such connections is said in `waiting`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import resource
+import socket
 from collections import Counter
 from functools import cache
 from typing import Any
@@ -21,14 +23,16 @@ from uvicorn.server import ServerState
 
 from ..problems import MEDIA_TYPE, URN
 from ..settings import Settings
+from . import waited
 from .clients import address
+from .waiting import Waiting
 
 __all__ = ["GuardedProtocol", "forget", "taken"]
 
 #: Connections of each server by client.
 _clients: WeakKeyDictionary[ServerState, Counter[str]] = WeakKeyDictionary()
-#: Those of each server whose head has not come yet, the longest awaited first.
-_slow: WeakKeyDictionary[ServerState, dict[GuardedProtocol, None]] = WeakKeyDictionary()
+#: Those of each server whose head has not come yet.
+_waiting: WeakKeyDictionary[ServerState, Waiting] = WeakKeyDictionary()
 #: Files that the process has open beside its connections: tables, the ledger, pipes.
 _OTHER_FILES = 256
 #: Seconds for which a connection that is one too many may stay without a word.
@@ -83,6 +87,8 @@ class GuardedProtocol(HttpToolsProtocol):
         self._in_head = True
         self._refused = False
         self._full = ""
+        self._waiting: Waiting
+        #: Ends the wait for a word of one that is one too many.
         self._timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -92,33 +98,43 @@ class GuardedProtocol(HttpToolsProtocol):
         super().connection_made(transport)
         limits = self._limits
         counts = _clients.setdefault(self.server_state, Counter())
-        _slow.setdefault(self.server_state, {})
+        waiting = _waiting.get(self.server_state)
+        if waiting is None:
+            waiting = _waiting[self.server_state] = Waiting(self.loop, limits.head_timeout)
+        self._waiting = waiting
         self._name = address(self.client[0]) if self.client else ""
         counts[self._name] += 1
+        most = _most(limits.max_connections)
         if self._name and counts[self._name] > limits.max_connections_per_client:
-            self._one_too_many(f"{limits.max_connections_per_client} connections of this client are open already.")
-        elif len(self.connections) > _most(limits.max_connections) and not self._displace():
-            self._one_too_many(f"{_most(limits.max_connections)} connections are open already.")
+            why = f"{limits.max_connections_per_client} connections of this client are open already."
+            self._one_too_many(why, len(self.connections) <= most)
+        elif len(self.connections) > most and not self._displace():
+            self._one_too_many(f"{most} connections are open already.", False)
         else:
-            self._await_head()
+            waiting.add(self)
 
-    def _one_too_many(self, why: str) -> None:
+    def _one_too_many(self, why: str, has_room: bool) -> None:
         """Say why when something has come: what is closed unread resets the connection, and the answer is lost."""
         self._full = why
-        self._timer = self.loop.call_later(_LINGER, self._too_slow)
+        if has_room and self._waiting.crowded:
+            self._waiting.hold(self)
+        else:
+            self._timer = self.loop.call_later(_LINGER, self.late)
 
     def _displace(self) -> bool:
         """Let the connection go that has been longest about its head; return whether there was one."""
-        slowest = next(iter(_slow[self.server_state]), None)
-        if slowest is None:
+        slowest = self._waiting.first
+        if not isinstance(slowest, GuardedProtocol):
             return False
         slowest._refuse(503, "too-many-connections", "others came with whole requests.")
         return True
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget a connection."""
-        self._stop_timer()
+        self._no_longer_wait()
         forget(self.server_state, self._name)
+        if self.cycle is not None:
+            waited.end(self.cycle.scope)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -138,9 +154,9 @@ class GuardedProtocol(HttpToolsProtocol):
     def on_message_begin(self) -> None:
         """Begin a request, perhaps not the first of this connection."""
         super().on_message_begin()
-        self._in_head = True
-        if self._timer is None:
-            self._await_head()
+        if not self._in_head:  # the first one of a connection is waited for since it was made
+            self._in_head = True
+            self._waiting.add(self)
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """Take a header."""
@@ -152,7 +168,7 @@ class GuardedProtocol(HttpToolsProtocol):
     def on_headers_complete(self) -> None:
         """Hand the request to the application."""
         self._in_head, self._head = False, 0
-        self._stop_timer()
+        self._no_longer_wait()
         if not self._refused and sum(len(n) + len(v) + 4 for n, v in self.headers) > self._limits.max_head:
             self._too_long()  # it came in one piece
         if not self._refused:
@@ -168,22 +184,31 @@ class GuardedProtocol(HttpToolsProtocol):
         if not self._refused:
             super().on_message_complete()
 
-    def _await_head(self) -> None:
-        _slow[self.server_state][self] = None
-        self._timer = self.loop.call_later(self._limits.head_timeout, self._too_slow)
-
-    def _stop_timer(self) -> None:
-        _slow[self.server_state].pop(self, None)
+    def _no_longer_wait(self) -> None:
+        self._waiting.drop(self)
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
-    def _too_slow(self) -> None:
-        self._stop_timer()
+    def late(self) -> None:
+        """Say that the time for a head is over, and close."""
+        self._no_longer_wait()
         if self._head or self.headers:
             self._refuse(408, "request-timeout", f"no whole request came within {self._limits.head_timeout:g} s.")
         else:
             self.transport.close()  # nothing was said: there is nothing to answer
+
+    def hold(self) -> socket.socket | None:
+        """Read no more."""
+        if self.transport.is_closing():
+            return None
+        self.flow.pause_reading()
+        found: socket.socket | None = self.transport.get_extra_info("socket")
+        return found
+
+    def leave(self) -> None:
+        """Close without a word."""
+        self.transport.abort()
 
     def _too_long(self) -> None:
         self._refuse(431, "head-too-long", f"the head of the request is longer than {self._limits.max_head} bytes.")
@@ -193,7 +218,7 @@ class GuardedProtocol(HttpToolsProtocol):
         if self._refused or self.transport.is_closing():
             return
         self._refused = True
-        self._stop_timer()
+        self._no_longer_wait()
         title = code.replace("-", " ").capitalize()
         body = orjson.dumps({"type": URN + code, "title": title, "status": status, "detail": detail})
         head = [

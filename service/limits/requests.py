@@ -15,6 +15,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from .. import problems
 from ..errors import BodyTooLarge, QueryTooLong, ServiceError, SlowBody, TimedOut
 from ..settings import Settings
+from . import waited
 
 __all__ = ["Limits"]
 
@@ -46,9 +47,10 @@ class Limits:
         if declared.isdigit() and int(declared) > limit.max_body:
             await problems.of(self._too_large(), scope)(scope, receive, send)
             return
-        await self._watch(scope, receive, send)
+        with waited.begin(scope) as wait:
+            await self._watch(scope, receive, send, wait)
 
-    async def _watch(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _watch(self, scope: Scope, receive: Receive, send: Send, wait: waited.Wait) -> None:
         """Pass the request on while counting its body and its time; the first to run out gives the answer."""
         begun, received, whole = False, 0, False
         failure: ServiceError | None = None
@@ -86,8 +88,10 @@ class Limits:
             if begun or not timer.expired():
                 raise
             error = TimedOut(
-                f"no answer began within {self.settings.timeout:g} s.", advice="Try again, or ask for less resolution."
+                f"no answer began within {self.settings.timeout:g} s.",
+                advice=wait.advice or "Try again, or ask for less resolution.",
             )
+            wait.over.set()
             await problems.of(error, scope)(scope, receive, send)
         if failure and not begun:
             await problems.of(failure, scope)(scope, receive, send)

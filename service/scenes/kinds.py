@@ -20,6 +20,7 @@ from store.shape import Shape
 from .. import vocabulary
 from ..errors import InvalidQuery, ServiceError, Wrong
 from ..formats import mesh
+from ..limits import waited
 from ..shapes.asking import beyond, choose, preset_of, words_of
 from ..shapes.live import LiveTables
 from ..shapes.query import parse
@@ -55,6 +56,7 @@ class Kind:
     def shape(self, n: int) -> Shape:
         """Return the shape on the lattice of n colatitudes."""
         if n not in self.shapes:
+            waited.check()
             start = time.thread_time()
             self.shapes[n] = self.table.at(self.point, self.stage, resolution=n)
             self.spent[n] = time.thread_time() - start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from solver.arrays import Array, Floats
 from solver.contract import SolverError
 
 from ..errors import Wrong
+from ..limits import waited
 from .errors import InvalidScene
 from .kinds import Kind
 from .request import Place, Scene
@@ -22,6 +24,8 @@ __all__ = ["Instances", "Prop", "bowls", "place"]
 
 #: Share of a heaped bowl's room that fruits fill, and how much higher than its rim they may heap.
 _FILLED, _HEAPED = 0.55, 1.6
+#: How often somebody looks who waits for a heap that another one pours [s].
+_LOOK = 0.2
 
 
 class Instances(NamedTuple):
@@ -187,7 +191,7 @@ def _pour(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
     # the mirror image is a body of its own
     number = 2 * kind + found.mirrored
     shapes = tuple(_Told(kinds[k], mirrored) for k in used for mirrored in (False, True))
-    return _settled(shapes, number.tobytes(), found.scale.tobytes(), bowl, rule.seed)
+    return _heap(shapes, number.tobytes(), found.scale.tobytes(), bowl, rule.seed).rest()
 
 
 class _Told:
@@ -205,15 +209,38 @@ class _Told:
         return isinstance(other, _Told) and other.key == self.key
 
 
+class _Heap:
+    """Bodies that are poured, by whoever asks for them first, as long as somebody waits."""
+
+    def __init__(self, pouring: resting.Pouring, order: Array) -> None:
+        self._pouring, self._back = pouring, np.argsort(order)
+        self._lock = threading.Lock()
+
+    def rest(self) -> resting.Rest:
+        """Return how they rest.
+
+        Raises:
+            TimedOut: nobody waits any more; what was computed is kept for whoever asks again.
+
+        """
+        while not self._lock.acquire(timeout=_LOOK):
+            waited.check()  # another request pours the same ones
+        try:
+            rest = self._pouring.rest(self._check)
+        finally:
+            self._lock.release()
+        return rest._replace(centre=rest.centre[self._back], turn=rest.turn[self._back])
+
+    def _check(self) -> None:
+        done = f"{len(self._back)} fruits are {self._pouring.share:.0%} of their longest way to rest"
+        waited.check(f"{done}, and go on from there: ask again.")
+
+
 @lru_cache(maxsize=16)
-def _settled(
-    shapes: tuple[_Told, ...], number: bytes, scale: bytes, bowl: resting.Bowl | None, seed: int
-) -> resting.Rest:
+def _heap(shapes: tuple[_Told, ...], number: bytes, scale: bytes, bowl: resting.Bowl | None, seed: int) -> _Heap:
     order = np.random.default_rng(seed).permutation(len(scale) // 8)
     kinds, sizes = np.frombuffer(number, np.int64)[order], np.frombuffer(scale)[order]
-    rest = resting.settle([one.body for one in shapes], kinds.tolist(), sizes, bowl, seed)
-    back = np.argsort(order)
-    return rest._replace(centre=rest.centre[back], turn=rest.turn[back])
+    return _Heap(resting.Pouring([one.body for one in shapes], kinds.tolist(), sizes, bowl, seed), order)
 
 
 _RULES = {"row": _row, "scatter": _scatter, "bowl": _pour, "pile": _pour}

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InvalidQuery, UnfitFormat, Wrong
-from . import animation, caches, maps, text, usd
+from . import animation, caches, maps, text, usd, usdz
 from .options import Options
 from .view import Sequence, of_run
 
@@ -47,6 +47,7 @@ EXPORTS: Mapping[str, Export] = {
         Export("ply-zip", "application/zip; of=ply", ".ply.zip", "PLY files, one per stage", text.ply_zip),
         Export("usda", "model/vnd.usda", ".usda", "USD as text, sampled over time", usd.usda),
         Export("usdc", "model/vnd.usdc", ".usdc", "USD, sampled over time", usd.usdc),
+        Export("usdz", "model/vnd.usdz+zip", ".usdz", "USD with baked textures in one file", usdz.usdz),
         Export("mdd", "application/x-mdd", ".mdd", "MDD vertex cache", caches.mdd, kept=True),
         Export("pc2", "application/x-pc2", ".pc2", "PC2 vertex cache", caches.pc2, kept=True),
         Export("ply", "model/x-ply", ".ply", "PLY of one stage, with colours and fields", text.ply, single=True),

@@ -24,11 +24,14 @@ if TYPE_CHECKING:
     from .seam import Seam
     from .view import Sequence, Surface
 
-__all__ = ["usda", "usdc"]
+__all__ = ["Pictures", "composed", "usda", "usdc"]
+
+#: What a material takes from pictures: time and path in the file, by what it is.
+Pictures = dict[str, list[tuple[float, str]]]
 
 
-def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
-    """Return a sequence as a USD file of the kind that the suffix names.
+def composed(sequence: Sequence, options: Options, pictures: Pictures | None = None) -> Any:
+    """Return a sequence as a stage in memory; pictures: what its materials take colour and roughness from.
 
     Raises:
         Unavailable: usd-core is not installed.
@@ -58,7 +61,7 @@ def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
     mesh.GetPrim().SetCustomDataByKey("stages", _doubles(about["stages"]["values"]))
     if sequence.seam is not None:
         _texture(mesh, sequence.seam)
-    _materials(stage, mesh, sequence)
+    _materials(stage, mesh, sequence, pictures or {})
     for number, surface in enumerate(sequence):
         at = 1 + number * options.step
         if number == 0 or not sequence.kept:
@@ -66,6 +69,17 @@ def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
             _triangles(mesh, surface, None if sequence.kept else at)
         _sample(mesh, surface, at)
         _threads(stage, mesh, sequence.threads(surface, options.threads), at)
+    return stage
+
+
+def _encode(suffix: str, sequence: Sequence, options: Options) -> bytes:
+    """Return a sequence as a USD file of the kind that the suffix names.
+
+    Raises:
+        Unavailable: usd-core is not installed.
+
+    """
+    stage = composed(sequence, options)
     with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
         path = Path(folder) / f"result.{suffix}"
         stage.GetRootLayer().Export(str(path))
@@ -145,9 +159,45 @@ def _texture(mesh: Any, seam: Seam) -> None:
     st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(seam.triangles.ravel(), np.int32)))
 
 
-def _materials(stage: Any, mesh: Any, sequence: Sequence) -> None:
-    """Bind materials under the mesh's own names, which take colour and roughness from the vertices."""
-    from pxr import Gf, Sdf, UsdGeom, UsdShade, Vt
+def _read(stage: Any, path: Any, what: str) -> Any:
+    """Return the output of a reader of the vertices' colour or roughness."""
+    from pxr import Gf, Sdf, UsdShade
+
+    colour = what == "diffuseColor"
+    kind = Sdf.ValueTypeNames.Float3 if colour else Sdf.ValueTypeNames.Float
+    reader = UsdShade.Shader.Define(stage, path.AppendChild(what))
+    reader.CreateIdAttr("UsdPrimvarReader_float3" if colour else "UsdPrimvarReader_float")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor" if colour else what)
+    reader.CreateInput("fallback", kind).Set(Gf.Vec3f(0.5) if colour else 0.5)
+    return reader.CreateOutput("result", kind)
+
+
+def _pictured(stage: Any, path: Any, what: str, pictures: list[tuple[float, str]]) -> Any:
+    """Return the output of a texture whose picture changes from stage to stage."""
+    from pxr import Sdf, UsdShade
+
+    colour, kinds = what == "diffuseColor", Sdf.ValueTypeNames
+    reader = UsdShade.Shader.Define(stage, path.AppendChild("st"))
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", kinds.String).Set("st")
+    texture = UsdShade.Shader.Define(stage, path.AppendChild(what))
+    texture.CreateIdAttr("UsdUVTexture")
+    file = texture.CreateInput("file", kinds.Asset)
+    # who does not follow pictures in time sees the last
+    file.Set(Sdf.AssetPath(pictures[-1][1]))
+    if len(pictures) > 1:
+        for at, name in pictures:
+            file.Set(Sdf.AssetPath(name), at)
+    texture.CreateInput("sourceColorSpace", kinds.Token).Set("sRGB" if colour else "raw")
+    texture.CreateInput("wrapS", kinds.Token).Set("repeat")
+    texture.CreateInput("wrapT", kinds.Token).Set("clamp")
+    texture.CreateInput("st", kinds.Float2).ConnectToSource(reader.CreateOutput("result", kinds.Float2))
+    return texture.CreateOutput("rgb", kinds.Float3) if colour else texture.CreateOutput("r", kinds.Float)
+
+
+def _materials(stage: Any, mesh: Any, sequence: Sequence, pictures: Pictures) -> None:
+    """Bind materials under the mesh's own names, which take colour and roughness from pictures, else the vertices."""
+    from pxr import Sdf, UsdGeom, UsdShade, Vt
 
     if not sequence.coloured:
         return
@@ -159,18 +209,10 @@ def _materials(stage: Any, mesh: Any, sequence: Sequence) -> None:
         material.GetPrim().SetDisplayName(name or "skin")
         shader = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
         shader.CreateIdAttr("UsdPreviewSurface")
-        for what, kind, output in (
-            ("diffuseColor", Sdf.ValueTypeNames.Color3f, "UsdPrimvarReader_float3"),
-            ("roughness", Sdf.ValueTypeNames.Float, "UsdPrimvarReader_float"),
-        ):
-            reader = UsdShade.Shader.Define(stage, path.AppendChild(what))
-            reader.CreateIdAttr(output)
-            varname = "displayColor" if what == "diffuseColor" else what
-            reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(varname)
-            fallback = Gf.Vec3f(0.5) if what == "diffuseColor" else 0.5
-            reader.CreateInput("fallback", kind if what == "roughness" else Sdf.ValueTypeNames.Float3).Set(fallback)
-            result = reader.CreateOutput("result", kind if what == "roughness" else Sdf.ValueTypeNames.Float3)
-            shader.CreateInput(what, kind).ConnectToSource(result)
+        for what in ("diffuseColor", "roughness"):
+            kind = Sdf.ValueTypeNames.Color3f if what == "diffuseColor" else Sdf.ValueTypeNames.Float
+            found = _pictured(stage, path, what, pictures[what]) if what in pictures else _read(stage, path, what)
+            shader.CreateInput(what, kind).ConnectToSource(found)
         material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
         if len(parts) == 1:
             api.Bind(material)

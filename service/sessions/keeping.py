@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
-from collections import deque
-from typing import NamedTuple
+from typing import Any
 
-from store.ledger.asks import Asker
+from store.ledger.asks import Asker, Spending
+from store.ledger.live import RENEW, Held, LiveTally
+from store.store import Store
 from store.tokens import Token
 
 from ..errors import TooManySessions, UnknownSession
@@ -21,23 +22,15 @@ __all__ = ["Sessions"]
 _LOOK = 1.0
 
 
-class _Spent(NamedTuple):
-    """Processor seconds of a session that has ended."""
-
-    at: float
-    asker: Asker
-    seconds: float
-
-
 class Sessions:
-    """The sessions of this process of the service."""
+    """The sessions of this process of the service; how many there may be is counted over all of them, in the ledger."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
+        hours = 3600 * settings.quota_hours
+        self._spending = Spending(settings.max_seconds_per_token, settings.max_seconds_per_client, hours)
         self._open: dict[str, Session] = {}
-        #: Those that are about to begin, by who asked.
-        self._begun: list[Asker] = []
-        self._spent: deque[_Spent] = deque()
+        self._known: LiveTally | None = None
         self._watch: asyncio.Task[None] | None = None
 
     async def open(self, asker: Asker, unlimited: bool, asked: dict[str, object]) -> Session:
@@ -46,20 +39,43 @@ class Sessions:
         Raises:
             TooManySessions: there is no room, or no time left.
             InvalidInput: the engine cannot begin.
+            ReadOnlyStore: the store's ledger, where sessions are counted, cannot be written.
 
         """
-        if not unlimited:
-            self._check(asker)
-        self._begun.append(asker)
+        id = f"s_{secrets.token_hex(8)}"
+        if unlimited:
+            await self._tell("enter_anyway", id, asker)
+        else:
+            await self._renew()  # what they have cost until now counts
+            limits = self._settings
+            most, own = limits.max_sessions, limits.max_sessions_per_token
+            held = await self._tell("enter", id, asker, most, own, self._spending)
+            if held is not None:
+                raise self._refused(held)
         try:
-            session = await Session.begin(f"s_{secrets.token_hex(8)}", asker, asked)
-        finally:
-            self._begun.remove(asker)
+            session = await Session.begin(id, asker, asked)
+        except BaseException:
+            await asyncio.shield(self._tell("leave", id, 0.0))
+            raise
         session.limited = not unlimited
         self._open[session.id] = session
         if self._watch is None or self._watch.done():
             self._watch = asyncio.create_task(self._watching())
         return session
+
+    async def _renew(self) -> None:
+        if self._open:
+            await self._tell("renew", {session.id: session.spent for session in self._open.values()})
+
+    async def _tell(self, what: str, *words: Any) -> Any:
+        """Say something to the ledger, in a thread: another process may be writing."""
+
+        def say() -> Any:
+            if self._known is None:
+                self._known = LiveTally(Store.open(self._settings.store).ledger.database)
+            return getattr(self._known, what)(*words)
+
+        return await asyncio.to_thread(say)
 
     def find(self, id: object, key: object, solver: str, token: Token) -> Session:
         """Return the session that a client had.
@@ -76,42 +92,29 @@ class Sessions:
             )
         return found
 
-    def _check(self, asker: Asker) -> None:
+    def _refused(self, held: Held) -> TooManySessions:
         limits = self._settings
-        askers = [session.asker for session in self._open.values()] + self._begun
-        if len(askers) >= limits.max_sessions:
-            raise TooManySessions(
-                f"{len(askers)} sessions are open already, of {limits.max_sessions} that may be.",
+        if held.open >= limits.max_sessions:
+            return TooManySessions(
+                f"{held.open} sessions are open already, of {limits.max_sessions} that may be.",
                 advice="Try again later, or run it as a job.",
             )
-        own = sum(one.id == asker.id for one in askers)
-        if own >= limits.max_sessions_per_token:
-            raise TooManySessions(f"{own} sessions of this token are open already.", advice="Close one.")
-        for of, most in (("token", limits.max_seconds_per_token), ("address", limits.max_seconds_per_client)):
-            spent = self._of(asker, of)
-            if most is not None and spent >= most:
-                hours = limits.quota_hours
-                raise TooManySessions(
-                    f"this {of} has spent {spent:.0f} s of {most:g} s on sessions in {hours:g} h.",
-                    advice="Wait until there is room again.",
-                )
-
-    def _of(self, asker: Asker, of: str) -> float:
-        """Return processor seconds that a token's or an address's sessions took within the quota's hours."""
-        while self._spent and self._spent[0].at < time.time() - 3600 * self._settings.quota_hours:
-            self._spent.popleft()
-
-        def same(other: Asker) -> bool:
-            return other.id == asker.id if of == "token" else other.client == asker.client
-
-        ended = sum(one.seconds for one in self._spent if same(one.asker))
-        return ended + sum(session.spent for session in self._open.values() if same(session.asker))
+        if held.own >= limits.max_sessions_per_token:
+            return TooManySessions(f"{held.own} sessions of this token are open already.", advice="Close one.")
+        most = limits.max_seconds_per_token
+        of, spent = ("token", held.token) if most is not None and held.token >= most else ("address", held.client)
+        most = most if of == "token" else limits.max_seconds_per_client
+        return TooManySessions(
+            f"this {of} has spent {spent:.0f} s of {most or 0:g} s on sessions in {limits.quota_hours:g} h.",
+            advice="Wait until there is room again.",
+        )
 
     async def close(self, session: Session) -> None:
         """End a session."""
-        if self._open.pop(session.id, None) is not None:
-            self._spent.append(_Spent(time.time(), session.asker, session.spent))
+        mine = self._open.pop(session.id, None) is not None
         await session.end()
+        if mine:
+            await self._tell("leave", session.id, session.spent)
 
     async def close_all(self) -> None:
         """End all: the service stops."""
@@ -122,8 +125,12 @@ class Sessions:
 
     async def _watching(self) -> None:
         """End what nobody wants any more, or what has had its time."""
+        renewed = time.monotonic()
         while self._open:
             await asyncio.sleep(_LOOK)
+            if time.monotonic() - renewed > RENEW:
+                renewed = time.monotonic()
+                await self._renew()
             for session in list(self._open.values()):
                 why = self._over(session)
                 if why:

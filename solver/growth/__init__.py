@@ -37,7 +37,7 @@ def _cost(params: GrowthParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="growth",
-    version="5",
+    version="6",
     title="Growth of thin shells",
     params=GrowthParams,
     fields=("mesh_position", "elastic_strain", *CHANNELS, "mesh_area", "stored_energy", "rest_area"),

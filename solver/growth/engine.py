@@ -9,30 +9,23 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Generator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from .. import shell
 from ..contract import Context, InvalidGeometry
 from ..geometry.crossings import crossings
 from .fresh import fresh
 from .living.history import History, Moment
-from .matter import grown_further
-from .params import GrowthParams, Solid, present
-from .plastic import forgotten
-from .remeshing.remesh import MOST, remesh
+from .params import GrowthParams, Solid
+from .remeshing.remesh import MOST
 from .settling.active import Habit
-from .settling.energy import StepEnergy
-from .settling.equilibrium import balanced, begun
-from .settling.impossible import check_held, check_outward, enclosed
+from .settling.impossible import check_outward, enclosed
 from .settling.stage import settled
 from .settling.tangent import Tangent
 from .shapes import start
 from .state import State
-from .tooling.placing import branched, started
-from .tooling.rates import grown, rates
+from .stepping import Carried, Steps
 from .tooling.tools import Tool
 
 __all__ = ["Engine", "Undone"]
@@ -65,14 +58,13 @@ class Engine:
             InvalidGeometry: a shape that passes through itself, unless it may.
 
         """
-        self.params, self.tolerance, self._most = params, tolerance, most
-        self._material = shell.Material(params.thickness, params.poisson)
+        self.params, self.tolerance = params, tolerance
         self._tools, self._solids = list(params.tools), list(params.solids)
         self._keeps, self._history = history, History()
         self._work: Generator[None, None, None] | None = None
         begun = params.mesh.shape() if params.mesh else start(params.shape, vertices, params.aspect)
         self.state = fresh(params, begun)
-        through = crossings(self.state.x, self.state.mesh.triangles).count if params.contact else 0
+        through = crossings(self.state.x, self.state.mesh.triangles).count if params.contact != 0 else 0
         if through:
             raise InvalidGeometry(
                 f"the start shape passes through itself in {through} pairs of triangles.",
@@ -80,17 +72,20 @@ class Engine:
             )
         #: Of a closed surface.
         self._volume = 0.0 if len(self.state.mesh.border) else enclosed(begun)
-        self._longest = params.remesh * self.state.length
-        self._largest = MOST * len(self.state.x)
-        self._tangent, self._habit = Tangent(self.state.mesh), Habit()
-        #: Those of before the step that is under way.
-        self._before = self._tangent, self._habit
+        longest, largest = params.remesh * self.state.length, MOST * len(self.state.x)
+        self._way = Steps(params, tolerance, most, longest, largest, self._volume)
+        self._carried = Carried(Tangent(self.state.mesh), Habit(), params.contact or 0.0)
         self._steps = 0
 
     @property
     def residual(self) -> float:
         """Largest out-of-balance force of the last equilibrium, over mu l."""
         return self.state.forces
+
+    @property
+    def distance(self) -> float:
+        """Return the distance that parts keep from each other, 0 as long as none has come near another."""
+        return self._carried.distance
 
     @property
     def script(self) -> GrowthParams:
@@ -207,13 +202,12 @@ class Engine:
         if self._work is not None:
             self._work.close()
             self._work = None
-            self._tangent, self._habit = self._before
 
     def _moment(self) -> Moment:
-        return Moment(self._steps, self.state, tuple(self._tools), tuple(self._solids), self._tangent, self._habit)
+        return Moment(self._steps, self.state, tuple(self._tools), tuple(self._solids), self._carried)
 
     def _stand_at(self, moment: Moment) -> None:
-        self._steps, self.state, tools, solids, self._tangent, self._habit = moment
+        self._steps, self.state, tools, solids, self._carried = moment
         self._tools, self._solids = list(tools), list(solids)
 
     def reach(self, time: float, context: Context) -> State:
@@ -235,77 +229,36 @@ class Engine:
     def reaching(self, time: float) -> Generator[None, None, State]:
         """Do what `reach` does; yields after every piece of work."""
         self._give_up()
-        found = yield from self._reached(time)
-        for nearer in settled(found, self.script, self.tolerance):
-            found = nearer
-            yield
+        state, distance = yield from self._reached(time)
+        found = yield from self._settled(state, distance)
+        if self.params.contact is None and not distance and not self._way.apart(state, found):
+            found = yield from self._settled(state, self.params.thickness)
         check_outward(found, self._volume, self.state.time, self.params)
         return found
 
-    def _reached(self, time: float) -> Generator[None, None, State]:
-        """Find the state at a growth time as the way on leaves it."""
+    def _settled(self, found: State, distance: float) -> Generator[None, None, State]:
+        for nearer in settled(found, self.script, self.tolerance, distance):
+            found = nearer
+            yield
+        return found
+
+    def _reached(self, time: float) -> Generator[None, None, tuple[State, float]]:
+        """Find the state at a growth time as the way on leaves it, and the distance that its parts keep."""
         while (self._steps + 1) * self.params.step <= time + 1e-9:
             yield from self._step(self.params.step)
         rest = time - self._steps * self.params.step
         if rest <= 1e-9 and self._steps:
-            return self.state
+            return self.state, self._carried.distance
         # a step of its own, which leaves no trace
-        kept = self.state, History(self._history), self._tangent, self._habit, self._steps
-        self._tangent, self._habit = Tangent(self.state.mesh), Habit()
-        try:
-            yield from self._step(max(rest, 0.0))
-            return self.state
-        finally:
-            self.state, self._history, self._tangent, self._habit, self._steps = kept
+        fresh = self._carried._replace(tangent=Tangent(self.state.mesh), habit=Habit())
+        tools, solids = tuple(self._tools), tuple(self._solids)
+        state, carried = yield from self._way.step(self.state, fresh, tools, solids, max(rest, 0.0))
+        return state, carried.distance
 
     def _step(self, dt: float) -> Generator[None, None, None]:
         """Grow by dt and find the equilibrium; yields after every piece of work."""
-        # the way on from here is the same after an undo only with the same inverse
         kept = self._moment()
-        before, self._before, self._tangent = self.state, (self._tangent, self._habit), self._tangent.copy()
-        meshed = yield from self._readied(before)
-        state = started(meshed, kept.tools, self.params.step, self.params.seed)
-        middle = state.time + dt / 2
-        acting = dict(enumerate(kept.tools))
-        g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
-        yield
-        state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
-        p = self.params
-        tangent = self._tangent
-        solids = present(kept.solids, state.time)
-        energy = StepEnergy(state, self._material, p.pressure, solids, tangent, p.gravity, p.contact, p.bending)
-        goal = self.tolerance * state.length
-        yield
-        first = yield from begun(energy, meshed, dt, goal, p, self._habit)
-        self._habit = first.habit
-        point, spent = yield from balanced(energy, first.x, first.spent, goal, self._most, p, before.time)
-        forces = point.gradient / state.length
-        drift = (point.x - state.x) / dt if dt else None
-        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
-        check_held(energy, state, goal, before.time)
-        check_outward(state, self._volume, before.time, p)
-        state = branched(state, acting, self.params.seed)
-        yield
+        self.state, self._carried = yield from self._way.step(self.state, self._carried, kept.tools, kept.solids, dt)
         if self._keeps:
             self._history.remember(kept)
-        self.state = state
         self._steps += 1
-
-    def _readied(self, state: State) -> Generator[None, None, State]:
-        """Find the state from which a step grows: what is plastic forgotten, on a mesh that fits; yields in between.
-
-        Both disturb the equilibrium. So they come before a step's growth, not after it: what is returned is settled on
-        the mesh and against the rest state that are returned with it.
-        """
-        if self.params.plasticity and self._steps:
-            state = replace(state, g=forgotten(state, self.params.plasticity, self.params.yield_strain))
-        if not self.params.remesh:
-            return state
-        finer, changes = yield from remesh(state, self._longest, self._largest, apart=self.params.contact > 0)
-        tangent = self._tangent
-        for pairs in changes:
-            tangent = tangent.remeshed(finer.mesh, pairs)
-        if finer.mesh is not state.mesh:
-            self._tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
-            self._habit = self._habit.remeshed(finer.mesh, changes)
-        return finer

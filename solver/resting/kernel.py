@@ -167,14 +167,23 @@ def _meet(
 
 @njit(cache=True, error_model="numpy")
 def _ground(
-    at: Floats, turn: Floats, i: int, points: Floats, scale: float, bowl: Floats, point: Floats, normal: Floats
-) -> float:
+    at: Floats, turn: Floats, i: int, points: Floats, scale: float, reach: float, bowl: Floats, point: Floats,
+    normal: Floats,
+) -> float:  # fmt: skip
     """Find the point of body i that is deepest in the floor y = 0 or in the bowl's shell.
 
     bowl: radius of the inner sphere, thickness, height of the rim; radius 0 is no bowl. The inner sphere's lowest point
     lies `thickness` above the floor.
     """
     deepest = 0.0
+    cy = at[i, 1] - bowl[0] - bowl[1]
+    away = math.sqrt(at[i, 0] ** 2 + cy * cy + at[i, 2] ** 2)
+    # most bodies of a heap are far from both
+    clear = bowl[0] <= 0 or at[i, 1] - reach > bowl[2] or away + reach < bowl[0]
+    if at[i, 1] > reach and clear:
+        return 0.0
+    # which side it came from, the body's centre says
+    within = away < bowl[0] + 0.5 * bowl[1]
     moved = np.empty(3)
     for k in range(len(points)):
         moved[0], moved[1], moved[2] = rotate(turn[i], points[k], False)
@@ -189,9 +198,6 @@ def _ground(
         y = moved[1] - bowl[0] - bowl[1]
         r = math.sqrt(moved[0] ** 2 + y * y + moved[2] ** 2)
         inner, outer = r - bowl[0], bowl[0] + bowl[1] - r
-        # which side it came from, the body's centre says
-        cy = at[i, 1] - bowl[0] - bowl[1]
-        within = math.sqrt(at[i, 0] ** 2 + cy * cy + at[i, 2] ** 2) < bowl[0] + 0.5 * bowl[1]
         depth = inner if within else outer
         if depth > deepest:
             deepest = depth
@@ -229,7 +235,8 @@ def _speeds(
     return fastest
 
 
-@njit(cache=True, error_model="numpy")
+# takes seconds: other threads of a service go on
+@njit(cache=True, error_model="numpy", nogil=True)
 def step(
     at: Floats, turn: Floats, speed: Floats, spin: Floats, kind: Ints, scale: Floats, tables: Floats, points: Floats,
     reach: Floats, mass: Floats, inertia: Floats, bowl: Floats, h: float, drag: float, friction: float, count: int,
@@ -268,7 +275,7 @@ def step(
                         _resolve(at, turn, before, turned, (a, b), point, normal, depth, mass, inertia, friction)
         for i in range(n):
             for _again in range(3):
-                depth = _ground(at, turn, i, points[kind[i]], scale[i], bowl, point, normal)
+                depth = _ground(at, turn, i, points[kind[i]], scale[i], reach[i], bowl, point, normal)
                 if depth <= 0:
                     break
                 touching[i] = True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..contract import InvalidInput
 from ..lattice import azimuths, colatitudes, directions
 from . import kernel
 
-__all__ = ["MOST", "Body", "Bowl", "Rest", "radii", "settle"]
+__all__ = ["MOST", "Body", "Bowl", "Pouring", "Rest", "radii", "settle"]
 
 #: Most bodies of one pile: each is held against all others.
 MOST = 1500
@@ -87,33 +87,69 @@ def settle(bodies: Sequence[Body], kinds: Sequence[int], sizes: Floats, bowl: Bo
         raise InvalidInput(
             f"{count} bodies are more than {MOST} of one pile.", advice=f"Make several piles of at most {MOST}."
         )
-    random = np.random.default_rng(seed)
-    tables = np.stack([radii(body) for body in bodies])
-    ways = directions(*np.meshgrid(colatitudes(_POINTS), azimuths(_POINTS), indexing="ij")).reshape(-1, 3)
-    ways = np.concatenate([ways, [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]])
-    points = np.stack([ways * _along(table, ways)[:, None] for table in tables])
-    kind = np.asarray(kinds)
-    reach = tables.max(axis=(1, 2))[kind] * sizes
-    mean = np.sqrt((tables**2).mean(axis=(1, 2)))[kind] * sizes
-    unit = float(mean.mean())
-    scale, mass = sizes / unit, (mean / unit) ** 3
-    shell = np.zeros(3) if bowl is None else np.array([bowl.sphere, bowl.thickness, bowl.rim]) / unit
-    at = _poured(reach / unit, 0.0 if bowl is None else bowl.opening / unit, shell, random)
-    turn = random.standard_normal((count, 4))
-    turn /= np.linalg.norm(turn, axis=1)[:, None]
-    speed, spin = np.zeros((count, 3)), np.zeros((count, 3))
-    fastest, drag = np.inf, 0.05
-    for batch in range(_LONGEST):
-        fastest = kernel.step(
-            at, turn, speed, spin, kind, scale, tables, points, reach / unit, mass, 0.4 * mass * (mean / unit) ** 2,
-            shell, _STEP, drag, _FRICTION, _BATCH,
-        )  # fmt: skip
-        if batch > 6 and fastest < _STILL:
-            break
-        if batch > 10:
+    return Pouring(bodies, kinds, sizes, bowl, seed).rest()
+
+
+class Pouring:
+    """Bodies on their way: what was computed stays where somebody stops waiting, and goes on from there."""
+
+    def __init__(
+        self, bodies: Sequence[Body], kinds: Sequence[int], sizes: Floats, bowl: Bowl | None, seed: int
+    ) -> None:
+        """Place bodies, `kinds` of `bodies` by number, each `sizes` large, above the floor or the bowl.
+
+        Raises:
+            InvalidInput: there are too many for one pile.
+
+        """
+        count = len(kinds)
+        if count > MOST:
+            raise InvalidInput(
+                f"{count} bodies are more than {MOST} of one pile.", advice=f"Make several piles of at most {MOST}."
+            )
+        random = np.random.default_rng(seed)
+        tables = np.stack([radii(body) for body in bodies])
+        ways = directions(*np.meshgrid(colatitudes(_POINTS), azimuths(_POINTS), indexing="ij")).reshape(-1, 3)
+        ways = np.concatenate([ways, [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]])
+        points = np.stack([ways * _along(table, ways)[:, None] for table in tables])
+        kind = np.asarray(kinds)
+        reach = tables.max(axis=(1, 2))[kind] * sizes
+        mean = np.sqrt((tables**2).mean(axis=(1, 2)))[kind] * sizes
+        self._unit = unit = float(mean.mean())
+        scale, mass = sizes / unit, (mean / unit) ** 3
+        shell = np.zeros(3) if bowl is None else np.array([bowl.sphere, bowl.thickness, bowl.rim]) / unit
+        self._at = _poured(reach / unit, 0.0 if bowl is None else bowl.opening / unit, shell, random)
+        self._turn = random.standard_normal((count, 4))
+        self._turn /= np.linalg.norm(self._turn, axis=1)[:, None]
+        self._speed, self._spin = np.zeros((count, 3)), np.zeros((count, 3))
+        inertia = 0.4 * mass * (mean / unit) ** 2
+        self._fixed = kind, scale, tables, points, reach / unit, mass, inertia, shell
+        self._batch, self._fastest, self._drag = 0, float("inf"), 0.05
+        self._found: Rest | None = None
+
+    @property
+    def share(self) -> float:
+        """Share of the longest way to rest that is behind."""
+        return 1.0 if self._found else self._batch / _LONGEST
+
+    def rest(self, check: Callable[[], None] = lambda: None) -> Rest:
+        """Return how they rest; `check` is called now and then, and may raise what ends the wait."""
+        while self._found is None:
+            check()
+            self._advance()
+        return self._found
+
+    def _advance(self) -> None:
+        self._fastest = kernel.step(
+            self._at, self._turn, self._speed, self._spin, *self._fixed, _STEP, self._drag, _FRICTION, _BATCH
+        )
+        batch, self._batch = self._batch, self._batch + 1
+        if (batch > 6 and self._fastest < _STILL) or self._batch == _LONGEST:
+            still = bool(self._fastest < _STILL)
+            self._found = Rest(self._at * self._unit, self._turn, float(self._fastest), still)
+        elif batch > 10:
             # thicker air, but never so thick that what falls in it would seem to rest
-            drag = min(1.3 * drag, 1.0)
-    return Rest(at * unit, turn, float(fastest), bool(fastest < _STILL))
+            self._drag = min(1.3 * self._drag, 1.0)
 
 
 def _along(table: Floats, ways: Floats) -> Floats:

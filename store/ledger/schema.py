@@ -20,7 +20,12 @@ CREATE TABLE IF NOT EXISTS asks (
     key TEXT NOT NULL, token TEXT NOT NULL, name TEXT NOT NULL, client TEXT NOT NULL, at REAL NOT NULL,
     expected REAL NOT NULL
 );
-CREATE INDEX IF NOT EXISTS asks_at ON asks (at)
+CREATE INDEX IF NOT EXISTS asks_at ON asks (at);
+-- live sessions: whose, what they have cost [s], and until when they are counted as open, by which clock
+CREATE TABLE IF NOT EXISTS sessions (
+    id TEXT PRIMARY KEY, token TEXT NOT NULL, name TEXT NOT NULL, client TEXT NOT NULL, at REAL NOT NULL,
+    seconds REAL NOT NULL, clock TEXT, lease REAL
+)
 """
 
 #: What older files lack: by the version that they have, how they become the next.

@@ -47,8 +47,8 @@ def onset(
 ) -> None:
     """Say at which shrinkage a dehydrating fruit starts to buckle, and into what.
 
-    Spheres take milliseconds, fruits with a circular equator seconds, others minutes. With --method both, the JSON
-    document is the exact answer and holds the linear one under "linear".
+    Spheres take milliseconds, fruits with a circular equator seconds, others up to minutes. With --method both, the
+    JSON document is the exact answer and holds the linear one under "linear".
 
     [bold]Examples[/bold]
 

@@ -17,7 +17,7 @@ NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 
 
 def test_there_are_some() -> None:
-    assert {path.stem for path in NOTEBOOKS} == {"batch", "decay", "map", "refine"}
+    assert {path.stem for path in NOTEBOOKS} == {"batch", "decay", "map", "refine", "scene"}
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

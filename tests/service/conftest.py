@@ -17,6 +17,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from service.app import create_app
+from service.limits.connections import GuardedProtocol
 from service.settings import Settings
 from solver import registry
 from solver.dehydration import SOLVER
@@ -42,7 +43,7 @@ def build(store: Store, name: str = "default", **options: Any) -> tables.TableIn
 
 @contextmanager
 def served(app: FastAPI, ws: Any = "none") -> Iterator[httpx.Client]:
-    server = uvicorn.Server(uvicorn.Config(app, port=0, ws=ws, log_config=None, access_log=False))
+    server = uvicorn.Server(uvicorn.Config(app, port=0, http=GuardedProtocol, ws=ws, log_config=None, access_log=False))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:

@@ -60,7 +60,8 @@ def test_a_coded_answer_is_the_plain_one_under_another_tag(client: httpx.Client,
 
 def test_every_format_is_compressed_or_packed_already() -> None:
     known = {each.media_type.partition(";")[0] for each in (*FORMATS.values(), *EXPORTS.values())}
-    packed = {"application/zip", "application/x-npz", "model/vnd.usdc", "application/vnd.wizen.points"}
+    packed = {"application/zip", "application/x-npz", "model/vnd.usdc", "model/vnd.usdz+zip"}
+    packed.add("application/vnd.wizen.points")
     packed |= {"image/png", "image/x-exr"}
     assert known - packed <= {"application/json", *coding._TYPES}
     assert set(coding._TYPES) <= known | {"application/x-ndjson"}  # of batches

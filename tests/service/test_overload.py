@@ -11,14 +11,14 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import httpx
 import pytest
 import uvicorn
 
-from service.limits import connections
+from service.limits import connections, waiting
 from service.limits.admission import Load
 from service.limits.clients import address, client_of
 from service.limits.connections import GuardedProtocol
@@ -270,6 +270,38 @@ def test_a_newcomer_displaces_the_slowest(port: int) -> None:
     assert held[0].recv(4096).split()[1] in (b"503", b"408")  # on a busy machine its time may have been up before
     for line in held:
         line.close()
+
+
+def test_a_crowd_of_late_ones_is_held_and_not_turned_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few are told and let go. A crowd would come back at once: it stays, unread, until its room is needed."""
+    monkeypatch.setattr(connections, "_settings", lambda: Settings(**{**LIMITS, "head_timeout": 0.2}))
+    monkeypatch.setattr(waiting, "_CROWD", 3)
+    monkeypatch.setattr(waiting, "_LOOK", 0.05)
+    with listening(hello) as port:
+        held = []
+        for i in range(5):
+            line = socket.create_connection(("127.0.0.1", port), timeout=0.02, source_address=(f"127.0.1.{i + 1}", 0))
+            line.sendall(HEAD)
+            held.append(line)
+        time.sleep(0.4)
+        told = 0
+        for line in held:
+            line.sendall(b"X: y\r\n")
+            with suppress(TimeoutError):
+                told += line.recv(4096).startswith(b"HTTP/1.1 408")
+        assert told == 0
+        for _ in range(2):  # there is room for one more; the second one takes that of the first who came
+            other = socket.create_connection(("127.0.0.1", port), timeout=10)
+            other.sendall(HEAD + b"\r\n")
+            assert other.recv(4096).startswith(b"HTTP/1.1 200")
+            held.append(other)
+        with suppress(ConnectionResetError):  # what it had sent was never read
+            assert held[0].recv(4096).split()[1] == b"503"
+        # who leaves is missed: those that are left are no crowd, and what comes now late is told so
+        for line in held:
+            line.close()
+        time.sleep(0.2)
+        assert talk(port, HEAD).split()[1] == b"408"
 
 
 def test_a_crowd_of_newcomers_is_taken_in_while_shapes_are_computed(monkeypatch: pytest.MonkeyPatch) -> None:

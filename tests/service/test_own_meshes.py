@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import struct
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -128,3 +130,35 @@ def test_a_mesh_without_texture_coordinates_is_unwrapped(tmp_path: Path) -> None
     assert seam.uv.max() <= 1
     drawn = sequence.unwrapped().baked(np.full(len(ball.vertices), 0.7, "f4"), 64)
     assert drawn == pytest.approx(0.7)  # between the charts too
+
+
+def test_a_usdz_has_each_stage_s_textures_on_the_mesh_s_own_coordinates(
+    given: dict, rotten: xr.Dataset, tmp_path: Path
+) -> None:
+    path = tmp_path / "ring.usdz"
+    path.write_bytes(write(of_run(rotten), EXPORTS["usdz"], Options(textures=64, step=12)))
+    stage = Usd.Stage.Open(str(path))
+    st = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/decay")).GetPrimvar("st")
+    assert np.array(st.Get()).tobytes() == np.array(given["uv"], np.float32).tobytes()
+    assert np.array_equal(np.array(st.GetIndices()).reshape(-1, 3), given["uv_faces"])
+    shaders = [UsdShade.Shader(p) for p in stage.Traverse() if p.IsA(UsdShade.Shader)]
+    textures = [s for s in shaders if s.GetIdAttr().Get() == "UsdUVTexture"]
+    assert len(textures) == 2 * 2  # colour and roughness of two materials
+    asset = next(t for t in textures if t.GetPath().name == "diffuseColor").GetInput("file").GetAttr()
+    assert list(asset.GetTimeSamples()) == [1, 13]
+    archive = zipfile.ZipFile(path)
+    assert archive.namelist()[0] == "result.usdc"
+    assert all(info.compress_type == zipfile.ZIP_STORED and _data(path, info) % 64 == 0 for info in archive.infolist())
+    fresh, old = (
+        np.asarray(Image.open(io.BytesIO(archive.read(asset.Get(at).path))), float).reshape(-1, 3) for at in (1, 13)
+    )
+    assert len(fresh) == 64**2
+    # it rots: most texels are no longer red
+    assert (fresh[:, 0] > 2 * fresh[:, 1]).mean() > 0.9
+    assert old.mean() < fresh.mean() - 5 or np.abs(old - fresh).max() > 50
+
+
+def _data(path: Path, info: zipfile.ZipInfo) -> int:
+    """Return where a file's data begin in an archive: USDZ wants multiples of 64."""
+    head = path.read_bytes()[info.header_offset : info.header_offset + 30]
+    return info.header_offset + 30 + sum(struct.unpack("<HH", head[26:30]))

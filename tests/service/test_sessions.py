@@ -231,6 +231,11 @@ def test_more_sessions_than_may_be_are_refused_and_room_comes_back(live: Served)
     problem, closed = refused(live.client(token=third))
     assert (problem["type"], closed) == ("urn:wizen:problem:too-many-sessions", 4429)
     assert len(engines()) == 3
+    # another process over the same store counts the same sessions
+    settings = Settings(store=live.root, max_sessions=3, max_sessions_per_token=2)
+    with served(create_app(settings), ws="websockets-sansio") as second:
+        problem, closed = refused(Client(str(second.base_url), token=third, params=BALL, quality="preview"))
+        assert (problem["type"], closed) == ("urn:wizen:problem:too-many-sessions", 4429)
     for one in open_ones:
         one.send(do="close")
         with pytest.raises(ConnectionClosed):

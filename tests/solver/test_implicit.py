@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.sparse import bsr_array
 
 from solver.contract import Cancelled, Context, InvalidInput, NotConverged
-from solver.dehydration.implicit import base_state, build_model, build_quadratic_mesh, equilibrium, graded_layers
+from solver.dehydration.implicit import (
+    Patch,
+    base_state,
+    build_model,
+    build_quadratic_mesh,
+    carried,
+    equilibrium,
+    graded_layers,
+)
 from solver.dehydration.implicit.buckling import parities
 from solver.dehydration.implicit.hexahedron import PRESSURE
 from solver.dehydration.implicit.newton import masked
@@ -144,3 +154,22 @@ def test_newton_is_quadratic_and_history_is_kept():
     assert len(history) <= 7
     assert state.state.steps == len(history) - 1
     assert PRESSURE.shape == (27, 8)
+
+
+def test_a_patch_follows_the_whole_it_is_cut_from():
+    """Its edge stays where the whole's state puts it, and inside equilibrium finds the whole's state again."""
+    whole = base_state(FRUIT, 0.05, n=4, layers=graded_layers(2, 1.0), kappa_ratio=100.0)
+    patch = Patch(np.array([1.1, 0.0, 0.0]), 0.7)
+    mesh = build_quadratic_mesh(FRUIT, 4, graded_layers(2, 1.0), "octant", patch=patch)
+    assert 0 < len(mesh.stacks) < len(whole.mesh.stacks)
+    model = build_model(FRUIT, mesh, 100.0)
+    start = carried(whole, model)
+    disturbed = start.deformed.copy()
+    inside = np.flatnonzero(model.pattern.free >= 0)
+    disturbed[inside] += 1e-3 * model.free * np.sin(40 * mesh.positions[inside])
+    found = equilibrium(model, 0.05, guess=dataclasses.replace(start, deformed=disturbed))
+    edge = np.repeat(mesh.cut, mesh.levels)
+    assert edge.any()
+    np.testing.assert_allclose(found.deformed, whole(mesh.positions), atol=1e-9)
+    for _, free in parities(model):
+        assert not free[edge[inside]].any()

@@ -80,9 +80,9 @@ def test_the_meridional_road_converges() -> None:
     assert errors[1] < 2e-3
 
 
-@pytest.mark.parametrize(("gamma", "error"), [(10.0, 0.0196), (30.0, 0.0353)])
+@pytest.mark.parametrize(("gamma", "error"), [(10.0, -0.0019), (30.0, -0.0014)])
 def test_the_full_road_is_as_near_whatever_the_bulk_modulus(gamma: float, error: float) -> None:
-    """A coarse mesh is too stiff by `error`, measured; a line through tangents came out 9 % low at 1e4, 32 % at 1e5."""
+    """The limit of two coarse meshes is off by `error`, measured; one-sided differences of tangents see the modulus."""
     errors = []
     for kappa_ratio in (None, 1000.0):
         found = full.crossings(sphere(0.4, 0.12, gamma), kappa_ratio=kappa_ratio, quality="preview")[1]

@@ -1,4 +1,4 @@
-"""Flesh in a closed mesh of the user's own: stuffed tetrahedra that carry its surface, whatever its shape.
+"""Flesh in a mesh of the user's own, or behind an open one: stuffed tetrahedra that carry its surface.
 
 The mesh need not be fit for anything but to say what is inside: each of its vertices goes with the nearest place on the
 skin of the tetrahedra, and keeps its distance from there, so that detail finer than the flesh stays as it was drawn.
@@ -15,7 +15,8 @@ from ...geometry.nearest import Nearest, nearest
 from ..params import DecayParams
 from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.places import Neighbour
-from ..surfaces.surface import Surface
+from ..surfaces.surface import Surface, extent
+from .rind import rind
 from .solid import Solid, volumes
 from .stuffing import Stuffed, boundary, pieces, stuffed
 
@@ -25,6 +26,8 @@ __all__ = ["Embedded"]
 _PER_CUBE, _PER_SHELLS = 12.0, 20.0
 #: No vertex may lie farther from the flesh than this share of the lattice's edge: there it would be missing.
 _FAR = 0.75
+#: The same where the borders of a rind are ridges, which the lattice cuts off.
+_RIDGE = 1.25
 #: Refinements of a lattice that is too coarse for a thin part, and the most tetrahedra that one may have.
 _TRIES, _MOST = 5, 150_000
 _FINER = 1.5
@@ -34,23 +37,26 @@ class Embedded:
     """Flesh in a mesh of the user's own, of about as many tetrahedra as a round fruit of so many layers.
 
     Raises:
-        InvalidGeometry: the mesh is not closed, or too thin somewhere to hold flesh.
+        InvalidGeometry: the mesh is too thin somewhere to hold flesh, or open and not fit for a rind.
 
     """
 
     def __init__(self, params: DecayParams, surface: Surface, layers: int) -> None:
         closed = extent_of(surface)
-        if closed is None or closed.volume <= 0:
-            raise InvalidGeometry(
-                "the mesh is open: nothing says what is inside of it.", advice="Close its borders, or take body=none."
-            )
-        self._surface, self.extent = surface, closed
-        filled = _filled(surface, closed.volume, layers)
+        points, faces = surface.points, surface.faces
+        if closed is None:
+            points, faces = rind(points, faces, params.flesh.rind)
+        elif closed.volume <= 0:
+            raise InvalidGeometry("the mesh is flat: nothing is inside of it.", advice="Take body=none.")
+        # what an open mesh weighs is what the fruit of the parameters does, as in its fields
+        self._surface, self.extent = surface, closed or extent(params)
+        filled = _filled(points, faces, layers, _FAR if closed else _RIDGE)
         skin_faces = boundary(filled.tets)
-        skin, faces = np.unique(skin_faces, return_inverse=True)
+        skin, outside = np.unique(skin_faces, return_inverse=True)
         below = nearest(filled.points, surface.points, surface.faces)
         depth = below.distance.copy()
-        depth[skin] = 0.0
+        if closed is not None:
+            depth[skin] = 0.0
         self.solid = Solid(
             filled.points,
             filled.tets,
@@ -59,14 +65,14 @@ class Embedded:
             rays_from(filled.points),
             depth,
             skin,
-            faces.reshape(-1, 3),
+            outside.reshape(-1, 3),
         )
         self.inwards = _matrix(below, surface.faces, len(surface.points))
         held = nearest(surface.points, filled.points[skin], self.solid.faces)
         self._onto = _matrix(held, self.solid.faces, len(skin))
         self.core = depth >= np.median(depth)
         self.carried = False
-        self.floor = float(surface.points[:, 1].min())
+        self.floor = float(points[:, 1].min())
         self.hanging = np.zeros(len(filled.points))
         # each point of the skin stands for the vertices that go with it, down to the lowest
         most = self.solid.faces[held.face, np.argmax(held.shares, axis=1)]
@@ -91,13 +97,15 @@ class Embedded:
         return float(far.min()) - other.radius
 
 
-def _filled(surface: Surface, volume: float, layers: int) -> Stuffed:
-    """Return flesh that hangs together and comes near every vertex."""
+def _filled(points: Floats, faces: Ints, layers: int, far: float) -> Stuffed:
+    """Return flesh in a closed surface (v, 3), (f, 3) that hangs together, so many edges from vertices at most."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    volume = abs(float(np.sum(a * np.cross(b, c)))) / 6
     edge = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
     why = ""
     for _ in range(_TRIES):
-        found = stuffed(surface.points, surface.faces, edge)
-        why = _lacking(found, surface, edge)
+        found = stuffed(points, faces, edge)
+        why = _lacking(found, points, far * edge)
         if not why:
             return found
         edge /= _FINER
@@ -109,7 +117,7 @@ def _filled(surface: Surface, volume: float, layers: int) -> Stuffed:
     )
 
 
-def _lacking(found: Stuffed, surface: Surface, edge: float) -> str:
+def _lacking(found: Stuffed, points: Floats, far: float) -> str:
     """Return what is wrong with flesh, and where; nothing if it is whole."""
     if not len(found.tets):
         return "it is thinner than the lattice everywhere"
@@ -118,10 +126,10 @@ def _lacking(found: Stuffed, surface: Surface, edge: float) -> str:
         least = int(np.argmin(np.bincount(of)))
         return f"a part about {_place(found.points[of == least].mean(axis=0))} does not hang together with the rest"
     skin, faces = np.unique(boundary(found.tets), return_inverse=True)
-    away = nearest(surface.points, found.points[skin], faces.reshape(-1, 3)).distance
+    away = nearest(points, found.points[skin], faces.reshape(-1, 3)).distance
     worst = int(np.argmax(away))
-    if away[worst] > _FAR * edge:
-        return f"it is too thin at {_place(surface.points[worst])}"
+    if away[worst] > far:
+        return f"it is too thin at {_place(points[worst])}"
     return ""
 
 

@@ -37,6 +37,7 @@ class Flesh(BaseModel):
         0.02, ge=0, le=0.1, description="Share of rotten flesh's weight that leaves as carbon dioxide; a choice [1]"
     )
     rot_softness: float = Field(0.98, ge=0, le=0.999, description="Share of its stiffness that rotten flesh loses [1]")
+    rind: float = Field(0.15, ge=0.02, le=1, description="Thickness of the flesh behind an open mesh of one's own [r1]")
     gravity: float = Field(9.81, ge=0, le=100, description="Gravity; 0 is a fruit that floats [m/s2]")
 
     @property
@@ -56,6 +57,13 @@ class Skin(BaseModel):
     )
     joining: float = Field(
         0.7, ge=0, le=1, description="Share that it joins of what its place shrinks beyond that: rot takes skin too [1]"
+    )
+    slack: float = Field(
+        0.2,
+        ge=0,
+        le=0.6,
+        description="Most of the skin's lengths that the body may leave to be folded; beyond, it shrinks too: "
+        "deeper folds close, and skin that dries gives way; a choice [1]",
     )
     depth: float = Field(0.1, ge=0.01, le=1, description="Depth of the flesh that holds the skin [r1]")
 

@@ -52,7 +52,7 @@ class Wrinkles:
         """
         even, rest = self._body.parted(balance)
         carried = (1 + even) * self._points + self._body.onto(self._cells) @ rest
-        share = (1 + self._skin.shrinkage * (balance.dried - 1)) * self._joined(carried, balance.dried)
+        share = self._share(carried, balance.dried)
         folds = near.points if near else self._shell.uneven(self._normals, Context.generator(self._seed))
         model = near.model if near else None
         found = self._shell.wrinkled(
@@ -60,11 +60,18 @@ class Wrinkles:
         )
         return found._replace(points=found.points - carried)
 
-    def _joined(self, carried: Floats, dried: float) -> Floats:
-        """Return lengths of the skin of each face (f), over those where nothing rots: it joins its place's collapse."""
+    def _share(self, carried: Floats, dried: float) -> Floats:
+        """Return lengths of the skin over its fresh ones (f): it joins its place's collapse, and folds only so deep.
+
+        A skin pressed to less than some .75 of its lengths both ways has no folds that its mesh could show: triangles
+        close like books, and none of them finds a balance.
+        """
         there = metric(carried, self._faces)
-        area = np.sqrt(np.maximum(there[:, 0] * there[:, 2] - there[:, 1] ** 2, 0) / self._square)
-        return np.asarray(1 - self._skin.joining * (1 - np.minimum(np.sqrt(area) / dried, 1.0)))
+        area = np.maximum(there[:, 0] * there[:, 2] - there[:, 1] ** 2, 0) / self._square
+        covered = np.sqrt(np.sqrt(area))
+        joined = 1 - self._skin.joining * (1 - np.minimum(covered / dried, 1.0))
+        own = (1 + self._skin.shrinkage * (dried - 1)) * joined
+        return np.asarray(np.minimum(own, covered / (1 - self._skin.slack)))
 
     def on_lattice(self, folds: Floats, resolution: int) -> Floats:
         """Return what `at` found on the common lattice (n, 2 n, 3)."""

@@ -79,6 +79,8 @@ class Shape:
                 )
             if "volume" in self._wanted and self._closed is None:
                 raise InvalidInput("an open mesh has no volume.", advice="Close it, or leave the volume out.")
+            if "density" in self._wanted and self._closed is None and self._body is not None:
+                raise InvalidInput("an open mesh has no density.", advice="Close it, or leave the density out.")
         if self._dries:
             dried.check(self._params, self._need)
             dried.displaced(self._params, self.lost(self._need.stages[-1]), 4, context)

@@ -1,49 +1,70 @@
 """The onset of any fruit, elliptic equators too: triquadratic elements between the symmetry planes, all parities.
 
-Cost: three-dimensional. The part of the fruit between its planes is solved twice per look (two smooth states), then
-each parity costs two factorisations and some eighty solves; unknowns grow with 1 / thickness^2.
+Thin skins buckle first in one place, and only the patch that holds the mode is meshed finely; its edge follows a coarse
+smooth state. s_cr is the limit of two meshes by the order that spheres show.
+Cost: some six factors of each mesh; of whole parts, unknowns grow with 1 / thickness^2, of patches with 1 / thickness.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
-from scipy.special import sph_harm_y
 
 from ...arrays import Floats
 from ...contract import Context, NotConverged
-from ...fem import HEX27
 from ..fresh.closed_form import flat_film_wavelength, onset_estimate
-from ..fresh.mesh import layer_fractions
-from ..implicit import Equilibrium, Model, build_model, build_quadratic_mesh, equilibrium, natural_symmetry
-from ..implicit.buckling import Crossing, first_crossing, fresh_metric, parities, stress_stiffness, tangent_at
-from ..implicit.location import fold, locate
+from ..implicit import BaseState, Model, Patch
+from ..implicit.buckling import Crossing, Path, crossing, parities
 from ..params import DehydrationParams
+from .field import dominant, mode_heights
+from .looks import Look, elsewhere, even
+from .places import expected_onsets
 from .result import FieldMode, Method, Onset, Tie
+from .states import States
 
 __all__ = ["crossings", "onset_full"]
 
 
-#: Quadratic elements per wrinkle of the flat film on a unit sphere: s_cr of the sphere with te = 0.04 and gamma = 10
-#: comes out 3.4, 2.1 and 1.3 % high with 1.5, 2 and 2.5 of them, incompressible.
-PER_WAVELENGTH = {"preview": 1.5, "default": 2.5, "fine": 3.5}
-#: The linear method's first modes are shorter (degree 23 instead of 14 on that sphere): it needs this many times more.
-LINEAR_FINER = 2.0
-#: Core layer at the interface in wavelengths, and how fast layers grow inwards.
-FIRST_LAYER, LAYER_GROWTH = 0.17, 1.8
+#: Quadratic elements per wrinkle of the flat film, of the mesh that looks at all parities and of the one that decides.
+PER_WAVELENGTH = {"preview": (1.5, 2.1), "default": (2.0, 2.9), "fine": (2.9, 4.0)}
+#: The linear method's first modes are shorter (degree 23 instead of 14 on the sphere with te .04): it needs more.
+LINEAR_FINER = 1.6
+#: Order of s_cr in element size, measured on spheres: 3.0 to 3.5 between 1.9 and 4.8 elements a wrinkle.
+ORDER = 3.2
+#: Shear modulus of the skin over the core's past which elements stay as short as at it: 3.4 to a wrinkle are off by
+#: 1.9 % at 30, as 2.4 are at 10.
+STIFF = 10.0
 #: Bulk over shear modulus that stands for incompressible; s_cr is off by about 2e-5, relative.
 PENALTY = 1e5
 #: Largest shrinkage that is looked at.
 SEARCHED = 0.6
-#: Fractions of the expected onset through whose lowest stiffnesses a line is drawn: a first look, then a close one.
-LOOKS = ((0.80, 0.86), (0.96, 0.985))
-#: Parities whose first look is this close to the best are looked at closely.
-RIVALS = 1.03
-#: Shrinkage of the small state whose stress the linear method scales.
-SMALL = 1e-4
+#: Share of the expected onset at which one looks first, from a look that saw it, and on the finer mesh (whose onset is
+#: lower).
+FIRST_LOOK, NEXT_LOOK, FINE_LOOK = 0.85, 0.97, 0.975
+#: A look that found the smooth state unstable, or not at all, is taken again from this much of it.
+BACK = 0.96
+#: A look from farther below the onset than this is repeated from nearer.
+FAR = 0.93
+#: Radius of the first patch in wavelengths, its growth, and what a mode may have left beyond 3/4 of the radius.
+#: On plum 1 radii of 2.5, 3.5 and 4.9 gave .08676, .08645 and .08644.
+REACH, WIDER, LEFT = 3.5, 1.4, 0.25
+#: Stacks up to which the whole part is as good as a patch, and places within this of the first that are looked at.
+FEW, RIVALS, PLACES = 360, 1.05, 3
+#: Modes of other parities within this fraction above the first one are called ties.
+TIED = 0.05
+#: Onsets this close count as one.
+SAME = 5e-4
+#: How much coarser a patch may be along the crests than across.
+CRESTS = 1.2
+_TRIES = 14
+
+
+class _AlreadyUnstable(Exception):
+    """The smooth state below the expected onset has a falling direction."""
 
 
 def onset_full(
@@ -65,24 +86,38 @@ def onset_full(
 
     """
     begin = time.perf_counter()
+    context = context or Context()
     model, found = crossings(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
-    settings = {"n": len(model.mesh.quad_of[0]), "layers": model.mesh.layers, "unknowns": int(model.free.sum())}
+    n = len(model.mesh.quad_of[0])
+    settings = {
+        "n": n,
+        "layers": model.mesh.layers,
+        "stacks": len(model.mesh.stacks),
+        "unknowns": int(model.free.sum()),
+    }
     if not found:
         return Onset(
             None, None, None, "full", method, kappa_ratio, None, seconds=time.perf_counter() - begin, settings=settings,
             searched=SEARCHED, reason=f"the smooth shape stays stable up to s = {SEARCHED:g}",
         )  # fmt: skip
     modes = []
-    for crossing in found:
-        heights = _heights(params, model, crossing)
-        degree, wavenumber = _dominant(heights, 2 * len(model.mesh.quad_of[0]) * 2)
-        modes.append((crossing.shrinkage, degree, wavenumber, heights))
+    for number, each in enumerate(found):
+        context.check_cancelled()
+        context.report(0.9 + 0.1 * number / len(found), "waves of the modes")
+        heights = mode_heights(params, model, each)
+        modes.append((each.shrinkage, *dominant(heights, _highest(params, n)), heights))
     s_cr, degree, wavenumber, heights = modes[0]
     return Onset(
         s_cr, degree, wavenumber, "full", method, kappa_ratio, FieldMode(heights),
         ties=tuple(Tie(s, d, m) for s, d, m, _ in modes[1:]), seconds=time.perf_counter() - begin,
         searched=SEARCHED, settings=settings,
     )  # fmt: skip
+
+
+def _highest(params: DehydrationParams, n: int) -> int:
+    """Return the highest degree that a mode on a mesh of `n` elements an edge may have."""
+    wave = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
+    return min(4 * n, math.ceil(2.5 * 2 * np.pi * max(params.radii) / wave) + 8)
 
 
 def crossings(
@@ -93,151 +128,164 @@ def crossings(
 
     The part of `onset_full` that costs no search for the modes' degrees. Raises what it raises.
     """
-    context = context or Context()
-    model = _model(params, kappa_ratio, PER_WAVELENGTH[quality] * (LINEAR_FINER if method == "linear" else 1.0))
-    return model, _exact(params, model, context) if method == "exact" else _linear(model, context)
+    search = _Search(params, method, kappa_ratio or PENALTY, context or Context())
+    coarse, fine = (each * (LINEAR_FINER if method == "linear" else 1) for each in PER_WAVELENGTH[quality])
+    return search.run(coarse, fine)
 
 
-def _model(params: DehydrationParams, kappa_ratio: float | None, per_wavelength: float) -> Model:
-    wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
-    n = 2 * math.ceil(np.pi / 4 * per_wavelength / wavelength)
-    flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), 0.05)
-    core = layer_fractions(flesh, FIRST_LAYER * min(wavelength, 0.4), LAYER_GROWTH)
-    mesh = build_quadratic_mesh(params, max(n, 4), core, natural_symmetry(params))
-    return build_model(params, mesh, kappa_ratio or PENALTY)
+class _Search:
+    """One fruit and what is expected of its onset."""
 
+    def __init__(self, params: DehydrationParams, method: Method, kappa_ratio: float, context: Context) -> None:
+        self.params, self.method, self.context = params, method, context
+        self.states = States(params, kappa_ratio, context)
+        self.wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
+        # under stiffer skins waves are longer, but elements must not be longer than the skin is thick by more
+        self.resolved = flat_film_wavelength(params.exocarp_thickness, min(params.modulus_ratio, STIFF))
+        rough = FIRST_LOOK * min(onset_estimate(params.modulus_ratio, min(params.stone)), SEARCHED)
+        self.places = expected_onsets(self.states.smooth(rough)[0])
+        # shrinkage from which the next look is taken; the linear method looks from the fresh shape
+        self.below = min(NEXT_LOOK * float(self.places.onsets.min()), SEARCHED)
+        # shrinkage at which a smooth state was found unstable, or not at all
+        self.unstable = np.inf
 
-def _linear(model: Model, context: Context) -> list[Crossing]:
-    """All parities' first singular K0 + s K_sigma, sorted."""
-    fresh = equilibrium(model, 0.0, context=context)
-    small = equilibrium(model, SMALL, tolerance=1e-7, context=context)
-    base, slope = tangent_at(model, fresh), stress_stiffness(model, small) / SMALL
-    return _sorted(_all(model, base, slope, 0.0, context))
+    def run(self, coarse: float, fine: float) -> tuple[Model, list[Crossing]]:
+        """Return the finer mesh's model and the crossings, sorted; coarse, fine: elements per wrinkle."""
+        look = self._place(coarse)
+        first = look.first
+        if first.shrinkage > SEARCHED:
+            return look.model, []
+        look = self._all(look)
+        first = next(each for each in look.found if each.parity == first.parity)
+        # where it does not matter, the parity whose factor is at hand
+        best = first if first.shrinkage < (1 + SAME) * look.first.shrinkage else look.first
+        n = max(self._elements(look.patch, fine), len(look.model.mesh.quad_of[0]) + 2)
+        model = self.states.model(n, look.patch)
+        guesses = {best.parity: elsewhere(self.params, look.model, best.mode, model)}
+        self.below, self.unstable = FINE_LOOK * best.shrinkage, np.inf
+        last = self._repeated(model, guesses, 0.6, look.patch, look).first
+        ratio = n / len(look.model.mesh.quad_of[0])
+        limit = last.shrinkage - (best.shrinkage - last.shrinkage) / (ratio**ORDER - 1)
+        others = [
+            Crossing(
+                max(each.shrinkage * limit / best.shrinkage, limit),
+                elsewhere(self.params, look.model, each.mode, model), each.parity,
+            )
+            for each in look.found
+            if each is not best and (1 + SAME) * best.shrinkage < each.shrinkage < (1 + TIED) * best.shrinkage
+        ]  # fmt: skip
+        return model, [each for each in (last._replace(shrinkage=limit), *others) if each.shrinkage <= SEARCHED]
 
+    def _all(self, look: Look) -> Look:
+        """Return what the other parities show beside the even one."""
+        for _ in range(_TRIES):
+            odd: dict[tuple[int, ...], Floats | None] = dict.fromkeys(look.others())
+            try:
+                more = self._seen(look.model, look.path, odd, 0.3)
+            except _AlreadyUnstable:
+                # one of them comes that much earlier
+                self._back(look.path.shrinkage)
+                look = self._repeated(look.model, {look.first.parity: look.first.mode}, 0.3, look.patch)
+            else:
+                return replace(look, found=sorted([look.first, *more], key=lambda each: each.shrinkage))
+        raise self._lost()
 
-def _exact(params: DehydrationParams, model: Model, context: Context) -> list[Crossing]:
-    expected = min(onset_estimate(params.modulus_ratio, min(params.stone)), SEARCHED)
-    at: Equilibrium | None = None
-    metric = fresh_metric(model)
-    wanted: dict[tuple[int, ...], Floats | None] = {parity: None for parity, _ in parities(model)}
-    known: list[Crossing] = []
-    for _ in range(8):
-        low, high = (expected * fraction for fraction in (LOOKS[-1] if known else LOOKS[0]))
-        ahead = at is not None and at.shrinkage <= low
-        first = equilibrium(model, low, start=at if ahead else None, context=context)
-        at = equilibrium(model, high, start=first, context=context)
-        try:
-            found = _softened(model, first, at, metric, context, wanted)
-        except _AlreadyUnstable:
-            expected, at, known = 0.8 * low, None, []
-            wanted = {parity: None for parity, _ in parities(model)}
-            continue
-        best = min((crossing.shrinkage for crossing in found), default=np.inf)
-        if best > SEARCHED:
-            return []
-        if known and abs(best / expected - 1) < 0.03:
-            return _sorted(found)
-        expected, known = best, found
-        wanted = {c.parity: c.mode for c in found if c.shrinkage < RIVALS * best}
-    raise NotConverged(
-        "the onset was not bracketed.", advice="Ask for a finer quality.", last_stage=at.shrinkage if at else None
-    )
+    # ------------------------------------------------------------------------------------------------------ where
 
+    def _place(self, per_wavelength: float) -> Look:
+        """Return the even parity's first mode on the whole part, or on the patch that holds it."""
+        whole = self._elements(None, per_wavelength)
+        if 6 * whole**2 // 2 ** len(self.states.whole.mesh.planes) <= FEW:
+            model = self.states.model(whole, None)
+            return self._repeated(model, {even(model): None}, 0.1)
+        seen = [self._grown(patch, per_wavelength, 0) for patch in self._patches()]
+        look = min(seen, key=lambda each: each.first.shrinkage)
+        for number in range(_TRIES):
+            if look.patch is None:
+                return look
+            centre, beyond = look.extent()
+            if beyond <= LEFT:
+                return look
+            look = self._grown(Patch(centre, WIDER * look.patch.radius), per_wavelength, number + 1)
+        return look
 
-class _AlreadyUnstable(Exception):
-    """The smooth state below the expected onset has a falling direction."""
+    def _patches(self) -> list[Patch]:
+        """Return the places that may come first, the first of all first."""
+        middles, expected, _ = self.places
+        order = np.argsort(expected)
+        radius, places = REACH * self.wavelength, list[Floats]()
+        for at in order[expected[order] <= RIVALS * expected[order[0]]]:
+            if all(np.linalg.norm(middles[at] - other) > 2 * radius for other in places):
+                places.append(middles[at])
+        return [Patch(centre, radius) for centre in places[:PLACES]]
 
+    def _grown(self, patch: Patch, per_wavelength: float, number: int) -> Look:
+        n = self._elements(patch, per_wavelength)
+        model = self.states.model(n, patch)
+        if len(model.mesh.stacks) > 0.7 * 6 * n**2 / 2 ** len(model.mesh.planes):
+            model, patch = self.states.model(self._elements(None, per_wavelength), None), None  # type: ignore[assignment]
+        return self._repeated(model, {even(model): None}, 0.05 + 0.02 * number, patch)
 
-def _softened(
-    model: Model, first: Equilibrium, second: Equilibrium, metric: Floats, context: Context,
-    wanted: dict[tuple[int, ...], Floats | None],
-) -> list[Crossing]:  # fmt: skip
-    """Where each wanted parity's lowest stiffness, known at two states, falls to zero.
+    def _elements(self, patch: Patch | None, per_wavelength: float) -> int:
+        """Return the even number of elements per edge that has `per_wavelength` to a wrinkle where it counts."""
+        if patch is None:
+            return max(2 * math.ceil(np.pi / 4 * per_wavelength / self.resolved), 4)
+        middles, _, widths = self.places
+        near = np.linalg.norm(middles - patch.centre, axis=1)
+        across, along = widths[near <= max(patch.radius, near.min())].max(axis=0)
+        size = len(self.states.whole.mesh.quad_of[0]) * float(max(across, along / CRESTS))
+        return max(2 * math.ceil(size * per_wavelength / self.resolved / 2), 4)
 
-    A line through the two stiffnesses, not through the two tangents: those hold kappa B^T B with B linear in s, and a
-    line through that is too low by kappa (s - low) (s - high) |B' v|^2 beyond both, which ends in false crossings.
-    """
-    lows = _all(model, tangent_at(model, first), -metric, 0.0, context, wanted)
-    begun: dict[tuple[int, ...], Floats | None] = {c.parity: c.mode for c in lows}
-    highs = {c.parity: c for c in _all(model, tangent_at(model, second), -metric, 0.0, context, begun)}
-    found = []
-    for low in lows:
-        high = highs.get(low.parity)
-        if high is None or high.shrinkage >= low.shrinkage:
-            continue
-        slope = (low.shrinkage - high.shrinkage) / (second.shrinkage - first.shrinkage)
-        found.append(Crossing(second.shrinkage + high.shrinkage / slope, high.mode, high.parity))
-    return found
+    def _repeated(
+        self, model: Model, wanted: Mapping[tuple[int, ...], Floats | None], done: float, patch: Patch | None = None,
+        coarser: Look | None = None,
+    ) -> Look:  # fmt: skip
+        """Return crossings seen from near: a look from too far below, or from beyond, is taken again."""
+        for _ in range(_TRIES):
+            self.context.report(done, f"{len(model.mesh.stacks)} columns of elements at s = {self.below:.4f}")
+            try:
+                path, state = self._path(model, coarser)
+                found = self._seen(model, path, wanted, done)
+            except (NotConverged, _AlreadyUnstable):
+                if self.method == "linear":
+                    raise
+                self._back(self.below)
+                continue
+            near = found[0].shrinkage if found else np.inf
+            if self.method == "linear" or near > SEARCHED or self.below >= min(FAR * near, BACK * BACK * self.unstable):
+                none = Crossing(np.inf, np.zeros_like(model.free, dtype=float), next(iter(wanted)))
+                return Look(model, patch, path, state, found or [none])
+            self.below = min(NEXT_LOOK * near, 1.6 * self.below, BACK * self.unstable)
+            wanted = {each.parity: each.mode for each in found}
+        raise self._lost()
 
+    def _back(self, unstable: float) -> None:
+        """Look from below what turned out unstable."""
+        self.unstable = min(self.unstable, unstable)
+        self.below = BACK * self.unstable
 
-def _all(
-    model: Model, base: Floats, slope: Floats, start: float, context: Context,
-    wanted: dict[tuple[int, ...], Floats | None] | None = None,
-) -> list[Crossing]:  # fmt: skip
-    found = []
-    for number, (parity, free) in enumerate(parities(model)):
-        if wanted is not None and parity not in wanted:
-            continue
-        context.check_cancelled()
-        context.report(number / 2 ** len(parity), f"parity {parity}")
-        factor = model.factor(base, free, context.check_cancelled)
-        if factor.negative:
-            raise _AlreadyUnstable
-        guess = (wanted or {}).get(parity)
-        crossing = first_crossing(model, base, slope, start, parity, free, factor, guess, context.check_cancelled)
-        if crossing is not None:
-            found.append(crossing)
-    return found
+    def _lost(self) -> NotConverged:
+        return NotConverged("the onset was not bracketed.", advice="Ask for a finer quality.", last_stage=self.below)
 
+    def _path(self, model: Model, coarser: Look | None) -> tuple[Path, BaseState]:
+        if self.method == "linear":
+            return self.states.fresh_path(model)
+        known = None if coarser is None else (coarser.state, coarser.path.velocity)
+        return self.states.path(model, self.below, known)
 
-def _sorted(found: list[Crossing]) -> list[Crossing]:
-    return sorted((c for c in found if c.shrinkage <= SEARCHED), key=lambda c: c.shrinkage)
-
-
-def _heights(params: DehydrationParams, model: Model, crossing: Crossing) -> Callable[[Floats], Floats]:
-    """The mode's height along the outward normal as a function of parametric directions, largest magnitude 1."""
-    mesh = model.mesh
-    nodal = np.zeros_like(mesh.positions)
-    nodal[model.pattern.free >= 0] = crossing.mode
-
-    def raw(towards: Floats) -> Floats:
-        colatitude, azimuth = np.arccos(np.clip(towards[:, 1], -1, 1)), np.arctan2(towards[:, 2], towards[:, 0])
-        points = params.surface(colatitude, azimuth)
-        folded, signs = fold(mesh, points)
-        element, local = locate(params, mesh, folded)
-        moved = signs * np.einsum("pa,pai->pi", HEX27.shape(local), nodal[mesh.connectivity[element]])
-        for axis, parity in zip(mesh.planes, crossing.parity, strict=True):
-            if parity < 0:
-                moved *= signs[:, axis : axis + 1]
-        step = 1e-5
-        # one-sided where the pole is nearer than the step; the azimuthal tangent vanishes there, so go a little off it
-        inner = np.clip(colatitude, 1e-3, np.pi - 1e-3)
-        along = params.surface(inner + step, azimuth) - params.surface(inner - step, azimuth)
-        around = params.surface(inner, azimuth + step) - params.surface(inner, azimuth - step)
-        normal = np.cross(around, along)
-        normal *= np.sign(np.einsum("pi,pi->p", normal, points) / np.linalg.norm(normal, axis=1))[:, None]
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        found: Floats = np.einsum("pi,pi->p", moved, normal)
-        return found
-
-    theta, phi = np.meshgrid(np.linspace(0.01, np.pi - 0.01, 181), np.linspace(0, np.pi, 181), indexing="ij")
-    sample = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
-    values = raw(sample.reshape(-1, 3))
-    scale = values[np.argmax(np.abs(values))]
-    return lambda towards: raw(np.asarray(towards, dtype=float)) / scale
-
-
-def _dominant(heights: Callable[[Floats], Floats], highest: int) -> tuple[int, int]:
-    """Spherical-harmonic degree and azimuthal wavenumber that carry most of the mode's mean square."""
-    nodes, weights = np.polynomial.legendre.leggauss(highest + 8)
-    colatitude = np.arccos(nodes)
-    azimuth = np.arange(2 * highest + 2) * np.pi / (highest + 1)
-    theta, phi = np.meshgrid(colatitude, azimuth, indexing="ij")
-    points = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
-    waves = np.fft.rfft(heights(points.reshape(-1, 3)).reshape(theta.shape), axis=1)[:, : highest + 1]
-    power = np.zeros((highest + 1, highest + 1))
-    for m in range(highest + 1):
-        degrees = np.arange(m, highest + 1)
-        harmonics = sph_harm_y(degrees[:, None], m, colatitude[None, :], 0.0).real
-        power[m:, m] = np.abs((harmonics * weights) @ waves[:, m]) ** 2 * (1 if m == 0 else 2)
-    return int(power.sum(axis=1).argmax()), int(power.sum(axis=0).argmax())
+    def _seen(
+        self, model: Model, path: Path, wanted: Mapping[tuple[int, ...], Floats | None], done: float
+    ) -> list[Crossing]:
+        """Return the crossings of the parities wanted, sorted; with a guess at their modes where there is one."""
+        watch, found = self.context.check_cancelled, []
+        asked = [(parity, free) for parity, free in parities(model) if parity in wanted]
+        for number, (parity, free) in enumerate(asked):
+            self.context.report(done + 0.3 * number / len(asked), f"parity {parity}")
+            own = bool((free == model.free).all())
+            factor = path.velocity.factor if own else model.factor(path.velocity.tangent, free, watch)
+            if factor.negative:
+                raise _AlreadyUnstable
+            each = crossing(model, path, parity, free, factor, wanted[parity], watch)
+            if each is not None:
+                found.append(each)
+        return sorted(found, key=lambda each: each.shrinkage)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .base_state import BaseState, base_state
-from .mesh import QuadraticMesh, Symmetry, build_quadratic_mesh, graded_layers, natural_symmetry
+from .base_state import BaseState, base_state, carried
+from .mesh import Patch, QuadraticMesh, Symmetry, build_quadratic_mesh, graded_layers, natural_symmetry
 from .newton import Equilibrium, Loading, Model, build_model, equilibrium
 
 __all__ = [
@@ -11,11 +11,13 @@ __all__ = [
     "Equilibrium",
     "Loading",
     "Model",
+    "Patch",
     "QuadraticMesh",
     "Symmetry",
     "base_state",
     "build_model",
     "build_quadratic_mesh",
+    "carried",
     "equilibrium",
     "graded_layers",
     "natural_symmetry",

@@ -13,11 +13,11 @@ from ...contract import Context, NotConverged
 from ...fem import HEX27
 from ..params import DehydrationParams
 from .hexahedron import POINTS, PRESSURE, pressure_functions
-from .location import fold, locate
+from .location import fold, interpolate, locate
 from .mesh import QuadraticMesh, Symmetry, build_quadratic_mesh, graded_layers, natural_symmetry
 from .newton import Equilibrium, Loading, Model, build_model, equilibrium
 
-__all__ = ["BaseState", "base_state"]
+__all__ = ["BaseState", "base_state", "carried"]
 
 logger = logging.getLogger("wizen.dehydration.implicit")
 
@@ -92,18 +92,28 @@ class BaseState:
         return self(fresh.reshape(-1, 3)).reshape(fresh.shape)
 
 
-def _carried(coarse: BaseState, model: Model) -> Equilibrium:
-    """The coarse state on another mesh of the same fruit."""
-    moved = coarse(model.mesh.positions)
-    fixed = np.arange(len(moved)) % model.mesh.levels == 0
+def carried(coarse: BaseState, model: Model, elsewhere: Equilibrium | None = None) -> Equilibrium:
+    """Return the coarse state on another mesh of the same fruit, or of a patch of it: a start, no equilibrium yet.
+
+    elsewhere: on `model`, what holds where the coarse state is of a patch and does not reach.
+    """
+    fresh, gauss = model.mesh.positions, model.gauss.reshape(-1, 3)
+    folded, signs = fold(coarse.mesh, fresh)
+    moved = fresh + signs * interpolate(coarse.params, coarse.mesh, coarse.displaced - coarse.nodes, folded)
     held = np.zeros_like(moved, dtype=bool)
-    held[fixed] = True
-    held[~fixed] = ~model.free
-    moved = np.where(held, model.mesh.positions, moved)
-    folded, _ = fold(coarse.mesh, model.gauss.reshape(-1, 3))
-    element, local = locate(coarse.params, coarse.mesh, folded)
+    held[:: model.mesh.levels] = True
+    for axis in model.mesh.planes:
+        held[:, axis] |= fresh[:, axis] == 0
+    moved = np.where(held, fresh, moved)
+    element, local = locate(coarse.params, coarse.mesh, fold(coarse.mesh, gauss)[0])
     at_points = np.einsum("pr,pr->p", pressure_functions(local), coarse.pressure[element]).reshape(-1, len(POINTS))
     pressure = at_points @ np.linalg.pinv(PRESSURE).T
+    if elsewhere is not None:
+        beyond = (element < 0).reshape(-1, len(POINTS)).any(axis=1)
+        pressure[beyond] = elsewhere.pressure[beyond]
+        outside = np.repeat(model.mesh.cut, model.mesh.levels)
+        outside[model.mesh.connectivity[beyond]] = True
+        moved[outside] = elsewhere.deformed[outside]
     return Equilibrium(coarse.state.shrinkage, moved, pressure)
 
 
@@ -146,7 +156,7 @@ def base_state(
                 params, s, n=n // 2, layers=core, exocarp_layers=exocarp_layers, kappa_ratio=kappa_ratio,
                 tolerance=max(tolerance, COARSE_TOLERANCE), loading=loading, symmetry=part, context=context,
             )  # fmt: skip
-            guess = _carried(coarse, model)
+            guess = carried(coarse, model)
         except NotConverged as failure:
             logger.info("the coarser mesh found no start: %s", failure)
     return BaseState(params, model, equilibrium(model, s, tolerance=tolerance, guess=guess, context=context))

@@ -11,7 +11,7 @@ from ..fresh.mesh import _FACES as FACES
 from ..params import DehydrationParams
 from .mesh import QuadraticMesh
 
-__all__ = ["fold", "locate"]
+__all__ = ["fold", "interpolate", "locate"]
 
 
 _NUDGE = 1e-9
@@ -70,12 +70,23 @@ def locate(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tu
     """Return element (k,) and local coordinates (k, 3) of fresh points (k, 3) inside the mesh's part (see `fold`).
 
     The element is that of the point's ray and depth; local coordinates then solve X(xi) = point, and may reach a
-    little beyond +-1 where the polynomial faces miss the fruit's surface.
+    little beyond +-1 where the polynomial faces miss the fruit's surface. The element is negative beyond a patch.
     """
     element, local = _first_guess(params, mesh, points)
-    corners = mesh.positions[mesh.connectivity[element]]
+    inside = np.flatnonzero(element >= 0)
+    corners, target, at = mesh.positions[mesh.connectivity[element[inside]]], points[inside], local[inside]
     for _ in range(4):
-        gap = points - np.einsum("pa,pai->pi", HEX27.shape(local), corners)
-        jacobian = np.einsum("pai,pak->pik", corners, HEX27.gradients(local))
-        local = np.clip(local + np.linalg.solve(jacobian, gap[..., None])[..., 0], -1.5, 1.5)
+        gap = target - np.matmul(HEX27.shape(at)[:, None], corners)[:, 0]
+        jacobian = np.matmul(corners.swapaxes(1, 2), HEX27.gradients(at))
+        at = np.clip(at + np.linalg.solve(jacobian, gap[..., None])[..., 0], -1.5, 1.5)
+    local[inside] = at
     return element, local
+
+
+def interpolate(params: DehydrationParams, mesh: QuadraticMesh, nodal: Floats, points: Floats) -> Floats:
+    """Return a field of nodal values (nn, 3) at fresh points (k, 3) of the mesh's part, 0 beyond a patch."""
+    element, local = locate(params, mesh, points)
+    found, inside = np.zeros_like(points), np.flatnonzero(element >= 0)
+    shape = HEX27.shape(local[inside])[:, None]
+    found[inside] = np.matmul(shape, nodal[mesh.connectivity[element[inside]]])[:, 0]
+    return found

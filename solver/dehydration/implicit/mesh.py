@@ -6,7 +6,7 @@ Every fruit is symmetric about x = 0 and z = 0; about y = 0 as well where r1 to 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,12 +15,19 @@ from ...contract import InvalidInput
 from ..fresh.mesh import CubedSphere, build_mesh
 from ..params import DehydrationParams
 
-__all__ = ["QuadraticMesh", "Symmetry", "build_quadratic_mesh", "graded_layers", "natural_symmetry"]
+__all__ = ["Patch", "QuadraticMesh", "Symmetry", "build_quadratic_mesh", "graded_layers", "natural_symmetry"]
 
 Symmetry = Literal["octant", "quarter", "whole"]
 
 #: Planes (as normal axes) that bound each part.
 PLANES: dict[Symmetry, tuple[int, ...]] = {"octant": (0, 1, 2), "quarter": (0, 2), "whole": ()}
+
+
+class Patch(NamedTuple):
+    """Part of a fruit: all below the outer surface within `radius` of `centre` (3,), both fresh [r1]."""
+
+    centre: Floats
+    radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +39,7 @@ class QuadraticMesh:
     stacks: (ns, 9) columns under each quad of the surface. planes: normal axes of the symmetry planes that bound the
     mesh. quad_of: (6, n, n) stack of each quad of the cubed sphere, -1 where the part leaves it out.
     breaks: (layers + 1,) radial breakpoints: fraction of the flesh up to 1, then 1 + fraction of the exocarp.
+    cut: (columns,) those on the edge of a patch, which no symmetry holds.
     """
 
     sphere: CubedSphere
@@ -43,6 +51,7 @@ class QuadraticMesh:
     quad_of: Ints
     levels: int
     breaks: Floats
+    cut: Bools
 
     @property
     def columns(self) -> int:
@@ -74,9 +83,12 @@ def _with_middles(breaks: Floats) -> Floats:
 
 
 def build_quadratic_mesh(
-    params: DehydrationParams, n: int, core: Floats, symmetry: Symmetry = "whole", exocarp_layers: int = 1
-) -> QuadraticMesh:
+    params: DehydrationParams, n: int, core: Floats, symmetry: Symmetry = "whole", exocarp_layers: int = 1,
+    patch: Patch | None = None,
+) -> QuadraticMesh:  # fmt: skip
     """Return the mesh with `n` quadratic elements per edge of the cubed sphere and core layers at fractions `core`.
+
+    patch: the stacks that are kept, by the middle of their outer faces; None keeps all.
 
     Raises InvalidInput if a symmetric part is asked for with an odd `n`: its planes would cut elements in two.
     """
@@ -92,7 +104,13 @@ def build_quadratic_mesh(
     inside = np.ones(len(linear.rays), dtype=bool)
     for axis in planes:
         inside &= linear.rays[:, axis] > -1e-9
-    kept = inside[quads].all(axis=-1)
+    there = inside[quads].all(axis=-1)
+    kept = there
+    if patch is not None:
+        middles = linear.positions.reshape(-1, levels, 3)[quads[..., 4], -1]
+        kept = there & (np.linalg.norm(middles - patch.centre, axis=-1) <= patch.radius)
+    edge = np.zeros(len(linear.rays), dtype=bool)
+    edge[quads[there & ~kept]] = True
     quad_of = np.where(kept, np.cumsum(kept.ravel()).reshape(kept.shape) - 1, -1)
     columns = np.unique(quads[kept])
     number = np.full(len(linear.rays), -1)
@@ -107,5 +125,6 @@ def build_quadratic_mesh(
     is_exocarp = np.tile(np.arange(layers) >= len(core) - 1, len(stacks))
     breaks = np.concatenate([core, 1 + np.arange(1, exocarp_layers + 1) / exocarp_layers])
     return QuadraticMesh(
-        linear.sphere, positions.reshape(-1, 3), connectivity, is_exocarp, stacks, planes, quad_of, levels, breaks
-    )
+        linear.sphere, positions.reshape(-1, 3), connectivity, is_exocarp, stacks, planes, quad_of, levels, breaks,
+        edge[columns],
+    )  # fmt: skip

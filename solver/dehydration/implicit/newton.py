@@ -48,7 +48,8 @@ def uniform(points: Floats, shrinkage: float) -> Floats:
 class Model:
     """A mesh with materials, supports and the symbolic half of its factorisation.
 
-    free: (nodes off the stone, 3) components that may move. gauss: (ne, 27, 3) fresh Gauss points.
+    free: (nodes off the stone, 3) components that may move; those of a patch's edge stay where a start puts them.
+    gauss: (ne, 27, 3) fresh Gauss points.
     """
 
     mesh: QuadraticMesh
@@ -111,6 +112,7 @@ def build_model(
     free = np.ones((int((~fixed).sum()), 3), dtype=bool)
     for axis in mesh.planes:
         free[:, axis] = mesh.positions[~fixed, axis] != 0
+    free[np.repeat(mesh.cut, mesh.levels - 1)] = False
     gauss = np.matmul(HEX27.shape(POINTS), mesh.positions[mesh.connectivity])
     return Model(mesh, mu, kappa_ratio * mu, loading or uniform, pattern, analysis, free, gauss)
 

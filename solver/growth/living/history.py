@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..params import Solid
-from ..settling.active import Habit
-from ..settling.tangent import Tangent
 from ..state import State
+from ..stepping import Carried
 from ..tooling.tools import Tool
 
 __all__ = ["History", "Moment"]
@@ -23,8 +22,7 @@ class Moment(NamedTuple):
     state: State
     tools: tuple[Tool, ...]
     solids: tuple[Solid, ...]
-    tangent: Tangent
-    habit: Habit
+    carried: Carried
 
 
 class History(list[Moment]):
@@ -35,7 +33,7 @@ class History(list[Moment]):
         self.append(moment)
         seen: set[int] = set()
         for number in range(len(self) - 1, 0, -1):
-            seen.add(id(self[number].tangent.inverse))
+            seen.add(id(self[number].carried.tangent.inverse))
             if len(seen) > _INVERSES or len(self) - number > _MOMENTS:
                 del self[1 : number + 1]
                 return

@@ -12,7 +12,7 @@ from ...contract import InvalidInput, Quality, SolverError
 from ...meshes import Frame
 from ..anchors import place
 from ..engine import Engine, Undone
-from ..params import GrowthParams, Solid
+from ..params import GrowthParams, Solid, check_pace
 from ..settings import choose
 from ..settling.stage import residual
 from ..shown import shown
@@ -98,7 +98,8 @@ class GrowingLive:
         """Take an action; return the number of the tool or solid that it concerns.
 
         Raises:
-            InvalidInput: too many tools, solids or dabs, a place off the surface, a number that nothing has.
+            InvalidInput: too many tools, solids or dabs, a place off the surface, a solid that is too fast, or
+                a number that nothing has.
 
         """
         if self.owed > self.stage + 1e-9:
@@ -116,6 +117,10 @@ class GrowingLive:
             return {"tool": self._engine.add(action.tool)}
         if isinstance(action, Put):
             _room("solids", len(self.script.solids), _MOST_SOLIDS)
+            try:
+                check_pace(action.solid, self.step)
+            except ValueError as error:
+                raise InvalidInput(f"solid: {error}.", advice="Take a smaller `velocity`.") from None
             self.begin()
             return {"solid": self._engine.put(action.solid)}
         assert isinstance(action, Lift)

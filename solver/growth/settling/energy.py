@@ -22,7 +22,7 @@ from .loads import area_vectors, depth_in, half_way
 from .tangent import LEAF, Tangent
 from .touching import Touching
 
-__all__ = ["StepEnergy", "ahead", "elastic"]
+__all__ = ["StepEnergy", "ahead", "elastic", "vertex_areas"]
 
 #: Added to the tangent's diagonal [mu]: it takes out the rigid motions and steadies what is about to buckle.
 _SHIFT = 1e-5
@@ -35,6 +35,12 @@ _HARDNESS = 30.0
 def elastic(state: State, material: shell.Material, bending: Bending) -> float:
     """Return the energy of stretching and bending of a state, in mu l^2."""
     return StepEnergy(state, material, 0.0, (), Tangent(state.mesh), bending=bending)(state.x)[0]
+
+
+def vertex_areas(state: State) -> Floats:
+    """Return the rest areas (n,) of vertices."""
+    thirds = np.repeat(shell.areas(state.g) / 3, 3)
+    return np.bincount(state.mesh.triangles.ravel(), thirds, len(state.x)).astype(np.float64)
 
 
 def ahead(energy: StepEnergy, state: State, dt: float) -> Floats:
@@ -80,8 +86,7 @@ class StepEnergy:
         self._room = min((half_way(solid) for solid in solids), default=np.inf)
         #: Whether the last step asked for was not allowed whole.
         self.cut = False
-        thirds = np.repeat(shell.areas(state.g) / 3, 3)
-        self.areas = np.bincount(state.mesh.triangles.ravel(), thirds, len(state.x)).astype(np.float64)
+        self.areas = vertex_areas(state)
         unit = state.length * min(1.0, material.flexural / state.length**2)
         self.touching = Touching(state, distance, unit, self.areas) if distance else None
         self.follow(state.x)

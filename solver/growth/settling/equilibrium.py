@@ -34,7 +34,7 @@ def begun(
 ) -> Generator[None, None, Settled]:
     """Find where the search for the whole begins, from the state before the step; yields after pieces of work."""
     state = energy.state
-    if not (params.active and params.imperfection and not params.contact):
+    if not (params.active and params.imperfection and not energy.touching):
         return Settled(ahead(energy, state, dt), 0, habit)
     now, last = state.g.T, before.g.T
     changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])

@@ -16,6 +16,8 @@ __all__ = ["check_held", "check_near", "check_outward", "enclosed"]
 
 #: Share of the load beyond which what is left over is no rounding, and standard deviations of what vertices leave over.
 _LEFT, _DEVIATIONS = 0.3, 3.0
+#: Share of all loads that their sum is wrong by where they cancel: rounding, however they are added up.
+_DIGITS = 1e-12
 #: Sizes of a shape that it may move by in one step.
 _AWAY = 50.0
 
@@ -38,8 +40,9 @@ def check_held(energy: StepEnergy, state: State, goal: float, last: float) -> No
     free = ~state.held.any(axis=0)
     left = np.abs(energy(state.x)[1].sum(axis=0)) * free
     pulled = float(np.abs(energy.load.sum(axis=0)).max())
+    least = max(_DEVIATIONS * goal * np.sqrt(len(state.x)), _DIGITS * float(np.abs(energy.load).sum()))
     for axis, name in enumerate("xyz"):
-        if left[axis] > max(_LEFT * pulled, _DEVIATIONS * goal * np.sqrt(len(state.x))):
+        if left[axis] > max(_LEFT * pulled, least):
             raise NotConverged(
                 f"nothing holds the sheet along {name}: at growth time {state.time:g} it falls without end.",
                 advice="Attach a part of it, or let it lie on a solid that is wide enough.",
@@ -77,6 +80,6 @@ def check_outward(state: State, volume: float, last: float, params: GrowthParams
         advice = "Less suction, or a thicker sheet" if params.pressure < 0 else "Shorter steps, or slower growth"
         raise Unstable(
             f"the surface has turned inside out by growth time {state.time:g}: it encloses {now:.3g}.",
-            advice=f"{advice}; with `contact` it cannot pass through itself.",
+            advice=f"{advice}; with contact = {params.thickness:g} it cannot pass through itself, and takes its time.",
             last_stage=last,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ..params import Plane, Solid, SolidBall, SolidBox
+from ..params import Plane, Solid, SolidBox
 
 __all__ = ["area_vectors", "depth_in", "half_way"]
 
@@ -31,9 +31,7 @@ def depth_in(solid: Solid, x: Floats) -> tuple[Floats, Floats]:
 
 def half_way(solid: Solid) -> float:
     """Return half of what it is from a solid's surface to its middle at least."""
-    if isinstance(solid, Plane):
-        return np.inf
-    return solid.radius / 2 if isinstance(solid, SolidBall) else min(solid.size) / 4
+    return solid.thick / 2
 
 
 def _depth_in_box(box: SolidBox, way: Floats) -> tuple[Floats, Floats]:

@@ -38,12 +38,13 @@ def residual(state: State, params: GrowthParams) -> float:
     return state.forces * state.length / force_unit(state, shell.Material(params.thickness, params.poisson))
 
 
-def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[State]:
+def settled(state: State, params: GrowthParams, tolerance: float, distance: float) -> Iterator[State]:
     """Settle a state until no force is above tolerance x `force_unit`, or as far as it goes; yields after each step.
 
     And until nothing moves any more: Newton's last step, which is the distance that is left, is below 0.3 % of an edge.
     Pressure follows the normals, which were frozen on the way here: within each step where the surface is closed, else
     it is laid again until nothing changes. The last value is the result, `forces` of which is what is left.
+    distance: that parts keep from each other, 0 where none come near.
 
     Raises:
         Unstable: the shape left the finite.
@@ -57,7 +58,7 @@ def settled(state: State, params: GrowthParams, tolerance: float) -> Iterator[St
         present(params.solids, state.time),
         Tangent(state.mesh),
         params.gravity,
-        params.contact,
+        distance,
         params.bending,
         following=params.bending == "hinges",
     )

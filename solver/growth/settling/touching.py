@@ -13,10 +13,10 @@ from ...linalg.multifrontal import Analysis, analyse
 from ...shell.contact.steps import largest
 from ..state import State
 
-__all__ = ["Touching"]
+__all__ = ["Touching", "touches"]
 
 #: Room for moves, at first and at most, and for the change of an edge, over the mean rest edge.
-_FAR, _FURTHEST, _CHANGE = 0.4, 2.0, 0.12
+_FAR, _FURTHEST, _CHANGE = 0.2, 1.0, 0.12
 #: Share of a step up to a touch that is taken.
 _SHORT = 0.9
 #: How much further than their reach stencils are apart that are coupled in second derivatives already.
@@ -29,10 +29,7 @@ class Touching:
     def __init__(self, state: State, distance: float, unit: float, areas: Floats) -> None:
         """distance: that parts keep. unit: force that bends an edge [mu l]. areas (n,): of the vertices at rest."""
         self._mesh, self._length, self._distance = state.mesh, _edge(state), distance
-        # where a step grows threefold what is near is near as it is, too: else it would push before it has room
-        rest, now = state.g, shell.metric(state.x, state.mesh.triangles)
-        lengths = np.minimum(_lengths(rest, state.mesh), _lengths(now, state.mesh))
-        self._near = shell.near_of((rest, now), state.mesh, lengths, areas, distance)
+        self._near = _near(state, distance, areas)
         # pressure that bends a sheet as sharply as its mesh can show
         self._hardness = unit / state.length**2
         self._coupled: tuple[Ints, shell.Pattern, Analysis] | None = None
@@ -113,6 +110,20 @@ class Touching:
 
     def _close(self, x: Floats) -> Ints:
         return self.pairs.stencils[shell.within(x, self.pairs, _AHEAD)]
+
+
+def touches(state: State, distance: float, areas: Floats) -> bool:
+    """Return whether anything of a state is within reach as `Touching` has it."""
+    near = _near(state, distance, areas)
+    found = shell.search(state.x, state.mesh, near, distance, 0.0, 0.0, state.length)
+    return len(shell.within(state.x, found)) > 0
+
+
+def _near(state: State, distance: float, areas: Floats) -> shell.Near:
+    # where a step grows threefold what is near is near as it is, too: else it would push before it has room
+    rest, now = state.g, shell.metric(state.x, state.mesh.triangles)
+    lengths = np.minimum(_lengths(rest, state.mesh), _lengths(now, state.mesh))
+    return shell.near_of((rest, now), state.mesh, lengths, areas, distance)
 
 
 def _lengths(g: Floats, mesh: shell.Topology) -> Floats:

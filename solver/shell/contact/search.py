@@ -61,8 +61,9 @@ def search(x: Floats, mesh: Topology, near: Near, distance: float, room: float, 
     places = _near_places(x, near.start, near.other, even, spans, near.way, distance, change / length)
     places = np.concatenate([places, _far_places(x, order, begin, keys, wide, near.start, near.other, spans, reach)])
     own = near.start, near.other, near.way, near.altitudes, near.areas, near.face_start, near.faces
+    balls = *_balls(x, near.faces), *_balls(x, near.edges)
     stencils, kinds, felt, areas, beyond, close = _stencils(
-        x, places, *own, near.edge_start, near.edges, spans, distance, reach, change / length
+        x, places, *own, near.edge_start, near.edges, *balls, spans, distance, reach, change / length
     )
     beyond = np.where(close, length * beyond, beyond)
     order = np.lexsort((beyond, ~close))
@@ -148,7 +149,8 @@ def _square(x: Floats, u: int, v: int) -> float:
 @njit(cache=True, error_model="numpy")
 def _stencils(
     x: Floats, places: Ints, start: Ints, other: Ints, way: Floats, altitudes: Floats, areas: Floats, face_start: Ints,
-    faces: Ints, edge_start: Ints, edges: Ints, spans: Floats, distance: float, far: float, change: float,
+    faces: Ints, edge_start: Ints, edges: Ints, face_middles: Floats, face_radii: Floats, edge_middles: Floats,
+    edge_radii: Floats, spans: Floats, distance: float, far: float, change: float,
 ) -> tuple[Ints, Ints, Floats, Floats, Floats, Bools]:  # fmt: skip
     """Return the stencils of what pairs of vertices own, as in `Pairs`, and which are near along the sheet."""
     room, count, last = 1024, 0, -1
@@ -162,6 +164,7 @@ def _stencils(
                 mark[other[at]], ways[other[at]] = v, way[at]
             last = v
         apart = _APART * (ways[u] + spans[u] + spans[v]) if near else 1.0
+        furthest = distance + apart * change if near else far
         # 0: v and faces of u, 1: u and faces of v, 2: edges of both; near ones come both ways
         for kind in range(3):
             if near and (kind == 1 or (kind == 2 and u < v)):
@@ -169,11 +172,18 @@ def _stencils(
             what, owner = (EDGES, u) if kind == 2 else (FACE, v if kind == 1 else u)
             q[0] = u if kind == 1 else v
             for a in range(edge_start[v + 1] - edge_start[v] if kind == 2 else 1):
-                first, end = face_start[owner], face_start[owner + 1]
+                first, end, about, radius = face_start[owner], face_start[owner + 1], x[q[0]], furthest
                 if kind == 2:
                     q[1] = edges[edge_start[v] + a, 1]
                     first, end = edge_start[u], edge_start[u + 1]
+                    about, radius = edge_middles[edge_start[v] + a], furthest + edge_radii[edge_start[v] + a]
                 for b in range(first, end):
+                    # most are ruled out by the balls about them
+                    if kind == 2:
+                        if _apart(about, edge_middles[b], radius + edge_radii[b]):
+                            continue
+                    elif _apart(about, face_middles[b], radius + face_radii[b]):
+                        continue
                     if kind == 2:
                         q[2], q[3] = edges[b]
                     else:
@@ -196,6 +206,28 @@ def _stencils(
                     count += 1
     numbers = numbers[:, :count]
     return stencils[:count], kinds[:count], numbers[0], numbers[1], numbers[2], close[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _balls(x: Floats, corners: Ints) -> tuple[Floats, Floats]:
+    """Return the middles (m, 3) and radii (m,) of balls about what has these corners (m, k)."""
+    middles, radii = np.zeros((len(corners), 3)), np.zeros(len(corners))
+    for m in range(len(corners)):
+        for v in corners[m]:
+            for d in range(3):
+                middles[m, d] += x[v, d] / corners.shape[1]
+        for v in corners[m]:
+            square = 0.0
+            for d in range(3):
+                square += (x[v, d] - middles[m, d]) ** 2
+            radii[m] = max(radii[m], np.sqrt(square))
+    return middles, radii
+
+
+@njit(cache=True, error_model="numpy")
+def _apart(a: Floats, b: Floats, distance: float) -> bool:
+    found: bool = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2 > distance * distance * (1 + 1e-12)
+    return found
 
 
 @njit(cache=True)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver.contract import InvalidGeometry, Need
+from solver.contract import InvalidGeometry, InvalidInput, Need
 from solver.decay import SOLVER, DecayParams
 from solver.decay.body import embedded
+from solver.decay.body.rind import rind
 from solver.decay.body.solid import volumes
 from solver.decay.body.stuffing import boundary, pieces, stuffed
 from solver.decay.fields.system import laid
@@ -38,6 +39,12 @@ def bent() -> trimesh.Trimesh:
         [(1.5 + thick * y) * np.sin(along), (1.5 + thick * y) * -np.cos(along), -thick * z], axis=1
     )
     return found
+
+
+def cap(subdivisions: int = 3) -> trimesh.Trimesh:
+    """An open half of a ball of radius 1."""
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    return ball.submesh([ball.triangles_center[:, 1] < 0.02], append=True)
 
 
 def run(mesh: trimesh.Trimesh, stages=(0.0, 10.0), fields=BODY, **values):
@@ -139,10 +146,17 @@ def test_flesh_reaches_as_low_as_its_mesh() -> None:
 
 def test_what_cannot_hold_flesh_says_so_and_where(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(embedded, "_MOST", 10_000)
-    sheet = trimesh.creation.box((1.0, 1.0, 1.0))
-    sheet.update_faces(np.arange(len(sheet.faces)) > 1)
-    with pytest.raises(InvalidGeometry, match="open"):
-        run(sheet)
+    turned = cap()
+    turned.faces[7] = turned.faces[7][::-1]
+    with pytest.raises(InvalidGeometry, match=r"wound opposite ways at \("):
+        run(turned)
+    fin = cap()
+    a, b = fin.faces[7][:2]
+    fin = trimesh.Trimesh(np.vstack([fin.vertices, [[0, 2, 0]]]), np.vstack([fin.faces, [[a, b, len(fin.vertices)]]]))
+    with pytest.raises(InvalidGeometry, match=r"3 triangles share an edge at \("):
+        run(fin)
+    with pytest.raises(InvalidInput, match="no density"):
+        run(cap(), fields=("density",))
     far = trimesh.creation.icosphere(subdivisions=2)
     other = far.copy()
     other.apply_scale(0.2).apply_translation([3.0, 0, 0])
@@ -152,3 +166,28 @@ def test_what_cannot_hold_flesh_says_so_and_where(monkeypatch: pytest.MonkeyPatc
     needle.vertices = np.where(needle.vertices[:, :1] > 0.999, [[3.0, 0, 0]], needle.vertices)
     with pytest.raises(InvalidGeometry, match=r"(too thin at|about) \((2|3)"):
         run(needle)
+
+
+def test_an_open_mesh_gets_a_rind_of_flesh_on_the_side_that_it_faces_from() -> None:
+    mesh = cap()
+    points, faces = rind(np.asarray(mesh.vertices), np.asarray(mesh.faces), 0.2)
+    closed = trimesh.Trimesh(points, faces, process=False)
+    assert closed.is_watertight
+    assert closed.is_winding_consistent
+    solid_angle = float(mesh.area)  # of facets: 1 % below the ball's
+    assert closed.volume == pytest.approx(solid_angle * (1 - 0.8**3) / 3, rel=0.02)
+    fields = ("mesh_position", "triangle", "mass", "water_lost")
+    found = run(mesh, fields=fields, flesh={**STILL, "gravity": 0.0, "rind": 0.2}, wounds=[])
+    fresh, dry = found.mesh_position.values.astype(float)
+    # what only dries shrinks alike everywhere, and its mass is what has not evaporated
+    share = float(found.water_lost[1])
+    assert share > 0.01
+    assert float(found.mass[1]) == pytest.approx(1 - share, abs=1e-9)
+    scale = (1 - share) ** (1 / 3)
+    middle = fresh.mean(axis=0)
+    assert np.abs(dry - dry.mean(axis=0) - scale * (fresh - middle)).max() < 1e-5
+    # and what has a weight rests on its floor
+    lying = run(mesh, (12.0,), fields=("mesh_position", "triangle", "least_jacobian"), wounds=[{"vertex": 3}])
+    assert lying.mesh_position.values[0, :, 1].min() > float(mesh.vertices[:, 1].min()) - 1e-3
+    assert np.abs(lying.mesh_position.values[0] - mesh.vertices).max() > 0.1
+    assert float(lying.least_jacobian[0]) > 0

@@ -67,10 +67,10 @@ def test_what_is_far_stays_to_the_last_bit_and_the_residual_is_the_same_everywhe
         before = alone.state
         alone.advance(1e9, until=before.time + 1)
         assert alone.residual <= 1e-3
-        state, part = alone.state, alone._habit.part
+        state, part = alone.state, alone._carried.habit.part
         energy = StepEnergy(state, shell.Material(0.02), 0.0, (), Tangent(state.mesh))
         assert np.abs(energy(state.x)[1]).max() <= 1e-3 * state.length
-        if part is not None and alone._habit.failures == 0:
+        if part is not None and alone._carried.habit.failures == 0:
             moved = (state.x != before.x).any(axis=1)
             assert not moved[~part.inside(len(moved))].any()
             still += int(moved.any())
@@ -80,7 +80,7 @@ def test_what_is_far_stays_to_the_last_bit_and_the_residual_is_the_same_everywhe
 def test_the_error_against_the_whole_is_that_of_the_residual():
     """What parts leave out is no more than what the goal leaves out: both ways against a hundredth of the goal."""
     exact, whole, parts = engine(1000, 10, 1e-5), engine(1000, 10), engine(1000, 10, active=True)
-    assert parts._habit.part is not None
+    assert parts._carried.habit.part is not None
 
     def apart(one: Engine, other: Engine) -> float:
         x, y = one.state.x - one.state.x.mean(axis=0), other.state.x - other.state.x.mean(axis=0)

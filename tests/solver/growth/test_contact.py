@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import shell
-from solver.contract import InvalidGeometry
+from solver.contract import Context, InvalidGeometry
 from solver.geometry.crossings import crossings
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
@@ -64,12 +64,42 @@ def test_a_strip_that_curls_up_stays_outside_itself():
         engine = Engine(GrowthParams.parse({**common, "contact": contact}), 250, 1e-3)
         while engine.state.time < 1 - 1e-9:
             engine.advance(1e9, until=engine.state.time + 0.125)
-            if contact:
+            if contact != 0:
                 assert not crossings(engine.state.x, engine.state.mesh.triangles).count
         return crossings(engine.state.x, engine.state.mesh.triangles).count
 
     assert through(0.0) > 20
     assert through(DISTANCE) == 0
+    # not asked for, it is the thickness, from the step on in which parts come that near
+    assert through(None) == 0
+
+
+def test_where_no_part_comes_near_another_contact_costs_a_look_and_changes_no_byte():
+    tool = {"kind": "spot", "at": (0, 0, 1), "radius": 0.5, "stretch": (3.0, 3.0)}
+    ends = []
+    for contact in (0.0, None):
+        engine = Engine(GrowthParams.parse({"tools": [tool], "step": 0.25, "contact": contact}), 200, 1e-3)
+        ends.append(engine.reach(1.0, Context()).x)
+        assert engine.distance == 0.0
+    assert np.array_equal(*ends)
+
+
+def test_what_comes_near_only_when_a_stage_settles_is_kept_apart_too():
+    """A loose tolerance leaves most of the curling to the end, where a stage is settled."""
+    curl = {
+        "kind": "surface",
+        "where": {"kind": "everywhere"},
+        "frame": (1, 0, 0),
+        "stretch": (1, 1),
+        "curl": (4.0, 0),
+    }
+    values = {"shape": "strip", "aspect": 6.0, "thickness": 0.03, "step": 0.25, "remesh": 0, "tools": [curl]}
+    counts = []
+    for contact in (0.0, None):
+        state = Engine(GrowthParams.parse({**values, "contact": contact}), 60, 1e-3).reach(1.0, Context())
+        counts.append(crossings(state.x, state.mesh.triangles).count)
+    assert counts[0] > 100
+    assert counts[1] == 0
 
 
 def test_a_shape_that_passes_through_itself_is_refused_unless_it_may(monkeypatch):
@@ -80,7 +110,7 @@ def test_a_shape_that_passes_through_itself_is_refused_unless_it_may(monkeypatch
     with pytest.raises(InvalidGeometry, match="passes through itself") as caught:
         Engine(GrowthParams.parse({"shape": "disc", "contact": 0.05}), 50)
     assert "contact = 0" in caught.value.advice
-    Engine(GrowthParams.parse({"shape": "disc"}), 50)
+    Engine(GrowthParams.parse({"shape": "disc", "contact": 0.0}), 50)
 
 
 def test_energy_never_rises_in_contact():

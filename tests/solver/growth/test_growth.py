@@ -263,7 +263,14 @@ HOSTILE = {
     "spot on a border": {"shape": "disc", "tools": [{"kind": "spot", "at": (1.0, 0.0, 0.0)}], "step": 0.25},
     "spot finer than the mesh": {"tools": [{"kind": "spot", "at": (0, 0, 1), "radius": 0.01, "stretch": (9.0, 9.0)}]},
     "tenfold along one way": {"shape": "strip", "tools": [surface(frame=(1, 0, 0), stretch=(10.0, 1.0))]},
-    "plastic and remeshed": {"plasticity": 1.0, "remesh": 1.1, "tools": [surface(stretch=(2.5, 1.0))], "step": 0.25},
+    # it crumples: parts that keep apart take seconds
+    "plastic and remeshed": {
+        "plasticity": 1.0,
+        "remesh": 1.1,
+        "tools": [surface(stretch=(2.5, 1.0))],
+        "step": 0.25,
+        "contact": 0.0,
+    },
     "paper thin": {"thickness": 0.001, "tools": [{"kind": "spot", "at": (0, 0, 1), "stretch": (3.0, 3.0)}]},
 }
 #: Which of them end in an error, with the last equilibrium kept.

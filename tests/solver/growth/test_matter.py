@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from solver.contract import Context, Need
+from solver.contract import Context, InvalidInput, Need
 from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.matter import BARE, coloured
-from solver.growth.params import GrowthParams, Plane, SolidBox
+from solver.growth.params import GrowthParams, Plane, SolidBox, present
 from solver.growth.settling.loads import depth_in
 from solver.growth.shapes import start
 from solver.growth.tooling.places import Lines, share
@@ -145,3 +145,25 @@ def test_a_cloth_lies_on_a_box_and_hangs_over_its_sides():
     assert state.x[top, 2] == pytest.approx(np.full(int(top.sum()), -0.01), abs=0.005)
     assert state.x[:, 2].min() < -0.1
     assert not isinstance(params.solids[0], Plane)
+
+
+def test_a_ball_that_rises_lifts_the_sheet_and_leaves_it_behind():
+    held = [{"where": {"kind": "rim", "width": 0.1}}]
+    ball = {"kind": "ball", "centre": (0.1, 0, -0.75), "radius": 0.5, "velocity": (0, 0, 1.0), "duration": 0.6}
+    common = {"shape": "disc", "thickness": 0.02, "curved": False, "attached": held, "step": 0.1}
+    state, params = reached(0.5, 300, **common, solids=[ball])
+    there = present(params.solids, 0.5)[0]
+    assert there.centre == pytest.approx((0.1, 0.0, -0.25))
+    # a stretched sheet presses itself into a penalty, a little
+    assert depth_in(there, state.x)[0].max() < 0.03
+    assert state.x[:, 2].max() == pytest.approx(0.25, abs=0.03)
+    assert not present(params.solids, 0.65)
+    back, _ = reached(1.0, 300, **common, solids=[ball])
+    assert np.abs(back.x[:, 2]).max() < 0.01
+
+
+def test_a_solid_that_would_pass_through_the_sheet_in_a_step_is_refused():
+    ball = {"kind": "ball", "radius": 0.5, "velocity": (0, 0, 3.0)}
+    with pytest.raises(InvalidInput, match=r"ball moves by 0\.3 in a step of 0\.1.*0\.5 deep"):
+        SOLVER.parse({"solids": [ball], "step": 0.1})
+    SOLVER.parse({"solids": [ball], "step": 0.05})

@@ -1,0 +1,152 @@
+"""One step of growth: what is plastic forgotten, a mesh that fits, the rest state grown, the equilibrium found.
+
+Unless a distance is asked for, contact costs what it is needed for: a step is taken as if parts could pass through each
+other, and looked at. Where none came near another it stands as it is, to the last bit. Where some did it is taken anew
+with contact from before, where all was apart, and so are all that follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import shell
+from ..geometry.crossings import crossings
+from .matter import grown_further
+from .params import GrowthParams, Solid, present
+from .plastic import forgotten
+from .remeshing.remesh import remesh
+from .settling.active import Habit
+from .settling.energy import StepEnergy, vertex_areas
+from .settling.equilibrium import balanced, begun
+from .settling.impossible import check_held, check_outward
+from .settling.tangent import Tangent
+from .settling.touching import touches
+from .state import State
+from .tooling.placing import branched, started
+from .tooling.rates import grown, rates
+from .tooling.tools import Tool
+
+__all__ = ["Carried", "Steps"]
+
+#: Most looks on the way of one step.
+_LOOKS = 16
+
+
+class Carried(NamedTuple):
+    """What a step takes over from the one before, beside the state."""
+
+    tangent: Tangent
+    habit: Habit
+    #: That parts keep from each other, 0 as long as none has come near another.
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """How a run takes its steps.
+
+    tolerance: residual; most: steps to an equilibrium. longest: rest edge that is not cut; largest: vertices at most.
+    volume: inside a closed surface, 0 of others.
+    """
+
+    params: GrowthParams
+    tolerance: float
+    most: int
+    longest: float
+    largest: int
+    volume: float
+
+    def step(
+        self, before: State, carried: Carried, tools: Sequence[Tool], solids: Sequence[Solid], dt: float
+    ) -> Generator[None, None, tuple[State, Carried]]:
+        """Grow by dt and find the equilibrium; yields after every piece of work.
+
+        Raises:
+            NotConverged: an equilibrium was not found. Unstable: the shape left the finite, or is inside out.
+            OverBudget: too many vertices.
+
+        """
+        found = yield from self._taken(before, carried, tools, solids, dt)
+        meshed, state, after = found
+        if self.params.contact is None and not carried.distance:
+            clear = meshed is before or not crossings(meshed.x, meshed.mesh.triangles).count
+            yield
+            if not (clear and self.apart(replace(state, x=meshed.x), state)):
+                yield
+                near = carried._replace(distance=self.params.thickness)
+                _, state, after = yield from self._taken(before, near, tools, solids, dt)
+        return state, after
+
+    def apart(self, start: State, end: State) -> bool:
+        """Return whether no part of the sheet is as near another as its thickness at the end of a straight way.
+
+        On the way it is looked whether anything crosses, as often as vertices move by an edge.
+        """
+        way = end.x - start.x
+        way -= way.mean(axis=0)
+        looks = min(max(int(np.ceil(np.abs(way).max() / end.length)), 1), _LOOKS)
+        for k in range(looks):
+            if crossings(end.x - k / looks * way, end.mesh.triangles).count:
+                return False
+        return not touches(end, self.params.thickness, vertex_areas(end))
+
+    @property
+    def _material(self) -> shell.Material:
+        return shell.Material(self.params.thickness, self.params.poisson)
+
+    def _taken(
+        self, before: State, carried: Carried, tools: Sequence[Tool], solids: Sequence[Solid], dt: float
+    ) -> Generator[None, None, tuple[State, State, Carried]]:
+        """Take a step; the value is the state on the step's mesh, the one at its end, and what is carried."""
+        p, distance = self.params, carried.distance
+        # the way on from here is the same after an undo only with the same inverse
+        carried = carried._replace(tangent=carried.tangent.copy())
+        meshed, carried = yield from self._readied(before, carried)
+        state = started(meshed, tools, p.step, p.seed)
+        middle = state.time + dt / 2
+        acting = dict(enumerate(tools))
+        g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
+        yield
+        state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
+        there = present(solids, state.time)
+        energy = StepEnergy(state, self._material, p.pressure, there, carried.tangent, p.gravity, distance, p.bending)
+        goal = self.tolerance * state.length
+        if not there:
+            # whatever the shape, nothing will take up what pulls now
+            check_held(energy, state, goal, before.time)
+        yield
+        first = yield from begun(energy, meshed, dt, goal, p, carried.habit)
+        point, spent = yield from balanced(energy, first.x, first.spent, goal, self.most, p, before.time)
+        forces = point.gradient / state.length
+        drift = (point.x - state.x) / dt if dt else None
+        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
+        # where rounding ends the search, more may be left than was asked for
+        check_held(energy, state, max(goal, point.gradient), before.time)
+        check_outward(state, self.volume, before.time, p)
+        state = branched(state, acting, p.seed)
+        yield
+        return meshed, state, carried._replace(habit=first.habit)
+
+    def _readied(self, state: State, carried: Carried) -> Generator[None, None, tuple[State, Carried]]:
+        """Find the state from which a step grows: what is plastic forgotten, on a mesh that fits; yields in between.
+
+        Both disturb the equilibrium. So they come before a step's growth, not after it: what is returned is settled on
+        the mesh and against the rest state that are returned with it.
+        """
+        p = self.params
+        if p.plasticity and state.time:
+            state = replace(state, g=forgotten(state, p.plasticity, p.yield_strain))
+        if not p.remesh:
+            return state, carried
+        finer, changes = yield from remesh(state, self.longest, self.largest, apart=carried.distance > 0)
+        tangent, habit = carried.tangent, carried.habit
+        for pairs in changes:
+            tangent = tangent.remeshed(finer.mesh, pairs)
+        if finer.mesh is not state.mesh:
+            tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
+            habit = habit.remeshed(finer.mesh, changes)
+        return finer, carried._replace(tangent=tangent, habit=habit)
