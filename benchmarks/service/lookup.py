@@ -2,8 +2,9 @@
 
 Rows go by resolution, by what is asked for (in the default method), and by method (positions).
 
-The table is synthetic (30 samples, 5 stages, 96 waves of random smooth displacement), because only its size matters
-here; errors against finite-element runs are measured elsewhere.
+The table is synthetic (30 samples, 5 stages, 96 waves of random smooth displacement that does not fold), because only
+its size matters here; errors against finite-element runs are measured elsewhere. Then shapes that fold, of the default
+table that comes with wizen at random places: what putting them apart takes hangs on how they fold.
 """
 
 from __future__ import annotations
@@ -24,26 +25,32 @@ from solver import registry
 from solver.contract import Need, Params, finish
 from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
-from store import tables
+from store import starter, tables
 from store.blending import methods
 from store.ledger.jobs import JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import spectra, surface, transforms
+from store.surfaces.apart import compiled
 
 BAND = 96
 STAGES = (0.1, 0.15, 0.2, 0.25, 0.3)
 QUERY = {"te": 0.0317, "gamma": 23.0}
 STAGE = 0.17
+#: Size of the longest waves [r1]: none of their sums faces inwards.
+_HEIGHT = 3e-5
+#: Stages at which a shape that folds is asked for, and places of each.
+_FOLDED, _PLACES = (0.2, 0.25, 0.3), 12
 
 
 def smooth(rng: np.random.Generator, stages: int, band: int) -> np.ndarray:
     """Return (stage, n, 2n, 3) random fields whose spectra fall like wrinkles' do, steeply beyond wave 40."""
     k = np.arange(band + 1)
-    decay = np.exp(-((np.hypot(k[:, None], k) / 40) ** 2))[..., None] * 1e-3
+    decay = np.exp(-((np.hypot(k[:, None], k) / 40) ** 2))[..., None] * _HEIGHT
     shape = (stages, band + 1, band + 1, 3)
     waves = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * decay
-    return spectra.synthesize(waves, band).astype(np.float32)
+    # waves of any m at the poles would fold there
+    return (spectra.synthesize(waves, band) * np.sin(colatitudes(band))[:, None, None] ** 2).astype(np.float32)
 
 
 def put(store: Store, params: Params, need: Need, rng: np.random.Generator) -> None:
@@ -99,6 +106,7 @@ def main() -> None:
         print(f"build: {built.samples} samples in {time.perf_counter() - start:.2f} s")
         start = time.perf_counter()
         table = ShapeTable.open(store, surfaces=registry.surface)
+        compiled()  # as a service is, which has others to answer
         print(f"open and verify: {(time.perf_counter() - start) * 1e3:.1f} ms")
         rows = []
         for n in (32, 64, 96, 128, 256, 512):
@@ -117,13 +125,40 @@ def main() -> None:
             rows.append({"resolution": n, "what": "normals", "ms": round(ms, 4)})
         ms = median(lambda: table.at(QUERY, STAGE, m=8, fields=()), options.seconds)
         rows.append({"resolution": 0, "what": "descriptors only", "ms": round(ms, 4)})
+    rows += _folded()
     print(f"fft: {transforms.backend()}, one core, medians [ms of processor]")
     for row in rows:
-        print(f"{row['resolution']:>5} {row['what']:<17} {row['ms']:9.3f}")
+        print(f"{row['resolution']:>5} {row['what']:<28} {row['ms']:9.3f}")
     usual = {row["resolution"]: row["ms"] for row in rows if row["what"] == "position"}
     head = ["lattice", *(f"{n} x {2 * n}" for n in usual)]
-    cells = ["ms", *(f"{ms:.2f}" for ms in usual.values())]
-    keep("service-lookup", rows, fft=transforms.backend(), table={"head": head, "rows": [cells]})
+    cells = [["unfolded, ms", *(f"{ms:.2f}" for ms in usual.values())]]
+    for s in _FOLDED:
+        found = {row["resolution"]: row["ms"] for row in rows if row["what"] == _name(s)}
+        cells.append([f"{_name(s)}, ms", *(f"{found[n]:.1f}" if n in found else "" for n in usual)])
+    keep("service-lookup", rows, fft=transforms.backend(), table={"head": head, "rows": cells})
+
+
+def _name(s: float) -> str:
+    return f"in the package, s = {s:g}"
+
+
+def _folded() -> list[dict[str, Any]]:
+    """Return rows of the medians over places in the package's table, each asked for once after a warm-up."""
+    table, rng = ShapeTable.open(starter.ROOT, surfaces=registry.surface), np.random.default_rng(1)
+    points = [{name: float(rng.uniform(*span)) for name, span in table.axes.items()} for _ in range(_PLACES)]
+    rows = []
+    for s in _FOLDED:
+        for n in (64, 128, 256):
+            for point in points[:2]:
+                table.at(point, s, resolution=n)
+            times, crossing = [], 0
+            for point in points:
+                start = time.process_time()
+                crossing += table.at(point, s, resolution=n).crossings or 0
+                times.append(1e3 * (time.process_time() - start))
+            row = {"ms": round(statistics.median(times), 3), "worst": round(max(times), 3), "crossing": crossing}
+            rows.append({"resolution": n, "what": _name(s), **row})
+    return rows
 
 
 if __name__ == "__main__":

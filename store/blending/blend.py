@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property, lru_cache
@@ -20,6 +19,7 @@ from .methods.cells import Cells
 from .methods.thin import Mixture, Thin, outer
 from .methods.weights import Samples
 from .neighbours import Weighted
+from .stacks import Stacks
 
 __all__ = ["Blend", "Blender", "complex_view", "powers"]
 
@@ -66,6 +66,7 @@ class Blender:
         self._stored = stored
         self._samples = samples
         self._given = power
+        self._stacks = Stacks(stored)
 
     def mix(
         self, query: Array | None, near: Weighted, stages: Sequence[int], method: Method, without: int | None = None
@@ -84,7 +85,8 @@ class Blender:
         """
         chosen, places, shares = tuple(mixed.samples.tolist()), tuple(stages), np.array(list(stages.values()))
         parts = (mixed.weights * shares).ravel()
-        waves = self._mean(chosen, places, parts, band)
+        most = self._stored.shape[-2] - 1
+        waves = complex_view(self._stacks.mean(chosen, places, parts, most if band is None else min(band, most)))
         if len(parts) <= 1 or not method.corrections or query is None:
             # one sample at one stage, or on its way there from the fresh shape: nothing was lost
             return Blend(waves)
@@ -123,22 +125,6 @@ class Blender:
         targets = bands.Targets(self.power, self._samples)
         return targets, Cells(self._stored, targets.bands), self._samples
 
-    def _mean(self, samples: tuple[int, ...], stages: tuple[int, ...], parts: Array, band: int | None) -> Array:
-        cut = slice(None if band is None else band + 1)
-        kind = self._stored.dtype.type
-        # not by BLAS: its threads would wait for each other in a busy server, for a sum of a tenth of a millisecond
-        terms = [
-            (self._stored[i, j][:, cut, cut], kind(w))
-            for (i, j), w in zip(itertools.product(samples, stages), parts.tolist(), strict=True)
-        ]
-        if not terms:  # the fresh shape alone
-            return complex_view(np.zeros_like(self._stored[0, 0][:, cut, cut]))
-        total = np.multiply(*terms[0], order="C")
-        scaled = np.empty_like(total)
-        for waves, w in terms[1:]:
-            np.add(total, np.multiply(waves, w, out=scaled), out=total)
-        return complex_view(total)
-
 
 @lru_cache(maxsize=16)
 def _signs(waves: int, dtype: str) -> Array:
@@ -161,6 +147,6 @@ def powers(stored: Stored) -> Array:
 
 def _form(parts: Array, products: Array) -> Array:
     """Return the quadratic form (...) of terms (T,) and their products (T, T, ...)."""
-    count = len(parts)
+    count, parts = len(parts), parts.astype(products.dtype)
     found: Array = parts @ (parts @ products.reshape(count, -1)).reshape(count, -1)
     return found

@@ -7,6 +7,7 @@ reach from point to point, and points of a fine lattice lie close.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -42,11 +43,15 @@ class Evened(NamedTuple):
 def compiled() -> None:
     """Load the compiled code that folded surfaces need; where none is kept yet, make it: some 15 s of a processor."""
     from solver.geometry.apart import put_apart
+    from solver.geometry.seen import seen_whole
 
     colatitude, azimuth = np.meshgrid(colatitudes(_LEAST), azimuths(_LEAST), indexing="ij")
     x, y = np.sin(colatitude) * np.cos(azimuth), np.sin(colatitude) * np.sin(azimuth)
     ball = np.stack([x, y, np.cos(colatitude)], axis=-1).reshape(-1, 3)
-    put_apart(np.concatenate([ball, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]]), _topology(_LEAST), 0)
+    ends = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    put_apart(np.concatenate([ball, ends]), _topology(_LEAST), 0)
+    for kind in (np.float32, np.float64):
+        seen_whole(ball.reshape(_LEAST, 2 * _LEAST, 3).astype(kind), ends.astype(kind))
 
 
 def even_out(
@@ -61,7 +66,7 @@ def even_out(
     `before` is called where there is something to do that takes its time: the surface folds.
     """
     points, poles = whole(n)
-    if faces_outward(points, poles):
+    if _is_seen_whole(points, poles):
         return Evened(None, None, 0, 0)
     before()
     given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
@@ -84,6 +89,15 @@ def even_out(
         found = put_apart(moved, topology)
     shift = moved - given
     return Evened(shift[:-2].reshape(n, 2 * n, 3), shift[-2:], found.crossings, near)
+
+
+def _is_seen_whole(points: Array, poles: Array) -> bool:
+    # once the compiler is there, by what it makes; it is not loaded for that
+    if "solver.geometry.apart" not in sys.modules:
+        return faces_outward(points, poles)
+    from solver.geometry.seen import seen_whole
+
+    return bool(seen_whole(points, poles))
 
 
 @lru_cache(maxsize=8)

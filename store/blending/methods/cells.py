@@ -56,7 +56,8 @@ class Cells:
         local = _local(waves)
         own = np.sqrt(np.maximum(local[np.diag_indices(len(local))], 0))
         low = found[..., : harmonics.LOWEST, : harmonics.LOWEST].copy()  # a view would keep all harmonics of the cell
-        return Cell(_power(found, self._bands), local, own, low)
+        # single precision is enough for a smooth factor, and half to read at every query
+        return Cell(_power(found, self._bands), local.astype(np.float32), own, low)
 
 
 def _power(found: Array, bands: Bands) -> Array:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from solver.geometry.inward import candidates
-from solver.geometry.outward import faces_outward
+from solver.geometry.outward import Field, faces_outward
+from solver.geometry.seen import seen_whole
 from solver.lattice import closed_lattice, directions, lattice
 
 
@@ -17,6 +18,13 @@ def wavy(height: float, slide: float, n: int = 24) -> np.ndarray:
     points = (1 + height * waves)[..., None] * directions(theta, phi)
     points[..., 1] += slide * waves
     return points
+
+
+def seen(points: Field, poles: Field) -> bool:
+    """What both say."""
+    found = faces_outward(points, poles)
+    assert seen_whole(points, poles) == found
+    return found
 
 
 def ends(points: np.ndarray) -> np.ndarray:
@@ -30,13 +38,16 @@ def test_it_is_whole_where_nothing_faces_inwards(height: float, slide: float) ->
     points = wavy(height, slide)
     whole = np.concatenate([points.reshape(-1, 3), ends(points)])
     found = candidates(whole, triangles, np.empty(len(triangles)), np.empty(0, bool))
-    assert faces_outward(points, ends(points)) == (len(found) == 0)
-    assert faces_outward(points.astype("f4"), ends(points).astype("f4")) == (len(found) == 0)
+    assert seen(points, ends(points)) == (len(found) == 0)
+    assert seen(points.astype("f4"), ends(points).astype("f4")) == (len(found) == 0)
 
 
 def test_both_answers_are_given() -> None:
-    for points, seen in ((wavy(0.02, 0.0), True), (wavy(0.02, 0.3), False), (-wavy(0.02, 0.0), False)):
-        assert faces_outward(points, ends(points)) == seen
+    for points, is_seen in ((wavy(0.02, 0.0), True), (wavy(0.02, 0.3), False), (-wavy(0.02, 0.0), False)):
+        assert seen(points, ends(points)) == is_seen
+    unknown = wavy(0.02, 0.0)
+    unknown[5, 7] = np.nan
+    assert not seen(unknown, ends(unknown))
 
 
 @pytest.mark.parametrize(("row", "column"), [(0, 0), (0, 47), (11, 30), (23, 13)])
@@ -45,4 +56,4 @@ def test_one_point_pushed_beyond_its_neighbours_is_seen_wherever_it_lies(row: in
         points = wavy(0.0, 0.0, n)
         i, j = row * n // 24, column * n // 24
         points[i, j] = points[i, (j + 3) % (2 * n)]
-        assert not faces_outward(points, ends(wavy(0.0, 0.0, n)))
+        assert not seen(points, ends(wavy(0.0, 0.0, n)))

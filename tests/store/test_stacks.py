@@ -1,0 +1,45 @@
+"""Weighted sums of spectra, against sums term by term."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from store.blending import stacks
+from store.blending.stacks import Stacks
+
+
+def spectra(symmetric: bool) -> np.ndarray:
+    found = np.random.default_rng(2).standard_normal((5, 2, 3, 9, 9, 2)).astype(np.float32)
+    if symmetric:
+        found[..., 1::2, :, :] = 0
+    return found
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+@pytest.mark.parametrize("band", [4, 8])
+def test_a_sum_is_a_sum(symmetric: bool, band: int) -> None:
+    stored = spectra(symmetric)
+    samples, stages, parts = (4, 0, 3), (1, 0), np.array([0.3, 0.1, -0.2, 0.5, 0.25, 0.05])
+    wanted = sum(
+        w * stored[i, j, :, : band + 1, : band + 1]
+        for (i, j), w in zip(itertools.product(samples, stages), parts, strict=True)
+    )
+    kept = Stacks(stored)
+    for _ in range(2):  # made, then kept
+        found = kept.mean(samples, stages, parts, band)
+        assert found.flags.c_contiguous
+        np.testing.assert_allclose(found, wanted, atol=1e-6)
+    assert not kept.mean(samples, (), np.empty(0), band).any()
+
+
+def test_no_more_is_kept_than_there_is_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    stored = spectra(False)
+    monkeypatch.setattr(stacks, "_ROOM", 5 * stored[0, 0].nbytes)
+    kept = Stacks(stored)
+    for i in range(5):
+        found = kept.mean((i, (i + 1) % 5), (0,), np.array([0.5, 0.5]), 8)
+        np.testing.assert_allclose(found, (stored[i, 0] + stored[(i + 1) % 5, 0]) / 2, atol=1e-6)
+    assert len(kept._kept) == 2
