@@ -83,7 +83,7 @@ def _dot(a: Array, b: Array) -> float:
 _NOTHING = 1e-9
 #: Share of errors that the expected one covers.
 COVERED = 0.9
-#: The default method of older tables, which hold its errors. They stand for the present one's: those of runs held out lie
+#: The default of older tables, which hold its errors. They stand for the present one's: those of runs held out lie
 #: within what they foretell (record dehydration-calibration); slopes far outside of the samples may not.
 _FORMER = "linear+LL+env"
 
