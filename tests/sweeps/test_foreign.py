@@ -145,6 +145,13 @@ def test_each_is_refused_in_a_sentence(name: str, tmp_path: Path) -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000, "kilobytes"
 
 
+def test_an_accessor_without_bytes_is_called_so(tmp_path: Path) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(HOSTILE["a billion elements of nothing"][1])
+    with pytest.raises(InvalidQuery, match="no bytes of its own"):
+        load(path)
+
+
 def test_nothing_else_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Materials of an OBJ lie elsewhere; the mesh is read without them."""
     (tmp_path / "secret.mtl").write_text("newmtl secret\n")

@@ -29,6 +29,20 @@ def split_at(wood: Wood, hinge: int) -> tuple[Wood, int, int]:
     return found.wood, old, count
 
 
+def test_a_pass_breaks_as_much_as_it_may_release_and_the_worst_in_any_case():
+    wood = laid()
+    e = np.flatnonzero(wood.rods.alive)[[10, 40, 70]]
+    ratio, place = np.zeros(len(wood.rods.a)), np.full(len(wood.rods.a), 0.5)
+    ratio[e] = [2.0, 4.0, 3.0]
+    strain = wood.strength[e, wood.strength.shape[1] // 2] * ratio[e]
+    cost = 0.5 * wood.rods.k[e] * wood.rods.rest[e] * strain**2
+    counts = [
+        break_worst(wood.copied(), ratio, place, allowed).rods
+        for allowed in (0.0, 0.99 * (cost[1] + cost[2]), 1.01 * (cost[1] + cost[2]), 1.01 * cost.sum())
+    ]
+    assert counts == [1, 1, 2, 3]
+
+
 @pytest.mark.parametrize("which", [7, 40])
 def test_halves_of_a_split_vertex_share_bonds_mass_and_load(which):
     """All that hung on the vertex hangs on both by the lengths of their edges, and on neither twice."""
