@@ -49,8 +49,8 @@ def test_a_turned_mirrored_moved_and_scaled_file_is_found_again(n: int) -> None:
     page = matched(obj(points, closed_lattice(n)[:, ::-1]), ".obj", 7.5)
     assert page.best.distance < (0.1 if n == 64 else 0.5)
     for name, value in ASKED.items():
-        # 64 is the lattice that shapes are compared on. From another one the right place itself is some .3 away, and along
-        # a valley where gamma trades with te others are nearer: there the answer's own uncertainty has to say so.
+        # 64 is the lattice that shapes are compared on. From another one the right place itself is some .3 away, and
+        # along a valley where gamma trades with te others are nearer: there the answer's own uncertainty has to say so.
         unsure = 0.1 * value if n == 64 or name == "te" else 3 * page.best.uncertainty[name]
         assert abs(page.best.parameters[name] - value) <= unsure
     assert page.best.stage == pytest.approx(STAGE, abs=0.01)
