@@ -27,6 +27,9 @@ from .asking import closed_loop, open_loop, run
 from .served import CLIENTS, KINDS, path, said, serving, spent
 from .slow import beside_slow, report_slow
 
+#: Longest time for which a peak rate is measured [s].
+_PEAK = 20.0
+
 
 def memory(pid: int) -> float:
     """Return what a process holds [MB]."""
@@ -55,18 +58,18 @@ class Watch(threading.Thread):
 
 def twice(process: subprocess.Popen[str], port: int, kind: str, seconds: float, turn: int) -> dict[str, Any]:
     """Measure the peak rate, then ask twice as often, then the peak again: the rate of a shared machine drifts."""
-    seed = 10**7 * (turn + 1)
+    seed, short = 10**7 * (turn + 1), min(seconds / 3, _PEAK)
     moments = [spent(process.pid)]
-    before = run(closed_loop(port, path(kind, seed), CLIENTS, seconds / 3))
+    before = run(closed_loop(port, path(kind, seed), CLIENTS, short))
     if not before.good:
-        raise SystemExit(f"nothing was answered in {seconds / 3:.0f} s of {kind}: ask for longer")
+        raise SystemExit(f"nothing was answered in {short:.0f} s of {kind}: ask for longer")
     moments.append(spent(process.pid))
     watch = Watch(process.pid)
     watch.start()
     over = run(open_loop(port, path(kind, seed + 10**6), 2 * before.rate, seconds, turn))
     seen = watch.stop()
     moments.append(spent(process.pid))
-    after = run(closed_loop(port, path(kind, seed + 2 * 10**6), CLIENTS, seconds / 3))
+    after = run(closed_loop(port, path(kind, seed + 2 * 10**6), CLIENTS, short))
     moments.append(spent(process.pid))
     peak = (before.rate + after.rate) / 2
     # of what the server got: answers per second of its processor time
