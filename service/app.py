@@ -60,6 +60,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Door]]:
         if runner.wanted:
             runner.start()
         try:
+            memory.keep("service")
             yield {DOOR: app.state.door}
         finally:
             await app.state.sessions.close_all()

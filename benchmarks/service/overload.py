@@ -100,20 +100,21 @@ def main() -> None:
     parser.add_argument("--flat", type=float, default=300.0, help="of overload in the last round, watched for memory")
     parser.add_argument("--only-slow", action="store_true", help="leave the rest out")
     options = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    rounds = [(kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS]
     if not options.only_slow:
-        overloaded(options)
+        overloaded(rounds, rows)
     if options.slow:
         with serving() as (process, port), serving() as (other, second):
             servers = [(process.pid, port), (other.pid, second)]
             report_slow(beside_slow(servers, options.seconds, options.rounds, options.slow))
+    if options.flat and not options.only_slow:
+        overloaded([(next(iter(KINDS)), options.flat, options.rounds)], rows)
 
 
-def overloaded(options: argparse.Namespace) -> None:
-    """Measure overload, and keep what came of it."""
+def overloaded(rounds: list[tuple[str, float, int]], rows: list[dict[str, Any]]) -> None:
+    """Measure overload by a server of its own, and keep what came of it beside the `rows` that are there."""
     with serving() as (process, port):
-        rounds = [(kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS]
-        rounds += [(next(iter(KINDS)), options.flat, options.rounds)] if options.flat else []
-        rows: list[dict[str, Any]] = []
         for kind, seconds, turn in rounds:
             rows.append(twice(process, port, kind, seconds, turn))
             report(rows)  # after each: whatever ends a long run, what was measured is kept

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import gc
 import hashlib
 from collections.abc import Callable
 from functools import lru_cache
@@ -15,6 +14,7 @@ from starlette.responses import Response
 
 from .. import problems
 from ..errors import InvalidQuery, Wrong
+from ..limits import memory
 from ..settings import Settings
 from ..shapes.live import LiveTables
 from ..views.scene import ScenePage
@@ -42,14 +42,10 @@ def _inlined(schema: Any, known: dict[str, Any]) -> Any:
 
 @lru_cache(maxsize=1)
 def _maker() -> Callable[..., Made]:
-    """Return what makes scenes: it takes a while to import, and the service starts without.
-
-    All that is there by then stays, so it is taken out of what the garbage collector walks through: in a scene of
-    10,000 items, that took as long as everything else.
-    """
+    """Return what makes scenes: it takes a while to import, and the service starts without."""
     from .compose import make
 
-    gc.freeze()
+    memory.keep("scenes")
     return make
 
 
