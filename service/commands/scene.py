@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,10 +12,9 @@ from sweeps.commands.terminal.options import As_json, StoreToRead
 from sweeps.errors import InvalidOption
 
 if TYPE_CHECKING:
-    from store.ledger.jobs import JobSpec
-
-    from ..scenes.compose import Made
+    from ..scenes.kinds import Runs
     from ..scenes.request import Scene
+    from ..shapes.live import LiveTables
 
 __all__ = ["add_to"]
 
@@ -57,21 +55,20 @@ def scene(
     """
     from store import seal
 
+    from ..scenes.compose import make
     from ..scenes.request import FORMATS, parse
 
     formats = {suffix: name for name, (_, suffix) in FORMATS.items() if name != "json"}
     if out is not None and out.suffix not in formats:
         raise InvalidOption(f"--out {out}: no scene is written as {out.suffix!r}.", f"Take {', '.join(formats)}.")
     understood = parse(_with_files(_toml(file), file.parent))
-    if any(place.rule in ("bowl", "pile") for place in understood.places):
-        note("letting things fall until they rest: a few hundred take some seconds")
     to = formats[out.suffix] if out else "json"
     if solve:
         store = _own(store)
-    made = _made(understood, store, to, plain)
-    if solve and store is not None and made.missing:
-        _solve(made.missing, store)
-        made = _made(understood, store, to, plain)
+        _solve(understood, store)
+    if any(place.rule in ("bowl", "pile") for place in understood.places):
+        note("letting things fall until they rest: a few hundred take some seconds")
+    made = make(understood, *_found(store), to, not plain, _runs(store))
     if out is not None:
         seal.publish(out, made.data)
     emit(
@@ -113,22 +110,27 @@ def _with_files(values: dict[str, Any], folder: Path) -> dict[str, Any]:
     return values
 
 
-def _made(scene: Scene, root: Path | None, to: str, plain: bool) -> Made:
-    """Return the scene of what the store holds; tables are the package's where it has none."""
+def _found(root: Path | None) -> tuple[LiveTables, int]:
+    """Return the tables of a store, the package's where it has none, and the finest lattice that is looked up."""
     from store import starter
     from sweeps.commands.terminal.tables import open_store
 
-    from ..scenes.compose import make
-    from ..scenes.kinds import Runs
     from ..settings import Settings
     from ..shapes.live import LiveTables
 
     store = open_store(root)
-    tables = LiveTables(store.root if store.table_names() else starter.ROOT, 60.0)
+    return LiveTables(store.root if store.table_names() else starter.ROOT, 60.0), Settings().max_resolution
+
+
+def _runs(root: Path | None) -> Runs:
+    """Return where runs are, and what is said of those that are not stored."""
+    from sweeps.commands.terminal.tables import open_store
+
+    from ..scenes.kinds import Runs
+
     advice = "Solve it with --solve" + (", in a store of your own: --store DIR." if root is None else ".")
-    return make(
-        scene, tables, Settings().max_resolution, to, not plain, Runs(lambda: store, lambda asked: (None, advice))
-    )
+    store = open_store(root)
+    return Runs(lambda: store, lambda asked: (None, advice))
 
 
 def _own(root: Path | None) -> Path:
@@ -145,17 +147,23 @@ def _own(root: Path | None) -> Path:
     return Store.open(root or starter.ROOT, create=True).root
 
 
-def _solve(missing: Sequence[JobSpec], root: Path) -> None:
-    """Solve runs and keep them."""
+def _solve(scene: Scene, root: Path) -> None:
+    """Solve the runs that a scene lacks, and keep them."""
     from store.store import Store
     from sweeps.commands.terminal import progress
     from sweeps.running import executors
     from sweeps.running.runner import run_jobs
 
+    from ..scenes.kinds import distinct
+
+    kinds, _ = distinct(scene.items, *_found(root), _runs(root))
+    missing = {kind.missing.spec.key: kind.missing.spec for kind in kinds if kind.missing is not None}
+    if not missing:
+        return
     note(f"solving {len(missing)} runs that are missing")
     with executors.choose(None) as pool, progress.stopping(progress.GIVEN_BACK) as stop:
         with progress.sweep("scene", {}) as observe:
-            run_jobs(missing, Store.open(root), pool, "scene", observe, stop=stop)
+            run_jobs(missing.values(), Store.open(root), pool, "scene", observe, stop=stop)
         if stop.is_set():
             raise typer.Exit(130)
 

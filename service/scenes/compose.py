@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.arrays import Array, Floats
-from store.ledger.jobs import JobSpec
 
 from ..errors import Wrong
 from ..shapes.live import LiveTables
@@ -27,13 +26,10 @@ _AGAIN = 6
 
 
 class Made(NamedTuple):
-    """A scene's file, empty where only its report was asked for, the report as JSON values, and the runs that were not
-    stored: something plain stands in for each.
-    """
+    """A scene's file, empty where only its report was asked for, and the report as JSON values."""
 
     data: bytes
     report: dict[str, Any]
-    missing: tuple[JobSpec, ...] = ()
 
 
 def make(
@@ -93,7 +89,7 @@ def make(
         raise OverBudget.of([Wrong("budget.bytes", f"{scene.budget.bytes} are too few for {len(data)}", advice)])
     lap("computed and written")
     told = report.Told(scene, kinds, rows, everything, found, shown, levels, rests, len(data), compress, times)
-    return Made(data, report.document(told), tuple(kind.missing.spec for kind in kinds if kind.missing))
+    return Made(data, report.document(told))
 
 
 def _reaches(scene: Scene, kinds: Sequence[Kind], everything: Instances) -> tuple[Floats, Floats]:

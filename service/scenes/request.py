@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from solver.contract import Quality
 
@@ -95,7 +95,7 @@ class Item(_Strict):
         None, description="Whose shapes; none: of the one that has the preset, or that the tables are of"
     )
     preset: str | None = Field(None, description="A fruit by its name; `wizen presets` lists them")
-    parameters: dict[str, JsonValue] = Field(
+    parameters: dict[str, Any] = Field(
         {}, description="Over the preset's: numbers by axis, and of runs all that jobs take"
     )
     run: str | None = Field(
@@ -116,6 +116,7 @@ class Item(_Strict):
     name: str = Field("", max_length=80, description="What the report calls it")
     size: Length | Literal["real"] | None = Field(
         None,
+        union_mode="left_to_right",
         description="Length of r1, or of a run's own unit [scene unit]; real: as large as such things are. None: 1 for "
         "tables, for runs their real size where it is known, else 1",
     )
@@ -128,12 +129,9 @@ class Item(_Strict):
 
     @model_validator(mode="after")
     def _stands(self) -> Self:
-        if self.run is not None and (self.solver or self.preset or self.parameters or self.quality):
-            raise ValueError("run names all of a run: leave out solver, preset, parameters and quality")
-        if self.run is not None and self.source == "table":
-            raise ValueError("run names a stored run, which no table holds: leave out source")
-        whole = self.run is not None and self.stage is None and not self.curve
-        if (self.stage is None) == (not self.curve) and not whole:
+        if self.run is not None:
+            self._named()
+        elif (self.stage is None) == (not self.curve):
             raise ValueError("an item has either a stage or a curve of stages: write one of them")
         if not _finite(self.parameters):
             raise ValueError("parameters are finite numbers")
@@ -147,6 +145,15 @@ class Item(_Strict):
         if self.vary and self.seed is None:
             raise ValueError("vary needs a seed")
         return self
+
+    def _named(self) -> None:
+        """Check an item that names a run."""
+        if self.solver or self.preset or self.parameters or self.quality:
+            raise ValueError("run names all of a run: leave out solver, preset, parameters and quality")
+        if self.source == "table":
+            raise ValueError("run names a stored run, which no table holds: leave out source")
+        if self.stage is not None and self.curve:
+            raise ValueError("an item has either a stage or a curve of stages: write one of them")
 
     @property
     def first(self) -> float:
@@ -171,12 +178,12 @@ class Item(_Strict):
         return len(self.transforms) or self.count
 
 
-def _finite(value: JsonValue) -> bool:
-    if isinstance(value, dict):
-        return all(map(_finite, value.values()))
-    if isinstance(value, list):
-        return all(map(_finite, value))
-    return not isinstance(value, float) or math.isfinite(value)
+def _finite(value: object) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, dict | list):
+        return all(map(_finite, value.values() if isinstance(value, dict) else value))
+    return True
 
 
 class Budget(_Strict):

@@ -18,10 +18,8 @@ from ..errors import InvalidScene
 from ..request import Item
 from .kind import Kind
 from .looked import Looked
-from .placeholders import placeholder
 from .runs import Missing, Runs, find
 from .shades import shade_of
-from .stored import stored
 
 __all__ = ["distinct"]
 
@@ -100,6 +98,10 @@ def _is_run(item: Item, tables: LiveTables) -> bool:
 
 
 def _of_run(item: Item, runs: Runs) -> Kind:
+    # these take a while to import, and most scenes are of tables alone
+    from .placeholders import placeholder
+    from .stored import stored
+
     found = find(item, runs)
     if not isinstance(found, Missing):
         return stored(runs.store(), found, item)

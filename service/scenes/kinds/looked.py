@@ -83,8 +83,8 @@ class Looked(Kind):
         """As fine as the table's own lattice."""
         return int(RUNGS[min(int(np.searchsorted(RUNGS, self.table.resolution)), len(RUNGS) - 1)])
 
-    @cached_property
     def _fresh(self) -> Floats:
+        """Return points of the fresh shape, which nobody keeps: there may be thousands of kinds."""
         angles = np.meshgrid(np.linspace(0, np.pi, 17), np.linspace(0, 2 * np.pi, 32, endpoint=False), indexing="ij")
         found: Floats = self.table.fresh(self.point).points(*angles)
         return found
@@ -92,7 +92,7 @@ class Looked(Kind):
     @property
     def fresh_reach(self) -> float:
         """Radius that holds the fresh shape and what it shrinks to: drying moves nothing outwards by 5 %."""
-        return 1.05 * float(np.linalg.norm(self._fresh, axis=-1).max())
+        return 1.05 * float(np.linalg.norm(self._fresh(), axis=-1).max())
 
     @cached_property
     def outline(self) -> Floats:
@@ -119,7 +119,7 @@ class Looked(Kind):
     @cached_property
     def extent(self) -> float:
         """Largest coordinate of the fresh shape, which needs no look-up and which drying does not pass."""
-        return 1.08 * float(np.abs(self._fresh).max())
+        return 1.08 * float(np.abs(self._fresh()).max())
 
     @property
     def dryness(self) -> float:

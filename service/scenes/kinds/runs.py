@@ -11,7 +11,6 @@ from store.errors import StoreError, UnknownJob
 from store.keys import is_key
 from store.ledger.jobs import Job, JobSpec
 from store.store import Store
-from sweeps import results
 from sweeps.errors import InvalidOption
 
 from ... import vocabulary
@@ -76,6 +75,8 @@ def find(item: Item, runs: Runs) -> str | Missing:
 
 
 def _named(run: str, runs: Runs) -> str | Missing:
+    from sweeps import results
+
     store, key = runs.store(), run.lower()
     if not is_key(key):
         try:
@@ -111,9 +112,9 @@ def _asked(item: Item, runs: Runs) -> str | Missing:
         return Missing(asked.solver, asked.params, spec, None, why, error.advice)
     if found is None and (known is None or known.state not in ("wanted", "running")):
         return Missing(asked.solver, asked.params, spec, None, "it is not stored.", advice)
-    job = found or known
-    assert job is not None
-    return Missing(asked.solver, asked.params, spec, job, *_waiting(job))
+    waiting = found or known
+    assert waiting is not None
+    return Missing(asked.solver, asked.params, spec, waiting, *_waiting(waiting))
 
 
 def _question(item: Item) -> Asked:

@@ -158,7 +158,7 @@ class Solid:
             found.append(middle)
             corners = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
         points = np.concatenate(found)
-        return points[np.linalg.norm(points, axis=1) > 1e-9 * np.abs(points).max()]
+        return np.asarray(points[np.linalg.norm(points, axis=1) > 1e-9 * np.abs(points).max()])
 
 
 def merged(points: Array) -> Array:

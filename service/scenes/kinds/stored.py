@@ -123,16 +123,18 @@ class Stored(Kind):
 
     @property
     def look(self) -> tuple[str, Hashable]:
-        """A material of its own."""
-        return f"{self.made.source.get('solver', 'run')} {self._digest[:8]}", self._digest
+        """A material of its own, or the plain one of all that stands in for something."""
+        if self.missing is not None:
+            return "placeholder", None
+        return f"{self.made.source['solver']} {self._digest[:8]}", self._digest
 
     @property
     def prim(self) -> str:
-        """A material of its own."""
-        return f"run{self._digest[:12]}"
+        """The material's name as a word."""
+        return "placeholder" if self.missing is not None else f"run{self._digest[:12]}"
 
     @property
-    def skin(self) -> Skin:  # type: ignore[override]
+    def skin(self) -> Skin:
         """The largest of its colours, and its mean roughness."""
         return self.made.skin
 
