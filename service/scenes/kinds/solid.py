@@ -2,7 +2,8 @@
 
 Coarser levels are meshoptimizer's: edges are collapsed onto vertices that are there, where position and colour suffer
 least (Garland and Heckbert 1997; Hoppe 1999 for colours), so that a vertex of any level is one of the mesh, and later
-stages that keep its triangles are coarsened alike. Without that package there is one level, the mesh itself.
+stages that keep its triangles are coarsened alike. Meshes of many parts are clustered where that leaves far too much.
+Without that package there is one level, the mesh itself.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ __all__ = ["Level", "Solid", "merged"]
 
 #: Weight of a colour's error beside that of a position over the mesh's size.
 _COLOURS = 0.3
+#: How far a coarser mesh may be off before it may have more triangles than asked for, over its size; how many times as
+#: many, before parts are melted together; and the fewest that still show something.
+_WORST, _MORE, _LEAST = 0.1, 4, 8
 #: Largest angle [radian] between corners of a triangle as the middle sees them, when its outline is sampled.
 _FINE, _HALVINGS = 0.09, 24
 
@@ -103,12 +107,18 @@ class Solid:
             vertex_attributes_stride=size(seen.strides[0]),
             attribute_count=size(seen.shape[1]),
             target_index_count=size(int(3 * count)),
-            target_error=ctypes.c_float(1.0),
+            target_error=ctypes.c_float(_WORST),
             options=ctypes.c_uint(library.SIMPLIFY_PRUNE),
             result_error=error,
         )
-        if left < 12:  # nothing to be seen of it would be left
-            return self.triangles, 0.0
+        if left > 3 * _MORE * count:
+            # many small parts with seams: of what is so small on the screen, only where it is counts
+            loose, other = np.empty_like(flat), np.zeros(1, np.float32)
+            least = library.simplify_sloppy(
+                loose, flat, points, target_index_count=int(3 * count), target_error=1.0, result_error=other
+            )
+            if 3 * _LEAST <= least < left:
+                out, left, error = loose, least, other
         return out[:left].reshape(-1, 3).astype(np.int64), float(error[0])
 
     @cached_property

@@ -119,6 +119,21 @@ def test_a_fine_mesh_has_as_few_triangles_as_are_asked_for() -> None:
     assert half.is_open
 
 
+def test_what_is_in_many_parts_is_not_lost_from_afar() -> None:
+    pytest.importorskip("meshoptimizer")
+    import trimesh
+
+    boxes = [trimesh.creation.box((0.2, 0.01, 0.01)) for _ in range(400)]
+    for box, move in zip(boxes, np.random.default_rng(0).uniform(-1, 1, (400, 3)), strict=True):
+        box.apply_translation(move)
+    heap = trimesh.util.concatenate(boxes)
+    solid = Solid(((heap.vertices, heap.vertex_normals),), heap.faces, (np.ones((len(heap.vertices), 3)),))
+    level = solid.level(8)
+    assert 8 <= len(level.triangles) <= 4 * 256
+    left = heap.vertices[level.vertices]
+    assert (np.ptp(left, axis=0) > 1.6).all()
+
+
 def test_without_the_package_meshes_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
