@@ -118,13 +118,18 @@ def encode(
     groups: Sequence[Array] = list(np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1).T)
     order = [np.flatnonzero((seen.kind == k) & (n == size) & (seen.mirrored == m)) for k, size, m in groups]
     meshes, materials, made = _meshes(file, kinds, groups, known)
-    if len(n):
-        nodes = _instances(file, kinds, seen, groups, order, made)
-    changing = [(at, kinds[k]) for at, (k, _, _) in enumerate(groups) if kinds[k].curve]
+    still = [at for at, (k, _, _) in enumerate(groups) if not kinds[k].curve]
+    if still:
+        nodes = _instances(file, kinds, seen, [groups[at] for at in still], [order[at] for at in still], made)
+    changing: list[tuple[int, Kind]] = []
+    for (k, size, _), rows in zip(groups, order, strict=True):
+        if kinds[k].curve:
+            changing += [(len(nodes) + i, kinds[k]) for i in range(len(rows))]
+            nodes += _one_by_one(kinds[k].label, seen.only(rows), *made[k, size])
     animations = moving.weights(file, changing)
     for prop in held.get("bowl", ()):
         nodes.append(props.bowl(file, meshes, materials, prop))
-    used = {_INSTANCING} if len(n) else set()
+    used = {_INSTANCING} if still else set()
     used |= {_QUANTIZED} if len(n) else set()
     required = sorted(used | ({_MESHOPT} if compress and compressor() is not None else set()))
     more = {name for material in materials for name in material.get("extensions", {})}
@@ -252,6 +257,21 @@ def _instances(
         nodes.append(node | ({"scale": [-1, 1, 1]} if mirror else {}))
         first += len(rows)
     return nodes
+
+
+def _one_by_one(name: str, seen: Instances, mesh: int, step: float) -> list[Json]:
+    """Return a node for each of the instances of a mesh with morph targets, which readers do not draw as instances."""
+    found: list[Json] = []
+    turns = seen.turn / np.linalg.norm(seen.turn, axis=1)[:, None]
+    for centre, turn, scale, mirrored in zip(seen.centre, turns, seen.scale * step, seen.mirrored, strict=True):
+        wide = float(scale)
+        place = {
+            "translation": centre.tolist(),
+            "rotation": turn.tolist(),
+            "scale": [-wide if mirrored else wide, wide, wide],
+        }
+        found.append({"mesh": mesh, "name": name, **place})
+    return found
 
 
 def _material(name: str, looks: Skin) -> Json:
