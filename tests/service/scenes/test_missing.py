@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from service.cli import app
+from service.views.scene import SceneItem, ScenePage
 from solver import registry
 from store.store import Store
 
@@ -32,6 +33,8 @@ def told(client: httpx.Client, **more: Any) -> dict[str, Any]:
     answer = client.post("/v1/scenes?format=json", json=body(**more))
     assert answer.status_code == 200, answer.text
     report = answer.json()
+    ScenePage.model_validate(report)
+    assert set(report["items"][0]) <= set(SceneItem.model_fields)
     return {**report["items"][0], "count": report["missing"]}
 
 
