@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import gc
 import hashlib
 from collections.abc import Callable
 from functools import lru_cache
@@ -18,6 +17,7 @@ from store.ledger.jobs import Job
 from .. import problems
 from ..errors import Forbidden, InvalidQuery, Unauthorized, Wrong
 from ..jobs.submit import asker_of, submit
+from ..limits import memory
 from ..security import authorize, bearer
 from ..settings import Settings
 from ..shapes.live import LiveTables
@@ -47,14 +47,10 @@ def _inlined(schema: Any, known: dict[str, Any]) -> Any:
 
 @lru_cache(maxsize=1)
 def _maker() -> Callable[..., Made]:
-    """Return what makes scenes: it takes a while to import, and the service starts without.
-
-    All that is there by then stays, so it is taken out of what the garbage collector walks through: in a scene of
-    10,000 items, that took as long as everything else.
-    """
+    """Return what makes scenes: it takes a while to import, and the service starts without."""
     from .compose import make
 
-    gc.freeze()
+    memory.keep("scenes")
     return make
 
 
