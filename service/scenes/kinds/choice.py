@@ -50,10 +50,8 @@ def distinct(
                 if item.solver is None and item.run is None:
                     full = item.model_copy(update={"solver": _solver_of(item, tables)})
                 kinds.append(_of_run(full, runs) if _is_run(full, tables) else _of_table(full, tables, highest))
-            except InvalidQuery as error:
-                wrong += [Wrong(f"items.{i}.{one.name}", one.detail, one.advice) for one in error.wrong]
             except (StoreError, SolverError, ServiceError) as error:
-                wrong.append(Wrong(f"items.{i}", error.message.rstrip("."), error.advice))
+                wrong += _complaints(error, f"items.{i}")
             if wrong:
                 numbers[key] = -1
         if item.size == "real" and not wrong:
@@ -64,6 +62,13 @@ def distinct(
     if wrong:
         raise InvalidScene.of(wrong)
     return kinds, rows
+
+
+def _complaints(error: StoreError | SolverError | ServiceError, name: str) -> list[Wrong]:
+    """Return what is wrong with an item, by what of it is."""
+    if isinstance(error, ServiceError) and error.wrong:
+        return [Wrong(f"{name}.{one.name}", one.detail, one.advice) for one in error.wrong]
+    return [Wrong(name, error.message.rstrip("."), error.advice)]
 
 
 def _values(item: Item) -> object:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.spatial import cKDTree
 
 from service.scenes.compose import make
@@ -28,7 +29,7 @@ from ._reading import array, instances
 from .test_scenes import CAMERA, complaints
 
 TABLES = LiveTables(starter.ROOT, 60.0)
-ROTTEN, SPLIT = "5a" * 32, "5b" * 32
+ROTTEN, SPLIT, NUMBERS = "5a" * 32, "5b" * 32, "6a" * 32
 N = 16
 
 
@@ -40,6 +41,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     run["converged"] = ("stage", [1, 1, 0])
     store.put(ROTTEN, run)
     store.put(SPLIT, splitting())
+    store.put(NUMBERS, xr.Dataset({"volume": ("stage", [1.0])}, {"stage": [0.0]}, {"solver": "decay"}))
     return store
 
 
@@ -199,8 +201,6 @@ def test_what_only_took_part_is_left_out_and_rims_show_both_sides(store: Store) 
     triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     fields = {"inside": np.zeros(8, "f4"), "body": np.repeat([0, 1], 4).astype("f4")}
     data = meshes.changing([meshes.Frame(points, triangles, fields)])
-    import xarray as xr
-
     key = "5c" * 32
     store.put(key, xr.Dataset(data, {"stage": [0.0]}, {"solver": "wood", "metres_per_unit": 1.0, "up": "z"}))
     found = made(store, [{"run": key, "size": "real", "transforms": [{}]}])
@@ -253,6 +253,7 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"run": "0" * 64}, "nothing is stored", "wizen results"),
     ({"run": ROTTEN, "stage": 3}, "no stage 3", "0, 2, 5"),
     ({"run": ROTTEN, "preset": "orange"}, "leave out solver", ""),
+    ({"run": NUMBERS}, "no whole surface", "position"),
     ({"run": ROTTEN, "shade": "plum"}, "no skin", ""),
     ({"preset": "orange", "stage": 500}, "outside", "range"),
     ({"preset": "mushroom", "stage": 1, "size": "real"}, "nobody knows how large", "size = 1.0"),
