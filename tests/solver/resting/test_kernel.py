@@ -66,6 +66,7 @@ def test_what_is_known_to_be_near_changes_nothing(bowl: tuple[float, float, floa
     found, truth = bodies(12, bowl, 4), bodies(12, bowl, 4)
     for one in (found, truth):
         one.at[:] = one.at * [3, 1, 3] + 2.2 * np.arange(12)[:, None] * [0, 1, 0]  # apart, at first
+        one.spin[:] *= 15  # what turns on the spot reaches others, too
     for one, calls, steps in ((found, 6, 200), (truth, 1200, 1)):
         for _ in range(calls):
             fastest = step(
