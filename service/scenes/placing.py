@@ -18,7 +18,7 @@ from ..errors import Wrong
 from ..limits import waited
 from .errors import InvalidScene
 from .kinds import Kind
-from .request import Item, Place, Scene
+from .request import Place, Scene
 
 __all__ = ["Instances", "Prop", "bowls", "place"]
 
@@ -63,7 +63,11 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
     item = np.repeat(np.arange(len(counts)), counts)
     kind = np.asarray(rows)[item]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    sizes = [_size(one, kinds[row], scene.unit) for one, row in zip(scene.items, rows, strict=True)]
+    named = [one.size for one in scene.items]
+    sizes = [
+        size if isinstance(size, float) else _size(size, kinds[row], scene.unit)
+        for size, row in zip(named, rows, strict=True)
+    ]
     scale = np.repeat(sizes, counts).astype(float)
     centre = np.zeros((len(item), 3))
     members: dict[str, list[Array]] = {one.name: [] for one in scene.places}
@@ -99,12 +103,10 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
     return found, rests
 
 
-def _size(item: Item, kind: Kind, unit: float) -> float:
-    """Return the length of a kind's own unit [scene unit]; that of tables is one unless the item says otherwise."""
-    if isinstance(item.size, float):
-        return item.size
-    known = kind.metres is not None and (item.size == "real" or kind.topology is not None)
-    return kind.metres / unit if known and kind.metres is not None else 1.0
+def _size(asked: str | None, kind: Kind, unit: float) -> float:
+    """Return the length of a kind's own unit [scene unit]; that of tables is one unless the real one is asked for."""
+    known = kind.metres if asked is not None or kind.topology is not None else None
+    return 1.0 if known is None else known / unit
 
 
 def bowls(scene: Scene) -> list[Prop]:

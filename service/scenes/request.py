@@ -168,11 +168,6 @@ class Item(_Strict):
         return tuple(stage for _, stage in self.curve) or (() if self.stage is None else (self.stage,))
 
     @property
-    def of_run(self) -> tuple[str | None, ...]:
-        """What tells items of runs apart, besides what items of tables have."""
-        return self.run, self.source, self.quality
-
-    @property
     def instances(self) -> int:
         """Number of individuals."""
         return len(self.transforms) or self.count

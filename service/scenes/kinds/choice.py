@@ -41,8 +41,14 @@ def distinct(
     rows: list[int] = []
     wrong: list[Wrong] = []
     for i, item in enumerate(items):
-        key = (item.solver, item.preset, _values(item), item.stage, item.curve, item.shade, *item.of_run)
-        number = numbers.get(key)
+        values: object = tuple(sorted(item.parameters.items()))
+        of_run = item.run, item.source, item.quality
+        key = (item.solver, item.preset, values, item.stage, item.curve, item.shade, of_run)
+        try:
+            number = numbers.get(key)
+        except TypeError:  # lists among the parameters; rare, where items are many
+            key = (*key[:2], json.dumps(item.parameters, sort_keys=True), *key[3:])
+            number = numbers.get(key)
         if number is None:
             numbers[key] = number = len(kinds)
             try:
@@ -69,13 +75,6 @@ def _complaints(error: StoreError | SolverError | ServiceError, name: str) -> li
     if isinstance(error, ServiceError) and error.wrong:
         return [Wrong(f"{name}.{one.name}", one.detail, one.advice) for one in error.wrong]
     return [Wrong(name, error.message.rstrip("."), error.advice)]
-
-
-def _values(item: Item) -> object:
-    """Return the parameters as something that can be looked up."""
-    if all(isinstance(value, float | int) for value in item.parameters.values()):
-        return tuple(sorted(item.parameters.items()))
-    return json.dumps(item.parameters, sort_keys=True)
 
 
 def _solver_of(item: Item, tables: LiveTables) -> str:

@@ -193,6 +193,13 @@ def test_usd_holds_the_same(store: Store, tmp_path: Path) -> None:
     assert np.allclose(instancer.GetScalesAttr().Get(), [[3.3] * 3, [1] * 3])
     box = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/scene/fruits/prototypes/shape1")).GetPointsAttr().Get())
     assert np.allclose(np.abs(box), 0.5)
+    path.write_bytes(made(store, [{"run": ROTTEN, "curve": [[0, 0], [1, 5]], "transforms": [{}]}], "usdc").data)
+    assert complaints(path) == []
+    colour = UsdGeom.Mesh(
+        Usd.Stage.Open(str(path)).GetPrimAtPath("/scene/fruits/prototypes/shape0")
+    ).GetDisplayColorPrimvar()
+    assert colour.GetTimeSamples() == [0, 24]
+    assert np.abs(np.array(colour.Get(0)) - np.array(colour.Get(24))).max() > 0.05
 
 
 def test_what_only_took_part_is_left_out_and_rims_show_both_sides(store: Store) -> None:
