@@ -193,6 +193,7 @@ def test_usd_holds_the_same(store: Store, tmp_path: Path) -> None:
     assert np.allclose(instancer.GetScalesAttr().Get(), [[3.3] * 3, [1] * 3])
     box = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/scene/fruits/prototypes/shape1")).GetPointsAttr().Get())
     assert np.allclose(np.abs(box), 0.5)
+    path = tmp_path / "curve.usdc"  # the first is still open, as mapped memory
     path.write_bytes(made(store, [{"run": ROTTEN, "curve": [[0, 0], [1, 5]], "transforms": [{}]}], "usdc").data)
     assert complaints(path) == []
     colour = UsdGeom.Mesh(
