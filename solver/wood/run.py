@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
+from .choosing import decide
 from .contact.listing import law
 from .fracture import sawed
 from .loads import READ, SUMS, measured
@@ -48,10 +49,18 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         raise InvalidInput("wood has no colatitude and azimuth.", advice="Leave the region out.")
     settings = choose(params, need.quality)
     begun = time.perf_counter()
+    said: dict[str, Any] = {}
+    if params.mode == "auto":
+        choice = decide(params)
+        params = params.model_copy(update={"mode": choice.mode, "mass_scaling": choice.scaling})
+        said = {"note": choice.why, "expected_error": choice.error}
+        context.report(0.0, choice.why)
     context.report(0.0, "laying the bundle")
     wood = lay(params, settings.vertices)
     attrs: dict[str, Any] = {
         "path": params.mode,
+        "mass_scaling": params.mass_scaling,
+        **said,
         "rods": len(wood.grid),
         "vertices": settings.vertices,
         "bonds": len(wood.bonds.i),
@@ -107,10 +116,11 @@ def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: 
         "work": work,
         "broken_rods": state.rods,
         "broken_bonds": state.bonds,
-        "impulse": state.impulse.sum(0),
+        "impulse": state.impulse[:, :3].sum(0),
         "fracture_energy": state.spent,
         "crack_area": float(wood.bonds.area @ wood.bonds.parted),
-        "body_impulse": state.impulse.copy(),
+        "body_impulse": state.impulse[:, :3].copy(),
+        "body_moment": state.impulse[:, 3:].copy(),
         "grip_impulse": state.gripped[:, :3].copy(),
         "grip_moment": state.gripped[:, 3:].copy(),
         "tip_position": weight @ wood.motion.x[ends] / weight.sum(),
@@ -146,9 +156,10 @@ def _dataset(
     dims = {
         "impulse": ("stage", "component"),
         "body_impulse": ("stage", "obstacle", "component"),
+        "body_moment": ("stage", "obstacle", "component"),
         "grip_impulse": ("stage", "grip", "component"),
         "grip_moment": ("stage", "grip", "component"),
-        **dict.fromkeys(("body_force", "body_shift"), ("stage", "obstacle", "component")),
+        **dict.fromkeys(("body_force", "body_torque", "body_shift"), ("stage", "obstacle", "component")),
         **dict.fromkeys(("grip_force", "grip_torque", "grip_shift"), ("stage", "grip", "component")),
         "fragment_mass": ("stage", "fragment"),
         "fragment_place": ("stage", "fragment", "component"),
