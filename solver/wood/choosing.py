@@ -71,8 +71,8 @@ def _frequency(params: WoodParams, held: _Held) -> float:
     spans = [b - a for a, b in pairwise(held.places)] if len(held.places) > 1 else []
     if not held.places:
         spans = [held.length]
-    squares = [(l**2 / (_HINGED * bends)) ** 2 + (l / (_SHEARED * shears)) ** 2 for l in spans]
-    squares += [(l**2 / (_JUTS * bends)) ** 2 + (l / (_JUTS_SHEARED * shears)) ** 2 for l in ends if l > 0]
+    squares = [(s**2 / (_HINGED * bends)) ** 2 + (s / (_SHEARED * shears)) ** 2 for s in spans]
+    squares += [(s**2 / (_JUTS * bends)) ** 2 + (s / (_JUTS_SHEARED * shears)) ** 2 for s in ends if s > 0]
     along = (held.length / (math.pi * (params.stiffness / params.density) ** 0.5)) ** 2
     return float(max(*squares, along) ** -0.5)
 

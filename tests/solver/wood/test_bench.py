@@ -47,7 +47,7 @@ def test_a_body_feels_what_the_rods_press_with():
 
 
 def test_forces_and_moments_of_a_loaded_beam_are_in_equilibrium():
-    """Pressed off its middle on two supports: shares by the lever, no sum of forces, none of moments about any point."""
+    """Pressed off its middle on two supports: shares by the lever, no sum of forces, none of moments."""
     size, at = (0.01, 0.06, 0.0), np.array([[0.03, 0, -0.0048], [0.13, 0, -0.0048], [0.06, 0, 0.0046]])
     bodies = [{"shape": "cylinder", "size": size, "friction": 0.0, "path": [{"time": 0, "position": p}]} for p in at]
     values = {**BAR, "rods": 1, "vertices": 25, "clamp": "none", "bodies": bodies, "damping": 300.0, "radius": 0.005}
