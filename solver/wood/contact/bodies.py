@@ -147,7 +147,8 @@ def press(
     """Add contact forces to f (v, 3) [N]; return the energy of the contacts [J].
 
     push (r, 6) gets the force [N] on each body and its moment about the centre [N m]; power[0] the power of the
-    bodies, power[1] the power lost by friction [W]. Friction is limited to what stops a point's share of the edge in half a step `dt` [s].
+    bodies, power[1] that lost by friction [W]. Friction is limited to what stops a point's share of the edge
+    in half a step `dt` [s].
     """
     energy = 0.0
     for e in range(len(rods.a)):
