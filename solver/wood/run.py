@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -17,6 +18,8 @@ from .contact.listing import law
 from .fracture import sawed
 from .loads import READ, SUMS, measured
 from .model.bundle import lay
+from .model.joining import longest_edge
+from .model.outline import corners
 from .model.state import Wood
 from .params import WoodParams
 from .pieces import pieces
@@ -49,12 +52,9 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         raise InvalidInput("wood has no colatitude and azimuth.", advice="Leave the region out.")
     settings = choose(params, need.quality)
     begun = time.perf_counter()
-    said: dict[str, Any] = {}
-    if params.mode == "auto":
-        choice = decide(params)
-        params = params.model_copy(update={"mode": choice.mode, "mass_scaling": choice.scaling})
-        said = {"note": choice.why, "expected_error": choice.error}
-        context.report(0.0, choice.why)
+    params, said = _settled(params, settings.vertices)
+    if said:
+        context.report(0.0, said["note"])
     context.report(0.0, "laying the bundle")
     wood = lay(params, settings.vertices)
     attrs: dict[str, Any] = {
@@ -100,6 +100,25 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
             error.last_stage = rows[-1]["stage"]
         raise
     return _dataset(rows, frames, wood, params, need, attrs)
+
+
+def _settled(params: WoodParams, vertices: int) -> tuple[WoodParams, dict[str, Any]]:
+    """Return the parameters with the mode chosen, and what is to be said of the run before it begins."""
+    said: dict[str, Any] = {}
+    notes = []
+    if params.mode == "auto":
+        choice = decide(params)
+        params = params.model_copy(update={"mode": choice.mode, "mass_scaling": choice.scaling})
+        said["expected_error"] = choice.error
+        notes.append(choice.why)
+    edge, most = params.length / (vertices - 1), longest_edge(params, corners(params))
+    if params.fracture != "none" and params.rods > 1 and params.reach > 0 and edge > most:
+        wanted = math.ceil(params.length / most) + 1
+        notes.append(
+            f"edges of {1e3 * edge:.3g} mm are longer than the {1e3 * most:.3g} mm that feel a crack's tip: it splits "
+            f"at loads that are too high (by .3 at twice that), and all at once; {wanted} vertices on a rod are enough"
+        )
+    return params, said | ({"note": "; ".join(notes)} if notes else {})
 
 
 def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: float) -> dict[str, Any]:
