@@ -3,8 +3,8 @@
 Loads are slow where they take many periods T = 2 pi / omega of the slowest wave between what holds the wood. An
 oscillator whose support is driven evenly for a time t lags by c / (omega^2 t), c the damping, and swings by
 exp(-c t / 2) / (omega t) of how far it has been driven; masses scaled s times make that s c / (omega^2 t) and sqrt(s)
-exp(-c t / 2) / (omega t). Periods are those of Timoshenko's beam by Dunkerley's sum: bending and shear. The error is of
-elastic forces before anything breaks: how a break runs is inertia's matter.
+exp(-c t / 2) / (omega t), once swings have had the time to decay. Periods are those of Timoshenko's beam by
+Dunkerley's sum: bending and shear. The error is of forces before anything breaks: how a break runs is inertia's matter.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ _SAFE, _SMALL = 0.5, 0.05
 _HINGED, _JUTS, _SHEARED, _JUTS_SHEARED = math.pi**2, 3.516, math.pi, math.pi / 2
 #: Factor of a section in shear.
 _SECTION = 0.9
+#: Of the energy of motion of half a sine, what is not that of its mean: 1 - 8 / pi^2.
+_BENDS = 1 - 8 / math.pi**2
 
 
 class Choice(NamedTuple):
@@ -55,10 +57,12 @@ class _Held(NamedTuple):
         return max(here, self.length - here)
 
 
-def _held(params: WoodParams) -> _Held:
+def _held(params: WoodParams, moving: bool = True) -> _Held:
+    """Return what holds; without what moves, if not `moving`."""
     places = {"none": [], "start": [0.0], "both": [0.0, params.length]}[params.clamp]
-    places = places + [b.path[0].position[0] for b in params.bodies]
-    places += [(max(g.low[0], 0.0) + min(g.high[0], params.length)) / 2 for g in params.grips]
+    places = places + [b.path[0].position[0] for b in params.bodies if moving or len(b.path) == 1]
+    grips = [g for g in params.grips if moving or len(g.path) <= 1]
+    places += [(max(g.low[0], 0.0) + min(g.high[0], params.length)) / 2 for g in grips]
     inside = sorted({round(min(max(p, 0.0), params.length), 9) for p in places})
     return _Held(tuple(inside), params.length)
 
@@ -78,25 +82,31 @@ def _frequency(params: WoodParams, held: _Held) -> float:
 
 
 def _driven(params: WoodParams, held: _Held) -> float:
-    """Return the shortest time [s] in which what moves can break the wood, or has gone its way; inf: nothing moves."""
+    """Return the shortest time [s] in which what moves can break the wood, or goes its way; inf: nothing moves.
+
+    Of a path in many steps, as of one that begins smoothly, the fastest counts, not the shortest.
+    """
     r, reach = params.wide, held.reach
     sags = params.strain_limit * reach**2 / ((12 if len(held.places) > 2 else 3) * r)
     turns = min(params.strain_limit * reach / r, params.shear_strength / max(params.shear, 1e-9) * reach / r)
     found = [math.inf]
     for body in params.bodies:
-        for a, b in pairwise(body.path):
-            found.append(_time(math.dist(a.position, b.position), b.time - a.time, sags))
+        ways = [(math.dist(a.position, b.position), b.time - a.time) for a, b in pairwise(body.path)]
+        found.append(_time(ways, sags))
     for grip in params.grips:
-        for p, q in pairwise(grip.path):
-            found.append(_time(math.dist(p.shift, q.shift), q.time - p.time, sags))
-            found.append(_time(math.dist(p.turn, q.turn), q.time - p.time, turns))
+        steps = list(pairwise(grip.path))
+        found.append(_time([(math.dist(p.shift, q.shift), q.time - p.time) for p, q in steps], sags))
+        found.append(_time([(math.dist(p.turn, q.turn), q.time - p.time) for p, q in steps], turns))
     if any(params.pull):
         found.append(params.strain_limit * params.length / math.hypot(*params.pull))
     return min(found)
 
 
-def _time(way: float, span: float, enough: float) -> float:
-    return math.inf if way == 0 else span * min(enough / way, 1.0)
+def _time(ways: list[tuple[float, float]], enough: float) -> float:
+    """Return the time [s] that a path of (way, time) takes for `enough`, or for all of it, at its fastest."""
+    total = sum(way for way, _ in ways)
+    fastest = max((way / span for way, span in ways), default=0.0)
+    return math.inf if fastest == 0 else min(enough, total) / fastest
 
 
 def _strained(params: WoodParams) -> float:
@@ -111,13 +121,23 @@ def _strained(params: WoodParams) -> float:
 
 
 def error_at(params: WoodParams, scaling: float) -> float:
-    """Return the error of elastic forces, over them, that is expected of masses scaled so many times."""
-    held = _held(params)
-    omega, time = _frequency(params, held), _driven(params, held)
+    """Return the error of forces, over them, that is expected of masses scaled so many times.
+
+    The larger of two: of what is between all that holds and drives, and of what drives, which moves the wood between
+    what rests. A bundle that nothing holds keeps its real mass as a whole, which leaves `_BENDS` of a half sine.
+    """
+    time = _driven(params, _held(params))
     if math.isinf(time):
         return 0.0
+    share = 1.0 if params.clamp != "none" or params.grips else _BENDS
+    within, whole = _frequency(params, _held(params)), _frequency(params, _held(params, moving=False))
+    return max(_missed(params, within, time, scaling), share * _missed(params, whole, time, scaling))
+
+
+def _missed(params: WoodParams, omega: float, time: float, scaling: float) -> float:
+    """Return by how much an oscillator driven for a time [s] lags and swings."""
     swings = math.exp(-min(params.damping * time / 2, 700.0)) / (omega * time)
-    return float(scaling * params.damping / (omega**2 * time) + scaling**0.5 * swings)
+    return scaling * params.damping / (omega**2 * time) + scaling**0.5 * swings
 
 
 def _at_rest(params: WoodParams) -> bool:

@@ -41,7 +41,10 @@ def test_rate_and_loads_decide():
     body = {"shape": "cylinder", "size": (0.01, 0.06, 0.0), "path": ways}
     faster = chosen({"bodies": [*blocks, body]}, "press")
     assert 1 < faster.scaling < slow.scaling
-    ways[1]["time"] = 0.003
+    # the same way in steps is the same load
+    ways[1:] = [{"time": 0.03 * n, "position": (0.075, 0, 0.015 - 0.003 * n)} for n in range(1, 11)]
+    assert chosen({"bodies": [*blocks, body]}, "press").scaling == faster.scaling
+    ways[1:] = [{"time": 0.003, "position": (0.075, 0, -0.015)}]
     assert chosen({"bodies": [*blocks, body]}, "press").scaling == 1
 
 
