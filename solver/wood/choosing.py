@@ -137,7 +137,7 @@ def error_at(params: WoodParams, scaling: float) -> float:
 def _missed(params: WoodParams, omega: float, time: float, scaling: float) -> float:
     """Return by how much an oscillator driven for a time [s] lags and swings."""
     swings = math.exp(-min(params.damping * time / 2, 700.0)) / (omega * time)
-    return scaling * params.damping / (omega**2 * time) + scaling**0.5 * swings
+    return float(scaling * params.damping / (omega**2 * time) + scaling**0.5 * swings)
 
 
 def _at_rest(params: WoodParams) -> bool:
