@@ -138,8 +138,8 @@ def main(species: list[str], seeds: list[int]) -> None:
             run = bending(wood, seed)
             cpu = time.process_time() - begun
             kept = {k: [float(f"{v:.4g}") for v in run[k]] for k in ("way", "force")}
-            places = np.round(run["ends"][run["cut"] < 0][:, :, [0, 2]], 4).reshape(-1, 4).tolist()
-            drawn = {"note": run["note"], "edges": places if seed == seeds[0] else []}
+            places = " ".join(f"{v:.4g}" for v in run["ends"][run["cut"] < 0][:, :, [0, 2]].ravel())
+            drawn = {"note": run["note"], "edges": places if seed == seeds[0] else ""}
             head, broken = (name, "bending", str(seed)), (str(run["rods"]), str(run["bonds"]))
             for (quantity, unit, more), got, wanted, scatter in zip(
                 (("apparent E [GPa]", 1e9, {}), ("rupture [MPa]", 1e6, {**kept, **drawn})),
@@ -175,7 +175,7 @@ def _drawn(out: Path) -> None:
         grid[test].set(title=test, xlabel="way [mm]", ylabel="force [N]")
     grid["DCB"].legend(fontsize=8)
     for run in (r for r in runs if r.get("edges")):
-        lines = 1e3 * np.array(run["edges"]).reshape(-1, 2, 2)
+        lines = 1e3 * np.array(run["edges"].split(), float).reshape(-1, 2, 2)
         axes = grid[run["species"]]
         axes.add_collection(LineCollection(list(lines), linewidths=0.5, colors="saddlebrown"))
         axes.set(xlim=(-5, 415), ylim=(-40, 20), ylabel=f"{run['species']}, z [mm]", aspect="equal")

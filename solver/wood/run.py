@@ -53,9 +53,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     settings = choose(params, need.quality)
     begun = time.perf_counter()
     params, said = _settled(params, settings.vertices)
-    if said:
-        context.report(0.0, said["note"])
-    context.report(0.0, "laying the bundle")
+    context.report(0.0, said.get("note", "laying the bundle"))
     wood = lay(params, settings.vertices)
     attrs: dict[str, Any] = {
         "path": params.mode,
