@@ -164,9 +164,13 @@ register(
     broken_bonds=Quantity("1", "bonds broken or left without a rod since the start", "n_b"),
     impulse=Quantity("N s", "impulse that the rigid bodies received from the rods since the start", "J"),
     body_impulse=Quantity("N s", "impulse that each rigid body received from the rods since the start", "J"),
+    body_moment=Quantity(
+        "N m s", "moment of impulse about its centre that each rigid body received from the rods since the start", "L"
+    ),
     grip_impulse=Quantity("N s", "impulse that each grip put in since the start", "J"),
     grip_moment=Quantity("N m s", "moment of impulse about its pivot that each grip put in since the start", "L"),
     body_force=Quantity("N", "mean force of the rods on each rigid body since the stage before", "F"),
+    body_torque=Quantity("N m", "mean moment of the rods on each body about its centre since the stage before", "M"),
     body_shift=Quantity("m", "mean way of each rigid body from its place at time 0, since the stage before", "u"),
     grip_force=Quantity("N", "mean force that each grip put in since the stage before", "F"),
     grip_torque=Quantity("N m", "mean moment about its pivot that each grip put in since the stage before", "M"),

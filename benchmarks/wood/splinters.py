@@ -24,7 +24,7 @@ _HEAD = ("masses over real ones", "seed", "breaks of rods", "of bonds", "CPU s",
 
 def _run(values: dict[str, Any], until: float) -> dict[str, Any]:
     """Return what became of a run."""
-    params = SOLVER.parse(values, preset="fig-4.2")
+    params = SOLVER.parse({"mode": "explicit", **values}, preset="fig-4.2")
     assert isinstance(params, WoodParams)
     need = Need(stages=tuple(until * n / 10 for n in range(1, 11)), fields=_FIELDS, quality="preview")
     told: dict[str, Any] = {

@@ -21,7 +21,7 @@ from solver.wood.contact.pairs import distances, pairs
 from solver.wood.model.bundle import lay
 from solver.wood.model.state import Wood
 
-_PRESS = {"rods": 24, "vertices": 31, "mass_scaling": 1e4}
+_PRESS = {"rods": 24, "vertices": 31, "mode": "explicit", "mass_scaling": 1e4}
 _STAGES = tuple(0.1 * n for n in range(1, 31))
 _FIELDS = ("rod_position", "rod_cut", "elastic_energy", "broken_rods", "broken_bonds")
 

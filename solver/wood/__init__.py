@@ -47,12 +47,14 @@ _NUMBERS = (
     "broken_bonds",
     "impulse",
     "body_impulse",
+    "body_moment",
     "grip_impulse",
     "grip_moment",
     "fracture_energy",
     "crack_area",
     "tip_position",
     "body_force",
+    "body_torque",
     "body_shift",
     "grip_force",
     "grip_torque",
@@ -65,7 +67,7 @@ _NUMBERS = (
 
 SOLVER = Solver(
     name="wood",
-    version="6",
+    version="7",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),

@@ -11,8 +11,13 @@ from .params import WoodParams
 __all__ = ["READ", "SUMS", "measured"]
 
 #: What each reading is made of, a sum since the start: force and moment are its differences over those of the stages.
-SUMS = {"body_force": "body_impulse", "grip_force": "grip_impulse", "grip_torque": "grip_moment"}
-READ = ("body_force", "body_shift", "grip_force", "grip_torque", "grip_shift")
+SUMS = {
+    "body_force": "body_impulse",
+    "body_torque": "body_moment",
+    "grip_force": "grip_impulse",
+    "grip_torque": "grip_moment",
+}
+READ = ("body_force", "body_torque", "body_shift", "grip_force", "grip_torque", "grip_shift")
 
 
 def _along(paths: list[tuple[list[float], list[Any]]], times: np.ndarray) -> np.ndarray:

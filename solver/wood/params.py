@@ -201,9 +201,10 @@ class WoodParams(Params):
         "sqrt of it longer; fragments as a whole keep their real mass",
         json_schema_extra={"units": "1"},
     )
-    mode: Literal["explicit", "static"] = Field(
+    mode: Literal["explicit", "static", "auto"] = Field(
         "explicit",
-        description="Explicit in time, or equilibrium at every stage",
+        description="Explicit in time, equilibrium at every stage, or auto: equilibria, scaled or real masses as the "
+        "loads' rate allows; the result says which, why, and at which expected error",
         json_schema_extra={"units": "1"},
     )
     step: float | None = Field(
@@ -238,6 +239,8 @@ class WoodParams(Params):
             raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
         if self.mode == "static" and (self.twist or self.curvature):
             raise ValueError("twist and curved axes need the explicit mode: set mode explicit")
+        if self.mode == "auto" and self.mass_scaling > 1:
+            raise ValueError("auto chooses the masses itself: leave mass_scaling out, or set mode explicit")
         if self.mode == "static" and self.mass_scaling > 1:
             raise ValueError("mass scaling is for the explicit mode: set mode explicit, or mass_scaling 1")
         if self.mode == "static" and self.rod_contact:

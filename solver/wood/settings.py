@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ..contract import Cost, Need, Quality
+from .choosing import decide
 from .params import WoodParams
 
 __all__ = ["Settings", "choose", "expected_cost"]
@@ -56,6 +57,9 @@ def choose(params: WoodParams, quality: Quality) -> Settings:
 
 def expected_cost(params: WoodParams, need: Need) -> Cost:
     """Return what a run is expected to take."""
+    if params.mode == "auto":
+        choice = decide(params)
+        params = params.model_copy(update={"mode": choice.mode, "mass_scaling": choice.scaling})
     settings = choose(params, need.quality)
     count = params.rods * settings.vertices
     width = 8 if need.dtype == "float64" else 4

@@ -131,6 +131,7 @@ def show(
         "params": params,
         "need": json.loads(run.attrs["need"]),
         "digest": run.attrs["digest"],
+        "note": run.attrs.get("note"),
         "path": str(path),
         "bytes": path.stat().st_size,
         "seconds": float(run["seconds"].sum()) if "seconds" in run else 0.0,

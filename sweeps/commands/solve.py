@@ -119,6 +119,8 @@ def solve(asked: _Asked) -> None:
         **{name: getattr(spec, name) for name in ("key", "solver", "version", "params", "need")},
         "digest": shards.digest(result),
         "seconds": seconds,
+        # what a solver has to say of how it ran
+        "note": result.attrs.get("note"),
         "path": asked.out and str(asked.out),
         "stages": [float(stage) for stage in result["stage"]],
         "descriptors": per_stage(result),

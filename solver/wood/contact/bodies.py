@@ -146,8 +146,9 @@ def press(
 ) -> float:
     """Add contact forces to f (v, 3) [N]; return the energy of the contacts [J].
 
-    push (r, 3) [N] gets the force on each body; power[0] the power of the bodies, power[1] the power lost by friction
-    [W]. Friction is limited to what stops a point's share of the edge in half a step `dt` [s].
+    push (r, 6) gets the force [N] on each body and its moment about the centre [N m]; power[0] the power of the
+    bodies, power[1] that lost by friction [W]. Friction is limited to what stops a point's share of the edge
+    in half a step `dt` [s].
     """
     energy = 0.0
     for e in range(len(rods.a)):
@@ -207,6 +208,12 @@ def press(
                 push[r, 0] -= p0
                 push[r, 1] -= p1
                 push[r, 2] -= p2
+                a0 = o0 + u * d0
+                a1 = o1 + u * d1
+                a2 = o2 + u * d2
+                push[r, 3] -= a1 * p2 - a2 * p1
+                push[r, 4] -= a2 * p0 - a0 * p2
+                push[r, 5] -= a0 * p1 - a1 * p0
                 power[0] += p0 * speed[r, 0] + p1 * speed[r, 1] + p2 * speed[r, 2]
                 power[1] += drag * slip * slip
     return energy

@@ -14,7 +14,7 @@ from .grain import Field
 from .outline import area, corners, sawn_through
 from .slopes import leaning
 
-__all__ = ["bodied", "bonded", "resolved", "sloped"]
+__all__ = ["bodied", "bonded", "longest_edge", "resolved", "sloped"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
@@ -121,6 +121,18 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
     slides = (params.stiffness * params.toughness_sliding * thick) ** 0.5 / zone
     own = (params.cleavage, params.shear_strength)
     return min(own[0], max(opens, _LEAST * own[0])), min(own[1], max(slides, _LEAST * own[1]))
+
+
+def longest_edge(params: WoodParams, outline: np.ndarray) -> float:
+    """Return the length [m] beyond which edges feel no crack's tip, however weak `resolved` may make the bonds.
+
+    Twice as long, a double cantilever beam bore 1.3 times what it should (docs/wood.md).
+    """
+    way = np.linalg.norm(np.roll(outline, -1, 0) - outline, axis=1).sum()
+    thick = 2 * area(outline) / float(way)
+    opens = ((params.stiffness * params.toughness * thick**3) ** 0.5 / (_LEAST * params.cleavage)) ** 0.5
+    slides = (params.stiffness * params.toughness_sliding * thick) ** 0.5 / (_LEAST * params.shear_strength)
+    return float(min(opens, slides)) / _ZONE
 
 
 def _begins(own: np.ndarray, resolved_: np.ndarray, cost: np.ndarray, holds: np.ndarray) -> np.ndarray:

@@ -42,7 +42,7 @@ class Scratch(NamedTuple):
     each: np.ndarray
     centre: np.ndarray
     speed: np.ndarray
-    push: np.ndarray
+    push: np.ndarray  # (r, 6) force [N] on each body and its moment about the centre [N m]
     power: np.ndarray
     bent: np.ndarray  # (h,) curvature beyond that at rest, of rods that resist twist [1/m]
     light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]

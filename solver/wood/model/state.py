@@ -64,7 +64,7 @@ def scratch_for(wood: Wood) -> Scratch:
         np.zeros((2, len(wood.bonds.i))),
         np.zeros((r, 3)),
         np.zeros((r, 3)),
-        np.zeros((r, 3)),
+        np.zeros((r, 6)),
         np.zeros(2),
         np.zeros(len(wood.rods.before)),
         wood.motion.mass.copy(),
@@ -76,7 +76,8 @@ def scratch_for(wood: Wood) -> Scratch:
 
 
 class State(NamedTuple):
-    """A moment of a run. books (6,) [J] as `motion` numbers them; impulse (r, 3) [N s] of the bodies; steps taken.
+    """A moment of a run. books (6,) [J] as `motion` numbers them; impulse (r, 6) of the bodies, [N s] and
+    its moment about their centres [N m s]; steps taken.
 
     gripped (g, 6): impulse [N s] and moment of it about the pivot [N m s] that each grip put in; spent [J]: energy that
     breaks took so far.

@@ -134,7 +134,8 @@ def march(
 ) -> bool:
     """Advance `steps` steps of `dt` [s] in place; scratch must hold the forces of the start. False: no longer finite.
 
-    `damping` [1/s] slows every velocity by exp(-damping t). impulse (r, 3) [N s] gathers what each body received.
+    `damping` [1/s] slows every velocity by exp(-damping t). impulse (r, 6) gathers what each body received:
+    impulse [N s] and moment of it about its centre [N m s].
     """
     x = motion.x
     v = motion.v
@@ -175,7 +176,7 @@ def march(
                     motion.spin[e] += half * scratch.torque[e] / turns.inertia[e]
                     motion.theta[e] += dt * motion.spin[e]
         for r in range(len(bodies.kind)):
-            for c in range(3):
+            for c in range(6):
                 impulse[r, c] += half * scratch.push[r, c]
         look = n == steps - 1
         _fill(motion, rods, turns, bodies, scratch, turning, time + (n + 1) * dt, dt, books, look)
@@ -188,7 +189,7 @@ def march(
                 if turns.inertia[e] > 0.0:
                     motion.spin[e] += half * scratch.torque[e] / turns.inertia[e]
         for r in range(len(bodies.kind)):
-            for c in range(3):
+            for c in range(6):
                 impulse[r, c] += half * scratch.push[r, c]
         books[WORK] += work + half * (power + grip(held, v, f) + pinned(f, pins, half) + scratch.power[0])
         books[LOST] += half * (rubbed + scratch.power[1])

@@ -79,7 +79,7 @@ def begin(wood: Wood) -> State:
     books = np.zeros(6)
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, books)
     return State(
-        wood, scratch, books, np.zeros((len(wood.bodies.kind), 3)), np.zeros((len(wood.grips), 6)), 0.0, 0, 0, 0
+        wood, scratch, books, np.zeros((len(wood.bodies.kind), 6)), np.zeros((len(wood.grips), 6)), 0.0, 0, 0, 0
     )
 
 

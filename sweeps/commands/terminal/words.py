@@ -44,6 +44,8 @@ def show_run(console: Any, document: Mapping[str, Any], symbol: str) -> None:
         for name, d in document["descriptors"].items()
     ]
     grid(console, head, rows)
+    if document.get("note"):
+        console.print(document["note"], markup=False)
     console.print(f"{document['seconds']:.1f} s, key {document['key'][:12]}, digest {document['digest'][:12]}")
     if document["path"]:
         console.print(f"written to {document['path']}", markup=False)

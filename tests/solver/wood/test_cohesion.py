@@ -1,13 +1,16 @@
 """Bonds that give way: what a crack costs, whatever its mix, and what crack each bond stands for."""
 
+import math
+
 import numpy as np
 import pytest
 
+from solver.contract import Context, Need
 from solver.wood import SOLVER
 from solver.wood.cohesion import soften
 from solver.wood.fracture import sawed
 from solver.wood.model.bundle import lay
-from solver.wood.model.joining import resolved
+from solver.wood.model.joining import longest_edge, resolved
 from solver.wood.model.outline import area, chords, corners, sawn_through
 from solver.wood.model.plan import KEEP
 from solver.wood.model.state import scratch_for
@@ -171,3 +174,19 @@ def test_strength_of_coarse_rods_is_what_their_edges_resolve():
     assert (10e9 * 250 * thick**3 / opens**2) ** 0.25 == pytest.approx(5.5 * 0.005)
     assert (10e9 * 700 * thick / slides**2) ** 0.5 == pytest.approx(5.5 * 0.005)
     assert resolved(params, 0.1, outline) == (1e6, 2e6)
+
+
+def test_edges_that_feel_no_crack_are_named_before_any_work():
+    """At the length named no bond is weaker than its floor, beyond it one would have to be; a run says so first."""
+    params = SOLVER.parse(PLANK)
+    outline, most = corners(params), longest_edge(SOLVER.parse(PLANK), corners(params))
+    assert resolved(params, 0.99 * most, outline)[0] > 1e6
+    assert 1e6 in resolved(params, 1.01 * most, outline)
+    told = []
+    for edges, said in ((math.ceil(params.length / most), False), (math.floor(params.length / most) - 1, True)):
+        values = {**PLANK, "rods": 4, "vertices": edges + 1, "unevenness": 0.0}
+        watch = Context(lambda _, message: told.append(message))
+        found = SOLVER.solve(SOLVER.parse(values), Need(stages=(0.0,), fields=("crack_area",)), watch)
+        assert ("longer than" in found.attrs.get("note", "")) is said
+        assert ("longer than" in told[0]) is said
+        told.clear()

@@ -40,9 +40,9 @@ def bundle() -> Wood:
 
 
 def pressed(wood: Wood, dt: float = 1e-6):
-    """Return energy, forces (v, 3), forces on the bodies (r, 3), powers (2,)."""
+    """Return energy, forces (v, 3), forces on the bodies and their moments (r, 6), powers (2,)."""
     m, b = wood.motion, wood.bodies
-    centre, speed, push = (np.zeros((len(b.kind), 3)) for _ in range(3))
+    centre, speed, push = (np.zeros((len(b.kind), n)) for n in (3, 3, 6))
     pose(b, 0.1, centre, speed)
     f, power = np.zeros_like(m.x), np.zeros(2)
     energy = press(m.x, m.v, f, m.mass, wood.rods, b, centre, speed, dt, push, power)
@@ -94,7 +94,10 @@ def test_contact_is_that_of_plain_numpy_and_keeps_momentum():
     assert energy == pytest.approx(own, rel=1e-12)
     assert np.abs(f - wanted).max() < 1e-12 * np.abs(wanted).max()
     assert power == pytest.approx(powers, rel=1e-12)
-    assert np.abs(f.sum(0) + push.sum(0)).max() < 1e-13 * np.abs(f).max() * len(f)
+    given, moment = push[:, :3], push[:, 3:]
+    assert np.abs(f.sum(0) + given.sum(0)).max() < 1e-13 * np.abs(f).max() * len(f)
+    arms = np.cross(m.x, f).sum(0) + np.cross(centres, given).sum(0) + moment.sum(0)
+    assert np.abs(arms).max() < 1e-13 * np.abs(np.cross(m.x, f)).max() * len(f)
 
 
 def test_forces_are_the_energy_s_differences():
@@ -135,14 +138,15 @@ def one(kind: int, k: float = 1e3) -> tuple[Rods, Bodies]:
 @pytest.mark.parametrize("kind", [0, 1])
 def test_friction_is_coulomb_s(kind):
     rods, body = one(kind)
-    f, push, power = np.zeros((2, 3)), np.zeros((1, 3)), np.zeros(2)
+    f, push, power = np.zeros((2, 3)), np.zeros((1, 6)), np.zeros(2)
     x, v = np.array([[0.0, 0.1, 0.99], [0.0, 0.2, 0.99]]), np.array([[2.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     rest = np.zeros((1, 3))
     energy = press(x, v, f, np.ones(2), rods, body, rest, rest, 1e-3, push, power)
     # 1e3 N/m2 on 0.1 m at a depth of 0.01 m
     assert f[0] == pytest.approx([-0.2, 0, 0.5])
     assert f[1] == pytest.approx([-0.2, 0, 0.5])
-    assert push[0] == pytest.approx([0.4, 0, -1.0])
+    # at y = .15 and z = .99 from the centre
+    assert push[0] == pytest.approx([0.4, 0, -1.0, -0.15, 0.396, -0.06], rel=1e-3)
     assert power == pytest.approx([0, 0.8])
     assert energy == pytest.approx(0.005)
 

@@ -135,7 +135,7 @@ def test_fragments_are_what_hangs_together():
 
 
 def test_a_slow_press_bends_a_branch_as_much_on_scaled_masses():
-    values = {"rods": 5, "vertices": 9, "fracture": "none"}
+    values = {"rods": 5, "vertices": 9, "fracture": "none", "mode": "explicit"}
     need = Need(stages=(1.0, 1.2), fields=("elastic_energy",), quality="preview")
     real_, scaled = (
         SOLVER.solve(SOLVER.parse({**values, "mass_scaling": s}, preset="fig-4.2"), need) for s in (1.0, 400.0)
@@ -146,7 +146,9 @@ def test_a_slow_press_bends_a_branch_as_much_on_scaled_masses():
 
 def test_bodies_do_not_throw_scaled_fragments_off():
     """What they push loses and gains no energy by a step that is long for the real mass."""
-    params = SOLVER.parse({"rods": 8, "vertices": 9, "mass_scaling": 2500.0, "fracture": "none"}, preset="fig-4.2")
+    params = SOLVER.parse(
+        {"rods": 8, "vertices": 9, "mode": "explicit", "mass_scaling": 2500.0, "fracture": "none"}, preset="fig-4.2"
+    )
     found = SOLVER.solve(params, Need(stages=(0.1, 0.3), fields=("elastic_energy", "work")))
     assert found.residual.values.max() < 0.02
     assert found.elastic_energy.values[-1] > 0
@@ -159,7 +161,7 @@ def test_equilibria_need_no_scaling():
 
 @pytest.mark.parametrize("touching", [False, True])
 def test_books_close_when_fragments_come_off(touching):
-    values = {"rods": 8, "vertices": 11, "mass_scaling": 2500.0, "seed": 3, "rod_contact": touching}
+    values = {"rods": 8, "vertices": 11, "mode": "explicit", "mass_scaling": 2500.0, "seed": 3, "rod_contact": touching}
     found = SOLVER.solve(SOLVER.parse(values, preset="fig-4.2"), Need(stages=(0.5, 1.0, 1.5), quality="preview"))
     assert found.broken_rods.values[-1] >= 3
     assert found.residual.values.max() < 0.05

@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from benchmarks.wood.bench import bent, opened, slid
 from benchmarks.wood.fracture import DCB, ENF, measured, trial
 
 
@@ -26,3 +28,21 @@ def test_slowly_driven_it_does_within_five_percent(of):
     assert found["before"] == pytest.approx(1, abs=0.05)
     assert found["mean"] == pytest.approx(1, abs=0.05)
     assert found["by_area"] == pytest.approx({"DCB": 250.0, "ENF": 700.0}[of.name], rel=0.02)
+
+
+def test_the_bench_reads_curves_as_beam_theory_made_them():
+    """Moduli and toughnesses that curves were drawn with: a bent stick, and cracks that grow."""
+    stiff, shear = 11.9e9, 0.74e9
+    way = np.linspace(0, 5e-3, 60)
+    force = np.where(way < 4e-3, 4 * 0.025**4 * 10.8e9 / 0.36**3 * way, 10.0)
+    e, rupture = bent(way, force)
+    assert e == pytest.approx(10.8e9)
+    assert rupture == pytest.approx(3 * force.max() * 0.36 / (2 * 0.025**3))
+    a = np.linspace(0.08, 0.13, 60)
+    bend = stiff * 0.02 * DCB.high**3 / 12
+    load = np.sqrt(250 * 0.02 * bend) / a
+    assert opened(2 * load * a**3 / (3 * bend), load, stiff) == pytest.approx(250)
+    h = ENF.high
+    load = np.sqrt(700 * 16 * stiff * 0.02**2 * h**3 / 9) / a
+    sag = load * ((3 * a**3 + 2 * 0.16**3) / (8 * stiff * 0.02 * h**3) + 3 * 0.16 / (10 * shear * 0.02 * h))
+    assert slid(sag, load, stiff, shear) == pytest.approx(700)
