@@ -6,7 +6,7 @@ every machine. `scalar` offers the same two functions in plain numba.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import llvmlite.ir as ir
@@ -19,9 +19,6 @@ from solver.dehydration.kernel.elements import core_forces, exocarp_forces, one_
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.generate.lanes import (
     FAST,
-    FOUR,
-    FOUR_INT,
-    INT32,
     INT64,
     WIDE,
     WIDE_INT,
@@ -32,16 +29,16 @@ from solver.dehydration.kernel.generate.lanes import (
     constant,
     gather_corner,
     load,
-    shuffle,
     splat,
     store,
     store_rows,
 )
+from solver.dehydration.kernel.generate.node_ir import update_nodes
 from solver.dehydration.kernel.strips import LANES
 
+__all__ = ["strip_forces", "update_nodes"]
+
 CORNERS = 4
-GROUP = 4
-"""Nodes that are moved at once, and the rows that each of them has nearly everywhere."""
 Face: TypeAlias = list[list[Any]]
 """[corner][component] -> vector of 16 lanes, or the stack slot of one."""
 
@@ -174,119 +171,6 @@ def strip_forces(
         march(build.add(first_core, deep), build.sub(cores, deep), data[4], CORE_PLANES, core_forces, wide_theta)
         march(first_exocarp, exocarps, data[6], EXOCARP_PLANES, exocarp_forces, constant(1.0))
         sweep.close()
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-def _sum_of_rows(build: Any, force: Any, places: Sequence[Any]) -> Any:
-    """Sum of force rows of one node, in their order, from zero; four floats, of which the last is a neighbour's."""
-    total = ir.Constant(FOUR, [0.0] * 4)
-    for place in places:
-        total = build.fadd(total, load(build, at(build, force, place), FOUR))
-    return total
-
-
-def _move(build: Any, total: Any, weight: Any, pushed: Any, keep: Any, x: Any, v: Any) -> None:
-    """Move nodes, four numbers each, by their summed forces; weight, pushed: inverse mass, and push times it."""
-    kind, count = total.type, total.type.count
-    zero = ir.Constant(kind, [0.0] * count)
-    # A row is three floats: the fourth belongs to its neighbour.
-    force = shuffle(build, total, zero, [k if k % 4 < 3 else count for k in range(count)])
-    kicked = build.fsub(
-        build.fmul(splat(build, keep, kind), load(build, v, kind), flags=FAST),
-        build.fmul(pushed, force, flags=FAST),
-        flags=FAST,
-    )
-    kicked = build.select(build.fcmp_ordered(">", weight, zero), kicked, zero)
-    store(build, kicked, v)
-    # Saturating: a run that blows up stops at the edge of the range instead of being undefined.
-    whole, name = ir.VectorType(INT32, count), f"v{count}f32"
-    rint = cgutils.get_or_insert_function(build.module, ir.FunctionType(kind, [kind]), f"llvm.rint.{name}")
-    saturate = cgutils.get_or_insert_function(
-        build.module, ir.FunctionType(whole, [kind]), f"llvm.fptosi.sat.v{count}i32.{name}"
-    )
-    quanta = build.fmul(kicked, ir.Constant(kind, [1 / QUANTUM] * count), flags=FAST)
-    moved = build.call(saturate, [build.call(rint, [quanta])])
-    store(build, build.add(load(build, x, whole), moved), x)
-
-
-@intrinsic
-def update_nodes(
-    typingctx: Any,
-    forces: Any,
-    row_start: Any,
-    rows: Any,
-    inverse_mass: Any,
-    state: Any,
-    velocity: Any,
-    keep: Any,
-    push: Any,
-    group: Any,
-) -> Any:
-    """Central-difference update of the nodes GROUP * group and on, GROUP of them where there are as many.
-
-    velocity <- keep * velocity - push * inverse_mass * (sum of force rows); state <- state + velocity; a node of
-    inverse mass 0 stays. The fourth component stays 0. Nodes of four rows each, as nearly all are, go at once.
-    """
-    arrays = (forces, row_start, rows, inverse_mass, state, velocity)
-    signature = types.void(*arrays, types.float32, types.float32, types.int64)
-
-    def codegen(context: Any, build: Any, signature: Any, args: Any) -> Any:
-        views = [
-            context.make_array(kind)(context, build, value)
-            for kind, value in zip(signature.args[:6], args[:6], strict=True)
-        ]
-        force, start, row, mass, x, v = (view.data for view in views)
-        keep, push, group = args[6:]
-        one, usual = ir.Constant(INT64, 1), ir.Constant(FOUR_INT, [GROUP] * GROUP)
-        count = build.extract_value(views[3].shape, 0)
-        begin = build.mul(group, ir.Constant(INT64, GROUP))
-        beyond = build.add(begin, ir.Constant(INT64, GROUP))
-        whole = build.icmp_signed("<=", beyond, count)
-
-        def one_by_one() -> None:
-            end = build.select(whole, beyond, count)
-            with cgutils.for_range_slice(build, begin, end, one, INT64) as (node, _):
-                first = build.sext(build.load(at(build, start, node)), INT64)
-                last = build.sext(build.load(at(build, start, build.add(node, one))), INT64)
-                total = cgutils.alloca_once(build, FOUR)
-                build.store(ir.Constant(FOUR, [0.0] * 4), total)
-                with cgutils.for_range_slice(build, first, last, one, INT64) as (entry, _):
-                    place = build.sext(build.load(at(build, row, entry)), INT64)
-                    build.store(build.fadd(build.load(total), load(build, at(build, force, place), FOUR)), total)
-                weight = build.load(at(build, mass, node))
-                place = build.shl(node, ir.Constant(INT64, 2))
-                pushed = splat(build, build.fmul(push, weight), FOUR)
-                here = at(build, x, place), at(build, v, place)
-                _move(build, build.load(total), splat(build, weight, FOUR), pushed, keep, *here)
-
-        def at_once() -> None:
-            entries = at(build, row, build.sext(build.load(at(build, start, begin)), INT64))
-            places = [build.sext(build.load(at(build, entries, k)), INT64) for k in range(GROUP * GROUP)]
-            sums = [_sum_of_rows(build, force, places[GROUP * k : GROUP * (k + 1)]) for k in range(GROUP)]
-            halves = [shuffle(build, *sums[k : k + 2], range(8)) for k in (0, 2)]
-            weights = load(build, at(build, mass, begin), FOUR)
-            spread = [k // 4 for k in range(LANES)]
-            pushed = shuffle(build, build.fmul(splat(build, push, FOUR), weights), weights, spread)
-            place = build.shl(begin, ir.Constant(INT64, 2))
-            total = shuffle(build, *halves, range(LANES))
-            here = at(build, x, place), at(build, v, place)
-            _move(build, total, shuffle(build, weights, weights, spread), pushed, keep, *here)
-
-        with build.if_else(whole, likely=True) as (inside, at_the_end):
-            with inside:
-                starts = load(build, at(build, start, begin), FOUR_INT)
-                following = load(build, at(build, start, build.add(begin, one)), FOUR_INT)
-                same = build.icmp_signed("==", build.sub(following, starts), usual)
-                every = build.icmp_unsigned("==", build.bitcast(same, ir.IntType(GROUP)), ir.IntType(GROUP)(-1))
-                with build.if_else(every, likely=True) as (alike, mixed):
-                    with alike:
-                        at_once()
-                    with mixed:
-                        one_by_one()
-            with at_the_end:
-                one_by_one()
         return context.get_dummy_value()
 
     return signature, codegen
