@@ -24,7 +24,8 @@ from .jobs import results as jobs_results
 from .jobs import routes as jobs
 from .jobs.runner import JobRunner
 from .limits import memory
-from .limits.admission import Admission
+from .limits.admission import Admission, Load
+from .limits.door import DOOR, Door
 from .limits.requests import Limits
 from .matching import routes as matching
 from .openapi import Documented, operation_id
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 
 
 @asynccontextmanager
-async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Door]]:
     # handlers run in this pool; each shape in flight holds its arrays, so their number bounds the memory
     anyio.to_thread.current_default_thread_limiter().total_tokens = app.state.settings.threads
     runner = JobRunner(app.state.settings)
@@ -59,7 +60,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         if runner.wanted:
             runner.start()
         try:
-            yield
+            memory.keep("service")
+            yield {DOOR: app.state.door}
         finally:
             await app.state.sessions.close_all()
             if runner.wanted:
@@ -127,9 +129,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
     """Put around the routes what a request passes on its way to them; the last one added is the outermost."""
+    load = Load(settings.threads, min(settings.max_delay, settings.timeout))
+    app.state.door = Door(settings, load, metrics, app.state, app.state.answers.is_kept)
     if settings.public_read:
         app.add_middleware(Shortcut, state=app.state)
-    app.add_middleware(Admission, settings=settings)
+    app.add_middleware(Admission, load=load)
     app.add_middleware(Limits, settings=settings, is_patient=lambda: app.state.compiling.is_under_way)
     if settings.public_read and settings.cache_bytes:
         app.add_middleware(Repeats, state=app.state)

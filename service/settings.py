@@ -56,7 +56,7 @@ class Settings(BaseSettings):
     max_delay: float = Field(
         1.0, gt=0, description="Longest expected wait for a shape or a result; what would wait longer gets a 503 [s]"
     )
-    max_waiting: int = Field(256, ge=1, description="Most small shapes that wait to be computed, in each process")
+    max_waiting: int = Field(1024, ge=1, description="Most small shapes that wait to be computed, in each process")
     threads: int = Field(8, ge=1, le=256, description="Shapes computed at the same time; each holds its arrays")
     reload_interval: float = Field(0.5, ge=0, description="How often a table's manifest is looked at, at most [s]")
     cache_age: int = Field(60, ge=0, description="How long a client may reuse a shape without asking again [s]")

@@ -21,7 +21,7 @@ from store.errors import StoreError
 
 from . import problems
 
-__all__ = ["LOGGER", "Metrics", "Telemetry"]
+__all__ = ["LOGGER", "Metrics", "Telemetry", "record"]
 
 LOGGER = logging.getLogger("wizen.service")
 
@@ -95,25 +95,27 @@ class Telemetry:
                 raise  # half an answer is out: the connection must break
             await problems.unforeseen(scope)(scope, receive, watched)
         finally:
-            self._record(scope, method, status, sent, time.perf_counter() - begin)
+            record(self.metrics, scope, method, status, sent, time.perf_counter() - begin)
 
-    def _record(self, scope: Scope, method: str, status: int, sent: int, seconds: float) -> None:
-        # the route, not the path: what a stranger types must not become a label
-        route = getattr(scope.get("route"), "path", "none")
-        known = method if method in {"GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"} else "other"
-        self.metrics.requests.labels(route, known, str(status)).inc()
-        self.metrics.seconds.labels(route).observe(seconds)
-        fields = {
-            "request_id": scope["state"]["request_id"],
-            "method": method,
-            "path": scope["path"],
-            "route": route,
-            "status": status,
-            "milliseconds": round(1e3 * seconds, 3),
-            "bytes": sent,
-        }
-        LOGGER.info(
-            "%s %r %d %.1f ms %d bytes id=%s",
-            method, scope["path"], status, 1e3 * seconds, sent, fields["request_id"],
-            extra=fields,
-        )  # fmt: skip
+
+def record(metrics: Metrics, scope: Scope, method: str, status: int, sent: int, seconds: float) -> None:
+    """Count an answer of so many bytes and log it."""
+    # the route, not the path: what a stranger types must not become a label
+    route = getattr(scope.get("route"), "path", "none")
+    known = method if method in {"GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"} else "other"
+    metrics.requests.labels(route, known, str(status)).inc()
+    metrics.seconds.labels(route).observe(seconds)
+    fields = {
+        "request_id": scope["state"]["request_id"],
+        "method": method,
+        "path": scope["path"],
+        "route": route,
+        "status": status,
+        "milliseconds": round(1e3 * seconds, 3),
+        "bytes": sent,
+    }
+    LOGGER.info(
+        "%s %r %d %.1f ms %d bytes id=%s",
+        method, scope["path"], status, 1e3 * seconds, sent, fields["request_id"],
+        extra=fields,
+    )  # fmt: skip

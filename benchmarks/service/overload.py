@@ -27,6 +27,9 @@ from .asking import closed_loop, open_loop, run
 from .served import CLIENTS, KINDS, path, said, serving, spent
 from .slow import beside_slow, report_slow
 
+#: Longest time for which a peak rate is measured [s].
+_PEAK = 20.0
+
 
 def memory(pid: int) -> float:
     """Return what a process holds [MB]."""
@@ -55,18 +58,18 @@ class Watch(threading.Thread):
 
 def twice(process: subprocess.Popen[str], port: int, kind: str, seconds: float, turn: int) -> dict[str, Any]:
     """Measure the peak rate, then ask twice as often, then the peak again: the rate of a shared machine drifts."""
-    seed = 10**7 * (turn + 1)
+    seed, short = 10**7 * (turn + 1), min(seconds / 3, _PEAK)
     moments = [spent(process.pid)]
-    before = run(closed_loop(port, path(kind, seed), CLIENTS, seconds / 3))
+    before = run(closed_loop(port, path(kind, seed), CLIENTS, short))
     if not before.good:
-        raise SystemExit(f"nothing was answered in {seconds / 3:.0f} s of {kind}: ask for longer")
+        raise SystemExit(f"nothing was answered in {short:.0f} s of {kind}: ask for longer")
     moments.append(spent(process.pid))
     watch = Watch(process.pid)
     watch.start()
     over = run(open_loop(port, path(kind, seed + 10**6), 2 * before.rate, seconds, turn))
     seen = watch.stop()
     moments.append(spent(process.pid))
-    after = run(closed_loop(port, path(kind, seed + 2 * 10**6), CLIENTS, seconds / 3))
+    after = run(closed_loop(port, path(kind, seed + 2 * 10**6), CLIENTS, short))
     moments.append(spent(process.pid))
     peak = (before.rate + after.rate) / 2
     # of what the server got: answers per second of its processor time
@@ -98,25 +101,25 @@ def main() -> None:
     parser.add_argument("--only-slow", action="store_true", help="leave the rest out")
     options = parser.parse_args()
     if not options.only_slow:
-        overloaded(options)
+        overloaded([(kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS], "service-overload")
     if options.slow:
         with serving() as (process, port), serving() as (other, second):
             servers = [(process.pid, port), (other.pid, second)]
             report_slow(beside_slow(servers, options.seconds, options.rounds, options.slow))
+    if options.flat and not options.only_slow:
+        overloaded([(next(iter(KINDS)), options.flat, options.rounds)], "service-overload-long")
 
 
-def overloaded(options: argparse.Namespace) -> None:
-    """Measure overload, and keep what came of it."""
+def overloaded(rounds: list[tuple[str, float, int]], name: str) -> None:
+    """Measure overload of a server, and keep what came of it."""
+    rows: list[dict[str, Any]] = []
     with serving() as (process, port):
-        rounds = [(kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS]
-        rounds += [(next(iter(KINDS)), options.flat, options.rounds)] if options.flat else []
-        rows: list[dict[str, Any]] = []
         for kind, seconds, turn in rounds:
             rows.append(twice(process, port, kind, seconds, turn))
-            report(rows)  # after each: whatever ends a long run, what was measured is kept
+            report(name, rows)  # after each: whatever ends a long run, what was measured is kept
 
 
-def report(rows: list[dict[str, Any]]) -> None:
+def report(name: str, rows: list[dict[str, Any]]) -> None:
     """Keep the record."""
     head = ["asked for", "for", "peak", "asked over peak", "goodput over peak", "by processor time", "p99 of answers"]
     head += [
@@ -137,7 +140,7 @@ def report(rows: list[dict[str, Any]]) -> None:
         ]
         for row in rows
     ]  # fmt: skip
-    keep("service-overload", rows, table={"head": head, "rows": cells})
+    keep(name, rows, table={"head": head, "rows": cells})
 
 
 if __name__ == "__main__":

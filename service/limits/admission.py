@@ -13,14 +13,14 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from .. import problems
 from ..errors import Overloaded
-from ..settings import Settings
 from .clients import client_of
 
-__all__ = ["Admission", "Load"]
+__all__ = ["Admission", "Load", "refusal"]
 
 #: Weight of the last interval in the mean, and by how much one may stand out from it: a table that is opened once
 #: says nothing about what comes after it.
@@ -47,13 +47,17 @@ class Load:
         """How long a request would take that is let in now [s]."""
         return (self.under_way + 1) * self._interval
 
-    def refused(self, client: str) -> float | None:
-        """Return None if a client's request is let in, else the seconds after which it is worth another try."""
+    def refused(self, client: str | None) -> float | None:
+        """Return None if a client's request is let in, else the seconds after which it is worth another try.
+
+        Without a client it is refused where anybody's would be.
+        """
         delay = self.delay
-        self._spent(client)  # whoever asks counts, let in or not
+        if client is not None:
+            self._spent(client)  # whoever asks counts, let in or not
         if self.under_way < self._free or delay <= self._longest / 2:
             return None
-        if delay > self._longest or self._greedy(client):
+        if delay > self._longest or (client is not None and self._greedy(client)):
             return max(1.0, delay)
         return None
 
@@ -63,8 +67,14 @@ class Load:
             self._last = self._now()
         self.under_way += 1
 
-    def leave(self, client: str) -> None:
-        """Count a request as finished, and the time since the last one did as work for its client."""
+    def leave(self, client: str, is_done: bool = True) -> None:
+        """Count a request as finished, and the time since the last one did as work for its client.
+
+        One that was refused after all is none: counted, it would say that the service is fast.
+        """
+        if not is_done:
+            self.under_way -= 1
+            return
         now = self._now()
         passed = now - self._last
         self._last = now
@@ -95,9 +105,9 @@ class Admission:
     health costs next to nothing and always passes.
     """
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    def __init__(self, app: ASGIApp, load: Load) -> None:
         self.app = app
-        self.load = Load(settings.threads, min(settings.max_delay, settings.timeout))
+        self.load = load
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on if there is room for it; it counts until its answer begins."""
@@ -105,32 +115,42 @@ class Admission:
             await self.app(scope, receive, send)
             return
         client, load = client_of(scope), self.load
-        wait = load.refused(client)
-        if wait is not None:
-            error = Overloaded(
-                f"there is more to do than time: the answer would take about {wait:.0f} s.",
-                advice="Ask again after that, ask for many in one batch, or start more workers.",
-                headers={"Retry-After": str(math.ceil(wait))},
-            )
-            await problems.of(error, scope)(scope, receive, send)
+        response = refusal(load, scope)
+        if response is not None:
+            await response(scope, receive, send)
             return
         begun = False
 
-        def begin() -> None:
+        def begin(is_done: bool) -> None:
             nonlocal begun
             if not begun:
                 begun = True
-                load.leave(client)
+                load.leave(client, is_done)
 
         async def watched(message: Message) -> None:
-            begin()  # what is being sent waits for its reader, not for us
+            begin(message.get("status") != 503)  # what is being sent waits for its reader, not for us
             await send(message)
 
         load.enter()
         try:
             await self.app(scope, receive, watched)
         finally:
-            begin()
+            begin(is_done=True)
+
+
+def refusal(load: Load, scope: Scope, is_known: bool = True) -> Response | None:
+    """Return what to answer to a request that there is no time for, None if there is; `is_known`: who sends it."""
+    if not _is_work(scope["path"]):
+        return None
+    wait = load.refused(client_of(scope) if is_known else None)
+    if wait is None:
+        return None
+    error = Overloaded(
+        f"there is more to do than time: the answer would take about {wait:.0f} s.",
+        advice="Ask again after that, ask for many in one batch, or start more workers.",
+        headers={"Retry-After": str(math.ceil(wait))},
+    )
+    return problems.of(error, scope)
 
 
 def _is_work(path: str) -> bool:

@@ -18,13 +18,15 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import orjson
-from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
+from uvicorn._types import ASGI3Application
+from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
 from ..problems import MEDIA_TYPE, URN
 from ..settings import Settings
 from . import waited
 from .clients import address
+from .door import DOOR
 from .waiting import Waiting
 
 __all__ = ["GuardedProtocol", "forget", "taken"]
@@ -173,6 +175,22 @@ class GuardedProtocol(HttpToolsProtocol):
             self._too_long()  # it came in one piece
         if not self._refused:
             super().on_headers_complete()
+
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
+        """Answer what is turned away at the door; a uvicorn without this step leaves that to the application."""
+        door = self.app_state.get(DOOR)
+        response = None if door is None or self.flow.write_paused else door.refused(cycle.scope)
+        if response is None:
+            super()._start_asgi_task(cycle, app)
+            return
+        head = b"".join(b"%b: %b\r\n" % pair for pair in (*self.server_state.default_headers, *response.raw_headers))
+        body = b"" if cycle.scope["method"] == "HEAD" else response.body
+        close = b"" if cycle.keep_alive else b"connection: close\r\n"
+        self.transport.write(b"".join([STATUS_LINE[response.status_code], head, close, b"\r\n", body]))
+        cycle.response_started = cycle.response_complete = True  # a body, should there be one, is read and let go
+        if not cycle.keep_alive:
+            self.transport.close()
+        self.on_response_complete()
 
     def on_body(self, body: bytes) -> None:
         """Take a piece of the body."""

@@ -18,7 +18,7 @@ from ..errors import Wrong
 from ..limits import waited
 from .errors import InvalidScene
 from .kinds import Kind
-from .request import Place, Scene
+from .request import Item, Place, Scene
 
 __all__ = ["Instances", "Prop", "bowls", "place"]
 
@@ -63,7 +63,8 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
     item = np.repeat(np.arange(len(counts)), counts)
     kind = np.asarray(rows)[item]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    scale = np.repeat([one.size for one in scene.items], counts).astype(float)
+    sizes = [_size(one, kinds[row], scene.unit) for one, row in zip(scene.items, rows, strict=True)]
+    scale = np.repeat(sizes, counts).astype(float)
     centre = np.zeros((len(item), 3))
     members: dict[str, list[Array]] = {one.name: [] for one in scene.places}
     seeds = np.array([-1 if one.seed is None else one.seed for one in scene.items])[item]
@@ -96,6 +97,14 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
         turn[which] = rest.turn
         rests[rule.name] = rest
     return found, rests
+
+
+def _size(item: Item, kind: Kind, unit: float) -> float:
+    """Return the length of a kind's own unit [scene unit]; that of tables is one unless the item says otherwise."""
+    if isinstance(item.size, float):
+        return item.size
+    known = kind.metres is not None and (item.size == "real" or kind.topology is not None)
+    return kind.metres / unit if known and kind.metres is not None else 1.0
 
 
 def bowls(scene: Scene) -> list[Prop]:
@@ -145,7 +154,7 @@ def _lowest(found: Instances, kinds: Sequence[Kind]) -> Floats:
     cross = 2 * np.cross(back[:, :3], vector)
     local = vector + back[:, 3:] * cross + np.cross(back[:, :3], cross)
     local[:, 0] *= np.where(found.mirrored, -1, 1)
-    return np.array([(kinds[k].coarse @ d).max() for k, d in zip(found.kind, local, strict=True)]) * found.scale
+    return np.array([(kinds[k].outline @ d).max() for k, d in zip(found.kind, local, strict=True)]) * found.scale
 
 
 def _row(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
@@ -198,7 +207,7 @@ class _Told:
     """A body that is equal to another one of the same content."""
 
     def __init__(self, kind: Kind, mirrored: bool) -> None:
-        self.key = (kind.table.digest, tuple(sorted(kind.point.items())), kind.stage, mirrored)
+        self.key = (kind.identity, mirrored)
         surface = kind.body.surface
         self.body = resting.Body(surface * [-1, 1, 1] if mirrored else surface)
 

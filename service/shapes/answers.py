@@ -121,6 +121,11 @@ class Answers:
             scope["route"] = asked.route  # for the log and the metrics
         return found
 
+    def is_kept(self, scope: Scope, state: State) -> bool:
+        """Return whether `Repeats` would answer a request."""
+        settings = state.settings
+        return bool(settings.public_read and settings.cache_bytes) and self.repeated(scope, state) is not None
+
 
 class Repeats:
     """Answers repeated questions at once. Only where reading is free: whoever must show a token is asked for it."""

@@ -23,6 +23,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, info, path_of
 
+from ..limits import memory
 from ..telemetry import LOGGER
 
 __all__ = ["LiveTables"]
@@ -206,7 +207,9 @@ class LiveTables:
         self._known(name)
         # the stamp comes first: a swap in between is then noticed at the next look
         stamp = self._stamp(name)
-        return _Open(self._read(name), stamp, time.monotonic())
+        opened = _Open(self._read(name), stamp, time.monotonic())
+        memory.keep("tables")
+        return opened
 
     def _read(self, name: str) -> ShapeTable:
         return ShapeTable.open(self.store, name, surfaces=registry.surface, before_folds=self._before_folds)

@@ -18,8 +18,9 @@ import httpx
 import pytest
 import uvicorn
 
+from service.app import create_app
 from service.limits import connections, waiting
-from service.limits.admission import Load
+from service.limits.admission import Admission, Load
 from service.limits.clients import address, client_of
 from service.limits.connections import GuardedProtocol
 from service.settings import Settings, page
@@ -116,6 +117,35 @@ def test_one_slow_request_stops_nobody() -> None:
     assert sum(at.refused.values()) < 0.2 * len(at.waited)
 
 
+def test_what_is_refused_after_all_is_no_work_done() -> None:
+    """Counted, it said that the service was fast: the more was refused further in, the more was let in."""
+    clock = [0.0]
+    load = Load(1, 1.0, lambda: clock[0])
+    for _ in range(100):
+        for _ in range(5):
+            load.enter()
+        for _ in range(4):
+            load.leave("all", is_done=False)
+        clock[0] += 0.01
+        load.leave("all")
+    assert load.under_way == 0
+    assert load.delay == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("status", "is_work"), [(200, True), (422, True), (503, False)])
+def test_an_answer_that_says_no_is_no_work_done(status: int, is_work: bool) -> None:
+    async def says(scope: Any, receive: Any, send: Any) -> None:
+        time.sleep(0.01)
+        await send({"type": "http.response.start", "status": status, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    load = Load(8, 1.0)
+    with listening(Admission(says, load)) as port:
+        talk(port, b"GET /v1/shapes/x HTTP/1.0\r\n\r\n")
+    assert load.under_way == 0
+    assert (load.delay > 0.005) == is_work
+
+
 def test_clients_have_names() -> None:
     def named(host: str, *headers: tuple[bytes, bytes]) -> str:
         return client_of({"client": (host, 1), "headers": headers})
@@ -152,6 +182,40 @@ def test_an_overloaded_service_says_so_at_once(built: Any) -> None:
         assert client.get("/v1/tables").status_code == 200
 
 
+def test_at_the_door_is_said_what_would_be_said_inside(built: Any) -> None:
+    """Refused at the door: what has no body and lies not ready. It is counted, and the connection stays."""
+    app = create_app(Settings(store=built, threads=1))
+    query = "/v1/shapes/dehydration?te=0.03&gamma=7&resolution=16&format=points"
+    turned_away = app.state.door.refused
+    seen = []
+
+    def refused(scope: Any) -> Any:
+        seen.append((scope["method"], (found := turned_away(scope)) is not None))
+        return found
+
+    app.state.door.refused = refused
+    with listening(app, lifespan="on") as port, httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60) as client:
+        kept = client.get(f"{query}&s=0.3")
+        assert kept.status_code == 200
+        load = app.state.door._load
+        load._interval, load.under_way = 1.0, 100
+        for headers in ({}, {"X-Forwarded-For": "10.0.0.1"}):
+            answer = client.get(f"{query}&s=0.2", headers=headers)
+            assert checked(answer, 503, "overloaded")["instance"] == f"{query}&s=0.2"
+            assert int(answer.headers["retry-after"]) >= 100
+        assert answer.headers["server"] == kept.headers["server"]
+        assert client.head(f"{query}&s=0.2").headers["content-length"] != "0"
+        assert seen == [("GET", False), ("GET", True), ("GET", True), ("HEAD", True)]
+        assert client.get(f"{query}&s=0.3").content == kept.content
+        checked(client.post("/v1/shapes:batch", json={}), 503, "overloaded")
+        assert [is_refused for _, is_refused in seen[4:]] == [False, False]
+        assert client.get("/v1/tables").status_code == 200
+        counted = 'wizen_requests_total{method="GET",route="none",status="503"} 2.0'
+        assert counted in client.get("/metrics").text
+        line = b"GET " + f"{query}&s=0.2".encode() + b" HTTP/1.0\r\n\r\n"
+        assert b"connection: close" in talk(port, line)
+
+
 def test_a_body_that_dribbles_in(built: Any) -> None:
     with service_over(built, body_timeout=0.3) as client:
 
@@ -178,7 +242,7 @@ async def hello(scope: Any, receive: Any, send: Any) -> None:
 @contextmanager
 def listening(app: Any, **more: Any) -> Iterator[int]:
     options: dict[str, Any] = {"http": GuardedProtocol, "ws": "none", "lifespan": "off", "log_config": None}
-    server = uvicorn.Server(uvicorn.Config(app, port=0, **options, **more))
+    server = uvicorn.Server(uvicorn.Config(app, port=0, **(options | more)))
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:
