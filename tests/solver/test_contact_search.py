@@ -115,6 +115,27 @@ def test_brute_force_finds_the_same_pairs_at_the_same_distance(gap):
     assert max(abs(both[key] - value) for key, value in crossed.items()) < 1e-5
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.25])
+def test_pairs_that_are_not_looked_at_could_not_have_counted(turn):
+    rng, results = np.random.default_rng(3), []
+    points, quads, minv, _ = two_plates(0.13, rng, wave=0.1)
+    moved = points + np.array([0.02, 0.0, 0.05]) + rng.uniform(-0.03, 0.03, points.shape)
+    moved[:, 2] += turn * 0.1 * (points[:, 0] - 4)
+    for all_of_them in (False, True):
+        contact = touching(points, quads, 0.1)
+        if all_of_them:
+            contact.apart[:] = 0
+        x, v = state(moved), np.full((len(points), 4), 1e-3, SINGLE)
+        push_apart(contact, x, v, minv)
+        results.append((x.tobytes(), v.tobytes(), contact.counts.tolist(), contact.values[: contact.counts[LIVE], 7]))
+    *few, near = results[0]
+    *every, far = results[1]
+    assert few == every
+    assert np.mean(near != far) > 0.1  # what is not looked at has a bound in its place
+    assert np.all(near <= far + 1e-6)
+    assert contact.counts[ACTIVE] > 0
+
+
 def test_full_list_is_reported_and_can_grow():
     points, quads, _, _ = two_plates(0.05, np.random.default_rng(7))
     contact = make_contact(np.arange(len(points)), quads, points, 0.1, capacity=5)

@@ -113,6 +113,19 @@ def test_order_of_elements_and_of_their_nodes_does_not_matter():
     assert internal_force(turned, state, 0.9).scale == pytest.approx(expected.scale, rel=1e-5)
 
 
+@pytest.mark.parametrize("columns", [(1, 1), (4, 5)])
+def test_what_blows_up_stops_at_the_edge_of_the_range(columns):
+    layout = build_layout(**block_mesh(np.random.default_rng(4), columns=columns))
+    state, velocity = new_state(layout)
+    speeds = np.array([1e6, -1e6, np.nan, 0.25])
+    velocity[:, :3] = speeds[(np.arange(layout.nodes)[:, None] + np.arange(3)) % 4]
+    expected = np.array([2**31 - 1, -(2**31), 0, 2**27])[(np.arange(layout.nodes)[:, None] + np.arange(3)) % 4]
+    march(layout, state, velocity, 1, theta=(1.0, 1.0), damping=0.0, backend="vector")
+    moved = (state.astype(np.int64) - layout.fresh)[:, :3] % 2**32
+    assert np.all(moved[~layout.free] == 0)
+    assert np.abs(moved - expected % 2**32)[layout.free].max() < 2**10  # forces of the fresh mesh are round-off
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_same_bytes_on_one_and_two_threads(backend):
     if numba.config.NUMBA_NUM_THREADS < 2:

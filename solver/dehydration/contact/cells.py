@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from ...arrays import Ints, Ints32, Singles
-from .data import OPTIONS, Long, Single
+from .data import INLINE, OPTIONS, Long, Single
 
 __all__ = ["first_cell", "overlap", "sort_into_cells"]
 
@@ -18,20 +18,20 @@ WORLD = np.float32(2**20)
 """Cells counted from the origin in each direction; what lies farther out (or is not finite) touches nothing."""
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def cell_key(i: int, j: int, k: int) -> int:
     """One integer per cell, 21 bits a direction."""
     return ((i & 0x1FFFFF) << 42) | ((j & 0x1FFFFF) << 21) | (k & 0x1FFFFF)
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def bucket_of(key: int, buckets: int) -> Long:
     """Multiplicative hash of a cell; buckets is a power of two."""
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     return np.int64((mixed ^ (mixed >> np.uint64(32))) & np.uint64(buckets - 1))
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def _cells(boxes: Singles, t: int, i: int, grown: Single, cell: Single) -> tuple[Long, Long]:
     """First and last cell in direction i that triangle t's box, grown, overlaps; (0, -1) if far away or empty."""
     low, high = boxes[t, i] - grown, boxes[t, 3 + i] + grown
@@ -86,7 +86,7 @@ def sort_into_cells(boxes: Singles, grown: Single, cell: Single, keys: Ints, ord
     return cell
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def overlap(boxes: Singles, t: int, u: int, reach: Single) -> bool:
     """Whether the boxes of two triangles come nearer than `reach` in every direction."""
     return bool(
@@ -96,7 +96,7 @@ def overlap(boxes: Singles, t: int, u: int, reach: Single) -> bool:
     )  # fmt: skip
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def first_cell(boxes: Singles, t: int, u: int, grown: Single, cell: Single) -> int:
     """The cell of the least corner of what two grown boxes share: the one in which the pair is met."""
     i = np.int64(np.floor((max(boxes[t, 0], boxes[u, 0]) - grown) / cell))

@@ -35,7 +35,7 @@ import numpy as np
 from numba import njit
 
 from ...arrays import Ints32, Singles
-from .data import ACTIVE, BINS, HITS, LIVE, OPTIONS, PAIRS, READS, Contact, Single
+from .data import ACTIVE, BINS, HITS, INLINE, LIVE, OPTIONS, PAIRS, READS, Contact, Single
 from .distance import edge_edge, node_triangle
 
 __all__ = ["measure", "prepare", "push_apart", "resolve"]
@@ -49,22 +49,25 @@ SLACK = np.float32(0.08)
 but do not touch made those that do so soft that walls pulled together came together by a quarter of an edge."""
 SAFE = np.float32(0.45)
 """Share of a distance that each side of a pair may go in a step: both together do not meet, nor do they by rounding."""
+SURE = np.float32(0.98)
+"""Share of what a pair may come nearer by without counting that is believed: the rest is for rounding."""
 
 
 @njit(**OPTIONS)
 def prepare(contact: Contact, x: Singles, v: Singles) -> int:
     """Positions at the beginning of the step, before x moved by v, and the number of pairs near enough to `measure`."""
     before, rows, counts = contact.before, contact.surface_nodes, contact.counts
+    reads, searched = contact.reads, contact.searched
     counts[LIVE] = counts[ACTIVE] = counts[HITS] = 0
     if counts[PAIRS] == 0:
         return 0
     farthest = np.float32(0)
     for place in range(counts[READS]):
-        i = contact.reads[place]
+        i = reads[place]
         square = np.float32(0)
         for k in range(3):
             before[i, k] = x[rows[i], k] - v[rows[i], k]
-            square += (before[i, k] - contact.searched[i, k]) ** 2
+            square += (before[i, k] - searched[i, k]) ** 2
         farthest = max(farthest, square)
     contact.moved[0] = np.sqrt(farthest)
     # two nodes of a pair may both have come this far
@@ -74,14 +77,38 @@ def prepare(contact: Contact, x: Singles, v: Singles) -> int:
     return int(counts[LIVE])
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
+def _gone(before: Singles, searched: Singles, i: int, j: int) -> Single:
+    """Square of how far nodes i and j have moved, one as the other sees it, since the last search."""
+    x = (before[i, 0] - searched[i, 0]) - (before[j, 0] - searched[j, 0])
+    y = (before[i, 1] - searched[i, 1]) - (before[j, 1] - searched[j, 1])
+    z = (before[i, 2] - searched[i, 2]) - (before[j, 2] - searched[j, 2])
+    square: Single = x * x + y * y + z * z
+    return square
+
+
+@njit(**INLINE)
 def measure(
-    before: Singles, pairs: Ints32, values: Singles, weights: Singles, limits: Singles, slack: Single, i: int
-) -> None:
+    before: Singles, searched: Singles, pairs: Ints32, apart: Singles, values: Singles, weights: Singles,
+    limits: Singles, slack: Single, clearance: Single, i: int,
+) -> None:  # fmt: skip
     """Closest points, gap and weight of pair i as the step began; each pair writes to its own place alone.
 
     The arrays are those of `Contact` by the same names, slack is SLACK of its margin: a parallel loop takes no tuples.
+    A pair that was so far apart at the search that it cannot have come near enough to count is not looked at: what two
+    triangles or edges come nearer by is at most what a corner of one has moved as a corner of the other sees it.
     """
+    a, b, c, d = pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3]
+    enough = max(limits[i] + slack, clearance)
+    spare = (apart[i] - enough) * SURE
+    if spare > 0:
+        gone = max(_gone(before, searched, a, c), _gone(before, searched, a, d))
+        gone = max(gone, _gone(before, searched, a if pairs[i, 4] == 0 else b, b if pairs[i, 4] == 0 else d))
+        if pairs[i, 4] != 0:
+            gone = max(gone, _gone(before, searched, b, c))
+        if gone < spare * spare:
+            values[i, 7], weights[i] = enough, np.float32(0)
+            return
     out, weight = values[i], np.float32(1)
     if pairs[i, 4] == 0:
         node_triangle(before, pairs[i, 0], pairs[i, 1], pairs[i, 2], pairs[i, 3], out)
@@ -94,12 +121,13 @@ def measure(
 def _share_load(contact: Contact, minv: Singles) -> None:
     """Stiffness of each hit into `hit_values`, from how much contact each node takes part in."""
     load, pairs, values, hits = contact.load, contact.pairs, contact.values, contact.hits
-    rows, source = contact.surface_nodes, contact.source
+    rows, source, weights, limits = contact.surface_nodes, contact.source, contact.weights, contact.limits
+    stiffness = contact.hit_values
     one, slack, count = np.float32(1), SLACK * contact.margin, contact.counts[HITS]
     load[:] = np.float32(0)
     for h in range(count):
         i = hits[h]
-        share = contact.weights[i] * min(one, (contact.limits[i] + slack - values[i, 7]) / slack)
+        share = weights[i] * min(one, (limits[i] + slack - values[i, 7]) / slack)
         for k in range(4):
             load[pairs[i, k]] += share * abs(values[i, k])
     for h in range(count):
@@ -109,33 +137,43 @@ def _share_load(contact: Contact, minv: Singles) -> None:
             node, b = pairs[i, k], abs(values[i, k])
             # an image takes part in what its source does, whether or not those pairs are looked at
             crowd += b * minv[rows[node]] * max(load[source[node]], b)
-        contact.hit_values[h, 0] = STIFFNESS * contact.weights[i] / crowd if crowd > 0 else np.float32(0)
+        stiffness[h, 0] = STIFFNESS * weights[i] / crowd if crowd > 0 else np.float32(0)
 
 
 @njit(**OPTIONS)
 def _look_around(contact: Contact) -> None:
     """How far each node began the step from what it might touch, into `room`."""
-    room, pairs, values = contact.room, contact.pairs, contact.values
-    room[:] = contact.clearance
+    room, pairs, values, source, clearance = (
+        contact.room,
+        contact.pairs,
+        contact.values,
+        contact.source,
+        contact.clearance,
+    )
+    room[:] = clearance
     for i in range(contact.counts[LIVE]):
+        if values[i, 7] >= clearance:
+            continue
         for k in range(4):
             # an image goes as far as what it is an image of
-            node = contact.source[pairs[i, k]]
+            node = source[pairs[i, k]]
             room[node] = min(room[node], values[i, 7])
 
 
 @njit(**OPTIONS)
 def _hold(contact: Contact, x: Singles, v: Singles) -> None:
     """Cut short what went farther in this step than it may; see SAFE."""
+    reads, rows, room, source = contact.reads, contact.surface_nodes, contact.room, contact.source
+    before = contact.before
     for place in range(contact.counts[READS]):
-        i = contact.reads[place]
-        row, most = contact.surface_nodes[i], SAFE * contact.room[contact.source[i]]
+        i = reads[place]
+        row, most = rows[i], SAFE * room[source[i]]
         square = v[row, 0] * v[row, 0] + v[row, 1] * v[row, 1] + v[row, 2] * v[row, 2]
         if square > most * most:
             share = most / np.sqrt(square)
             for k in range(3):
                 v[row, k] *= share
-                x[row, k] = contact.before[i, k] + v[row, k]
+                x[row, k] = before[i, k] + v[row, k]
 
 
 @njit(**OPTIONS)
@@ -144,12 +182,13 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
     counts, pairs, values, hits, forces = (
         contact.counts, contact.pairs, contact.values, contact.hits, contact.hit_values,
     )  # fmt: skip
+    weights, limits, clearance = contact.weights, contact.limits, contact.clearance
     energy, rows, zero, half = np.float64(0), contact.surface_nodes, np.float32(0), np.float32(0.5)
-    found = 0
+    found = active = 0
     if counts[PAIRS] == 0:
         return energy
     for i in range(counts[LIVE]):
-        if contact.weights[i] > 0:
+        if weights[i] > 0:
             hits[found] = i
             found += 1
     counts[HITS] = found
@@ -164,7 +203,7 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
             for m in range(3):
                 gap += b * values[i, 4 + m] * x[row, m]
                 speed += b * values[i, 4 + m] * v[row, m]
-        lacking, soft = contact.limits[i] - gap, half * contact.clearance
+        lacking, soft = limits[i] - gap, half * clearance
         forces[h, 1] = zero
         if lacking <= 0:
             continue
@@ -172,7 +211,8 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
         pushed = half * soft * begun * begun + max(lacking - soft, zero)
         forces[h, 1] = forces[h, 0] * max(pushed - DAMPING * begun * speed, zero)
         energy += forces[h, 0] * pushed * lacking * half
-        counts[ACTIVE] += 1
+        active += 1
+    counts[ACTIVE] += active
     for h in range(found):
         if forces[h, 1] == 0:
             continue
@@ -196,6 +236,9 @@ def push_apart(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float
     """
     live, slack = prepare(contact, x, v), SLACK * contact.margin
     for i in range(live):
-        measure(contact.before, contact.pairs, contact.values, contact.weights, contact.limits, slack, i)
+        measure(
+            contact.before, contact.searched, contact.pairs, contact.apart, contact.values, contact.weights,
+            contact.limits, slack, contact.clearance, i,
+        )  # fmt: skip
     energy: float = resolve(contact, x, v, minv)
     return energy

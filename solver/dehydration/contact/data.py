@@ -15,6 +15,8 @@ Single = np.float32
 Long = np.int64
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "arcp", "contract"}}
+INLINE: dict[str, Any] = OPTIONS | {"forceinline": True}
+"""For what is done pair by pair: a call hands over arrays whole and counts their references, more work than a pair."""
 
 PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS = 0, 1, 2, 3, 4, 5, 6
 """Entries of `Contact.counts`; LIVE: pairs near enough to be looked at in this step, READS: nodes that they need."""
@@ -54,6 +56,7 @@ class Contact(NamedTuple):
     away: Singles  # (capacity, 2) their distance and clearance
     pairs: Ints32  # (capacity, 5) the same in classes of distance: four nodes, kind (0: node and triangle)
     limits: Singles  # (capacity,) clearance of each of `pairs`
+    apart: Singles  # (capacity,) distance of each of `pairs` at the last search
     bins: Ints  # (BINS + 1,) first of each class in `pairs`
     load: Singles  # (ns,) scratch: how much contact each node takes part in
     room: Singles  # (ns,) scratch: how far each node is from what it might touch, the clearance at most
@@ -130,6 +133,7 @@ def _room(pairs: int) -> dict[str, Any]:
         "pairs": np.zeros((pairs, 5), integer),
         "values": np.zeros((pairs, 8), single),
         "limits": np.zeros(pairs, single),
+        "apart": np.zeros(pairs, single),
         "weights": np.zeros(pairs, single),
         "hits": np.zeros(pairs, integer),
         "hit_values": np.zeros((pairs, 2), single),

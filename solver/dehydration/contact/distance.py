@@ -12,7 +12,7 @@ from numba import njit
 
 from ...arrays import Singles
 from ...geometry.closest import of_products
-from .data import OPTIONS, Single
+from .data import INLINE, Single
 
 __all__ = ["edge_edge", "node_triangle"]
 
@@ -26,7 +26,7 @@ END = np.float32(0.05)
 ZERO, ONE, TINY = np.float32(0), np.float32(1), np.float32(1e-30)
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def node_triangle(x: Singles, p: int, a: int, b: int, c: int, out: Singles) -> Single:
     """Return the distance of node p from the triangle a, b, c (rows of x).
 
@@ -54,7 +54,7 @@ def node_triangle(x: Singles, p: int, a: int, b: int, c: int, out: Singles) -> S
     return found
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def edge_edge(x: Singles, a: int, b: int, c: int, d: int, out: Singles) -> Single:
     """Return how much the pair of edges a b and c d (rows of x) counts: nothing if parallel or where an end is nearest.
 

@@ -13,7 +13,7 @@ __all__ = ["features"]
 
 
 def features(triangles: Ints32, nodes: int) -> tuple[Ints32, Ints32]:
-    """Return the nodes (nt, 3) and edges (nt, 3, 2) that each of triangles (nt, 3) answers for, -1 where it does not.
+    """Return the nodes (nt, 3) and edges (nt, 3, 2) that each of triangles (nt, 3) answers for, then -1.
 
     The first triangle that has a node or an edge answers for it.
     """
@@ -26,4 +26,9 @@ def features(triangles: Ints32, nodes: int) -> tuple[Ints32, Ints32]:
     _, first = np.unique(key, return_index=True)
     edges = np.full(ends.shape, -1, np.int32)
     edges[first] = ends[first]
-    return own.reshape(-1, 3), edges.reshape(-1, 3, 2)
+    nodes_of, edges_of = own.reshape(-1, 3), edges.reshape(-1, 3, 2)
+    first_nodes, first_edges = (np.argsort(a < 0, axis=1, kind="stable") for a in (nodes_of, edges_of[..., 0]))
+    return (
+        np.take_along_axis(nodes_of, first_nodes, axis=1),
+        np.ascontiguousarray(np.take_along_axis(edges_of, first_edges[..., None], axis=1)),
+    )

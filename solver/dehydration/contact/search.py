@@ -15,7 +15,7 @@ from numba import njit
 
 from ...arrays import Ints32, Singles
 from .cells import first_cell, overlap, sort_into_cells
-from .data import BATCH, BINS, HITS, LIVE, NEEDED, OPTIONS, PAIRS, READS, SEARCHES, Contact, Single
+from .data import BATCH, BINS, HITS, INLINE, LIVE, NEEDED, OPTIONS, PAIRS, READS, SEARCHES, Contact, Single
 from .distance import edge_edge, node_triangle
 
 GENTLE = np.float32(0.7071)
@@ -27,14 +27,14 @@ OPENING = np.float32(0.3)
 @njit(**OPTIONS)
 def farthest_moved(contact: Contact, x: Singles) -> Single:
     """Largest distance of a node that is nobody's image from where the last search saw it; images move as they do."""
-    farthest = np.float32(0)
-    for i in range(contact.surface_nodes.size):
-        if contact.source[i] != i:
+    farthest, rows, source, searched = np.float32(0), contact.surface_nodes, contact.source, contact.searched
+    for i in range(rows.size):
+        if source[i] != i:
             continue
-        row = contact.surface_nodes[i]
-        a = x[row, 0] - contact.searched[i, 0]
-        b = x[row, 1] - contact.searched[i, 1]
-        c = x[row, 2] - contact.searched[i, 2]
+        row = rows[i]
+        a = x[row, 0] - searched[i, 0]
+        b = x[row, 1] - searched[i, 1]
+        c = x[row, 2] - searched[i, 2]
         farthest = max(farthest, a * a + b * b + c * c)
     found: Single = np.sqrt(farthest)
     return found
@@ -71,24 +71,25 @@ def gentlest(contact: Contact) -> Single:
 @njit(**OPTIONS)
 def _enclose(contact: Contact, reach: Single) -> None:
     """Boxes of the triangles; one out of reach of all nodes that are nobody's image gets none."""
-    x, boxes = contact.searched, contact.boxes
+    x, boxes, source, triangles = contact.searched, contact.boxes, contact.source, contact.triangles
     low, high = np.full(3, np.float32(np.inf)), np.full(3, np.float32(-np.inf))
     for i in range(x.shape[0]):
-        if contact.source[i] == i:
+        if source[i] == i:
             for k in range(3):
                 low[k], high[k] = min(low[k], x[i, k] - reach), max(high[k], x[i, k] + reach)
     for t in range(boxes.shape[0]):
-        a, b, c = contact.triangles[t, 0], contact.triangles[t, 1], contact.triangles[t, 2]
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         near = True
         for k in range(3):
             boxes[t, k] = min(x[a, k], x[b, k], x[c, k])
             boxes[t, 3 + k] = max(x[a, k], x[b, k], x[c, k])
             near &= boxes[t, k] <= high[k] and boxes[t, 3 + k] >= low[k]
         if not near:
-            boxes[t, :3], boxes[t, 3:] = np.float32(np.inf), np.float32(-np.inf)
+            for k in range(3):
+                boxes[t, k], boxes[t, 3 + k] = np.float32(np.inf), np.float32(-np.inf)
 
 
-@njit(**OPTIONS)
+@njit(**INLINE)
 def _enter(
     rest: Singles, clearance: Single, found: Ints32, away: Singles, place: int, a: int, b: int, c: int, d: int,
     kind: int, distance: Single, out: Singles,
@@ -120,7 +121,9 @@ def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
         images = source[b] != b and source[c] != c and source[d] != d
         for i in range(3):
             a = own_nodes[mine, i]
-            if a < 0 or (a == b) | (a == c) | (a == d) or (images and source[a] != a):
+            if a < 0:
+                break
+            if (a == b) | (a == c) | (a == d) or (images and source[a] != a):
                 continue
             near = True
             for k in range(3):
@@ -129,21 +132,33 @@ def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
                 distance = node_triangle(x, a, b, c, d, out)
                 if distance < reach:
                     place = _enter(rest, clearance, found, away, place, a, b, c, d, 0, distance, out)
-    for m in range(9 * count):
-        t, u, i, j = met[m // 9, 0], met[m // 9, 1], m % 9 // 3, m % 3
-        a, b, c, d = own_edges[t, i, 0], own_edges[t, i, 1], own_edges[u, j, 0], own_edges[u, j, 1]
-        if a < 0 or c < 0 or (a == c) | (a == d) | (b == c) | (b == d):
-            continue
-        if source[a] != a and source[b] != b and source[c] != c and source[d] != d:
-            continue
-        near = True
-        for k in range(3):
-            near &= min(x[a, k], x[b, k]) <= max(x[c, k], x[d, k]) + reach
-            near &= min(x[c, k], x[d, k]) <= max(x[a, k], x[b, k]) + reach
-        if near:
-            edge_edge(x, a, b, c, d, out)
-            if out[7] < reach:
-                place = _enter(rest, clearance, found, away, place, a, b, c, d, 1, out[7], out)
+    for m in range(count):
+        t, u = met[m, 0], met[m, 1]
+        for i in range(3):
+            a, b = own_edges[t, i, 0], own_edges[t, i, 1]
+            if a < 0:
+                break
+            near = True
+            for k in range(3):
+                near &= min(x[a, k], x[b, k]) <= boxes[u, 3 + k] + reach
+                near &= boxes[u, k] <= max(x[a, k], x[b, k]) + reach
+            if not near:
+                continue
+            images = source[a] != a and source[b] != b
+            for j in range(3):
+                c, d = own_edges[u, j, 0], own_edges[u, j, 1]
+                if c < 0:
+                    break
+                if (a == c) | (a == d) | (b == c) | (b == d) or (images and source[c] != c and source[d] != d):
+                    continue
+                near = True
+                for k in range(3):
+                    near &= min(x[a, k], x[b, k]) <= max(x[c, k], x[d, k]) + reach
+                    near &= min(x[c, k], x[d, k]) <= max(x[a, k], x[b, k]) + reach
+                if near:
+                    edge_edge(x, a, b, c, d, out)
+                    if out[7] < reach:
+                        place = _enter(rest, clearance, found, away, place, a, b, c, d, 1, out[7], out)
     contact.counts[NEEDED] = place
 
 
@@ -183,7 +198,7 @@ def _sort_by_distance(contact: Contact, reach: Single) -> None:
         k = k if k < BINS else BINS - 1
         place = bins[k]
         bins[k] += 1
-        contact.limits[place] = contact.away[i, 1]
+        contact.apart[place], contact.limits[place] = contact.away[i, 0], contact.away[i, 1]
         for m in range(5):
             contact.pairs[place, m] = found[i, m]
     for k in range(BINS, 0, -1):

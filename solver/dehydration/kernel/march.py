@@ -35,7 +35,7 @@ logger = logging.getLogger("wizen.dehydration.kernel")
 # Set by `compiled` before numba compiles `advance`. They must be globals: numba pickles what a closure captures into
 # the key of its cache, and an intrinsic pickles differently in every process.
 strip_forces: Any = None
-update_node: Any = None
+update_nodes: Any = None
 
 _FLAT, _INDICES = types.float32[::1], types.int32[::1]
 _PLANES = types.float32[:, :, ::1]
@@ -108,8 +108,9 @@ def _build(stamp: int) -> Callable[..., int]:
         push = np.float32(1 / (1 + damping / 2))
         # a parallel loop takes no tuples
         contact = skin.contact
-        before, candidates, limits = contact.before, contact.pairs, contact.limits
-        values, weights, slack = contact.values, contact.weights, SLACK * contact.margin
+        before, searched, candidates, apart = contact.before, contact.searched, contact.pairs, contact.apart
+        limits, values, weights = contact.limits, contact.values, contact.weights
+        slack, clearance = SLACK * contact.margin, contact.clearance
         for step in range(steps):
             if touching and (step % SEARCH_EVERY == 0 or is_stale(contact)) and not search(skin, state, velocity):
                 return step
@@ -120,14 +121,18 @@ def _build(stamp: int) -> Callable[..., int]:
                     theta, forces, record, squares,
                 )  # fmt: skip
             if not record:
-                for node in prange(inverse_mass.shape[0]):
-                    update_node(forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(node))
+                for group in prange((inverse_mass.shape[0] + 3) // 4):
+                    update_nodes(forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(group))
                 # a part's nodes on a mirror plane feel half of what balances across it
                 stay(planes, state, velocity)
                 if touching:
                     pairs = approach(skin, state, velocity)
-                    for pair in prange(pairs):
-                        measure(before, candidates, values, weights, limits, slack, np.int64(pair))
+                    if pairs:
+                        for pair in prange(pairs):
+                            measure(
+                                before, searched, candidates, apart, values, weights, limits, slack, clearance,
+                                np.int64(pair),
+                            )  # fmt: skip
                     if contact.counts[PAIRS]:
                         keep_apart(skin, state, velocity)
                         stay(planes, state, velocity)
@@ -140,11 +145,11 @@ def _build(stamp: int) -> Callable[..., int]:
 @functools.cache
 def compiled(backend: Backend) -> Callable[..., int]:
     """The time loop on one back end."""
-    global strip_forces, update_node
+    global strip_forces, update_nodes
     functions: Any = importlib.import_module(
         "solver.dehydration.kernel.generate." + ("vector_ir" if backend == "vector" else "scalar")
     )
-    strip_forces, update_node = functions.strip_forces, functions.update_node
+    strip_forces, update_nodes = functions.strip_forces, functions.update_nodes
     return _build(int(source_digest(backend)[:15], 16))
 
 

@@ -94,12 +94,14 @@ def widen(skin: Skin) -> Skin:
     return skin._replace(contact=grow(skin.contact, int(skin.contact.counts[1])))
 
 
-@njit(**OPTIONS)
-def _read_node(skin: Skin, state: Ints32, velocity: Singles, i: int) -> None:
-    first = 4 * np.int64(skin.rows[i])
+@njit(**OPTIONS, forceinline=True)
+def _read_node(
+    rows: Ints32, sign: Singles, position: Singles, speed: Singles, state: Ints32, velocity: Singles, i: int
+) -> None:
+    first = 4 * np.int64(rows[i])
     for k in range(3):
-        skin.position[i, k] = skin.sign[i, k] * (np.float32(state[first + k]) * UNIT)
-        skin.velocity[i, k] = skin.sign[i, k] * velocity[first + k]
+        position[i, k] = sign[i, k] * (np.float32(state[first + k]) * UNIT)
+        speed[i, k] = sign[i, k] * velocity[first + k]
 
 
 @njit(**OPTIONS)
@@ -108,8 +110,9 @@ def search(skin: Skin, state: Ints32, velocity: Singles) -> bool:
 
     False if there are more than the contact has room for.
     """
-    for i in range(skin.rows.size):
-        _read_node(skin, state, velocity, i)
+    rows, sign, position, speed = skin.rows, skin.sign, skin.position, skin.velocity
+    for i in range(rows.size):
+        _read_node(rows, sign, position, speed, state, velocity, i)
     return bool(find_pairs(skin.contact, skin.position) <= skin.contact.pairs.shape[0])
 
 
@@ -119,8 +122,9 @@ def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
     contact = skin.contact
     if contact.counts[PAIRS] == 0:
         return 0
+    rows, sign, position, speed, reads = skin.rows, skin.sign, skin.position, skin.velocity, contact.reads
     for place in range(contact.counts[READS]):
-        _read_node(skin, state, velocity, contact.reads[place])
+        _read_node(rows, sign, position, speed, state, velocity, reads[place])
     return int(prepare(contact, skin.position, skin.velocity))
 
 
@@ -128,13 +132,14 @@ def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
 def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> None:
     """Push touching skin apart in the step just made."""
     resolve(skin.contact, skin.position, skin.velocity, skin.inverse_mass)
+    rows, own, speed, reads = skin.rows, skin.own, skin.velocity, skin.contact.reads
     for place in range(skin.contact.counts[READS]):
-        i = skin.contact.reads[place]
-        if not skin.own[i]:
+        i = reads[place]
+        if not own[i]:
             continue
-        first = 4 * np.int64(skin.rows[i])
+        first = 4 * np.int64(rows[i])
         for k in range(3):
-            push = skin.velocity[i, k] - velocity[first + k]
+            push = speed[i, k] - velocity[first + k]
             if push != 0:
-                velocity[first + k] = skin.velocity[i, k]
+                velocity[first + k] = speed[i, k]
                 state[first + k] += np.int32(np.rint(push * QUANTA))

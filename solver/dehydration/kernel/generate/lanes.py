@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import llvmlite.ir as ir
+from numba.core import cgutils
 
 from solver.dehydration.kernel.algebra import INVERSE_CUBE_ROOT_MAGIC, Number, refine_inverse_cube_root
 from solver.dehydration.kernel.strips import LANES
@@ -104,6 +105,19 @@ def load(builder: Any, pointer: Any, kind: Any) -> Any:
 def store(builder: Any, value: Any, pointer: Any) -> None:
     """Unaligned vector store."""
     builder.store(value, builder.bitcast(pointer, value.type.as_pointer())).align = 4
+
+
+def align_stack(builder: Any) -> None:
+    """Make the function keep its stack on cache lines.
+
+    An element holds more than there are registers. LLVM finds out that it has to spill vectors when it is too late to
+    align the frame, and then each of them lies across two lines. A variable that wants a line of its own says so early;
+    assembly of no instructions keeps it from being optimised away.
+    """
+    slot = cgutils.alloca_once(builder, WIDE)
+    slot.align = 4 * LANES
+    keep = ir.FunctionType(ir.VoidType(), [slot.type])
+    builder.asm(keep, "", "r", [slot], side_effect=True)
 
 
 def splat(builder: Any, scalar: Any, kind: Any) -> Any:

@@ -30,6 +30,8 @@ ONE, TWO = np.uint32(1), np.uint32(2)
 UNIT, QUANTA = np.float32(QUANTUM), np.float32(1 / QUANTUM)
 VECTORS = 3 * LANES
 """Floats of one node's three components over the lanes."""
+GROUP = 4
+"""Nodes of one call of `update_nodes`."""
 
 
 @njit(**OPTIONS)
@@ -145,7 +147,7 @@ def update_node(
     push: float,
     node: int,
 ) -> None:
-    """Central-difference update of one node; arguments as in `vector_ir.update_node`."""
+    """Central-difference update of one node; arguments as in `node_ir.update_nodes`."""
     x = y = z = np.float32(0)
     for entry in range(np.uint32(row_start[np.uint64(node)]), np.uint32(row_start[np.uint64(node + 1)])):
         row = np.uint32(rows[entry])
@@ -162,3 +164,20 @@ def update_node(
     state[first] += np.int32(np.rint(x * QUANTA))
     state[first + ONE] += np.int32(np.rint(y * QUANTA))
     state[first + TWO] += np.int32(np.rint(z * QUANTA))
+
+
+@njit(inline="always")
+def update_nodes(
+    forces: Singles,
+    row_start: Ints32,
+    rows: Ints32,
+    inverse_mass: Singles,
+    state: Ints32,
+    velocity: Singles,
+    keep: float,
+    push: float,
+    group: int,
+) -> None:
+    """Update of a group of nodes; arguments as in `node_ir.update_nodes`."""
+    for node in range(GROUP * group, min(GROUP * group + GROUP, inverse_mass.size)):
+        update_node(forces, row_start, rows, inverse_mass, state, velocity, keep, push, node)

@@ -19,23 +19,24 @@ from solver.dehydration.kernel.elements import core_forces, exocarp_forces, one_
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.generate.lanes import (
     FAST,
-    FOUR,
-    FOUR_INT,
     INT64,
     WIDE,
     WIDE_INT,
     Lane,
     VectorArithmetic,
+    align_stack,
     at,
     constant,
     gather_corner,
     load,
-    shuffle,
     splat,
     store,
     store_rows,
 )
+from solver.dehydration.kernel.generate.node_ir import update_nodes
 from solver.dehydration.kernel.strips import LANES
+
+__all__ = ["strip_forces", "update_nodes"]
 
 CORNERS = 4
 Face: TypeAlias = list[list[Any]]
@@ -148,6 +149,7 @@ def strip_forces(
     signature = types.void(*(arrays.get(k) or others[k] for k in range(12)))
 
     def codegen(context: Any, build: Any, signature: Any, args: Any) -> Any:
+        align_stack(build)
         data = {k: context.make_array(signature.args[k])(context, build, args[k]).data for k in arrays}
         row = build.mul(args[3], ir.Constant(INT64, 5))
         first_face, first_core, cores, first_exocarp, exocarps = (
@@ -169,67 +171,6 @@ def strip_forces(
         march(build.add(first_core, deep), build.sub(cores, deep), data[4], CORE_PLANES, core_forces, wide_theta)
         march(first_exocarp, exocarps, data[6], EXOCARP_PLANES, exocarp_forces, constant(1.0))
         sweep.close()
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-@intrinsic
-def update_node(
-    typingctx: Any,
-    forces: Any,
-    row_start: Any,
-    rows: Any,
-    inverse_mass: Any,
-    state: Any,
-    velocity: Any,
-    keep: Any,
-    push: Any,
-    node: Any,
-) -> Any:
-    """Central-difference update of one node, all components at once.
-
-    velocity <- keep * velocity - push * inverse_mass * (sum of force rows); state <- state + velocity; a node of
-    inverse mass 0 stays. The fourth component stays 0.
-    """
-    arrays = (forces, row_start, rows, inverse_mass, state, velocity)
-    signature = types.void(*arrays, types.float32, types.float32, types.int64)
-
-    def codegen(context: Any, build: Any, signature: Any, args: Any) -> Any:
-        force, start, row, mass, x, v = (
-            context.make_array(kind)(context, build, value).data
-            for kind, value in zip(signature.args[:6], args[:6], strict=True)
-        )
-        keep, push, node = args[6:]
-        one = ir.Constant(INT64, 1)
-        first = build.sext(build.load(at(build, start, node)), INT64)
-        last = build.sext(build.load(at(build, start, build.add(node, one))), INT64)
-        total = cgutils.alloca_once_value(build, ir.Constant(FOUR, [0.0] * 4))
-        with cgutils.for_range_slice(build, first, last, one, INT64) as (entry, _):
-            place = build.sext(build.load(at(build, row, entry)), INT64)
-            summed = build.fadd(build.load(total), load(build, at(build, force, place), FOUR))
-            build.store(summed, total)
-        # A row is three floats: the fourth belongs to its neighbour.
-        zero = ir.Constant(FOUR, [0.0] * 4)
-        sum_of_rows = shuffle(build, build.load(total), zero, [0, 1, 2, 4])
-        weight = build.load(at(build, mass, node))
-        place = build.shl(node, ir.Constant(INT64, 2))
-        kicked = build.fsub(
-            build.fmul(splat(build, keep, FOUR), load(build, at(build, v, place), FOUR), flags=FAST),
-            build.fmul(splat(build, build.fmul(push, weight), FOUR), sum_of_rows, flags=FAST),
-            flags=FAST,
-        )
-        free = build.fcmp_ordered(">", splat(build, weight, FOUR), zero)
-        kicked = build.select(free, kicked, zero)
-        store(build, kicked, at(build, v, place))
-        # Saturating: a run that blows up stops at the edge of the range instead of being undefined.
-        rint = cgutils.get_or_insert_function(build.module, ir.FunctionType(FOUR, [FOUR]), "llvm.rint.v4f32")
-        saturate = cgutils.get_or_insert_function(
-            build.module, ir.FunctionType(FOUR_INT, [FOUR]), "llvm.fptosi.sat.v4i32.v4f32"
-        )
-        quanta = build.fmul(kicked, ir.Constant(FOUR, [1 / QUANTUM] * 4), flags=FAST)
-        moved = build.call(saturate, [build.call(rint, [quanta])])
-        store(build, build.add(load(build, at(build, x, place), FOUR_INT), moved), at(build, x, place))
         return context.get_dummy_value()
 
     return signature, codegen
