@@ -196,9 +196,8 @@ def test_usd_holds_the_same(store: Store, tmp_path: Path) -> None:
     path = tmp_path / "curve.usdc"  # the first is still open, as mapped memory
     path.write_bytes(made(store, [{"run": ROTTEN, "curve": [[0, 0], [1, 5]], "transforms": [{}]}], "usdc").data)
     assert complaints(path) == []
-    colour = UsdGeom.Mesh(
-        Usd.Stage.Open(str(path)).GetPrimAtPath("/scene/fruits/prototypes/shape0")
-    ).GetDisplayColorPrimvar()
+    stage = Usd.Stage.Open(str(path))
+    colour = UsdGeom.Mesh(stage.GetPrimAtPath("/scene/fruits/prototypes/shape0")).GetDisplayColorPrimvar()
     assert colour.GetTimeSamples() == [0, 24]
     assert np.abs(np.array(colour.Get(0)) - np.array(colour.Get(24))).max() > 0.05
 
