@@ -100,27 +100,26 @@ def main() -> None:
     parser.add_argument("--flat", type=float, default=300.0, help="of overload in the last round, watched for memory")
     parser.add_argument("--only-slow", action="store_true", help="leave the rest out")
     options = parser.parse_args()
-    rows: list[dict[str, Any]] = []
-    rounds = [(kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS]
     if not options.only_slow:
-        overloaded(rounds, rows)
+        overloaded([(kind, options.seconds, i) for i in range(options.rounds) for kind in KINDS], "service-overload")
     if options.slow:
         with serving() as (process, port), serving() as (other, second):
             servers = [(process.pid, port), (other.pid, second)]
             report_slow(beside_slow(servers, options.seconds, options.rounds, options.slow))
     if options.flat and not options.only_slow:
-        overloaded([(next(iter(KINDS)), options.flat, options.rounds)], rows)
+        overloaded([(next(iter(KINDS)), options.flat, options.rounds)], "service-overload-long")
 
 
-def overloaded(rounds: list[tuple[str, float, int]], rows: list[dict[str, Any]]) -> None:
-    """Measure overload by a server of its own, and keep what came of it beside the `rows` that are there."""
+def overloaded(rounds: list[tuple[str, float, int]], name: str) -> None:
+    """Measure overload of a server, and keep what came of it."""
+    rows: list[dict[str, Any]] = []
     with serving() as (process, port):
         for kind, seconds, turn in rounds:
             rows.append(twice(process, port, kind, seconds, turn))
-            report(rows)  # after each: whatever ends a long run, what was measured is kept
+            report(name, rows)  # after each: whatever ends a long run, what was measured is kept
 
 
-def report(rows: list[dict[str, Any]]) -> None:
+def report(name: str, rows: list[dict[str, Any]]) -> None:
     """Keep the record."""
     head = ["asked for", "for", "peak", "asked over peak", "goodput over peak", "by processor time", "p99 of answers"]
     head += [
@@ -141,7 +140,7 @@ def report(rows: list[dict[str, Any]]) -> None:
         ]
         for row in rows
     ]  # fmt: skip
-    keep("service-overload", rows, table={"head": head, "rows": cells})
+    keep(name, rows, table={"head": head, "rows": cells})
 
 
 if __name__ == "__main__":

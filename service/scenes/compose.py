@@ -15,7 +15,7 @@ from ..errors import Wrong
 from ..shapes.live import LiveTables
 from . import detail, glb, report, seen, usd
 from .errors import InvalidScene, OverBudget
-from .kinds import Kind, distinct
+from .kinds import Kind, Runs, distinct
 from .placing import Instances, bowls, place
 from .request import Scene
 
@@ -32,11 +32,18 @@ class Made(NamedTuple):
     report: dict[str, Any]
 
 
-def make(scene: Scene, tables: LiveTables, highest: int, to: str = "glb", compress: bool = True) -> Made:
-    """Return a scene as a file of a format in `request.FORMATS`.
+def make(
+    scene: Scene,
+    tables: LiveTables,
+    highest: int,
+    to: str = "glb",
+    compress: bool = True,
+    runs: Runs | None = None,
+) -> Made:
+    """Return a scene as a file of a format in `request.FORMATS`; `runs` as in `kinds.distinct`.
 
     Raises:
-        InvalidScene: listing what no table holds, a place that is too small, or a camera within a fruit.
+        InvalidScene: listing what neither tables nor runs hold, a place that is too small, or a camera within a fruit.
         OverBudget: the coarsest shapes cost more than the budget; it says what to drop.
         Unavailable: a format whose library is not installed.
 
@@ -49,7 +56,7 @@ def make(scene: Scene, tables: LiveTables, highest: int, to: str = "glb", compre
         times[name] = 1e3 * (now - start)
         start = now
 
-    kinds, rows = distinct(scene.items, tables, highest)
+    kinds, rows = distinct(scene.items, tables, highest, runs)
     lap("understood")
     everything, rests = place(scene, kinds, rows)
     lap("placed")
@@ -90,7 +97,7 @@ def _reaches(scene: Scene, kinds: Sequence[Kind], everything: Instances) -> tupl
 
     Kinds of which nothing is in sight, by a ball around the fresh shape, are not looked up at all.
     """
-    fresh = np.array([_fresh_reach(kind) for kind in kinds])
+    fresh = np.array([kind.fresh_reach for kind in kinds])
     outer = fresh[everything.kind] * everything.scale
     inner = np.zeros(len(outer))
     near = seen.view(scene.camera, everything.centre, outer).why == seen.SEEN
@@ -99,13 +106,6 @@ def _reaches(scene: Scene, kinds: Sequence[Kind], everything: Instances) -> tupl
         within_and_around = kinds[k].reach
         inner[which], outer[which] = (radius * everything.scale[which] for radius in within_and_around)
     return inner, outer
-
-
-def _fresh_reach(kind: Kind) -> float:
-    """Return a radius that holds the fresh shape and what it shrinks to: drying moves nothing outwards by 5 %."""
-    fresh = kind.table.fresh(kind.point)
-    angles = np.meshgrid(np.linspace(0, np.pi, 17), np.linspace(0, 2 * np.pi, 32, endpoint=False), indexing="ij")
-    return 1.05 * float(np.linalg.norm(fresh.points(*angles), axis=-1).max())
 
 
 def _check_eye(scene: Scene, kinds: Sequence[Kind], everything: Instances, outer: Floats) -> None:
@@ -119,10 +119,7 @@ def _check_eye(scene: Scene, kinds: Sequence[Kind], everything: Instances, outer
     distance = np.linalg.norm(away, axis=1)
     for i in np.flatnonzero(distance < outer):
         ahead = _turned_back(everything, int(i), away[i]) / everything.scale[i]
-        points = kinds[everything.kind[i]].coarse
-        r = np.linalg.norm(points, axis=1)
-        nearest = np.argmax(points @ ahead / r)
-        if np.linalg.norm(ahead) < r[nearest]:
+        if kinds[everything.kind[i]].holds(ahead):
             item = int(everything.item[i])
             back = math.ceil(100 * outer[i]) / 100
             advice = f"Move it {back:g} or more away from {[round(float(x), 3) for x in everything.centre[i]]}."

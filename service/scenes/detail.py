@@ -1,4 +1,4 @@
-"""Which lattice every seen instance gets: what the screen shows, and less where the budget is smaller."""
+"""Which level of detail every seen instance gets: what the screen shows, less where the budget is smaller."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from solver.arrays import Array, Floats
 from ..errors import Wrong
 from ..shapes.detail import PIXELS_PER_CELL
 from .errors import OverBudget
-from .kinds import Kind
+from .kinds import RUNGS, Kind
 from .request import Budget
 
-__all__ = ["RUNGS", "Levels", "choose", "expected"]
+__all__ = ["Levels", "choose", "expected"]
 
-#: Lattices that are used: few, so that instances share them.
-RUNGS = np.array([8, 16, 24, 32, 48, 64, 96, 128, 192, 256])
 #: By how much the lattices shrink from try to try, and how often before a budget is called too small.
 _LESS, _TRIES = 0.84, 28
 #: Bytes of a file: by vertex, by triangle of a lattice, by instance, by mesh and by node; compressed or not.
 _BYTES = {True: (9.5, 1.4, 22.0, 520.0, 560.0), False: (16.0, 6.0, 32.0, 430.0, 480.0)}
+#: A triangle of a mesh of its own, over one of a lattice: its neighbours are not where one expects them.
+_OWN = 2.0
 #: A look-up [ms]: of any lattice, and by squared colatitude; only said as an expectation.
 _MILLISECONDS = (1.4, 2.6e-4)
 
 
 class Levels(NamedTuple):
-    """Colatitudes by seen instance (b), those that the screen asks for (b), and what the file will cost: triangles
-    drawn, bytes and milliseconds expected. `share` is 1 where the budget took nothing away.
+    """Levels (colatitudes of lattices) by seen instance (b), those that the screen asks for (b), and what the file will
+    cost: triangles drawn, bytes and milliseconds expected. `share` is 1 where the budget took nothing away.
     """
 
     n: Array
@@ -44,38 +44,49 @@ class Levels(NamedTuple):
 def choose(
     budget: Budget, kinds: Sequence[Kind], kind: Array, pixels: Floats, compress: bool, most: float = 1.0
 ) -> Levels:
-    """Return the lattices of seen instances; `most` is the share of the screen's wish to begin with.
+    """Return the levels of seen instances; `most` is the share of the screen's wish to begin with.
 
     Raises:
-        OverBudget: even the coarsest lattices cost more; it says what to drop.
+        OverBudget: even the coarsest levels cost more; it says what to drop.
 
     """
-    own = np.array([RUNGS[min(int(np.searchsorted(RUNGS, k.table.resolution)), len(RUNGS) - 1)] for k in kinds])
+    own = np.array([k.finest for k in kinds])
     top = own[kind] if len(kind) else np.zeros(0, int)
     wanted = np.minimum(_rung(pixels, 1.0), top)
     share, levels = most, None
     for _ in range(_TRIES):
         n = np.minimum(_rung(pixels, share), top)
-        levels = Levels(n, wanted, *expected(kind, n, compress), share)
+        levels = Levels(n, wanted, *expected(kinds, kind, n, compress), share)
         if _fits(budget, levels):
             return levels
         if (n == RUNGS[0]).all():
             break
         share *= _LESS
     assert levels is not None
-    raise OverBudget.of(_over(budget, levels, kind, pixels, compress))
+    raise OverBudget.of(_over(budget, levels, kinds, kind, pixels, compress))
 
 
-def expected(kind: Array, n: Array, compress: bool) -> tuple[int, float, float]:
-    """Return triangles drawn, bytes and milliseconds to expect of instances with lattices."""
+def expected(kinds: Sequence[Kind], kind: Array, n: Array, compress: bool) -> tuple[int, float, float]:
+    """Return triangles drawn, bytes and milliseconds to expect of instances of kinds with levels.
+
+    What has a mesh of its own costs no look-up, and as many bytes as that mesh has vertices and triangles.
+    """
     if not len(n):
         return 0, 2000.0, 0.0
     a_vertex, a_triangle, an_instance, a_mesh, a_node = _BYTES[compress]
-    pairs = np.unique(np.stack([kind, n]), axis=1)[1].astype(float)
-    lattices = np.unique(n).astype(float)
-    size = float((2 * pairs**2 * a_vertex + a_mesh + 1.7 * a_node).sum() + (4 * lattices**2 * a_triangle).sum())
-    spent = float((_MILLISECONDS[0] + _MILLISECONDS[1] * pairs**2).sum()) + _MILLISECONDS[0] * len(np.unique(kind))
-    return int((4 * n.astype(np.int64) ** 2).sum()), size + an_instance * len(n) + 2000, spent
+    looked = np.array([one.topology is None for one in kinds])[kind]
+    drawn, size = int((4 * n[looked].astype(np.int64) ** 2).sum()), 0.0
+    if not looked.all():
+        own, copies = np.unique(np.stack([kind[~looked], n[~looked]]), axis=1, return_counts=True)
+        triangles = np.array([kinds[k].count(int(level)) for k, level in own.T])
+        drawn += int((triangles * copies).sum())
+        size += float((triangles * (0.5 * a_vertex + _OWN * a_triangle) + a_mesh + 1.7 * a_node).sum())
+    pairs = np.unique(np.stack([kind[looked], n[looked]]), axis=1)[1].astype(float)
+    lattices = np.unique(n[looked]).astype(float)
+    size += float((2 * pairs**2 * a_vertex + a_mesh + 1.7 * a_node).sum() + (4 * lattices**2 * a_triangle).sum())
+    spent = float((_MILLISECONDS[0] + _MILLISECONDS[1] * pairs**2).sum())
+    spent += _MILLISECONDS[0] * len(np.unique(kind[looked]))
+    return drawn, size + an_instance * len(n) + 2000, spent
 
 
 def _rung(pixels: Floats, share: float) -> Array:
@@ -93,7 +104,9 @@ def _fits(budget: Budget, levels: Levels) -> bool:
     return all(limit is None or cost <= limit for limit, cost in limits)
 
 
-def _over(budget: Budget, least: Levels, kind: Array, pixels: Floats, compress: bool) -> list[Wrong]:
+def _over(
+    budget: Budget, least: Levels, kinds: Sequence[Kind], kind: Array, pixels: Floats, compress: bool
+) -> list[Wrong]:
     """Return which limits are too low, and how many of the smallest instances to drop for each."""
     wrong = []
     order = np.argsort(pixels)
@@ -104,7 +117,7 @@ def _over(budget: Budget, least: Levels, kind: Array, pixels: Floats, compress: 
             continue
         for part in np.linspace(0, 1, 65)[1:-1]:
             rest = order[int(part * len(order)) :]
-            found = expected(kind[rest], least.n[rest], compress)
+            found = expected(kinds, kind[rest], least.n[rest], compress)
             if (found[1], found[0], found[2])[place] <= limit:
                 smallest = order[: int(part * len(order))]
                 advice = (

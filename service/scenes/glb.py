@@ -1,4 +1,4 @@
-"""A scene as binary glTF: every distinct lattice of a shape once, its instances by `EXT_mesh_gpu_instancing`, quantised
+"""A scene as binary glTF: every distinct level of a shape once, its instances by `EXT_mesh_gpu_instancing`, quantised
 (`KHR_mesh_quantization`) and, where the encoder is installed, compressed (`EXT_meshopt_compression`).
 
 A mirror image is the same mesh below a node that mirrors; its instances are turned to suit.
@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from solver.arrays import Array, Floats
 
-from ..formats import mesh
 from ..formats.about import GENERATOR
 from . import moving, props
 from .kinds import Kind
-from .meshes import VERTEX, Packed, Skin, pack, skin
+from .meshes import VERTEX, Packed, Skin
 from .placing import Instances, Prop
 
 __all__ = ["compressor", "encode"]
@@ -109,7 +108,7 @@ def encode(
     compress: bool,
     known: Collection[str] = (),
 ) -> bytes:
-    """Return the file of the seen instances with their lattices; `held` are props by what they are.
+    """Return the file of the seen instances with their levels; `held` are props by what they are.
 
     unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of what it is
     made of; of those that are `known` no more is there. They say too how long r1 is in their positions.
@@ -119,13 +118,18 @@ def encode(
     groups: Sequence[Array] = list(np.unique(np.stack([seen.kind, n, seen.mirrored.astype(int)]), axis=1).T)
     order = [np.flatnonzero((seen.kind == k) & (n == size) & (seen.mirrored == m)) for k, size, m in groups]
     meshes, materials, made = _meshes(file, kinds, groups, known)
-    if len(n):
-        nodes = _instances(file, kinds, seen, groups, order, made)
-    changing = [(at, kinds[k]) for at, (k, _, _) in enumerate(groups) if kinds[k].curve]
+    still = [at for at, (k, _, _) in enumerate(groups) if not kinds[k].curve]
+    if still:
+        nodes = _instances(file, kinds, seen, [groups[at] for at in still], [order[at] for at in still], made)
+    changing: list[tuple[int, Kind]] = []
+    for (k, size, _), rows in zip(groups, order, strict=True):
+        if kinds[k].curve:
+            changing += [(len(nodes) + i, kinds[k]) for i in range(len(rows))]
+            nodes += _one_by_one(kinds[k].label, seen.only(rows), *made[k, size])
     animations = moving.weights(file, changing)
     for prop in held.get("bowl", ()):
         nodes.append(props.bowl(file, meshes, materials, prop))
-    used = {_INSTANCING} if len(n) else set()
+    used = {_INSTANCING} if still else set()
     used |= {_QUANTIZED} if len(n) else set()
     required = sorted(used | ({_MESHOPT} if compress and compressor() is not None else set()))
     more = {name for material in materials for name in material.get("extensions", {})}
@@ -149,38 +153,37 @@ def encode(
 def _meshes(
     file: _File, kinds: Sequence[Kind], groups: Sequence[Array], known: Collection[str]
 ) -> tuple[list[Json], list[Json], dict[tuple[int, int], tuple[int, float]]]:
-    """Append the distinct lattices; return meshes, materials, and each mesh's number and step [r1]."""
+    """Append the distinct meshes; return them, materials, and each mesh's number and step [its unit]."""
     meshes: list[Json] = []
     materials: list[Json] = []
-    skins: dict[tuple[str, float], tuple[int, Skin]] = {}
-    indices: dict[int, int] = {}  # of the lattices that are sent
+    worn: dict[Hashable, int] = {}
+    indices: dict[Hashable, int] = {}  # of the levels that are sent
     made: dict[tuple[int, int], tuple[int, float]] = {}
     for k, size in ((int(k), int(size)) for k, size, _ in groups):
         if (k, size) in made:
             continue
         kind = kinds[k]
-        name = (kind.shade[0], round(kind.dryness, 3))
-        if name not in skins:
-            skins[name] = len(materials), skin(kind.shade[1], kind.dryness)
-            materials.append(_material(kind.shade[0], skins[name][1]))
-        material, looks = skins[name]
+        if kind.look not in worn:
+            worn[kind.look] = len(materials)
+            materials.append(_material(kind.look[0], kind.skin))
+        material = worn[kind.look]
         made[k, size] = len(meshes), kind.step
         tag = moving.etag(kind, size)
         # with these, whoever has the file can put other stages of the kind in the place of this one
-        extras: Json = {"etag": tag, "kind": kind.label, "colatitudes": size, "r1": 1 / kind.step}
+        extras: Json = {"etag": tag, "kind": kind.label, **kind.extras(size)}
         meshes.append({"name": f"{kind.label} {size}", "extras": extras})
         if tag in known:
             extras["known"] = True
             meshes[-1]["primitives"] = [_stub(file, material)]
             continue
-        first, *later = (pack(one, looks, kind.extent) for one in (kind.shape(size), *kind.later(size)))
-        if size not in indices:
-            indices[size] = _indices(file, mesh.triangles(size))
-        primitive = _primitive(file, first, indices[size], material)
+        first, *later = kind.packed(size)
+        if (kind.topology, size) not in indices:
+            indices[kind.topology, size] = _indices(file, kind.triangles(size))
+        primitive = _primitive(file, first, indices[kind.topology, size], material)
         meshes[-1]["primitives"] = [primitive]
         if later:
             meshes[-1]["weights"] = [0.0] * len(later)
-            primitive["targets"] = moving.target_views(file, first, later)
+            primitive["targets"] = moving.target_views(file, first, later, kind.fades)
     return meshes, materials, made
 
 
@@ -256,6 +259,21 @@ def _instances(
     return nodes
 
 
+def _one_by_one(name: str, seen: Instances, mesh: int, step: float) -> list[Json]:
+    """Return a node for each of the instances of a mesh with morph targets, which readers do not draw as instances."""
+    found: list[Json] = []
+    turns = seen.turn / np.linalg.norm(seen.turn, axis=1)[:, None]
+    for centre, turn, scale, mirrored in zip(seen.centre, turns, seen.scale * step, seen.mirrored, strict=True):
+        wide = float(scale)
+        place = {
+            "translation": centre.tolist(),
+            "rotation": turn.tolist(),
+            "scale": [-wide if mirrored else wide, wide, wide],
+        }
+        found.append({"mesh": mesh, "name": name, **place})
+    return found
+
+
 def _material(name: str, looks: Skin) -> Json:
     extensions: Json = {}
     if looks.coat:
@@ -272,6 +290,7 @@ def _material(name: str, looks: Skin) -> Json:
             "metallicFactor": 0.0,
             "roughnessFactor": round(looks.roughness, 4),
         },
+        **({"doubleSided": True} if looks.thin else {}),
         **({"extensions": extensions} if extensions else {}),
     }
 

@@ -1,4 +1,4 @@
-"""A shape as quantised vertices: positions in 13 bits, normals in 8, and the colours of its ridges and furrows."""
+"""Shapes as quantised vertices: positions in 13 bits, normals in 8, and colours, those of ridges and furrows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from store.shape import Shape
 
 from ..formats import mesh
 
-__all__ = ["STEPS", "VERTEX", "Packed", "Skin", "linear", "pack", "relief", "skin"]
+__all__ = ["STEPS", "VERTEX", "Packed", "Skin", "linear", "pack", "quantised", "relief", "skin", "weathered"]
 
 #: One vertex: 16 bytes, multiples of four as accessors want them.
 VERTEX = np.dtype([("position", "<i2", 4), ("normal", "i1", 4), ("colour", "u1", 4)])
@@ -26,7 +26,7 @@ _SHADES = 32
 
 
 class Packed(NamedTuple):
-    """Vertices (v) as `VERTEX`; a position times `scale` is in r1."""
+    """Vertices (v) as `VERTEX`; a position times `scale` is in the kind's unit."""
 
     vertices: Array
     scale: float
@@ -35,13 +35,17 @@ class Packed(NamedTuple):
 
 
 class Skin(NamedTuple):
-    """Colours (3) of ridges and furrows, linear light, roughness, coat, and the colour of the bloom."""
+    """Colours (3) of ridges and furrows, linear light, roughness, coat, and the colour of the bloom.
+
+    thin: it has an inner side that may be seen.
+    """
 
     ridge: Floats
     furrow: Floats
     roughness: float
     coat: float
     bloom: Floats
+    thin: bool = False
 
     @property
     def base(self) -> Floats:
@@ -77,21 +81,22 @@ def relief(position: Array, normal: Array) -> Floats:
     return np.asarray(np.einsum("ijk,ijk->ij", position - smooth, normal))
 
 
-def pack(shape: Shape, looks: Skin, reach: float | None = None) -> Packed:
-    """Return a shape's closed mesh, 2 n^2 + 2 vertices, quantised; `reach` [r1] is the largest coordinate that counts,
-    None: the shape's own.
-    """
-    position, ends = mesh.surface(shape)
-    lattice, poles = mesh.normals(position)
-    points, normal = mesh.vertices(position, ends), mesh.vertices(lattice, poles)
-    scale = (float(np.abs(points).max()) if reach is None else reach) / STEPS
-    height = relief(position, lattice)
+def weathered(position: Array, normal: Array, looks: Skin) -> Floats:
+    """Return colours (2 n^2 + 2, 3) over the skin's base of a lattice surface (n, 2n, 3) and its poles."""
+    height = relief(position, normal)
     # a smoothed round body lies within it: only what stands out of the mean is ridge
     height = height - np.median(height)
     share = np.clip(_FLAT + height / _DEEP, 0, 1)
     share = np.concatenate([share.ravel(), [share[0].mean(), share[-1].mean()]])[:, None]
     share = np.round(share * _SHADES) / _SHADES
-    colour = (looks.furrow * (1 - share) + looks.ridge * share) / looks.base
+    return np.asarray((looks.furrow * (1 - share) + looks.ridge * share) / looks.base)
+
+
+def quantised(points: Array, normal: Array, colour: Floats, reach: float) -> Packed:
+    """Return vertices of points, normals and colours over the skin's base (v, 3); `reach` is the largest coordinate
+    that counts.
+    """
+    scale = reach / STEPS
     out = np.zeros(len(points), VERTEX)
     out["position"][:, :3] = np.round(points / scale)
     out["normal"][:, :3] = np.round(normal * 127)
@@ -99,3 +104,14 @@ def pack(shape: Shape, looks: Skin, reach: float | None = None) -> Packed:
     out["colour"][:, 3] = 255
     columns = [out["position"][:, i] for i in range(3)]
     return Packed(out, scale, [int(c.min()) for c in columns], [int(c.max()) for c in columns])
+
+
+def pack(shape: Shape, looks: Skin, reach: float | None = None) -> Packed:
+    """Return a shape's closed mesh, 2 n^2 + 2 vertices, quantised; `reach` [r1] is the largest coordinate that counts,
+    None: the shape's own.
+    """
+    position, ends = mesh.surface(shape)
+    lattice, poles = mesh.normals(position)
+    points, normal = mesh.vertices(position, ends), mesh.vertices(lattice, poles)
+    colour = weathered(position, lattice, looks)
+    return quantised(points, normal, colour, float(np.abs(points).max()) if reach is None else reach)

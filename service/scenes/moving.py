@@ -27,19 +27,16 @@ __all__ = ["FPS", "etag", "known_vertices", "target_views", "weights"]
 #: Frames of a second, where a format counts frames.
 FPS = 24.0
 _BYTE, _SHORT, _FLOAT = 5120, 5122, 5126
-#: A target: what is added to positions and to normals; both are padded to four bytes.
-_TARGET = np.dtype([("position", "<i2", 4), ("normal", "i1", 4)])
+#: A target: what is added to positions and to normals, padded to four bytes, and to colours where they change.
+_PARTS = [("position", "<i2", 4), ("normal", "i1", 4), ("colour", "i1", 4)]
+_TARGET, _FADING = np.dtype(_PARTS[:2]), np.dtype(_PARTS)
 
 
 def etag(kind: Kind, n: int) -> str:
-    """Return what names the mesh of a kind on a lattice: what it is made of, so that it need not be made."""
+    """Return what names the mesh of a kind at a level: what it is made of, so that it need not be made."""
     said = {
         "by": GENERATOR,
-        "table": kind.table.digest,
-        "at": sorted(kind.point.items()),
-        "stages": [kind.stage, *(stage for _, stage in kind.curve)],
-        "n": int(n),
-        "shade": kind.shade[0],
+        **kind.made_of(n),
     }
     return hashlib.sha256(json.dumps(said).encode()).hexdigest()[:16]
 
@@ -49,15 +46,18 @@ def known_vertices(vertex: np.dtype[Any]) -> Array:
     return np.zeros(3, vertex)
 
 
-def target_views(file: _File, base: Packed, later: list[Packed]) -> list[dict[str, int]]:
-    """Append the morph targets of a mesh and return them, as steps of the quantised base."""
+def target_views(file: _File, base: Packed, later: list[Packed], fades: bool) -> list[dict[str, int]]:
+    """Append the morph targets of a mesh and return them, as steps of the quantised base; `fades`: of colours too."""
     found = []
     for one in later:
-        steps = np.zeros(len(base.vertices), _TARGET)
+        steps = np.zeros(len(base.vertices), _FADING if fades else _TARGET)
         gone = one.vertices["position"].astype(int) - base.vertices["position"]
         turned = one.vertices["normal"].astype(int) - base.vertices["normal"]
         steps["position"] = np.clip(gone, -32767, 32767)
         steps["normal"] = np.clip(turned, -127, 127)
+        if fades:
+            changed = one.vertices["colour"].astype(float) - base.vertices["colour"]
+            steps["colour"] = np.round(changed * (127 / 255))
         view = file.view(steps, "ATTRIBUTES", 34962)
         low, high = (getattr(steps["position"][:, :3], which)(axis=0).tolist() for which in ("min", "max"))
         found.append(
@@ -66,6 +66,8 @@ def target_views(file: _File, base: Packed, later: list[Packed]) -> list[dict[st
                 "NORMAL": file.accessor(view, _BYTE, "VEC3", len(steps), 8, normalized=True),
             }
         )
+        if fades:
+            found[-1]["COLOR_0"] = file.accessor(view, _BYTE, "VEC4", len(steps), 12, normalized=True)
     return found
 
 

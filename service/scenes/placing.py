@@ -63,7 +63,12 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
     item = np.repeat(np.arange(len(counts)), counts)
     kind = np.asarray(rows)[item]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    scale = np.repeat([one.size for one in scene.items], counts).astype(float)
+    named = [one.size for one in scene.items]
+    sizes = [
+        size if isinstance(size, float) else _size(size, kinds[row], scene.unit)
+        for size, row in zip(named, rows, strict=True)
+    ]
+    scale = np.repeat(sizes, counts).astype(float)
     centre = np.zeros((len(item), 3))
     members: dict[str, list[Array]] = {one.name: [] for one in scene.places}
     seeds = np.array([-1 if one.seed is None else one.seed for one in scene.items])[item]
@@ -96,6 +101,12 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
         turn[which] = rest.turn
         rests[rule.name] = rest
     return found, rests
+
+
+def _size(asked: str | None, kind: Kind, unit: float) -> float:
+    """Return the length of a kind's own unit [scene unit]; that of tables is one unless the real one is asked for."""
+    known = kind.metres if asked is not None or kind.topology is not None else None
+    return 1.0 if known is None else known / unit
 
 
 def bowls(scene: Scene) -> list[Prop]:
@@ -145,7 +156,7 @@ def _lowest(found: Instances, kinds: Sequence[Kind]) -> Floats:
     cross = 2 * np.cross(back[:, :3], vector)
     local = vector + back[:, 3:] * cross + np.cross(back[:, :3], cross)
     local[:, 0] *= np.where(found.mirrored, -1, 1)
-    return np.array([(kinds[k].coarse @ d).max() for k, d in zip(found.kind, local, strict=True)]) * found.scale
+    return np.array([(kinds[k].outline @ d).max() for k, d in zip(found.kind, local, strict=True)]) * found.scale
 
 
 def _row(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
@@ -198,7 +209,7 @@ class _Told:
     """A body that is equal to another one of the same content."""
 
     def __init__(self, kind: Kind, mirrored: bool) -> None:
-        self.key = (kind.table.digest, tuple(sorted(kind.point.items())), kind.stage, mirrored)
+        self.key = (kind.identity, mirrored)
         surface = kind.body.surface
         self.body = resting.Body(surface * [-1, 1, 1] if mirrored else surface)
 

@@ -14,7 +14,7 @@ from solver.resting import Rest
 from ..formats.about import GENERATOR
 from . import seen
 from .detail import Levels
-from .kinds import COARSE, Kind
+from .kinds import Kind
 from .placing import Instances
 from .request import Scene
 
@@ -69,6 +69,7 @@ def document(told: Told) -> dict[str, Any]:
         "shown": int(told.shown.sum()),
         "left_out": why,
         "kinds": len(told.kinds),
+        "missing": sum(kind.missing is not None for kind in told.kinds),
         "meshes": len(distinct),
         "triangles": told.levels.triangles,
         "bytes": told.size,
@@ -113,9 +114,10 @@ def _item(
     kind = told.kinds[k]
     if len(rows) == 1 and not ranks.shown[rows[0]]:
         # most items of a large scene
+        lacks = {} if kind.missing is None else {"missing": kind.missing.to_json()}
         return {
             "name": one.name or kind.label,
-            "table": kind.table.info.name,
+            **kind.source,
             "instances": 1,
             "shown": 0,
             "computed": [],
@@ -123,18 +125,20 @@ def _item(
             "reduced": 0,
             "skipped": {_WHY[ranks.why[rows[0]]]: 1},
             "lattices": {},
-            "milliseconds_saved": round(least, 2),
+            "milliseconds_saved": round(least if kind.topology is None else 0.0, 2),
+            **lacks,
         }
     shown = [row for row in rows if ranks.shown[row]]
     lattices = sorted(Counter(ranks.n[row] for row in shown).items())
     computed = [size for size, _ in lattices if (k, size) not in first]
     first |= {(k, size) for size in computed}
     alone = sum(spent.get(size, least) * count for size, count in lattices) + least * (len(rows) - len(shown))
+    alone = alone if kind.topology is None else 0.0  # what is stored is read, whoever asks
     used = sum(1e3 * kind.spent.get(size, 0.0) for size in computed)
     left = Counter(ranks.why[row] for row in rows)
     said: dict[str, Any] = {
         "name": one.name or kind.label,
-        "table": kind.table.info.name,
+        **kind.source,
         "instances": len(rows),
         "shown": len(shown),
         "computed": computed,
@@ -144,12 +148,6 @@ def _item(
         "lattices": {str(size): count for size, count in lattices},
         "milliseconds_saved": round(max(alone - used, 0.0), 2),
     }
-    looked = [kind.shapes[size] for size, _ in lattices if size in kind.shapes] or (
-        [kind.shapes[COARSE]] if COARSE in kind.shapes else []
-    )
-    if looked:
-        shape = looked[-1]
-        error = shape.expected_error
-        said["expected_error"] = None if error is None else {name: round(v, 5) for name, v in error.items()}
-        said["exact"], said["converged"] = shape.exact, shape.converged
-    return said
+    if kind.missing is not None:
+        said["missing"] = kind.missing.to_json()
+    return said | kind.trust([size for size, _ in lattices])

@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from solver.contract import Quality
+
 from ..errors import Wrong
 from .errors import InvalidScene, SceneTooLarge
 
@@ -87,17 +89,37 @@ class Transform(_Strict):
 
 
 class Item(_Strict):
-    """Fruits of one kind: a preset and/or parameters at one stage."""
+    """Things of one kind: a preset and/or parameters at one stage, of a table or a stored run, or such a run by key."""
 
-    solver: str | None = Field(None, description="Whose shapes; none: of the one that the tables are of")
+    solver: str | None = Field(
+        None, description="Whose shapes; none: of the one that has the preset, or that the tables are of"
+    )
     preset: str | None = Field(None, description="A fruit by its name; `wizen presets` lists them")
-    parameters: dict[str, float] = Field({}, description="By axis, over the preset's")
-    stage: float | None = Field(None, description="Stage, as the solver counts them; or a curve instead")
+    parameters: dict[str, Any] = Field(
+        {}, description="Over the preset's: numbers by axis, and of runs all that jobs take"
+    )
+    run: str | None = Field(
+        None,
+        pattern="^[0-9a-fA-F]{4,64}$",
+        description="A stored run by its key or the beginning of it, in place of solver, preset and parameters",
+    )
+    source: Literal["table", "run"] | None = Field(
+        None, description="Whether a table or a stored run; none: a table where the solver has tables"
+    )
+    quality: Quality | None = Field(None, description="Of a run; none: the best that is stored, else default")
+    stage: float | None = Field(
+        None, description="Stage, as the solver counts them; or a curve instead; of a run by key, none is the last one"
+    )
     curve: tuple[tuple[float, float], ...] = Field(
         (), max_length=64, description="Stages over time: pairs of seconds and stage, at least two, times rising from 0"
     )
     name: str = Field("", max_length=80, description="What the report calls it")
-    size: Length = Field(1.0, description="Length of r1 [scene unit]")
+    size: Length | Literal["real"] | None = Field(
+        None,
+        union_mode="left_to_right",
+        description="Length of r1, or of a run's own unit [scene unit]; real: as large as such things are. None: 1 for "
+        "tables, for runs their real size where it is known, else 1",
+    )
     count: int = Field(1, ge=1, description="How many individuals")
     seed: int | None = Field(None, ge=0, le=2**32 - 1, description="Turns and mirrors the individuals; none: as stored")
     vary: float = Field(0.0, ge=0, le=0.5, description="Share by which sizes of individuals differ; needs a seed")
@@ -107,8 +129,12 @@ class Item(_Strict):
 
     @model_validator(mode="after")
     def _stands(self) -> Self:
-        if (self.stage is None) == (not self.curve):
+        if self.run is not None:
+            self._named()
+        elif (self.stage is None) == (not self.curve):
             raise ValueError("an item has either a stage or a curve of stages: write one of them")
+        if not _finite(self.parameters):
+            raise ValueError("parameters are finite numbers")
         times = [at for at, _ in self.curve]
         if self.curve and (len(times) < 2 or times[0] < 0 or any(b <= a for a, b in pairwise(times))):
             raise ValueError("a curve has two or more pairs [seconds, stage], and its times rise, from 0 or later")
@@ -120,6 +146,15 @@ class Item(_Strict):
             raise ValueError("vary needs a seed")
         return self
 
+    def _named(self) -> None:
+        """Check an item that names a run."""
+        if self.solver or self.preset or self.parameters or self.quality:
+            raise ValueError("run names all of a run: leave out solver, preset, parameters and quality")
+        if self.source == "table":
+            raise ValueError("run names a stored run, which no table holds: leave out source")
+        if self.stage is not None and self.curve:
+            raise ValueError("an item has either a stage or a curve of stages: write one of them")
+
     @property
     def first(self) -> float:
         """The stage to begin with."""
@@ -128,9 +163,22 @@ class Item(_Strict):
         return self.curve[0][1]
 
     @property
+    def stages(self) -> tuple[float, ...]:
+        """All stages, in the order of the curve; none where a run's last one is meant."""
+        return tuple(stage for _, stage in self.curve) or (() if self.stage is None else (self.stage,))
+
+    @property
     def instances(self) -> int:
         """Number of individuals."""
         return len(self.transforms) or self.count
+
+
+def _finite(value: object) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, dict | list):
+        return all(map(_finite, value.values() if isinstance(value, dict) else value))
+    return True
 
 
 class Budget(_Strict):

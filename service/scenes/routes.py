@@ -12,9 +12,13 @@ import orjson
 from fastapi import APIRouter, Body, Query, Request
 from starlette.responses import Response
 
+from store.ledger.jobs import Job
+
 from .. import problems
-from ..errors import InvalidQuery, Wrong
+from ..errors import Forbidden, InvalidQuery, Unauthorized, Wrong
+from ..jobs.submit import asker_of, submit
 from ..limits import memory
+from ..security import authorize, bearer
 from ..settings import Settings
 from ..shapes.live import LiveTables
 from ..views.scene import ScenePage
@@ -22,6 +26,7 @@ from .request import FORMATS, Scene, parse
 
 if TYPE_CHECKING:
     from .compose import Made
+    from .kinds import Asked, Runs
 
 __all__ = ["router"]
 
@@ -47,6 +52,31 @@ def _maker() -> Callable[..., Made]:
 
     memory.keep("scenes")
     return make
+
+
+def _runs(request: Request) -> Runs:
+    """Return where runs are looked for, and what asks for those that are missing: jobs, of who may have any."""
+    from .kinds import Runs
+
+    state, secret = request.app.state, bearer(request)
+
+    def ask(asked: Asked) -> tuple[Job | None, str]:
+        try:
+            token = authorize(state, secret, "run")
+        except (Unauthorized, Forbidden) as error:
+            return None, f"With a token of the scope run the scene asks for it as a job. {error.advice}"
+        found = submit(
+            state,
+            asked.solver,
+            asked.parameters,
+            asked.need,
+            asker_of(request, token),
+            preset=asked.preset,
+            unlimited=token.allows("admin"),
+        )
+        return found.job, ""
+
+    return Runs(lambda: state.tables.store, ask)
 
 
 _SCHEMA = Scene.model_json_schema()
@@ -79,7 +109,8 @@ def scenes(
 
     What is out of the picture, behind others or smaller than a pixel is left out, and kinds of which nothing is in
     sight are not computed. `format=json` is the report alone, without a file; a file brings the report's summary in
-    the header `Wizen-Scene`.
+    the header `Wizen-Scene`. Items may be stages of stored runs; those that are not stored become jobs where the
+    request has a token with the scope run, and something plain stands in for them meanwhile.
     """
     make = _maker()
     settings: Settings = request.app.state.settings
@@ -89,7 +120,7 @@ def scenes(
         hint = f"Did you mean {near[0]!r}? " if near else ""
         advice = f"{hint}Formats: {', '.join(FORMATS)}."
         raise InvalidQuery.of([Wrong("format", f"there is no format {format[:40]!r}", advice)])
-    made = make(parse(body), tables, settings.max_resolution, format, compress)
+    made = make(parse(body), tables, settings.max_resolution, format, compress, _runs(request))
     if format == "json":
         return Response(orjson.dumps(made.report), media_type=FORMATS["json"][0])
     told = {name: value for name, value in made.report.items() if name not in ("items", "places", "generator")}

@@ -1,4 +1,4 @@
-"""A scene as USD: one prototype mesh for each distinct lattice of a shape, and a PointInstancer that places them.
+"""A scene as USD: one prototype mesh for each distinct level of a shape, and a PointInstancer that places them.
 
 Mirror images are prototypes of their own: an instancer's scales mirror the points and not the winding.
 """
@@ -14,13 +14,10 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array
-from store.shape import Shape
 
 from ..errors import Unavailable
-from ..formats import mesh
 from . import props
 from .kinds import Kind
-from .meshes import Skin, pack, skin
 from .moving import FPS
 from .placing import Instances, Prop
 
@@ -88,29 +85,25 @@ def _encode(
 usdc, usda = partial(_encode, "usdc"), partial(_encode, "usda")
 
 
-def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, bound: tuple[Any, Skin]) -> None:
-    from pxr import UsdGeom, Vt
+def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, material: Any) -> None:
+    from pxr import UsdGeom
 
-    material, looks = bound
-    shape = kind.shape(n)
     across = np.array([-1 if mirrored else 1, 1, 1], np.float32)
-    surfaces = [_surface(one, across) for one in (shape, *kind.later(n))]
-    colour = pack(shape, looks).vertices["colour"][:, :3] / 255 * looks.base
-    triangles = mesh.triangles(n)[:, :: -1 if mirrored else 1]
+    surfaces = [(points * across, normal * across) for points, normal in kind.surfaces(n)]
+    colours = kind.colours(n)
+    triangles = kind.triangles(n)[:, :: -1 if mirrored else 1]
     found = _mesh(stage, path, *surfaces[0], triangles, material)
     for (seconds, _), (points, normal) in zip(kind.curve, surfaces, strict=False):
         found.GetPointsAttr().Set(_vectors(points), FPS * seconds)
         found.GetNormalsAttr().Set(_vectors(normal), FPS * seconds)
         found.GetExtentAttr().Set(_vectors(np.stack([points.min(axis=0), points.max(axis=0)])), FPS * seconds)
+    if kind.skin.thin:
+        found.CreateDoubleSidedAttr(True)
     paint = UsdGeom.Mesh.Get(stage, path).CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-    paint.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(colour, np.float32)))
+    paint.Set(_vectors(colours[0]))
+    for (seconds, _), colour in zip(kind.curve if kind.fades else (), colours, strict=False):
+        paint.Set(_vectors(colour), FPS * seconds)
     stage.GetPrimAtPath(path).SetDisplayName(kind.label)
-
-
-def _surface(shape: Shape, across: Array) -> tuple[Array, Array]:
-    """Return vertices and their normals (v, 3), or those of the mirror image."""
-    position, poles = mesh.surface(shape)
-    return mesh.vertices(position, poles) * across, mesh.vertices(*mesh.normals(position)) * across
 
 
 def _vectors(values: Array) -> Any:
@@ -135,12 +128,11 @@ def _mesh(stage: Any, path: str, points: Array, normal: Array, triangles: Array,
     return found
 
 
-def _material(stage: Any, made: dict[str, Any], kind: Kind) -> tuple[Any, Skin]:
-    looks = skin(kind.shade[1], kind.dryness)
-    name = f"{kind.shade[0]}{round(1000 * kind.dryness)}"
+def _material(stage: Any, made: dict[str, Any], kind: Kind) -> Any:
+    name = kind.prim
     if name not in made:
-        made[name] = _shader(stage, f"/scene/looks/{name}", looks.roughness, looks.coat, None)
-    return made[name], looks
+        made[name] = _shader(stage, f"/scene/looks/{name}", kind.skin.roughness, kind.skin.coat, None)
+    return made[name]
 
 
 def _shader(stage: Any, path: str, roughness: float, coat: float, colour: tuple[float, ...] | None) -> Any:

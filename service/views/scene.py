@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import BaseModel, Field
 
 __all__ = ["ScenePage"]
@@ -21,18 +23,44 @@ class SceneDetail(BaseModel):
     lattices: list[int] = Field(description="Colatitudes that were used")
 
 
+class SceneMissing(BaseModel):
+    """A run that is not stored, and in whose place something plain stands."""
+
+    key: str = Field(description="Under which it will be stored: the id of its job")
+    job: dict[str, Any] | None = Field(
+        description="Its job's id, state and progress (0 to 1); null where there is none"
+    )
+    why: str
+    advice: str
+
+
 class SceneItem(BaseModel):
     """What was done about an item."""
 
     name: str
-    table: str
+    table: str | None = Field(None, description="The table that answers; what follows to `box` is of runs alone")
+    run: str | None = Field(None, description="Key of the stored run")
+    placeholder: str | None = Field(None, description="What stands in for a run that is not stored")
+    missing: SceneMissing | None = Field(None, description="Why it is not")
+    solver: str | None = None
+    symbol: str | None = Field(None, description="What the solver calls its stages")
+    stages: list[float] | None = None
+    shade: str | None = None
+    sides: list[float] | None = Field(None, description="Of a placeholder, along x, y and z [its unit]")
+    metres_per_unit: float | None = Field(None, description="Length of the run's unit [m]; null where nobody knows")
+    box: list[list[float]] | None = Field(None, description="Least and largest coordinates, unturned [its unit]")
     instances: int
     shown: int
     computed: list[int] = Field(description="Lattices that were looked up for this item first")
     shared: int = Field(description="Individuals that use a mesh that is there already")
     reduced: int = Field(description="Individuals that are coarser than the screen asks for")
     skipped: dict[str, int] = Field(description="Individuals that were left out, by why")
-    lattices: dict[str, int] = Field(description="Individuals by colatitudes")
+    lattices: dict[str, int] = Field(
+        description="Individuals by colatitudes n; a mesh of its own has at most some 4 n^2 triangles"
+    )
+    coarsened: dict[str, float] | None = Field(
+        None, description="How far meshes of runs are off the run's own, over its size, by n"
+    )
     milliseconds_saved: float = Field(description="Look-ups that a request for each would have taken, less those made")
     expected_error: dict[str, float] | None = Field(None, description="By measure; null where nobody knows")
     exact: bool | None = Field(None, description="A stored run at a stored stage, or the fresh shape")
@@ -47,6 +75,7 @@ class ScenePage(BaseModel):
     shown: int
     left_out: dict[str, int] = Field(description="Individuals that were left out, by why")
     kinds: int = Field(description="Distinct fruits and stages")
+    missing: int = Field(description="Of these, runs that are not stored: something plain stands in for them")
     meshes: int = Field(description="Distinct meshes")
     triangles: int = Field(description="Triangles drawn, over all individuals")
     bytes: int = Field(description="Size of the file; 0 where only the report was asked for")

@@ -12,13 +12,14 @@ from .looks import Fur, Label, Looks, Place, Shade, Skin
 from .need import Need, Quality, Region, Start
 from .params import Params
 from .solver import Cost, Solver, StageAxis, finish
-from .surface import Fresh, Surface
+from .surface import Extent, Fresh, Surface
 
 __all__ = [
     "Cancelled",
     "Clock",
     "Context",
     "Cost",
+    "Extent",
     "Fresh",
     "Fur",
     "InvalidGeometry",

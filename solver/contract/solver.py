@@ -19,7 +19,7 @@ from .live import Live
 from .looks import Looks
 from .need import Need, Quality
 from .params import Params
-from .surface import Fresh, Surface
+from .surface import Extent, Fresh, Surface
 from .words import named
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ class Solver:
     context, steps)`, which brings a surface on the lattice into the equilibrium next to it, or so many steps nearer,
     and returns what `run` returns of one stage, how far it `moved` and from which residual (`residual_placed`).
     `tolerances` are the worst of each quality over all that was. `clock` turns hours under given conditions into
-    stages. `live` begins a run that is acted upon while it goes.
-    stages. `sizes` are lengths of r1, or of the solver's own unit, in metres by preset, as such fruits are when fresh.
+    stages. `live` begins a run that is acted upon while it goes. `sizes` are lengths of r1, or of the solver's own
+    unit, in metres by preset, as such fruits are when fresh. `extent` says how large what is run is at the start.
     """
 
     name: str
@@ -92,6 +92,7 @@ class Solver:
     clock: Clock | None = None
     live: Live | None = None
     sizes: Mapping[str, float] = field(default_factory=dict)
+    extent: Callable[[Any], Extent] | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.

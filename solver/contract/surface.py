@@ -7,14 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Floats
 from ..lattice import azimuths, colatitudes
 
-__all__ = ["Fresh", "Surface"]
+__all__ = ["Extent", "Fresh", "Surface"]
+
+
+class Extent(NamedTuple):
+    """The box that a thing fills before its run: lengths (3) of its sides, y up, in the solver's unit of length.
+
+    metres: of that unit; None where nobody knows.
+    """
+
+    sides: Floats
+    metres: float | None = None
 
 
 class Fresh:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..contract import Context, Cost, Live, LiveEngine, Need, Quality, Solver, StageAxis
+from ..contract import Context, Cost, Extent, Live, LiveEngine, Need, Quality, Solver, StageAxis
 from .living.actions import ACTIONS
 from .looks import CHANNELS, LOOKS
 from .params import GrowthParams
@@ -35,6 +35,17 @@ def _cost(params: GrowthParams, need: Need) -> Cost:
     return expected_cost(params, need)
 
 
+def _extent(params: GrowthParams) -> Extent:
+    """Return the box of the start shape, in its own unit."""
+    import numpy as np
+
+    from .shapes import start
+
+    points = np.array(params.mesh.points) if params.mesh else start(params.shape, 200, params.aspect).x
+    x, y, z = np.ptp(points, axis=0)
+    return Extent(np.array([x, z, y]))
+
+
 SOLVER = Solver(
     name="growth",
     version="6",
@@ -51,4 +62,5 @@ SOLVER = Solver(
     run=_run,
     cost=_cost,
     live=Live(ACTIONS, _live, ("elastic_strain", *CHANNELS)),
+    extent=_extent,
 )

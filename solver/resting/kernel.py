@@ -1,8 +1,7 @@
 """The hot loop of falling bodies: position-based rigid-body dynamics (Mueller et al. 2020, "Detailed rigid body
 simulation with extended position based dynamics") with rigid contacts and Coulomb friction, one sweep a step.
 
-A body is a radial function on directions (colatitude about y, azimuth from x to z) and points of that surface; a point
-of one body within the other's radius is a contact. Inertia is that of a ball of the mean radius.
+Where bodies touch is told by `near`. Inertia is that of a ball of the mean radius.
 """
 
 from __future__ import annotations
@@ -13,35 +12,26 @@ import numpy as np
 from numba import njit
 
 from ..arrays import Bools, Floats, Ints
+from .near import (
+    NEAR,
+    SKIN,
+    SLACK,
+    are_apart,
+    caps_of,
+    deepest_in,
+    deepest_in_ground,
+    moved,
+    note,
+    outwards,
+    pairs_of,
+    rotate,
+    slopes,
+)  # fmt: skip
 
-__all__ = ["radius_at", "rotate", "step"]
+__all__ = ["step"]
 
 #: Share of its motion that a body in contact loses in a unit of time: it rolls a few radii on a floor.
 ROLLING = 1.5
-
-
-@njit(cache=True, error_model="numpy")
-def rotate(q: Floats, v: Floats, back: bool) -> tuple[float, float, float]:
-    """Return v turned by a unit quaternion (x, y, z, w), or turned back."""
-    sign = -1.0 if back else 1.0
-    x, y, z, w = sign * q[0], sign * q[1], sign * q[2], q[3]
-    a, b, c = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
-    return v[0] + w * a + y * c - z * b, v[1] + w * b + z * a - x * c, v[2] + w * c + x * b - y * a
-
-
-@njit(cache=True, error_model="numpy")
-def radius_at(table: Floats, x: float, y: float, z: float, r: float) -> float:
-    """Return the radius of a table (n, 2n) of radii by direction, bilinear, in the direction (x, y, z) / r."""
-    n = table.shape[0]
-    t = math.acos(min(max(y / r, -1.0), 1.0)) / math.pi * n - 0.5
-    p = math.atan2(z, x) / math.pi * n
-    i, j = math.floor(t), math.floor(p)
-    a, b = t - i, p - j
-    top, bottom = min(max(i, 0), n - 1), min(max(i + 1, 0), n - 1)
-    left, right = int(j) % (2 * n), int(j + 1) % (2 * n)
-    high = table[top, left] * (1 - b) + table[top, right] * b
-    low = table[bottom, left] * (1 - b) + table[bottom, right] * b
-    return float(high * (1 - a) + low * a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -116,98 +106,6 @@ def _resolve(
 
 
 @njit(cache=True, error_model="numpy")
-def _meet(
-    at: Floats, turn: Floats, i: int, j: int, points: Floats, table: Floats, reach: float, scale: tuple[float, float],
-    point: Floats, normal: Floats,
-) -> float:  # fmt: skip
-    """Find the point of body i that is deepest in body j: returns the depth, and fills the point and the normal."""
-    deepest, best = 0.0, -1
-    offset = at[i] - at[j]
-    moved, local = np.empty(3), np.empty(3)
-    # most points are out of reach: told in the body's own frame, where they need no turning
-    x, y, z = rotate(turn[i], offset, True)
-    most = reach * reach
-    for k in range(len(points)):
-        u, v, w = points[k, 0] * scale[0] + x, points[k, 1] * scale[0] + y, points[k, 2] * scale[0] + z
-        square = u * u + v * v + w * w
-        if square >= most or square < 1e-18:
-            continue
-        moved[0], moved[1], moved[2] = u, v, w
-        moved[0], moved[1], moved[2] = rotate(turn[i], moved, False)
-        r = math.sqrt(square)
-        local[0], local[1], local[2] = rotate(turn[j], moved, True)
-        depth = radius_at(table, local[0], local[1], local[2], r) * scale[1] - r
-        if depth > deepest:
-            deepest, best = depth, k
-            point[:] = moved + at[j]
-    if best < 0:
-        return 0.0
-    # outwards from j: against the slope of its radius, by differences of the signed distance along the radius
-    for c in range(3):
-        moved[c] = point[c] - at[j, c]
-    r = math.sqrt(moved[0] ** 2 + moved[1] ** 2 + moved[2] ** 2)
-    local[0], local[1], local[2] = rotate(turn[j], moved, True)
-    h = 0.15 * r
-    slope = np.empty(3)
-    for c in range(3):
-        kept = local[c]
-        local[c] = kept + h
-        up = math.sqrt(local[0] ** 2 + local[1] ** 2 + local[2] ** 2)
-        high = up - radius_at(table, local[0], local[1], local[2], up) * scale[1]
-        local[c] = kept - h
-        up = math.sqrt(local[0] ** 2 + local[1] ** 2 + local[2] ** 2)
-        slope[c] = high - up + radius_at(table, local[0], local[1], local[2], up) * scale[1]
-        local[c] = kept
-    slope /= math.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2) + 1e-12
-    normal[0], normal[1], normal[2] = rotate(turn[j], slope, False)
-    # the depth was along the radius
-    lean = (normal[0] * moved[0] + normal[1] * moved[1] + normal[2] * moved[2]) / r
-    return float(deepest * max(lean, 0.2))
-
-
-@njit(cache=True, error_model="numpy")
-def _ground(
-    at: Floats, turn: Floats, i: int, points: Floats, scale: float, reach: float, bowl: Floats, point: Floats,
-    normal: Floats,
-) -> float:  # fmt: skip
-    """Find the point of body i that is deepest in the floor y = 0 or in the bowl's shell.
-
-    bowl: radius of the inner sphere, thickness, height of the rim; radius 0 is no bowl. The inner sphere's lowest point
-    lies `thickness` above the floor.
-    """
-    deepest = 0.0
-    cy = at[i, 1] - bowl[0] - bowl[1]
-    away = math.sqrt(at[i, 0] ** 2 + cy * cy + at[i, 2] ** 2)
-    # most bodies of a heap are far from both
-    clear = bowl[0] <= 0 or at[i, 1] - reach > bowl[2] or away + reach < bowl[0]
-    if at[i, 1] > reach and clear:
-        return 0.0
-    # which side it came from, the body's centre says
-    within = away < bowl[0] + 0.5 * bowl[1]
-    moved = np.empty(3)
-    for k in range(len(points)):
-        moved[0], moved[1], moved[2] = rotate(turn[i], points[k], False)
-        for c in range(3):
-            moved[c] = moved[c] * scale + at[i, c]
-        if -moved[1] > deepest:
-            deepest = -moved[1]
-            point[:] = moved
-            normal[0], normal[1], normal[2] = 0.0, 1.0, 0.0
-        if bowl[0] <= 0 or moved[1] > bowl[2]:
-            continue
-        y = moved[1] - bowl[0] - bowl[1]
-        r = math.sqrt(moved[0] ** 2 + y * y + moved[2] ** 2)
-        inner, outer = r - bowl[0], bowl[0] + bowl[1] - r
-        depth = inner if within else outer
-        if depth > deepest:
-            deepest = depth
-            point[:] = moved
-            side = -1.0 if within else 1.0
-            normal[0], normal[1], normal[2] = side * moved[0] / r, side * y / r, side * moved[2] / r
-    return deepest
-
-
-@njit(cache=True, error_model="numpy")
 def _speeds(
     at: Floats, turn: Floats, speed: Floats, spin: Floats, before: Floats, turned: Floats, touching: Bools, h: float
 ) -> float:
@@ -235,6 +133,74 @@ def _speeds(
     return fastest
 
 
+@njit(cache=True, error_model="numpy")
+def _part(
+    at: Floats, turn: Floats, before: Floats, turned: Floats, a: int, b: int, kind: Ints, scale: Floats,
+    tables: Floats, caps: Floats, points: Floats, mass: Floats, inertia: Floats, friction: float, near: Ints,
+    depths: Floats, known: int, slack: float, point: Floats, normal: Floats,
+) -> tuple[bool, int]:  # fmt: skip
+    """Part body a from body b; return whether they touched, and how many points are listed as near."""
+    sizes, table, of = (scale[a], scale[b]), tables[kind[b]], points[kind[a]]
+    depth, listed = deepest_in(at, turn, a, b, of, table, caps[kind[b]], sizes, near, depths, known, slack, point)
+    if depth <= 0:
+        return False, listed
+    depth = outwards(at, turn, b, table, scale[b], depth, point, normal)
+    _resolve(at, turn, before, turned, (a, b), point, normal, depth, mass, inertia, friction)
+    return True, listed
+
+
+@njit(cache=True, error_model="numpy")
+def _fall(at: Floats, turn: Floats, speed: Floats, spin: Floats, h: float, drag: float) -> None:
+    """Move all bodies on for a step of h, as if nothing were in their way."""
+    for i in range(len(at)):
+        speed[i, 1] -= h
+        for k in range(3):
+            speed[i, k] *= 1 - drag * h
+            spin[i, k] *= 1 - drag * h
+            at[i, k] += speed[i, k] * h
+        _spin(turn[i], spin[i, 0] * h, spin[i, 1] * h, spin[i, 2] * h)
+
+
+@njit(cache=True, error_model="numpy")
+def _farthest(at: Floats, there: Floats) -> float:
+    """Return the square of how far the farthest body has moved from where it was."""
+    farthest = 0.0
+    for i in range(len(at)):
+        square = 0.0
+        for k in range(3):
+            square += (at[i, k] - there[i, k]) ** 2
+        farthest = max(farthest, square)
+    return farthest
+
+
+@njit(cache=True, error_model="numpy")
+def _lift(
+    at: Floats, turn: Floats, before: Floats, turned: Floats, points: Floats, i: int, scale: float, reach: float,
+    mass: Floats, inertia: Floats, bowl: Floats, friction: float, pose: Floats, near: Ints, depths: Floats, known: int,
+    point: Floats, normal: Floats,
+) -> tuple[bool, int]:  # fmt: skip
+    """Lift body i out of what stands still; return whether it touches that, and how many points are listed as near."""
+    touches = False
+    for _ in range(3):
+        slack = SLACK
+        if known >= 0:
+            slack = moved(at, turn, i, -1, (reach, 0.0), pose)
+        is_new = known < 0 or slack > SLACK
+        if is_new:
+            known, slack = -1, SLACK
+            note(at, turn, i, -1, pose)
+        depth, listed = deepest_in_ground(
+            at, turn, i, points, scale, reach, bowl, point, normal, near, depths, known, slack
+        )
+        if is_new:
+            known = listed
+        if depth <= 0:
+            break
+        touches = True
+        _resolve(at, turn, before, turned, (i, -1), point, normal, depth, mass, inertia, friction)
+    return touches, known
+
+
 # takes seconds: other threads of a service go on
 @njit(cache=True, error_model="numpy", nogil=True)
 def step(
@@ -244,41 +210,56 @@ def step(
     """Advance all bodies by `count` steps of h under gravity 1 and return the largest speed of the last one.
 
     at, speed, spin: (body, 3); turn: (body, 4); kind: (body); tables: (kind, n, 2n); points: (kind, m, 3) of size 1.
-    reach: (body) radius of the ball around it.
+    reach: (body) radius of the ball around it. Which bodies and which of their points are near each other is found anew
+    when they have moved that far that it may have changed: most of a heap lies still.
     """
     n = len(at)
     before, turned = np.empty_like(at), np.empty_like(turn)
     point, normal = np.empty(3), np.empty(3)
     touching = np.zeros(n, np.bool_)
     fastest = 0.0
+    steep, caps = slopes(tables), caps_of(tables)
+    pairs, there = np.empty((0, 2), np.int64), np.full_like(at, np.inf)
+    poses, near, known = np.empty((0, 2, 11)), np.empty((0, 2, NEAR), np.int64), np.empty((0, 2), np.int64)
+    depths = np.empty((0, 2, NEAR))
+    poses_down, near_down, known_down = np.empty((n, 11)), np.empty((n, NEAR), np.int64), np.full(n, -1)
+    depths_down = np.empty((n, NEAR))
     for _ in range(count):
         before[:], turned[:] = at, turn
         touching[:] = False
-        for i in range(n):
-            speed[i, 1] -= h
-            for k in range(3):
-                speed[i, k] *= 1 - drag * h
-                spin[i, k] *= 1 - drag * h
-                at[i, k] += speed[i, k] * h
-            _spin(turn[i], spin[i, 0] * h, spin[i, 1] * h, spin[i, 2] * h)
-        for i in range(n):
-            for j in range(i):
-                gap = reach[i] + reach[j]
-                x, y, z = at[i, 0] - at[j, 0], at[i, 1] - at[j, 1], at[i, 2] - at[j, 2]
-                if x * x + y * y + z * z >= gap * gap:
+        _fall(at, turn, speed, spin, h, drag)
+        if _farthest(at, there) > (0.25 * SKIN) ** 2:  # the rest of the room is for moves within a step
+            there[:] = at
+            pairs = pairs_of(at, reach, SKIN)
+            poses, near = np.empty((len(pairs), 2, 11)), np.empty((len(pairs), 2, NEAR), np.int64)
+            depths, known = np.empty((len(pairs), 2, NEAR)), np.full((len(pairs), 2), -1)
+        for p in range(len(pairs)):
+            i, j = pairs[p]
+            if are_apart(at, i, j, reach[i] + reach[j]):
+                continue
+            for side in range(2):
+                a, b = (i, j) if side == 0 else (j, i)
+                pose, slack = poses[p, side], SLACK
+                if known[p, side] >= 0:
+                    slack = moved(at, turn, a, b, (reach[a], reach[b] + SLACK), pose) * steep[kind[b]]
+                if known[p, side] < 0 or slack > SLACK:
+                    known[p, side], slack = -1, SLACK
+                    note(at, turn, a, b, pose)
+                elif not known[p, side]:
                     continue
-                for a, b in ((i, j), (j, i)):
-                    sizes = (scale[a], scale[b])
-                    depth = _meet(at, turn, a, b, points[kind[a]], tables[kind[b]], reach[b], sizes, point, normal)
-                    if depth > 0:
-                        touching[a] = touching[b] = True
-                        _resolve(at, turn, before, turned, (a, b), point, normal, depth, mass, inertia, friction)
+                touches, listed = _part(
+                    at, turn, before, turned, a, b, kind, scale, tables, caps, points, mass, inertia, friction,
+                    near[p, side], depths[p, side], known[p, side], slack, point, normal,
+                )  # fmt: skip
+                if known[p, side] < 0:
+                    known[p, side] = listed
+                if touches:
+                    touching[i] = touching[j] = True
         for i in range(n):
-            for _again in range(3):
-                depth = _ground(at, turn, i, points[kind[i]], scale[i], reach[i], bowl, point, normal)
-                if depth <= 0:
-                    break
-                touching[i] = True
-                _resolve(at, turn, before, turned, (i, -1), point, normal, depth, mass, inertia, friction)
+            touches, known_down[i] = _lift(
+                at, turn, before, turned, points[kind[i]], i, scale[i], reach[i], mass, inertia, bowl, friction,
+                poses_down[i], near_down[i], depths_down[i], known_down[i], point, normal,
+            )  # fmt: skip
+            touching[i] = touching[i] or touches
         fastest = _speeds(at, turn, speed, spin, before, turned, touching, h)
     return fastest

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..contract import InvalidInput
 from ..lattice import azimuths, colatitudes, directions
-from . import kernel
+from . import kernel, near
 
 __all__ = ["MOST", "Body", "Bowl", "Pouring", "Rest", "radii", "settle"]
 
@@ -21,6 +21,9 @@ _STEP, _FRICTION = 0.02, 0.5
 #: Speed below which a pile is at rest, where gravity and the mean radius are 1.
 _STILL = 0.02
 _BATCH, _LONGEST = 100, 40
+#: Of so many bodies, a few always creep: such a heap is done when all but a hundredth have moved more slowly than this
+#: for a batch. Overlaps are then what they are at the end of the longest way (1,000 raisins: .031 in the mean, both).
+_MANY, _CREEP = 300, 0.12
 
 
 class Body(NamedTuple):
@@ -140,11 +143,14 @@ class Pouring:
         return self._found
 
     def _advance(self) -> None:
+        before = self._at.copy()
         self._fastest = kernel.step(
             self._at, self._turn, self._speed, self._spin, *self._fixed, _STEP, self._drag, _FRICTION, _BATCH
         )
         batch, self._batch = self._batch, self._batch + 1
-        if (batch > 6 and self._fastest < _STILL) or self._batch == _LONGEST:
+        moved = np.linalg.norm(self._at - before, axis=1) / (_BATCH * _STEP)
+        creeps = len(moved) >= _MANY and np.quantile(moved, 0.99) < _CREEP
+        if (batch > 6 and (self._fastest < _STILL or creeps)) or self._batch == _LONGEST:
             still = bool(self._fastest < _STILL)
             self._found = Rest(self._at * self._unit, self._turn, float(self._fastest), still)
         elif batch > 10:
@@ -153,7 +159,7 @@ class Pouring:
 
 
 def _along(table: Floats, ways: Floats) -> Floats:
-    return np.array([kernel.radius_at(table, x, y, z, 1.0) for x, y, z in ways])
+    return np.array([near.radius_at(table, x, y, z, 1.0) for x, y, z in ways])
 
 
 def _poured(reach: Floats, opening: float, shell: Floats, random: np.random.Generator) -> Floats:

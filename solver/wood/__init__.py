@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..contract import Context, Cost, Need, Solver, StageAxis
+from ..contract import Context, Cost, Extent, Need, Solver, StageAxis
 from .looks import LOOKS
 from .params import Body, Grain, Notch, Waypoint, WoodParams
 from .presets import PRESETS, STAGES
@@ -26,6 +26,16 @@ def _cost(params: WoodParams, need: Need) -> Cost:
     from .settings import expected_cost
 
     return expected_cost(params, need)
+
+
+def _extent(params: WoodParams) -> Extent:
+    """Return the box of the bundle as it lies: along x, its section's y across and z upwards; in metres."""
+    import numpy as np
+
+    corners = np.array(params.outline or [(-params.radius,) * 2, (params.radius,) * 2])
+    across, up = np.ptp(corners, axis=0)
+    sag = abs(params.curvature) * params.length**2 / 8 + abs(params.bend) * params.length
+    return Extent(np.array([params.length, up + sag, across]), 1.0)
 
 
 _NUMBERS = (
@@ -69,4 +79,5 @@ SOLVER = Solver(
     run=_run,
     cost=_cost,
     looks=LOOKS,
+    extent=_extent,
 )

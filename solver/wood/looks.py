@@ -29,4 +29,4 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     return Skin(colour + (_STEEL - colour) * steel[..., None], _DRY + (_POLISHED - _DRY) * steel)
 
 
-LOOKS = Looks(layers=("inside", "body"), paint=_paint, advance="Break")
+LOOKS = Looks(layers=("inside", "body"), paint=_paint, aside="body", advance="Break")

@@ -15,6 +15,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..canonical import canonical
 from .clock import Clock
 from .database import Database
 from .jobs import STATES, Job, JobSpec, State, read_row
@@ -183,6 +184,13 @@ class Ledger:
         with self.database.read() as connection:
             rows = connection.execute(f"{SELECT} WHERE {where} ORDER BY created, jobs.rowid", values)
             return [read_row(row) for row in rows]
+
+    def alike(self, job: JobSpec) -> list[Job]:
+        """Return the jobs of the same solver, version and parameters, whatever they need, oldest first."""
+        values = job.solver, job.version, canonical(job.params).decode()
+        with self.database.read() as connection:
+            where = "WHERE solver = ? AND version = ? AND params = ? ORDER BY created, jobs.rowid"
+            return [read_row(row) for row in connection.execute(f"{SELECT} {where}", values)]
 
     def running(self, worker: str) -> list[Job]:
         """Return the jobs that a worker holds."""

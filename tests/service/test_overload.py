@@ -20,7 +20,7 @@ import uvicorn
 
 from service.app import create_app
 from service.limits import connections, waiting
-from service.limits.admission import Load
+from service.limits.admission import Admission, Load
 from service.limits.clients import address, client_of
 from service.limits.connections import GuardedProtocol
 from service.settings import Settings, page
@@ -130,6 +130,20 @@ def test_what_is_refused_after_all_is_no_work_done() -> None:
         load.leave("all")
     assert load.under_way == 0
     assert load.delay == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("status", "is_work"), [(200, True), (422, True), (503, False)])
+def test_an_answer_that_says_no_is_no_work_done(status: int, is_work: bool) -> None:
+    async def says(scope: Any, receive: Any, send: Any) -> None:
+        time.sleep(0.01)
+        await send({"type": "http.response.start", "status": status, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    load = Load(8, 1.0)
+    with listening(Admission(says, load)) as port:
+        talk(port, b"GET /v1/shapes/x HTTP/1.0\r\n\r\n")
+    assert load.under_way == 0
+    assert (load.delay > 0.005) == is_work
 
 
 def test_clients_have_names() -> None:

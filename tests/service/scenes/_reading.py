@@ -43,6 +43,18 @@ def _decoded(said: dict[str, Any], binary: bytes) -> bytes:
     return indices.astype("<u2" if said["byteStride"] == 2 else "<u4").tobytes()
 
 
+def placed(document: dict[str, Any], binary: bytes, node: dict[str, Any]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Return translations, rotations and scales of a node's instances, and in what way it mirrors all of them."""
+    said = node.get("extensions", {}).get("EXT_mesh_gpu_instancing")
+    if said is None:
+        scale = np.array(node["scale"])
+        mirror = np.sign(scale)
+        turn = np.array(node["rotation"]) * [1, mirror[0], mirror[0], 1]  # of what is mirrored afterwards
+        return [np.array([x]) for x in (np.array(node["translation"]) * mirror, turn, np.abs(scale))], mirror
+    parts = [array(document, binary, said["attributes"][n]) for n in ("TRANSLATION", "ROTATION", "SCALE")]
+    return parts, np.array(node.get("scale", [1, 1, 1]))
+
+
 def instances(data: bytes) -> list[tuple[str, np.ndarray, np.ndarray, bool]]:
     """Return name, world positions (v, 3), triangles and whether it is a mirror image, of every instance."""
     document, binary = parsed(data)
@@ -50,14 +62,12 @@ def instances(data: bytes) -> list[tuple[str, np.ndarray, np.ndarray, bool]]:
     found = []
     for number in root.get("children", []):
         node = document["nodes"][number]
-        said = node.get("extensions", {}).get("EXT_mesh_gpu_instancing")
-        if said is None:
+        if "etag" not in document["meshes"][node["mesh"]].get("extras", {}):
             continue
         primitive = document["meshes"][node["mesh"]]["primitives"][0]
         points = array(document, binary, primitive["attributes"]["POSITION"]).astype(float)
         triangles = array(document, binary, primitive["indices"]).reshape(-1, 3).astype(int)
-        parts = [array(document, binary, said["attributes"][n]) for n in ("TRANSLATION", "ROTATION", "SCALE")]
-        mirror = np.array(node.get("scale", [1, 1, 1]))
+        parts, mirror = placed(document, binary, node)
         for move, turn, grow in zip(*parts, strict=True):
             world = (Rotation.from_quat(turn).apply(points * grow) + move) * mirror * root["scale"]
             found.append((node["name"], world, triangles, bool(mirror[0] < 0)))

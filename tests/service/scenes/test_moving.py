@@ -17,7 +17,7 @@ from store import starter
 from store.lookup import ShapeTable
 
 from .._gltf import parsed
-from ._reading import array
+from ._reading import array, instances, placed
 from .test_scenes import CAMERA, complaints
 
 TABLES = LiveTables(starter.ROOT, 60.0)
@@ -44,7 +44,8 @@ def test_each_knot_of_a_curve_is_the_tables_shape_at_its_time(compress: bool) ->
     document, binary = parsed(scene.data)
     [mesh] = document["meshes"]
     [(node, data)] = [(i, one) for i, one in enumerate(document["nodes"]) if "mesh" in one]
-    grow = array(document, binary, data["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"])[0]
+    grow = np.abs(data["scale"])
+    assert "EXT_mesh_gpu_instancing" not in document["extensionsUsed"]  # three.js cannot draw instances that change
     [primitive] = mesh["primitives"]
     base = array(document, binary, primitive["attributes"]["POSITION"]).astype(float)
     n = scene.report["detail"]["lattices"][0]
@@ -58,6 +59,25 @@ def test_each_knot_of_a_curve_is_the_tables_shape_at_its_time(compress: bool) ->
     sampler = animation["samplers"][channel["sampler"]]
     assert array(document, binary, sampler["input"]).ravel().tolist() == [0.5, 2, 3]
     assert array(document, binary, sampler["output"]).reshape(3, 2).tolist() == [[0, 0], [1, 0], [0, 1]]
+
+
+def test_individuals_that_change_are_where_those_are_that_stay() -> None:
+    spots = [{"position": [float(x), 0.5, 0.0], "scale": 0.4} for x in range(-3, 4)]
+    item = {"preset": "raisin", "transforms": spots, "seed": 7}
+    still, changing = (
+        made([{**item, "stage": 0.0}], cull=False),
+        made([{**item, "curve": [[0, 0.0], [1, 0.2]]}], cull=False),
+    )
+    nodes = parsed(changing.data)[0]["nodes"]
+    assert len(nodes) == 8
+    assert {np.sign(node["scale"][0]) for node in nodes[:-1]} == {-1, 1}
+    one, other = (sorted(instances(scene.data), key=lambda i: i[1][:, 0].mean()) for scene in (still, changing))
+    for (_, world, triangles, mirrored), (_, moved, also, turned) in zip(one, other, strict=True):
+        assert np.abs(world - moved).max() < 2e-4
+        assert (triangles == also).all()
+        assert mirrored == turned
+    channels = parsed(changing.data)[0]["animations"][0]["channels"]
+    assert sorted(channel["target"]["node"] for channel in channels) == list(range(7))
 
 
 def test_usd_samples_prototypes_over_time(tmp_path: Path) -> None:
@@ -100,8 +120,7 @@ def test_a_camera_that_moved_gets_what_it_lacks() -> None:
 def place(data: bytes, node: int) -> list[list[float]]:
     """Where a node's instances are, and their scales: what a mesh that is known already has to be drawn with."""
     document, binary = parsed(data)
-    said = document["nodes"][node]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]
-    return [array(document, binary, said[name]).ravel().tolist() for name in ("TRANSLATION", "ROTATION", "SCALE")]
+    return [part.ravel().tolist() for part in placed(document, binary, document["nodes"][node])[0]]
 
 
 def test_known_meshes_are_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -172,7 +172,7 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"items": [RAISIN], "camera": {"position": [0, 9, 0]}}, "invalid-scene", "up"),
     ({"items": [at([0, 0, 0], [1, 0, 0])], "budget": {"triangles": 300}}, "over-budget", "Drop the 1 smallest of 2"),
     ({"items": [{**RAISIN, "colour": "red"}]}, "invalid-scene", "colour"),
-    ({"items": [{"preset": "orange", "solver": "decay", "stage": 3}]}, "invalid-scene", "table"),
+    ({"items": [{"preset": "orange", "source": "table", "stage": 3}]}, "invalid-scene", "table"),
 ]
 
 

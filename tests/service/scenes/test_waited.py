@@ -80,8 +80,13 @@ def checked_places(answer: httpx.Response) -> Any:
 
 def test_who_leaves_stops_what_he_asked_for(monkeypatch: Any) -> None:
     watch(monkeypatch)
+    made.clear()
     with client_of(starter.ROOT) as client:
-        with contextlib.suppress(httpx.ReadTimeout):
-            client.post(URL, json=bowl(40, 4), timeout=0.3)
+        # what is imported first, or a busy machine, may take longer than the asker waits
+        for _ in range(20):
+            with contextlib.suppress(httpx.ReadTimeout):
+                client.post(URL, json=bowl(40, 4), timeout=0.3)
+            if made:
+                break
         client.close()
         assert stands_still(heap()) < 1

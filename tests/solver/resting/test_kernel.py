@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from solver.lattice import directions, lattice
-from solver.resting.kernel import radius_at, step
+from solver.resting.kernel import step
+from solver.resting.near import radius_at
 
 from ._twin import Bodies, radius
 
@@ -57,3 +58,35 @@ def test_radii_between_directions_are_the_twin_s() -> None:
     r = np.linalg.norm(x, axis=1)
     found = [radius_at(table, *one, size) for one, size in zip(x, r, strict=True)]
     np.testing.assert_allclose(found, radius(table, x / r[:, None]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("bowl", [(0.0, 0.0, 0.0), (4.0, 0.2, 3.0)])
+def test_what_is_known_to_be_near_changes_nothing(bowl: tuple[float, float, float]) -> None:
+    """Lists of near bodies and points live as long as a call: one of many steps gives what many of one step give."""
+    found, truth = bodies(12, bowl, 4), bodies(12, bowl, 4)
+    for one in (found, truth):
+        one.at[:] = one.at * [3, 1, 3] + 2.2 * np.arange(12)[:, None] * [0, 1, 0]  # apart, at first
+    for one, calls, steps in ((found, 6, 200), (truth, 1200, 1)):
+        for _ in range(calls):
+            fastest = step(
+                one.at, one.turn, one.speed, one.spin, one.kind, one.scale, one.tables, one.points, one.reach,
+                one.mass, one.inertia, one.bowl, 0.02, 0.1, one.friction, steps,
+            )  # fmt: skip
+    assert fastest < 1.0
+    assert found.at[:, 1].max() < 4
+    for name in ("at", "turn", "speed", "spin"):
+        assert (getattr(found, name) == getattr(truth, name)).all(), name
+
+
+def test_what_turns_on_the_spot_strikes_its_neighbour() -> None:
+    """Two long bodies side by side, apart; one turns, and neither of their centres moves until it reaches the other."""
+    theta, phi = lattice(24)
+    ways = directions(theta, phi)
+    table = 1 / np.sqrt((ways[..., 0] / 2) ** 2 + ways[..., 1] ** 2 + ways[..., 2] ** 2)
+    at, turn = np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 2.2]]), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
+    speed, spin = np.zeros((2, 2, 3))
+    spin[0, 1] = 4.0
+    one = np.ones(2)
+    fixed = np.zeros(2, int), one, table[None], (table[..., None] * ways).reshape(1, -1, 3), 2 * one, one, 0.4 * one
+    step(at, turn, speed, spin, *fixed, np.zeros(3), 0.01, 0.0, 0.1, 60)
+    assert at[1, 2] > 2.3

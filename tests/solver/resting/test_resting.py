@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from solver.contract import InvalidInput
 from solver.lattice import directions, lattice
 from solver.resting import Body, Bowl, Rest, settle
-from solver.resting.kernel import radius_at, rotate
+from solver.resting.near import radius_at, rotate
 from solver.resting.settle import MOST, radii
 
 HALF = np.array([[1.0, 1.0, 1.0], [0.8, 1.3, 0.8]])

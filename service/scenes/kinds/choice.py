@@ -1,0 +1,168 @@
+"""Which kinds the items of a scene are: each distinct one once. Tables compute nothing yet; stored runs are read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from solver import registry
+from solver.contract import InvalidInput, SolverError
+from store.errors import StoreError
+
+from ... import vocabulary
+from ...errors import InvalidQuery, ServiceError, Wrong
+from ...shapes.asking import beyond, choose, preset_of, words_of
+from ...shapes.live import LiveTables
+from ...shapes.query import parse
+from ..errors import InvalidScene
+from ..request import Item
+from .kind import Kind
+from .looked import Looked
+from .runs import Missing, Runs, find
+from .shades import shade_of
+
+__all__ = ["distinct"]
+
+
+def distinct(
+    items: Sequence[Item], tables: LiveTables, highest: int, runs: Runs | None = None
+) -> tuple[list[Kind], list[int]]:
+    """Return the distinct kinds of a scene, and for each item which of them it is. No table is asked yet.
+
+    Runs are those of the tables' store, and nobody asks for those that it lacks, unless `runs` says so.
+
+    Raises:
+        InvalidScene: listing every item that neither tables nor runs are for, with what to change.
+
+    """
+    runs = runs or Runs(lambda: tables.store, lambda asked: (None, "Ask for it with POST /v1/jobs."))
+    numbers: dict[tuple[object, ...], int] = {}
+    kinds: list[Kind] = []
+    rows: list[int] = []
+    wrong: list[Wrong] = []
+    for i, item in enumerate(items):
+        values: object = tuple(sorted(item.parameters.items()))
+        of_run = item.run, item.source, item.quality
+        key = (item.solver, item.preset, values, item.stage, item.curve, item.shade, of_run)
+        try:
+            number = numbers.get(key)
+        except TypeError:  # lists among the parameters; rare, where items are many
+            key = (*key[:2], json.dumps(item.parameters, sort_keys=True), *key[3:])
+            number = numbers.get(key)
+        if number is None:
+            numbers[key] = number = len(kinds)
+            try:
+                full = item
+                if item.solver is None and item.run is None:
+                    full = item.model_copy(update={"solver": _solver_of(item, tables)})
+                kinds.append(_of_run(full, runs) if _is_run(full, tables) else _of_table(full, tables, highest))
+            except (StoreError, SolverError, ServiceError) as error:
+                wrong += _complaints(error, f"items.{i}")
+            if wrong:
+                numbers[key] = -1
+        if item.size == "real" and not wrong:
+            wrong += _measured(item, kinds[number], f"items.{i}.size")
+        rows.append(number)
+        if len(wrong) > 20:
+            break
+    if wrong:
+        raise InvalidScene.of(wrong)
+    return kinds, rows
+
+
+def _complaints(error: StoreError | SolverError | ServiceError, name: str) -> list[Wrong]:
+    """Return what is wrong with an item, by what of it is."""
+    if isinstance(error, ServiceError) and error.wrong:
+        return [Wrong(f"{name}.{one.name}", one.detail, one.advice) for one in error.wrong]
+    return [Wrong(name, error.message.rstrip("."), error.advice)]
+
+
+def _solver_of(item: Item, tables: LiveTables) -> str:
+    """Return the solver that an item without one means: the only one with its preset, or else with tables.
+
+    Raises:
+        InvalidInput: there is no such solver.
+
+    """
+    if item.preset is not None:
+        owners = [name for name in registry.names() if item.preset in registry.get(name).presets]
+        if len(owners) == 1:
+            return owners[0]
+    found = tables.solvers()  # reads what all tables say of themselves
+    if len(found) != 1:
+        advice = f"Name one: {', '.join(found)}." if found else "Name one, or build a table first."
+        raise InvalidInput(f"the tables are of {len(found)} solvers, and the item names none.", advice=advice)
+    return found[0]
+
+
+def _is_run(item: Item, tables: LiveTables) -> bool:
+    if item.run is not None or item.source is not None:
+        return item.run is not None or item.source == "run"
+    return item.solver in registry.names() and item.solver not in tables.solvers()
+
+
+def _of_run(item: Item, runs: Runs) -> Kind:
+    # these take a while to import, and most scenes are of tables alone
+    from .placeholders import placeholder
+    from .stored import stored
+
+    found = find(item, runs)
+    if not isinstance(found, Missing):
+        return stored(runs.store(), found, item)
+    if item.shade is not None:
+        shade_of(found.solver, item.shade, item.preset)  # says which there are
+    return placeholder(found, item.preset or found.solver.name)
+
+
+def _of_table(item: Item, tables: LiveTables, highest: int) -> Looked:
+    solver = vocabulary.solver_named(item.solver or "")
+    if item.quality is not None:
+        advice = "Leave it out, or say source = 'run'."
+        raise InvalidQuery.of([Wrong("quality", "is of runs: what tables hold was run already", advice)])
+    preset = preset_of(solver, item.preset)
+    symbol = solver.stages.symbol
+    said = {**_numbers(item), symbol: item.first}
+    found = choose(tables.families(solver), said, symbol, preset)
+    table = tables.get(found.name)
+    words = words_of(solver, table, highest)
+    query = parse([(k, repr(v)) for k, v in said.items()], words, [], found.filled, beyond(found, words))
+    if query.outside:
+        raise InvalidQuery.of(query.outside)
+    low, high = words.stages
+    for at, stage in item.curve:
+        if not low <= stage <= high:
+            detail = f"{stage:g} at {at:g} s is off the table's {words.say(symbol)}"
+            raise InvalidQuery.of([Wrong("curve", detail, f"Take stages from {words.say(symbol)}.")])
+    table.fresh(query.point)  # says what no shape can be
+    last = f"..{item.curve[-1][1]:g}" if item.curve else ""
+    label = f"{item.preset or table.info.name} {symbol}={item.first:g}{last}"
+    shade = shade_of(solver, item.shade, item.preset)
+    return Looked(solver, table, dict(query.point), query.stage, shade, label, item.curve)
+
+
+def _numbers(item: Item) -> dict[str, float]:
+    """Return the parameters of an item of a table.
+
+    Raises:
+        InvalidQuery: some are no numbers.
+
+    """
+    wrong = [
+        Wrong(f"parameters.{name}", "a table is asked by numbers", "Take a number, or say source = 'run'.")
+        for name, value in item.parameters.items()
+        if isinstance(value, bool) or not isinstance(value, float | int)
+    ]
+    if wrong:
+        raise InvalidQuery.of(wrong)
+    return {name: float(value) for name, value in item.parameters.items()}
+
+
+def _measured(item: Item, kind: Kind, name: str) -> list[Wrong]:
+    """Find how large a kind is in metres; return what is wrong where nobody knows."""
+    if isinstance(kind, Looked) and kind.metres is None:
+        params = kind.solver.parse(item.parameters, item.preset)
+        kind.metres = kind.solver.metres(params.model_dump(mode="json"))
+    if kind.metres is not None:
+        return []
+    advice = "Say how many units of the scene its own unit is: size = 1.0."
+    return [Wrong(name, f"nobody knows how large {kind.label} is", advice)]

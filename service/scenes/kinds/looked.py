@@ -1,0 +1,200 @@
+"""Shapes that tables answer, on lattices of any fineness, each computed once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from solver.arrays import Array, Floats
+from solver.contract import Shade, Solver
+from solver.resting import Body
+from store.lookup import ShapeTable
+from store.shape import Shape
+
+from ...formats import mesh
+from ...limits import waited
+from ..meshes import Packed, Skin, pack, skin
+from .kind import COARSE, RUNGS, Curve, Kind
+
+__all__ = ["Looked"]
+
+#: Share of the least radius of the coarse lattice that surely is within the shape, between its samples too.
+_WITHIN = 0.9
+
+
+@dataclass(eq=False)
+class Looked(Kind):
+    """One shape of one table: its point, its stage, its skin, and what of it has been computed. Lengths are in r1."""
+
+    solver: Solver
+    table: ShapeTable
+    point: dict[str, float]
+    stage: float
+    shade: tuple[str, Shade]
+    label: str
+    curve: Curve = ()
+    metres: float | None = None
+    shapes: dict[int, Shape] = field(default_factory=dict)
+    spent: dict[int, float] = field(default_factory=dict)
+
+    def shape(self, n: int) -> Shape:
+        """Return the shape on the lattice of n colatitudes."""
+        if n not in self.shapes:
+            waited.check()
+            start = time.thread_time()
+            self.shapes[n] = self.table.at(self.point, self.stage, resolution=n)
+            self.spent[n] = time.thread_time() - start
+        return self.shapes[n]
+
+    def later(self, n: int) -> list[Shape]:
+        """Return the shapes on the curve after the first, on the lattice of n colatitudes."""
+        start = time.thread_time()
+        found = [self.table.at(self.point, stage, resolution=n) for _, stage in self.curve[1:]]
+        self.spent[n] = self.spent.get(n, 0.0) + time.thread_time() - start
+        return found
+
+    @property
+    def source(self) -> dict[str, Any]:
+        """The table."""
+        return {"table": self.table.info.name}
+
+    def made_of(self, n: int) -> dict[str, Any]:
+        """Return the table's digest, point, stages, lattice and skin."""
+        return {
+            "table": self.table.digest,
+            "at": sorted(self.point.items()),
+            "stages": [self.stage, *(stage for _, stage in self.curve)],
+            "n": int(n),
+            "shade": self.shade[0],
+        }
+
+    @property
+    def identity(self) -> Hashable:
+        """Table, point and stage."""
+        return self.table.digest, tuple(sorted(self.point.items())), self.stage
+
+    @cached_property
+    def finest(self) -> int:
+        """As fine as the table's own lattice."""
+        return int(RUNGS[min(int(np.searchsorted(RUNGS, self.table.resolution)), len(RUNGS) - 1)])
+
+    def _fresh(self) -> Floats:
+        """Return points of the fresh shape, which nobody keeps: there may be thousands of kinds."""
+        angles = np.meshgrid(np.linspace(0, np.pi, 17), np.linspace(0, 2 * np.pi, 32, endpoint=False), indexing="ij")
+        found: Floats = self.table.fresh(self.point).points(*angles)
+        return found
+
+    @property
+    def fresh_reach(self) -> float:
+        """Radius that holds the fresh shape and what it shrinks to: drying moves nothing outwards by 5 %."""
+        return 1.05 * float(np.linalg.norm(self._fresh(), axis=-1).max())
+
+    @cached_property
+    def outline(self) -> Floats:
+        """Points (v, 3) of the coarse lattice and the poles."""
+        found: Floats = mesh.vertices(*mesh.surface(self.shape(COARSE))).astype(float)
+        return found
+
+    @cached_property
+    def reach(self) -> tuple[float, float]:
+        """Radii of balls about the origin: within the shape, and around it."""
+        r = np.linalg.norm(self.outline, axis=1)
+        low, high = float(r.min()), float(r.max())
+        for shape in self.later(COARSE):
+            r = np.linalg.norm(mesh.vertices(*mesh.surface(shape)), axis=1)
+            low, high = min(low, float(r.min())), max(high, float(r.max()))
+        return _WITHIN * low, 1.03 * high
+
+    def holds(self, point: Floats) -> bool:
+        """Return whether a point is nearer to the middle than the surface is in its direction."""
+        r = np.linalg.norm(self.outline, axis=1)
+        nearest = np.argmax(self.outline @ point / r)
+        return bool(np.linalg.norm(point) < r[nearest])
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest coordinate of the fresh shape, which needs no look-up and which drying does not pass."""
+        return 1.08 * float(np.abs(self._fresh()).max())
+
+    @property
+    def dryness(self) -> float:
+        """Share of the way from the fresh shape to the table's last stage."""
+        low, high = self.table.reach
+        last = high if abs(high) >= abs(low) else low
+        return min(abs(self.stage / last), 1.0) if last else 0.0
+
+    @property
+    def body(self) -> Body:
+        """The shape for piles."""
+        return Body(mesh.vertices(*mesh.surface(self.shape(32))).astype(float))
+
+    @property
+    def look(self) -> tuple[str, Hashable]:
+        """The skin and how dry it is."""
+        return self.shade[0], round(self.dryness, 3)
+
+    @property
+    def prim(self) -> str:
+        """The skin and how dry it is, as a word."""
+        return f"{self.shade[0]}{round(1000 * self.dryness)}"
+
+    @cached_property
+    def skin(self) -> Skin:
+        """The skin of a fruit that is so dry."""
+        return skin(self.shade[1], self.dryness)
+
+    def packed(self, n: int) -> list[Packed]:
+        """Return lattices as vertices; one scale suits them all."""
+        return [pack(one, self.skin, self.extent) for one in (self.shape(n), *self.later(n))]
+
+    def surfaces(self, n: int) -> list[tuple[Array, Array]]:
+        """Return the points and normals of lattices and their poles."""
+        found = []
+        for shape in (self.shape(n), *self.later(n)):
+            position, poles = mesh.surface(shape)
+            found.append((mesh.vertices(position, poles), mesh.vertices(*mesh.normals(position))))
+        return found
+
+    def colours(self, n: int) -> list[Floats]:
+        """Return colours of ridges and furrows, which stay what they are at the stage."""
+        rounded = pack(self.shape(n), self.skin).vertices["colour"][:, :3]
+        return [np.asarray(rounded / 255 * self.skin.base)]
+
+    @property
+    def fades(self) -> bool:
+        """Not yet."""
+        return False
+
+    def triangles(self, n: int) -> Array:
+        """Return the triangles of the lattice."""
+        return mesh.triangles(n)
+
+    def count(self, n: int) -> int:
+        """Return the number of triangles of the lattice."""
+        return 4 * n * n
+
+    @property
+    def topology(self) -> Hashable:
+        """That of all lattices."""
+        return None
+
+    def extras(self, n: int) -> dict[str, Any]:
+        """Return what others of the kind must have to be put in the mesh's place: its lattice, and how long r1 is."""
+        return {"colatitudes": n, "r1": 1 / self.step}
+
+    def trust(self, levels: Sequence[int]) -> dict[str, Any]:
+        """Return what the look-up says of itself."""
+        looked = [self.shapes[n] for n in levels if n in self.shapes] or (
+            [self.shapes[COARSE]] if COARSE in self.shapes else []
+        )
+        if not looked:
+            return {}
+        shape = looked[-1]
+        error = shape.expected_error
+        told = None if error is None else {name: round(v, 5) for name, v in error.items()}
+        return {"expected_error": told, "exact": shape.exact, "converged": shape.converged}
