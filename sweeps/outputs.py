@@ -50,6 +50,10 @@ def _npz(made: Made) -> bytes:
 
 
 def _png(made: Made) -> bytes:
+    if made.cut is not None and made.run is not None and "," in made.cut:
+        from . import opened
+
+        return opened.picture(made.run, opened.parsed(made.cut), title=made.title, symbol=made.stage_symbol)
     if made.cut is not None and made.run is not None:
         from .pictures import section
 

@@ -2,8 +2,9 @@
 
     python -m benchmarks.decay.frames [preset] [day,day ...] [frames a day] [frames] [cells]
 
-Default quality on 41k vertices (64 cells); each frame starts from the march's last shape, one a frame behind. Output:
-places and maps of all vertices as 32-bit floats, laid on the floor, and the volume. CPU time of one thread.
+Default quality on 41k vertices (64 cells); each frame starts from the march's last two shapes, one and two frames
+behind. Output: places and maps of all vertices as 32-bit floats, laid on the floor, and the volume. CPU time of one
+thread.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from benchmarks.figures import Sheet
 from solver.contract import Context, SolverError
 from solver.decay import SOLVER, DecayParams
 from solver.decay.body.body import Body
+from solver.decay.body.equilibrium import Balance
 from solver.decay.body.flesh import Skin
+from solver.decay.body.skin import Settled
 from solver.decay.body.wrinkles import Wrinkles
 from solver.decay.fields.stepping import Reached, march
 from solver.decay.fields.system import System
@@ -38,15 +41,19 @@ def frames(preset: str, day: float, rate: float, count: int, cells: int) -> list
     body = Body(params, system.surface, settings.cells, settings.layers, settings.balance)
     skin = Wrinkles(params, Skin(shrinkage=0.5), body, settings)
     days = tuple(day + k / rate for k in range(count + _FIRST))
-    balance, folds = None, None
+    balance: Balance | None = None
+    folds: Settled | None = None
+    earlier: tuple[Balance | None, Settled | None] = (None, None)
     found = []
     begun = time.process_time()
     for reached in march(system, days, settings.tolerance, settings.longest, Context()):
         clock = [begun, time.process_time()]
         rot = system.rot.share(reached.state.rot)
-        balance = body.settled(body.state(reached.state.water, rot), balance)
+        before = balance, folds
+        balance = body.settled(body.state(reached.state.water, rot), balance, earlier=earlier[0])
         clock.append(time.process_time())
-        folds = skin.at(balance, folds)
+        folds = skin.at(balance, folds, earlier=earlier[1])
+        earlier = before
         clock.append(time.process_time())
         points = system.surface.points + body.on_surface(balance) + skin.on_surface(folds.points)
         _handed(system, reached, body.obstacles.laid(points))

@@ -49,6 +49,12 @@ class _Asked:
     threads: Annotated[
         int | None, typer.Option("--threads", help="GLB, USD: N threads of mould at most, as cards or curves.")
     ] = None
+    cut: Annotated[
+        str | None,
+        typer.Option(
+            "--cut", metavar="X,Y,Z,NX,NY,NZ", help="Cut open: a point, and the normal to the half that goes."
+        ),
+    ] = None
     map_: Annotated[str | None, typer.Option("--map", help="PNG, EXR: which field.")] = None
     size: Annotated[int | None, typer.Option("--size", help="PNG, EXR: pixels along and down (512).")] = None
     low: Annotated[float | None, typer.Option("--low", help="PNG: value shown as 0.")] = None
@@ -70,7 +76,7 @@ class _Asked:
 
 
 #: Options that the formats know by the same names.
-_SHARED = ("colour", "textures", "threads", "size", "low", "high", "scale", "fps", "step")
+_SHARED = ("colour", "cut", "textures", "threads", "size", "low", "high", "scale", "fps", "step")
 
 
 @grouped(_Asked)
@@ -90,6 +96,8 @@ def export(asked: _Asked) -> None:
     wizen export run.h5 --out rot.png --map rot --size 512 --stage 8
 
     wizen export 3fa9 --store demo --out plum.usdc --scale 0.02
+
+    wizen export run.h5 --cut 0,0,0,0,0,1 --out inside.glb
 
     wizen export run.h5 --mesh my.obj --format pc2
     """

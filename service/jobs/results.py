@@ -51,6 +51,13 @@ _KNOWN: list[Format | Export] = [*FORMATS.values(), *EXPORTS.values()]
 _CONTENT = problems.files([NETCDF, *(e.media_type.partition(";")[0] for e in _KNOWN if e.name != "json")])
 
 
+def _ends(
+    low: Annotated[float | None, Query(allow_inf_nan=False, description=_said("low"))] = None,
+    high: Annotated[float | None, Query(allow_inf_nan=False, description=_said("high"))] = None,
+) -> dict[str, float | None]:
+    return {"low": low, "high": high}
+
+
 def _options(
     colour: Annotated[str | None, Query(max_length=100, description=_said("colour"))] = None,
     scale: Annotated[float | None, Query(gt=0, le=1e6, allow_inf_nan=False, description=_said("scale"))] = None,
@@ -58,12 +65,14 @@ def _options(
     step: Annotated[float | None, Query(gt=0, le=1000, allow_inf_nan=False, description=_said("step"))] = None,
     textures: Annotated[int | None, Query(ge=0, le=4096, description=_said("textures"))] = None,
     threads: Annotated[int | None, Query(ge=0, le=200_000, description=_said("threads"))] = None,
+    cut: Annotated[str | None, Query(max_length=200, description=_said("cut"))] = None,
     map: Annotated[str | None, Query(max_length=100, description=_said("map"))] = None,
     size: Annotated[int | None, Query(ge=2, le=8192, description=_said("size"))] = None,
-    low: Annotated[float | None, Query(allow_inf_nan=False, description=_said("low"))] = None,
-    high: Annotated[float | None, Query(allow_inf_nan=False, description=_said("high"))] = None,
+    *,
+    ends: Annotated[dict[str, float | None], Depends(_ends)],
 ) -> Options:
-    return Options.parse(dict(locals()))
+    said = dict(locals())
+    return Options.parse(said | said.pop("ends"))
 
 
 @router.get(
@@ -156,7 +165,9 @@ def _scene(
         InvalidQuery: no such stage or field, or more than the service sends.
 
     """
-    sequence = prepared(run, options, stage, single=not isinstance(chosen, Export) or chosen.single)
+    single = not isinstance(chosen, Export) or chosen.single
+    # a cut is made only of what would be sent whole
+    sequence = prepared(run, options.model_copy(update={"cut": None}), stage, single)
     pixels = max(options.size if chosen.name in ("png", "exr") else 0, options.textures)
     if pixels > settings.max_map:
         raise InvalidQuery.of([Wrong("size", f"{pixels} pixels are more than {settings.max_map}", "Ask for fewer.")])
@@ -173,6 +184,8 @@ def _scene(
                 )
             ]
         )
+    if options.cut is not None:
+        sequence = prepared(run, options, stage, single)
     if isinstance(chosen, Export):
         return write(sequence, chosen, options)
     return STILLS[chosen.name](sequence, options)

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from ..errors import InvalidQuery, UnfitFormat, Wrong
 from . import animation, caches, maps, text, usd, usdz
 from .options import Options
@@ -64,9 +66,11 @@ def prepared(run: xr.Dataset, options: Options, stage: float | None = None, sing
 
     Raises:
         UnfitFormat: the result holds no whole surface.
-        InvalidQuery: it has no such stage.
+        InvalidQuery: it has no such stage, or the cut is no plane through it.
 
     """
+    if options.cut is not None:
+        run = _opened(run, options.cut, stage, single)
     whole = replace(of_run(run), colour=options.colour, scale=options.scale)
     if stage is None:
         return whole.at(-1) if single else whole
@@ -75,6 +79,21 @@ def prepared(run: xr.Dataset, options: Options, stage: float | None = None, sing
         advice = f"Take one of {', '.join(f'{s:g}' for s in whole.stages)}."
         raise InvalidQuery.of([Wrong("stage", f"the result has no stage {stage:g}", advice)])
     return whole.at(near)
+
+
+def _opened(run: xr.Dataset, cut: str, stage: float | None, single: bool) -> xr.Dataset:
+    from sweeps import opened
+    from sweeps.errors import InvalidOption
+
+    try:
+        where = opened.parsed(cut)
+        days = np.arange(run.sizes.get("stage", 0))
+        if single or stage is not None:
+            # the others would be cut in vain; one that is not there is refused by name
+            days = days[-1:] if stage is None else days[np.isclose(run["stage"].values, stage, rtol=1e-9, atol=1e-9)]
+        return opened.opened(run.isel(stage=days) if len(days) and "vertex_count" not in run else run, where)
+    except InvalidOption as error:
+        raise InvalidQuery.of([Wrong("cut", str(error), error.advice or "")]) from None
 
 
 def write(sequence: Sequence, export: Export, options: Options) -> bytes:

@@ -22,6 +22,11 @@ class Options(BaseModel):
     step: float = Field(12.0, gt=0, le=1000, description="Frames from one stage to the next")
     textures: int = Field(0, ge=0, le=4096, description="Pixels of baked textures in place of vertex colours; 0: none")
     threads: int = Field(0, ge=0, le=200_000, description="Most threads of mould, as curves or cards; 0: none")
+    cut: str | None = Field(
+        None,
+        max_length=200,
+        description="Cut open: X,Y,Z of a point and of the normal to the half that goes, e.g. 0,0,0,0,0,1",
+    )
     map: str | None = Field(None, description="Field of a baked map; the first one if left out")
     size: int = Field(512, ge=2, le=8192, description="Pixels of a map, along and down")
     low: float | None = Field(None, description="Value that a 16-bit map shows as 0")

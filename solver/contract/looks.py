@@ -70,15 +70,17 @@ class Looks:
 
     layers: fields that `paint` makes colours of, given any of them by name (...) and the run's parameters; it returns
     None where these say no colours. scalars: of a stage, which `paint` is given too where a result has them. fur: what
-    stands on it, by the same fields; None where nothing grows. aside: a field that is 1 on what only took part in the
-    run, as a press, and does not belong to what came of it. labels: by axis or stage symbol. advance: the word for
-    going along the stage axis. shades and places: by their names on pages.
+    stands on it, by the same fields; None where nothing grows. inside: fields of a cut face, from those of the
+    surface above it, the depth below it and the parameters; None where nothing is known of what lies there. aside: a
+    field that is 1 on what only took part in the run, as a press, and does not belong to what came of it. labels: by
+    axis or stage symbol. advance: the word for going along the stage axis. shades and places: by their names on pages.
     """
 
     layers: tuple[str, ...] = ()
     paint: Callable[[Mapping[str, Array], Mapping[str, Any]], Skin | None] | None = None
     scalars: tuple[str, ...] = ()
     fur: Callable[[Mapping[str, Array], Mapping[str, Any]], Fur | None] | None = None
+    inside: Callable[[Mapping[str, Array], Array, Mapping[str, Any]], Mapping[str, Array]] | None = None
     aside: str | None = None
     labels: Mapping[str, Label] = field(default_factory=dict)
     advance: str = "Play"

@@ -13,6 +13,9 @@ from ..contract import Fur, Label, Looks, Skin
 __all__ = ["LOOKS"]
 
 _LAYERS = ("rot", "mould", "mould_active")
+#: What a cut face has besides: 1 on flesh, 0 on skin. Pale flesh, chosen by eye; linear light.
+_FLESH = "flesh"
+_PALE = np.array([0.95, 0.87, 0.60])
 #: Rotten flesh under the skin, and the rim of mould that still grows; linear light.
 _ROT = np.array([0.16, 0.075, 0.03])
 _RIM = np.array([0.86, 0.86, 0.82])
@@ -33,6 +36,8 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
 
     rot, mould, active = (layer(name) for name in _LAYERS)
     colour = np.broadcast_to(np.array(params["skin_colour"], float), (*known[0].shape, 3))
+    if _FLESH in fields:
+        colour = _over(colour, _PALE, np.asarray(fields[_FLESH], float))
     # what dries darkens and turns brown, and its wax goes dull
     dry = float(_smooth(np.asarray(fields.get("water_lost", 0.0)) / _DRIED))
     colour = colour * (1 - 0.35 * dry)
@@ -73,6 +78,13 @@ def _fur(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Fur | None:
     )
 
 
+def _inside(fields: Mapping[str, Array], depth: Array, params: Mapping[str, Any]) -> dict[str, Array]:
+    """Return what is in the flesh: rot by the body's own law, as deep as it goes there and fading evenly; no mould."""
+    rot = np.asarray(fields.get("rot", np.zeros_like(depth)), float)
+    deep = float(params["flesh"]["rot_depth"])
+    return {"rot": rot * np.clip(1 - depth / deep, 0, 1), _FLESH: np.ones_like(depth)}
+
+
 def _over(below: Array, above: Array, cover: Array) -> Array:
     found: Array = below + (above - below) * cover[..., None]
     return found
@@ -89,6 +101,7 @@ LOOKS = Looks(
     paint=_paint,
     scalars=("water_lost",),
     fur=_fur,
+    inside=_inside,
     advance="Rot",
     labels={
         "t": Label("t", "Days"),

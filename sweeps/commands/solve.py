@@ -74,7 +74,8 @@ class _Asked:
     max_seconds: Most_seconds = None
     out: Out = None
     cut: Annotated[
-        str | None, typer.Option("--cut", metavar="PLANE", help=".png: cut open along an azimuth (degree), or equator.")
+        str | None,
+        typer.Option("--cut", metavar="PLANE", help=".png: cut along an azimuth (degree), equator, or a plane."),
     ] = None
     as_json: As_json = False
 
@@ -93,6 +94,8 @@ def solve(asked: _Asked) -> None:
     wizen solve dehydration --preset plum1 --quality preview --stages 0.3 --out plum.png --json
 
     wizen solve decay --preset orange --stages 0,4,8 --out inside.png --cut 35
+
+    wizen solve decay --preset orange --stages 0,4,8 --out open.png --cut 0,0,0,0,0,1
 
     wizen solve dehydration --fields mesh_position --stages 0.2 --out as-solved.glb
 
@@ -204,9 +207,13 @@ def _save(
 
 def _check_cut(cut: str, out: Path | None) -> None:
     """Refuse, before any work, a cut that nobody could draw."""
+    from .. import opened
     from ..pictures import section
 
-    section.plane(cut)
+    if "," in cut:
+        opened.parsed(cut)
+    else:
+        section.plane(cut)
     if out is None or out.suffix != ".png":
         raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
 

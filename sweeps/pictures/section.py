@@ -50,7 +50,10 @@ def plane(word: str) -> Plane:
     except ValueError:
         angle = np.nan
     if not np.isfinite(angle):
-        raise InvalidOption(f"--cut {word!r} is no plane.", "Give an azimuth in degrees, e.g. --cut 35, or equator.")
+        raise InvalidOption(
+            f"--cut {word!r} is no plane.",
+            "Give an azimuth in degrees, e.g. --cut 35, equator, or a point and a normal, e.g. --cut 0,0,0,0,0,1.",
+        )
     along = np.array([np.cos(angle), 0, np.sin(angle)])
     return Plane(along, np.array([0, 1.0, 0]), f"cut along azimuth {float(word):g} degrees")
 

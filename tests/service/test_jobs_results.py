@@ -67,6 +67,28 @@ def test_results_by_accept(store: Store, queue_only: httpx.Client, tmp_path: Pat
     assert queue_only.get(result).status_code == 200
 
 
+def test_a_rotten_fruit_comes_cut_open(store: Store, queue_only: httpx.Client, tmp_path: Path) -> None:
+    need = {"stages": [0.0, 3.0], "fields": ["position", "rot"], "quality": "preview", "resolution": 12}
+    asked = queue_only.post("/v1/jobs", json={"solver": "decay", "preset": "orange", "need": need})
+    assert asked.status_code == 202
+    assert drain(store) == 1
+    result = f"{asked.json()['links']['self']}/result"
+    tags = set()
+    for plane, height in (("0,0,0,0,0,1", 0.0), ("0,0,0.4,0,0,2", 0.4)):
+        for kind in ("obj", "ply"):
+            found = queue_only.get(result, params={"format": kind, "cut": plane})
+            assert found.status_code == 200, found.text
+            (tmp_path / f"half.{kind}").write_bytes(found.content)
+            half = trimesh.load(tmp_path / f"half.{kind}", process=False)
+            assert half.vertices[:, 2].max() == pytest.approx(height, abs=1e-6)
+            tags.add(found.headers["etag"])
+    assert len(tags) == 4
+    assert (
+        "normal"
+        in checked(queue_only.get(result, params={"format": "obj", "cut": "up"}), 422, "invalid-query")["advice"]
+    )
+
+
 def test_breaking_wood_comes_back_as_meshes(store: Store, queue_only: httpx.Client, tmp_path: Path) -> None:
     params = {"rods": 8, "vertices": 8, "length": 0.05, "radius": 0.003, "clamp": "both", "pull": [20.0, 0.0, 0.0]}
     need = {"stages": [0.0, 6e-5], "fields": ["mesh_position", "inside", "broken_rods"]}

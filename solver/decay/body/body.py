@@ -21,7 +21,7 @@ from .equilibrium import Balance, rested, settle
 from .filling import Filling, Round
 from .flesh import Softened, softened
 from .loads import Loads
-from .material import blocks
+from .material import blocks, energy
 from .obstacles import Obstacles
 from .pressure import pressed
 from .springs import knit, swung
@@ -74,9 +74,16 @@ class Body:
         return pressed(state, self._params, solid)
 
     def settled(
-        self, state: Softened, near: Balance | None = None, watch: Callable[[], None] = lambda: None
+        self,
+        state: Softened,
+        near: Balance | None = None,
+        watch: Callable[[], None] = lambda: None,
+        earlier: Balance | None = None,
     ) -> Balance:
         """Return the shape that the flesh settles to, from a shape `near` it or from the evenly shrunk fresh one.
+
+        earlier: the shape as long before `near` as the wanted one comes after it: it starts from where both point to,
+        if no tetrahedron is inverted there.
 
         Raises:
             NotConverged: it does not.
@@ -90,6 +97,8 @@ class Body:
         loads = self._loads(state, start, fresh)
         if near is not None:
             start = near.points * even / near.even
+            ahead = start if earlier is None else 2 * start - earlier.points * even / earlier.even
+            start = ahead if np.isfinite(energy(ahead, *rest)) else start
         if self._params.body == "paper":
             network = knit(solid, state, self._inertia)
             found = swung(solid, start, network, loads, self._params.swing, watch)

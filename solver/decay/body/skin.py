@@ -33,6 +33,7 @@ from ...shell.inverse import Inverse, fronts_of, inverse_of
 from ...shell.normals import normals
 from .flesh import Skin
 from .obstacles import Obstacles
+from .recall import Move, direction, moved
 
 __all__ = ["Model", "Settled", "Shell"]
 
@@ -48,10 +49,14 @@ _UNEVEN = 1e-2
 
 
 class Model(NamedTuple):
-    """What L-BFGS knows of the energy's curvature: an inverse, and the last moves with the slope's changes (v, 3)."""
+    """What L-BFGS knows of the energy's curvature: an inverse, the last moves with the slope's changes.
+
+    steps: it took to get there; after many the inverse is of another shape.
+    """
 
     inverse: Inverse
-    moves: tuple[tuple[Floats, Floats], ...]
+    moves: tuple[Move, ...]
+    steps: int = 0
 
 
 class Settled(NamedTuple):
@@ -86,11 +91,13 @@ class Shell:
         model: Model | None = None,
         watch: Callable[[], None] = lambda: None,
         obstacles: Obstacles = _NOTHING,
+        ahead: Floats | None = None,
     ) -> Settled:
         """Return the skin where the body carries it to `carried` (v, 3), out of obstacles.
 
         share: the skin's lengths over its fresh ones, of each face (f) or of all. start (v, 3): from where it settles;
         see `uneven`. model: of a skin that lay about there; None starts from the fresh one's.
+        ahead (v, 3): another start, taken where less is out of balance there.
 
         Raises:
             NotConverged: there were too many steps.
@@ -100,8 +107,14 @@ class Shell:
         stiffness = hinge_stiffness(g, self._mesh, self._material.flexural)
         x = start.copy()
         slope, now = self._slope(x, carried, g, stiffness, obstacles)
+        if ahead is not None:
+            further, then = self._slope(ahead, carried, g, stiffness, obstacles)
+            if np.linalg.norm(further) < np.linalg.norm(slope):
+                x, slope, now = ahead.copy(), further, then
         residual = np.inf
-        inverse, moves = model or Model(self._fresh, ())
+        inverse, moves, before = model or Model(self._fresh, ())
+        if before >= _STALE:
+            inverse = self._inverse(x, g, stiffness, obstacles)
         for step in range(_STEPS):
             watch()
             pull = self._hold[:, None] * (x - carried)
@@ -109,10 +122,10 @@ class Shell:
             scale = np.linalg.norm(pull) + np.linalg.norm(slope - pull) + 1e-6 * len(x) ** -0.5
             residual = float(np.linalg.norm(slope) / scale)
             if residual <= tolerance:
-                return Settled(x, residual, step, Model(inverse, moves))
+                return Settled(x, residual, step, Model(inverse, moves, step))
             if step and step % _STALE == 0:
                 inverse = self._inverse(x, g, stiffness, obstacles)
-            d = _direction(slope, inverse, moves)
+            d = direction(slope, inverse.apply, moves)
             down, part = float(np.sum(slope * d)), 1.0
             for _ in range(_HALVINGS):
                 found, then = self._slope(x + part * d, carried, g, stiffness, obstacles)
@@ -121,7 +134,7 @@ class Shell:
                 part /= 2
             else:
                 break
-            moves = (*moves[1 - _MEMORY :], (part * d, found - slope))
+            moves = (*moves[1 - _MEMORY :], moved(part * d, found - slope))
             x, slope, now = x + part * d, found, then
         raise NotConverged(
             f"the skin stopped at a residual of {residual:.1e}.",
@@ -172,25 +185,3 @@ class Shell:
             total += float(np.sum(push * depth)) / 2
             np.subtract.at(gradient, inside, push[:, None] * way)
         return gradient, total
-
-
-def _direction(slope: Floats, inverse: Inverse, moves: tuple[tuple[Floats, Floats], ...]) -> Floats:
-    """Return the direction (v, 3) of L-BFGS that starts from an inverse in place of a multiple of one.
-
-    The tangent leaves compression out: alone it is too stiff for buckles, which past moves teach it.
-    """
-    q, parts = -slope, []
-    kept = [(s, y, _dot(s, y)) for s, y in moves]
-    kept = [(s, y, sy) for s, y, sy in kept if sy > 0]
-    for s, y, sy in reversed(kept):
-        parts.append(_dot(s, q) / sy)
-        q = q - parts[-1] * y
-    d = inverse.apply(q)
-    for (s, y, sy), part in zip(kept, reversed(parts), strict=True):
-        d = d + (part - _dot(y, d) / sy) * s
-    return d if _dot(slope, d) < 0 else -slope
-
-
-def _dot(a: Floats, b: Floats) -> float:
-    # no BLAS, whose sums depend on its threads
-    return float(np.einsum("vi,vi->", a, b))

@@ -41,10 +41,17 @@ class Wrinkles:
         self._faces, self._square = surface.faces, fresh[:, 0] * fresh[:, 2] - fresh[:, 1] ** 2
         self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness)
 
-    def at(self, balance: Balance, near: Settled | None = None, watch: Callable[[], None] = lambda: None) -> Settled:
+    def at(
+        self,
+        balance: Balance,
+        near: Settled | None = None,
+        watch: Callable[[], None] = lambda: None,
+        earlier: Settled | None = None,
+    ) -> Settled:
         """Return how far the skin stands off (v, 3) from the settled body, in place of its points.
 
         near: what `at` found in the stage to start from; None starts from a slightly uneven skin.
+        earlier: what was found as long before `near` as the balance comes after it: both then say where it goes.
 
         Raises:
             NotConverged: the skin found no equilibrium.
@@ -55,8 +62,9 @@ class Wrinkles:
         share = self._share(carried, balance.dried)
         folds = near.points if near else self._shell.uneven(self._normals, Context.generator(self._seed))
         model = near.model if near else None
+        ahead = carried + 2 * near.points - earlier.points if near and earlier else None
         found = self._shell.wrinkled(
-            carried, share, carried + folds, self._tolerance, model, watch, self._body.obstacles
+            carried, share, carried + folds, self._tolerance, model, watch, self._body.obstacles, ahead
         )
         return found._replace(points=found.points - carried)
 

@@ -34,6 +34,9 @@ class _Settled(NamedTuple):
     folds: Settled | None
 
 
+_NONE = _Settled(None, None)
+
+
 class Shape:
     """What the need asks of the fruit's shape, water lost included; nothing else is laid, filled or settled.
 
@@ -53,7 +56,7 @@ class Shape:
         self._closed = extent_of(self.surface) if own and self.surface is not None else extent(params)
         self._extent = self._closed or extent(params)
         self._body = self._wrinkles = None
-        self._node: _Settled = _Settled(None, None)
+        self._node = self._earlier = _NONE
         if moves and self.surface is not None:
             from ..body.body import Body
 
@@ -173,18 +176,22 @@ class Shape:
             NotConverged: body or skin found no equilibrium.
 
         """
-        self._node, _ = self._settled(water, rot, context)
+        # nodes are evenly spaced: the last two say where the next one will be; a stage lies somewhere between
+        found, _ = self._settled(water, rot, context, self._earlier)
+        self._earlier, self._node = self._node, found
 
-    def _settled(self, water: float, rot: Floats | None, context: Context) -> tuple[_Settled, dict[str, Any]]:
+    def _settled(
+        self, water: float, rot: Floats | None, context: Context, earlier: _Settled = _NONE
+    ) -> tuple[_Settled, dict[str, Any]]:
         """Return the moved shape of a day, and what is kept of how it was found."""
         if self._body is None:
             return _Settled(None, None), {}
         watch, before = context.check_cancelled, self._node
-        balance = self._body.settled(self._body.state(water, rot), before.balance, watch)
+        balance = self._body.settled(self._body.state(water, rot), before.balance, watch, earlier.balance)
         row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
         folds = None
         if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:
-            folds = self._wrinkles.at(balance, before.folds, watch)
+            folds = self._wrinkles.at(balance, before.folds, watch, earlier.folds)
             row["skin_residual"], row["skin_steps"] = folds.residual, folds.steps
         return _Settled(balance, folds), row
 

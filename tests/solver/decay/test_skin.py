@@ -5,9 +5,12 @@ import pytest
 
 from solver.contract import Context, Need
 from solver.decay import SOLVER
+from solver.decay.body.body import Body
 from solver.decay.body.flesh import Skin
 from solver.decay.body.obstacles import Obstacles
 from solver.decay.body.skin import Shell
+from solver.decay.body.wrinkles import Wrinkles
+from solver.decay.settings import choose
 from solver.decay.surfaces.surface import lay
 from solver.fruit import Fruit
 from solver.shell import hinge_stiffness
@@ -203,3 +206,14 @@ def test_a_skin_settles_on_fruits_that_rot_and_dry_to_mummies(preset):
     a, b, c = (points[faces[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     assert area.min() > 0.02 * area.mean()
+
+
+def test_a_skin_folds_only_so_deep_as_its_slack():
+    """Over a body at a share q of its lengths a skin that does not shrink keeps 1, at most q / (1 - slack)."""
+    params = SOLVER.parse({"body": "quasi-static", "te": 0.04}, "orange")
+    settings = choose(params, "preview")
+    body = Body(params, lay(params, settings.cells), settings.cells, settings.layers, settings.balance)
+    wrinkles = Wrinkles(params, Skin(shrinkage=0.0, joining=0.0, slack=0.2), body, settings)
+    fresh = lay(params, settings.skin).points
+    for share, wanted in ((0.9, 1.0), (0.8, 1.0), (0.6, 0.75), (0.4, 0.5)):
+        assert wrinkles._share(share * fresh, share) == pytest.approx(wanted, abs=1e-12)
