@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import anyio
@@ -42,7 +43,7 @@ from .shapes.live import LiveTables
 from .shapes.shortcut import Shortcut
 from .shapes.turns import Turns
 from .stopping import at_signals
-from .telemetry import Metrics, Telemetry
+from .telemetry import Metrics, Telemetry, record
 from .views.addresses import Rooted
 
 __all__ = ["create_app"]
@@ -130,7 +131,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
     """Put around the routes what a request passes on its way to them; the last one added is the outermost."""
     load = Load(settings.threads, min(settings.max_delay, settings.timeout))
-    app.state.door = Door(settings, load, metrics, app.state, app.state.answers.is_kept)
+    app.state.door = Door(settings, load, partial(app.state.answers.is_kept, app.state), partial(record, metrics))
     if settings.public_read:
         app.add_middleware(Shortcut, state=app.state)
     app.add_middleware(Admission, load=load)

@@ -10,12 +10,10 @@ import time
 import uuid
 from collections.abc import Callable
 
-from starlette.datastructures import State
 from starlette.responses import Response
 from starlette.types import Scope
 
 from ..settings import Settings
-from ..telemetry import Metrics, record
 from .admission import Load, refusal
 
 __all__ = ["DOOR", "Door"]
@@ -25,13 +23,19 @@ DOOR = "wizen.door"
 
 
 class Door:
-    """Turns away what `load` has no time for, unless `is_kept(scope)`: an answer that lies ready costs less."""
+    """Turns away what `load` has no time for, unless `is_kept(scope)`: an answer that lies ready costs less.
+
+    `record` is told of each refusal: the scope, method, status, bytes and seconds.
+    """
 
     def __init__(
-        self, settings: Settings, load: Load, metrics: Metrics, state: State, is_kept: Callable[[Scope, State], bool]
+        self,
+        settings: Settings,
+        load: Load,
+        is_kept: Callable[[Scope], bool],
+        record: Callable[[Scope, str, int, int, float], None],
     ) -> None:
-        self._settings, self._load, self._metrics = settings, load, metrics
-        self._state, self._is_kept = state, is_kept
+        self._settings, self._load, self._is_kept, self._record = settings, load, is_kept, record
 
     def refused(self, scope: Scope) -> Response | None:
         """Return the answer to a request that is turned away, None for one that may go on to the application.
@@ -48,9 +52,9 @@ class Door:
         forwarded = any(name == b"x-forwarded-for" for name, _ in scope["headers"])
         scope["state"]["request_id"] = request_id = uuid.uuid4().hex
         response = refusal(self._load, scope, is_known=not forwarded)
-        if response is None or self._is_kept(scope, self._state):
+        if response is None or self._is_kept(scope):
             return None
         response.headers["X-Request-ID"] = request_id
         seconds = time.perf_counter() - begin
-        record(self._metrics, scope, scope["method"], response.status_code, len(response.body), seconds)
+        self._record(scope, scope["method"], response.status_code, len(response.body), seconds)
         return response

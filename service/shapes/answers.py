@@ -121,7 +121,7 @@ class Answers:
             scope["route"] = asked.route  # for the log and the metrics
         return found
 
-    def is_kept(self, scope: Scope, state: State) -> bool:
+    def is_kept(self, state: State, scope: Scope) -> bool:
         """Return whether `Repeats` would answer a request."""
         settings = state.settings
         return bool(settings.public_read and settings.cache_bytes) and self.repeated(scope, state) is not None
