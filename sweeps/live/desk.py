@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Generator, Mapping
 from typing import Any, NamedTuple
 
-from solver.contract import InvalidInput, LiveEngine, Params, Quality, Solver, SolverError
+from solver.contract import InvalidInput, LiveEngine, OverBudget, Params, Quality, Solver, SolverError
 from solver.contract.words import SHORT
 from solver.meshes import Frame
 
@@ -22,6 +22,8 @@ _WINDOW, _BETWEEN = 2, 1 / 30
 _SLICE = 0.01
 #: Seconds without work after which the client gets every digit.
 _REST = 0.3
+#: Processor seconds after which a step that has no end waits for somebody who wants it: growth against all reason.
+_LONG = 20.0
 _QUALITIES = ("preview", "default", "fine")
 
 
@@ -75,6 +77,8 @@ class Desk:
         #: Whether there is something to show, and whether the client has what is there but for roundings.
         self._is_new, self._is_rough = True, False
         self._worked = 0.0
+        #: Processor seconds spent on the step under way.
+        self._spent = 0.0
         self._told: dict[str, Any] = {}
         #: Whether nobody looks: until `begin_again`, and while a connection is lost.
         self.held = True
@@ -166,7 +170,7 @@ class Desk:
     def _jumped(self, number: int) -> None:
         """The shape is another one, perhaps after the way back that is owed."""
         self._leave_settling()
-        self._until, self._pace, self._is_new = 0.0, math.inf, True
+        self._until, self._pace, self._is_new, self._spent = 0.0, math.inf, True, 0.0
         self._waiting.clear()
         self._wait(number, self._engine.owed)
 
@@ -250,16 +254,27 @@ class Desk:
             if self._settling is not None:
                 self._settle()
             elif self._engine.stage + self._engine.step <= self._goal + 1e-9:
-                self._is_new |= self._engine.advance(_SLICE, self._goal)
-                self._worked = time.monotonic()
+                self._advance()
         except SolverError as error:
-            self._until, self._settling, self._is_new = self._engine.stage, None, True
+            self._until, self._settling, self._is_new, self._spent = self._engine.stage, None, True, 0.0
             last = max((w.id for w in self._waiting), default=None)
             self._waiting.clear()
             self._say({"say": "error", "id": last, "problem": problem(error)})
         if self._may_show and self._has_news:
             self._send()
         self._state()
+
+    def _advance(self) -> None:
+        begin = time.process_time()
+        completed = self._engine.advance(_SLICE, self._goal)
+        self._worked = time.monotonic()
+        self._is_new |= completed
+        self._spent = 0.0 if completed else self._spent + time.process_time() - begin
+        if self._spent > _LONG and self._engine.owed <= self._engine.stage + 1e-9:
+            raise OverBudget(
+                f"a step was not done after {_LONG:g} s of processor time.",
+                advice="Undo what was asked for, ask for less at once, or `play` for as much time again.",
+            )
 
     def _settle(self) -> None:
         assert self._settling is not None
