@@ -6,6 +6,8 @@ The type of a problem is `urn:wizen:problem:<code>`; clients branch on it and pe
 from __future__ import annotations
 
 import difflib
+import re
+import uuid
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 from typing import Any
@@ -31,12 +33,16 @@ __all__ = [
     "Culprit",
     "Problem",
     "files",
+    "identify",
     "install",
     "of",
     "responses",
     "told",
     "unforeseen",
 ]
+
+#: Ids from outside are kept only if they cannot break a log line.
+_HONEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 MEDIA_TYPE = "application/problem+json"
 URN = "urn:wizen:problem:"
@@ -189,6 +195,12 @@ def install(app: FastAPI) -> None:
         app.add_exception_handler(root, _known)
     app.add_exception_handler(RequestValidationError, _validation)
     app.add_exception_handler(HTTPException, _http)
+
+
+def identify(scope: Scope) -> str:
+    """Return the id of a request, which its log record and its answer carry: what it came with, if that is honest."""
+    given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"").decode("latin-1")
+    return given if _HONEST_ID.fullmatch(given) else uuid.uuid4().hex
 
 
 async def _known(request: Request, error: Exception) -> Response:

@@ -7,12 +7,10 @@ The records go to the logger `wizen.service`; besides the sentence they carry `r
 from __future__ import annotations
 
 import logging
-import re
 import time
-import uuid
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import MutableHeaders
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -25,8 +23,6 @@ __all__ = ["LOGGER", "Metrics", "Telemetry", "record"]
 
 LOGGER = logging.getLogger("wizen.service")
 
-#: Ids from outside are kept only if they cannot break a log line.
-_HONEST_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 5.0)
 
 
@@ -68,8 +64,7 @@ class Telemetry:
             await self.app(scope, receive, send)
             return
         begin = time.perf_counter()
-        given = Headers(scope=scope).get("x-request-id", "")
-        request_id = given if _HONEST_ID.fullmatch(given) else uuid.uuid4().hex
+        request_id = problems.identify(scope)
         scope.setdefault("state", {})["request_id"] = request_id
         method = scope["method"]
         status, sent = 0, 0

@@ -145,6 +145,8 @@ def refusal(load: Load, scope: Scope, is_known: bool = True) -> Response | None:
     wait = load.refused(client_of(scope) if is_known else None)
     if wait is None:
         return None
+    # unless one before us did
+    scope.setdefault("state", {}).setdefault("request_id", problems.identify(scope))
     error = Overloaded(
         f"there is more to do than time: the answer would take about {wait:.0f} s.",
         advice="Ask again after that, ask for many in one batch, or start more workers.",

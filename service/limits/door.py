@@ -1,13 +1,12 @@
 """Refusals before a request reaches the application: there is most of them when there is too much to do.
 
-`Admission` decides the same behind everything that a request passes on its way in. That way costs a tenth of a shape,
-and at twice the peak rate half of all requests go it for nothing; from the door it is a thirtieth.
+`Admission` decides the same behind everything that a request passes on its way in. That way costs a good part of a
+small shape, and at twice the peak rate half of all requests go it for nothing.
 """
 
 from __future__ import annotations
 
 import time
-import uuid
 from collections.abc import Callable
 
 from starlette.responses import Response
@@ -50,11 +49,10 @@ class Door:
         if root and path.startswith(f"{root}/"):
             scope = {**scope, "path": path[len(root) :]}
         forwarded = any(name == b"x-forwarded-for" for name, _ in scope["headers"])
-        scope["state"]["request_id"] = request_id = uuid.uuid4().hex
         response = refusal(self._load, scope, is_known=not forwarded)
         if response is None or self._is_kept(scope):
             return None
-        response.headers["X-Request-ID"] = request_id
+        response.headers["X-Request-ID"] = scope["state"]["request_id"]
         seconds = time.perf_counter() - begin
         self._record(scope, scope["method"], response.status_code, len(response.body), seconds)
         return response

@@ -2,7 +2,8 @@
 
 A body is a radial function on directions (colatitude about y, azimuth from x to z) and points of that surface; a point
 of one body within the other's radius is a contact. Most of a heap lies still, so what was found to be near is tried
-alone until bodies have moved so far that it may have changed; the answer is the same as without.
+alone until bodies have moved so far that it may have changed. The answer is the same as without, but where a body is
+pushed farther than a fifth of a radius within one step, or turns the pole of its lattice, where radii jump, to another.
 """
 
 from __future__ import annotations
@@ -276,4 +277,6 @@ def deepest_in_ground(
                 normal[0], normal[1], normal[2] = side * moved[0] / r, side * y / r, side * moved[2] / r
         if known < 0 and closest > -slack:
             listed = _insert(near, depths, listed, k, closest)
-    return deepest, listed if listed <= len(near) else -1
+    # within the shell a body changes sides sooner than what is near it shows
+    changes = bowl[0] > 0 and abs(away - bowl[0] - 0.5 * bowl[1]) < slack
+    return deepest, listed if listed <= len(near) and not changes else -1

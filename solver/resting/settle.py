@@ -131,6 +131,16 @@ class Pouring:
         self._found: Rest | None = None
 
     @property
+    def batches(self) -> int:
+        """Batches of steps that are done."""
+        return self._batch
+
+    @property
+    def centre(self) -> Floats:
+        """Where bodies are (b, 3)."""
+        return self._at * self._unit
+
+    @property
     def share(self) -> float:
         """Share of the longest way to rest that is behind."""
         return 1.0 if self._found else self._batch / _LONGEST
@@ -139,10 +149,11 @@ class Pouring:
         """Return how they rest; `check` is called now and then, and may raise what ends the wait."""
         while self._found is None:
             check()
-            self._advance()
+            self.advance()
         return self._found
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
+        """Go on by a batch of steps, also where they rest already."""
         before = self._at.copy()
         self._fastest = kernel.step(
             self._at, self._turn, self._speed, self._spin, *self._fixed, _STEP, self._drag, _FRICTION, _BATCH

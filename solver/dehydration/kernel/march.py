@@ -24,6 +24,7 @@ from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.generate.digest import source_digest
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
 from solver.dehydration.kernel.skin import Skin, approach, keep_apart, search, widen
+from solver.dehydration.kernel.strips import GROUP
 
 from ...arrays import Array, Floats, Ints, Singles
 
@@ -121,7 +122,7 @@ def _build(stamp: int) -> Callable[..., int]:
                     theta, forces, record, squares,
                 )  # fmt: skip
             if not record:
-                for group in prange((inverse_mass.shape[0] + 3) // 4):
+                for group in prange((inverse_mass.shape[0] + GROUP - 1) // GROUP):
                     update_nodes(forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(group))
                 # a part's nodes on a mirror plane feel half of what balances across it
                 stay(planes, state, velocity)

@@ -16,6 +16,8 @@ import numpy as np
 from ...arrays import Bools, Ints
 
 LANES = 16
+GROUP = 4
+"""Nodes that the march moves at a time, and the force rows that each of them has where they are moved at once."""
 BOTTOM, TOP = [0, 2, 4, 6], [1, 3, 5, 7]
 """Local nodes of the faces zeta = -1 and zeta = +1; corner c of a face is local node 2c or 2c + 1."""
 

@@ -10,7 +10,7 @@ from solver.contract import InvalidInput
 from solver.lattice import directions, lattice
 from solver.resting import Body, Bowl, Rest, settle
 from solver.resting.near import radius_at, rotate
-from solver.resting.settle import MOST, radii
+from solver.resting.settle import MOST, Pouring, radii
 
 HALF = np.array([[1.0, 1.0, 1.0], [0.8, 1.3, 0.8]])
 WAYS = directions(*lattice(32)).reshape(-1, 3)
@@ -101,3 +101,22 @@ def test_turning_is_what_scipy_does() -> None:
 def test_a_pile_of_too_many_is_refused() -> None:
     with pytest.raises(InvalidInput, match="several piles"):
         settle(BODIES[:1], [0] * (MOST + 1), np.ones(MOST + 1), None, 0)
+
+
+@pytest.mark.slow
+def test_a_heap_of_hundreds_is_done_when_waiting_longer_changes_no_overlap() -> None:
+    """300 balls on the floor: found before the longest way, and no deeper in each other than ten batches on."""
+    pouring = Pouring(BODIES[:1], [0] * 300, np.ones(300), None, 5)
+    rest = pouring.rest()
+    assert pouring.batches < 40
+    for _ in range(10):
+        pouring.advance()
+    found, after = overlap(rest.centre), overlap(pouring.centre)
+    assert found == pytest.approx(after, abs=0.001)
+    assert found < 0.02
+
+
+def overlap(centre: np.ndarray) -> float:
+    """Return by how much touching balls of radius 1 are in each other, in the mean."""
+    away = np.linalg.norm(centre[:, None] - centre, axis=2)[np.triu_indices(len(centre), 1)]
+    return float((2 - away[away < 2]).mean())

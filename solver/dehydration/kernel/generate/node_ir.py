@@ -12,10 +12,7 @@ from numba.extending import intrinsic
 
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.generate.lanes import FAST, FOUR, FOUR_INT, INT32, INT64, at, load, shuffle, splat, store
-from solver.dehydration.kernel.strips import LANES
-
-GROUP = 4
-"""Nodes that are moved at once, and the rows that each of them then has."""
+from solver.dehydration.kernel.strips import GROUP, LANES
 
 
 def _sum_of_rows(build: Any, force: Any, places: Sequence[Any]) -> Any:

@@ -9,7 +9,7 @@ from numba import njit
 
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.generate.source import load_generated
-from solver.dehydration.kernel.strips import LANES
+from solver.dehydration.kernel.strips import GROUP, LANES
 
 from ....arrays import Ints, Ints32, Singles
 
@@ -30,8 +30,6 @@ ONE, TWO = np.uint32(1), np.uint32(2)
 UNIT, QUANTA = np.float32(QUANTUM), np.float32(1 / QUANTUM)
 VECTORS = 3 * LANES
 """Floats of one node's three components over the lanes."""
-GROUP = 4
-"""Nodes of one call of `update_nodes`."""
 
 
 @njit(**OPTIONS)
