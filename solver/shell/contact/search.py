@@ -60,14 +60,26 @@ def search(x: Floats, mesh: Topology, near: Near, distance: float, room: float, 
     begin = np.searchsorted(keys[order], np.arange(int(np.prod(wide)) + 1))
     places = _near_places(x, near.start, near.other, even, spans, near.way, distance, change / length)
     places = np.concatenate([places, _far_places(x, order, begin, keys, wide, near.start, near.other, spans, reach)])
-    own = near.start, near.other, near.way, near.altitudes, near.areas, near.face_start, near.faces
-    balls = *_balls(x, near.faces), *_balls(x, near.edges)
-    stencils, kinds, felt, areas, beyond, close = _stencils(
-        x, places, *own, near.edge_start, near.edges, *balls, spans, distance, reach, change / length
+    faces = len(near.faces)
+    # triangles and edges are gone through alike
+    parts = np.concatenate([near.faces, near.edges[:, [0, 1, 1]]])
+    of_faces, of_edges = _balls(x, near.faces), _balls(x, near.edges)
+    middles, radii = np.concatenate([of_faces[0], of_edges[0]]), np.concatenate([of_faces[1], of_edges[1]])
+    own = near.start, near.other, near.way, near.altitudes, near.face_start, faces + near.edge_start
+    stencils, kinds, felt, beyond, close = _stencils(
+        x, places, *own, parts, middles, radii, spans, distance, reach, change / length
     )
-    beyond = np.where(close, length * beyond, beyond)
-    order = np.lexsort((beyond, ~close))
-    return Pairs(stencils[order], kinds[order], felt[order], areas[order], beyond[order], int(close.sum()))
+    beyond[:close] *= length
+    # near ones come first
+    order = np.concatenate([_ascending(beyond[:close]), close + _ascending(beyond[close:])])
+    stencils, kinds = stencils[order], kinds[order]
+    a, b, c, d = near.areas[stencils.T]
+    return Pairs(stencils, kinds, felt[order], np.where(kinds == EDGES, (a + b + c + d) / 12, a), beyond[order], close)
+
+
+def _ascending(values: Floats) -> Ints:
+    """Return the order in which values (m,) ascend, equal ones as they stand."""
+    return np.argsort(values, kind="stable")
 
 
 def within(x: Floats, pairs: Pairs, factor: float = 1.0) -> Ints:
@@ -148,20 +160,23 @@ def _square(x: Floats, u: int, v: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _stencils(
-    x: Floats, places: Ints, start: Ints, other: Ints, way: Floats, altitudes: Floats, areas: Floats, face_start: Ints,
-    faces: Ints, edge_start: Ints, edges: Ints, face_middles: Floats, face_radii: Floats, edge_middles: Floats,
-    edge_radii: Floats, spans: Floats, distance: float, far: float, change: float,
-) -> tuple[Ints, Ints, Floats, Floats, Floats, Bools]:  # fmt: skip
-    """Return the stencils of what pairs of vertices own, as in `Pairs`, and which are near along the sheet."""
-    room, count, last = 1024, 0, -1
-    stencils, kinds, close = np.empty((room, 4), np.int64), np.empty(room, np.int64), np.empty(room, np.bool_)
-    numbers = np.empty((3, room))
+    x: Floats, places: Ints, start: Ints, other: Ints, way: Floats, altitudes: Floats, face_start: Ints,
+    edge_start: Ints, parts: Ints, middles: Floats, radii: Floats, spans: Floats, distance: float, far: float,
+    change: float,
+) -> tuple[Ints, Ints, Floats, Floats, int]:  # fmt: skip
+    """Return stencils, kinds, reaches of what pairs of vertices own, how far beyond, and how many of them are near.
+
+    parts (f + e, 3): corners of triangles, then those of edges, the higher twice; middles, radii: of balls about them.
+    """
+    room, count, close, last = 1024, 0, 0, -1
+    stencils, kinds, numbers = np.empty((room, 4), np.int64), np.empty(room, np.int64), np.empty((2, room))
     q, w, gap = np.empty(4, np.int64), np.empty(4), np.empty(3)
-    mark, ways = np.full(len(x), -1), np.zeros(len(x))
-    for v, u, near in places:
+    ways, lows = np.full(len(x), np.inf), _lowest(altitudes, parts)
+    owned, sizes = _owned(x, edge_start, parts)
+    for place in range(len(places)):
+        v, u, near = places[place, 0], places[place, 1], places[place, 2] == 1
         if near and v != last:
-            for at in range(start[v], start[v + 1]):
-                mark[other[at]], ways[other[at]] = v, way[at]
+            _lay_out(ways, start, other, way, last, v)
             last = v
         apart = _APART * (ways[u] + spans[u] + spans[v]) if near else 1.0
         furthest = distance + apart * change if near else far
@@ -169,43 +184,91 @@ def _stencils(
         for kind in range(3):
             if near and (kind == 1 or (kind == 2 and u < v)):
                 continue
-            what, owner = (EDGES, u) if kind == 2 else (FACE, v if kind == 1 else u)
-            q[0] = u if kind == 1 else v
-            for a in range(edge_start[v + 1] - edge_start[v] if kind == 2 else 1):
-                first, end, about, radius = face_start[owner], face_start[owner + 1], x[q[0]], furthest
+            what, begin, back = (EDGES, edge_start, spans[v]) if kind == 2 else (FACE, face_start, 0.0)
+            point, owner = (u, v) if kind == 1 else (v, u)
+            first, end = (edge_start[v], edge_start[v + 1]) if kind == 2 else (0, 1)
+            for a in range(first, end):
+                second, low, radius = point, altitudes[point], furthest
+                ox, oy, oz = x[point, 0], x[point, 1], x[point, 2]
                 if kind == 2:
-                    q[1] = edges[edge_start[v] + a, 1]
-                    first, end = edge_start[u], edge_start[u + 1]
-                    about, radius = edge_middles[edge_start[v] + a], furthest + edge_radii[edge_start[v] + a]
-                for b in range(first, end):
+                    second, low, radius = parts[a, 1], lows[a], furthest + radii[a]
+                    ox, oy, oz = middles[a, 0], middles[a, 1], middles[a, 2]
+                if _apart(ox, oy, oz, owned, owner, radius + sizes[owner]):
+                    continue
+                for b in range(begin[owner], begin[owner + 1]):
                     # most are ruled out by the balls about them
-                    if kind == 2:
-                        if _apart(about, edge_middles[b], radius + edge_radii[b]):
-                            continue
-                    elif _apart(about, face_middles[b], radius + face_radii[b]):
+                    if _apart(ox, oy, oz, middles, b, radius + radii[b]):
                         continue
-                    if kind == 2:
-                        q[2], q[3] = edges[b]
-                    else:
-                        q[1], q[2], q[3] = faces[b]
-                    if q[2] == q[0] or q[3] == q[0] or (q[2] == q[1] or q[3] == q[1] if kind == 2 else q[1] == q[0]):
+                    i, j, k = parts[b, 0], parts[b, 1], parts[b, 2]
+                    if i in (point, second) or j in (point, second) or k in (point, second):
                         continue
-                    felt = min(distance, _SHARE * _rest(q, kind, v, mark, ways, altitudes, spans)) if near else distance
+                    rest = _rest(ways, i, j, k, back, min(low, lows[b]))
+                    felt = min(distance, _SHARE * rest) if near else distance
+                    limit = felt + apart * change if near else far
+                    q[0], q[1], q[2], q[3] = point, second if kind == 2 else i, i if kind == 2 else j, k
                     square = nearest(x, q, what, w, gap)
-                    if square > (felt + apart * change if near else far) ** 2:
+                    if square > limit * limit:
                         continue
                     if count == room:
                         room *= 2
                         stencils, kinds = _more(stencils, kinds)
-                        numbers, close = np.concatenate((numbers, numbers), 1), np.concatenate((close, close))
-                    stencils[count], kinds[count], close[count], numbers[0, count] = q, what, near == 1, felt
-                    whole = areas[q[0]] + areas[q[1]] + areas[q[2]] + areas[q[3]]
-                    numbers[1, count] = whole / 12 if kind == 2 else areas[q[0]]
+                        numbers = np.concatenate((numbers, numbers), 1)
+                    stencils[count] = q
                     # of near ones over the edges in between, each of which adds its change
-                    numbers[2, count] = (np.sqrt(square) - felt) / (apart if near else 1.0)
+                    kinds[count], numbers[0, count], numbers[1, count] = what, felt, (np.sqrt(square) - felt) / apart
                     count += 1
-    numbers = numbers[:, :count]
-    return stencils[:count], kinds[:count], numbers[0], numbers[1], numbers[2], close[:count]
+                    close += near
+    return stencils[:count], kinds[:count], numbers[0, :count], numbers[1, :count], close
+
+
+@njit(cache=True, error_model="numpy")
+def _lay_out(ways: Floats, start: Ints, other: Ints, way: Floats, last: int, v: int) -> None:
+    """Write ways (n,) from vertex v, infinite to what is not near it, over those from the last, if that is not -1."""
+    for at in range(start[max(last, 0)], start[last + 1]):
+        ways[other[at]] = np.inf
+    for at in range(start[v], start[v + 1]):
+        ways[other[at]] = way[at]
+
+
+@njit(cache=True, error_model="numpy")
+def _rest(ways: Floats, i: int, j: int, k: int, back: float, height: float) -> float:
+    """Return a distance to i, j, k at rest, or less: by ways along edges, less `back`, and by altitudes next to it."""
+    found: float = max(min(min(ways[i], ways[j]), ways[k]) - back, height)
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _apart(ox: float, oy: float, oz: float, middles: Floats, m: int, distance: float) -> bool:
+    dx, dy, dz = ox - middles[m, 0], oy - middles[m, 1], oz - middles[m, 2]
+    found: bool = dx * dx + dy * dy + dz * dz > distance * distance * (1 + 1e-12)
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _owned(x: Floats, edge_start: Ints, parts: Ints) -> tuple[Floats, Floats]:
+    """Return middles (n, 3) and radii (n,) of balls about what each vertex owns."""
+    middles, radii = x.copy(), np.zeros(len(x))
+    for v in range(len(x)):
+        first, end = edge_start[v], edge_start[v + 1]
+        for d in range(3):
+            for e in range(first, end):
+                middles[v, d] += x[parts[e, 1], d]
+            middles[v, d] /= end - first + 1
+        for e in range(first - 1, end):
+            u, square = v if e < first else parts[e, 1], 0.0
+            for d in range(3):
+                square += (x[u, d] - middles[v, d]) ** 2
+            radii[v] = max(radii[v], np.sqrt(square))
+    return middles, radii
+
+
+@njit(cache=True, error_model="numpy")
+def _lowest(altitudes: Floats, parts: Ints) -> Floats:
+    """Return the least of the altitudes (n,) at the corners of each of parts (m, 3)."""
+    found = np.empty(len(parts))
+    for m in range(len(parts)):
+        found[m] = min(min(altitudes[parts[m, 0]], altitudes[parts[m, 1]]), altitudes[parts[m, 2]])
+    return found
 
 
 @njit(cache=True, error_model="numpy")
@@ -224,26 +287,6 @@ def _balls(x: Floats, corners: Ints) -> tuple[Floats, Floats]:
     return middles, radii
 
 
-@njit(cache=True, error_model="numpy")
-def _apart(a: Floats, b: Floats, distance: float) -> bool:
-    found: bool = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2 > distance * distance * (1 + 1e-12)
-    return found
-
-
 @njit(cache=True)
 def _more(stencils: Ints, kinds: Ints) -> tuple[Ints, Ints]:
     return np.concatenate((stencils, stencils)), np.concatenate((kinds, kinds))
-
-
-@njit(cache=True, error_model="numpy")
-def _rest(q: Ints, kind: int, v: int, mark: Ints, ways: Floats, altitudes: Floats, spans: Floats) -> float:
-    """Return a distance that the stencil has at rest, or less: by ways along edges, and by altitudes next to it."""
-    least = np.inf
-    for k in range(1 if kind != 2 else 2, 4):
-        if mark[q[k]] == v:
-            least = min(least, ways[q[k]])
-    if kind == 2:
-        least -= spans[v]
-    height = min(min(altitudes[q[0]], altitudes[q[1]]), min(altitudes[q[2]], altitudes[q[3]]))
-    found: float = max(least, height)
-    return found
