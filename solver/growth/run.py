@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from .. import shell
 from ..contract import Context, InvalidInput, Need, SolverError
+from ..geometry.crossings import crossings
 from ..linalg import definite
 from ..meshes import Frame, changing
 from .engine import Engine
@@ -29,6 +30,9 @@ _MESH = frozenset({"mesh_position", "elastic_strain", *CHANNELS})
 
 def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     """Return meshes and numbers of the wanted growth times; see `solver.quantities` for units.
+
+    `crossings` is always among them, counted on positions as they are handed over. Where parts pass through each other,
+    as they may with contact = 0, `note` says so.
 
     Raises:
         InvalidInput: a region, which a mesh of its own has not, or a factor that is not installed.
@@ -76,6 +80,7 @@ def _row(
         "residual": left,
         "iterations": state.iterations,
         "seconds": seconds,
+        "crossings": crossings(state.x.astype(need.dtype), state.mesh.triangles).count,
     }
     if "rest_area" in need.fields:
         row["rest_area"] = float(shell.areas(state.g).sum())
@@ -96,4 +101,18 @@ def _dataset(rows: list[dict[str, Any]], frames: list[Frame], need: Need, params
     if frames:
         data |= changing(frames[: len(rows)], need.dtype)
         coords["component"] = ["x", "y", "z"]
-    return xr.Dataset(data, coords, {"path": params.solver, "factor": definite.chosen(), "up": "z"})
+    attrs = {"path": params.solver, "factor": definite.chosen(), "up": "z"}
+    through = [row for row in rows if row["crossings"]]
+    if through:
+        worst = max(through, key=lambda row: int(row["crossings"]))
+        attrs["note"] = (
+            f"The sheet passes through itself at {len(through)} of {len(rows)} stages, at growth time "
+            f"{worst['stage']:g} in {worst['crossings']} pairs of triangles. {_advice(params)}"
+        )
+    return xr.Dataset(data, coords, attrs)
+
+
+def _advice(params: GrowthParams) -> str:
+    if params.contact == 0:
+        return "With contact = 0 it may: leave `contact` out, and parts keep the thickness apart."
+    return "Ask for float64 positions, or for a larger `contact`."

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from solver import shell
-from solver.contract import Context, InvalidGeometry
+from solver.contract import Context, InvalidGeometry, Need
 from solver.geometry.crossings import crossings
+from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.settling.energy import StepEnergy
@@ -111,6 +112,45 @@ def test_a_shape_that_passes_through_itself_is_refused_unless_it_may(monkeypatch
         Engine(GrowthParams.parse({"shape": "disc", "contact": 0.05}), 50)
     assert "contact = 0" in caught.value.advice
     Engine(GrowthParams.parse({"shape": "disc", "contact": 0.0}), 50)
+
+
+def pierced(x, triangles):
+    """Pairs of triangles without a common corner, one of which an edge of the other passes through: all are tried."""
+    corners, found = x[triangles], set()
+    for a, one in enumerate(corners):
+        normal = np.cross(one[1] - one[0], one[2] - one[0])
+        for b, other in enumerate(corners):
+            if set(triangles[a]) & set(triangles[b]):
+                continue
+            heights = (other - one[0]) @ normal
+            for i, j in ((0, 1), (1, 2), (2, 0)):
+                if heights[i] * heights[j] < 0:
+                    point = other[i] + heights[i] / (heights[i] - heights[j]) * (other[j] - other[i])
+                    turns = np.cross(np.roll(one, -1, axis=0) - one, point - one) @ normal
+                    if (turns > 0).all():
+                        found.add((min(a, b), max(a, b)))
+    return found
+
+
+def test_a_shape_that_passes_through_itself_says_so():
+    """What comes in crossed and may stay so is counted on what is handed over; what crosses nothing has no note."""
+    points, faces = sheet(3, 3, 0.2)
+    x = np.concatenate([points, points[:, [0, 2, 1]] + np.array([0.03, 0.21, -0.25])])
+    mesh = {"points": x.tolist(), "faces": np.concatenate([faces, faces + len(points)]).tolist()}
+    asked = Need(stages=(0.0, 0.05), quality="preview", fields=("mesh_position",))
+    values = {"mesh": mesh, "tools": [], "contact": 0.0, "imperfection": 0.0}
+    run = SOLVER.solve(SOLVER.parse(values), asked)
+    # nothing is cut: all stages have as many vertices
+    both = zip(np.split(run.mesh_position.values.astype(float), 2), np.split(run.triangle.values, 2), strict=True)
+    counts = [len(pierced(x, triangles)) for x, triangles in both]
+    assert list(run.crossings.values) == counts
+    assert min(counts) > 5
+    assert "2 of 2 stages" in run.attrs["note"]
+    assert f"in {max(counts)} pairs" in run.attrs["note"]
+    apart = {"points": points.tolist(), "faces": faces.tolist()}
+    alone = SOLVER.solve(SOLVER.parse({**values, "mesh": apart}), asked)
+    assert not alone.crossings.values.any()
+    assert "note" not in alone.attrs
 
 
 def test_energy_never_rises_in_contact():
