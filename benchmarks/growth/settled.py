@@ -1,0 +1,68 @@
+"""How far what a run hands over is from rest: python -m benchmarks.growth.settled [--vertices 1000] [NAME ...]
+
+Every file of the gallery is grown to three times. What is handed over is settled once more, nothing growing: to the
+same goal, and to one a thousand times finer. Told are the largest moves of a vertex, over the mean rest edge, at the
+worst of the times, and the largest residual of what was handed over: the largest force over that of an edge that is
+stretched or folded by 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from benchmarks.figures import Sheet
+from solver.contract import Context, SolverError
+from solver.growth.engine import Engine
+from solver.growth.params import GrowthParams
+from solver.growth.settling.stage import residual, settled
+from solver.growth.state import State
+
+_FOLDER = Path(__file__).parents[2] / "examples" / "growth"
+_TIMES, _GOAL, _FINER = (0.35, 0.7, 1.0), 1e-3, 1e-3
+
+
+def moved(state: State, params: GrowthParams, distance: float, goal: float) -> float:
+    """Return how far the vertices of a state move at most, over the mean rest edge, when it is settled to a goal."""
+    found = state
+    for nearer in settled(state, params, goal, distance):
+        found = nearer
+    return float(np.linalg.norm(found.x - state.x, axis=1).max()) / state.length
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--vertices", type=int, default=1000)
+    parser.add_argument("names", nargs="*")
+    asked = parser.parse_args()
+    paths = [_FOLDER / f"{name}.toml" for name in asked.names] or sorted(_FOLDER.glob("*.toml"))
+    sheet = Sheet(
+        "growth-settled", ("file", "vertices", "residual", "moves, same goal [edge]", "finer goal [edge]"), "growth"
+    )
+    for path in paths:
+        params = GrowthParams.parse(tomllib.loads(path.read_text(encoding="utf-8")))
+        engine = Engine(params, asked.vertices, _GOAL, history=False)
+        stages: list[dict[str, Any]] = []
+        try:
+            for time in _TIMES:
+                state = engine.reach(time, Context())
+                moves = [moved(state, params, engine.distance, goal * _GOAL) for goal in (1.0, _FINER)]
+                stages.append({"time": time, "residual": residual(state, params), "same": moves[0], "finer": moves[1]})
+        except SolverError as error:
+            sheet.add((path.stem, "", str(error), "", ""), file=path.stem, stages=stages, failed=str(error))
+            continue
+        worst = [max(stage[name] for stage in stages) for name in ("residual", "same", "finer")]
+        cells = path.stem, str(len(state.x)), *(f"{value:.1e}" for value in worst)
+        sheet.add(cells, file=path.stem, vertices=len(state.x), start=asked.vertices, stages=stages)
+    if not asked.names:
+        sheet.keep(finer=_FINER)
+
+
+if __name__ == "__main__":
+    with threadpool_limits(1, user_api="blas"):
+        main()
