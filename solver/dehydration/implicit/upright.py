@@ -77,7 +77,7 @@ def upright(params: DehydrationParams, points: Floats, foot: float) -> Floats:
     flesh = at.interface - inner_distance(params, at.along)
     depth = np.maximum(at.interface - distance, 0.0)
     kept = np.clip((flesh - depth) / (foot * flesh), 0.0, 1.0)
-    found = points + (np.minimum(depth, (1 - foot) * flesh) * kept)[:, None] * leaning
+    found: Floats = points + (np.minimum(depth, (1 - foot) * flesh) * kept)[:, None] * leaning
     above = np.flatnonzero(distance > at.interface * (1 + 1e-12))
     if len(above):
         # in the skin: a step along the normal, and on its ray to where the layer is there
