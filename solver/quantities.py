@@ -175,6 +175,9 @@ register(
     grip_force=Quantity("N", "mean force that each grip put in since the stage before", "F"),
     grip_torque=Quantity("N m", "mean moment about its pivot that each grip put in since the stage before", "M"),
     grip_shift=Quantity("m", "mean way of each grip from its place at time 0, since the stage before", "u"),
+    grip_turn=Quantity(
+        "rad", "mean rotation vector of each grip from its attitude at time 0, since the stage before", "phi"
+    ),
     fragments=Quantity("1", "pieces that hang together by whole rods and bonds", "n_f"),
     fragment_mass=Quantity("kg", "masses of the 32 heaviest fragments, the heaviest first; 0 where there is none", "m"),
     fragment_place=Quantity("m", "middles of mass of the 32 heaviest fragments; 0 where there is none", "x_f"),

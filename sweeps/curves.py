@@ -1,7 +1,8 @@
 """Numbers of a run by stage, as a table (.csv) and drawn (.svg): a test bench's curves.
 
 What has the dimension `stage` and at most two short ones besides is a column each: `body_force 0 z [N]`. Of fields
-called `X_force` and `X_shift`, force is drawn over way; of a run without such, all plain numbers over the stage.
+called `X_force` and `X_shift`, force is drawn over way, and moment over turn of `X_torque` and `X_turn`; of a run
+without such, all plain numbers over the stage.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,19 @@ __all__ = ["as_csv", "as_svg", "columns"]
 
 #: More values by stage than these are no list, but a field.
 _MOST = 256
+
+
+class _Axes(NamedTuple):
+    scale: float
+    across: str
+    up: str
+
+
+#: What is drawn over what, by the ends of their names.
+_OVER = {
+    ("_force", "_shift"): _Axes(1e3, "way [mm]", "force [N]"),
+    ("_torque", "_turn"): _Axes(180 / np.pi, "turn [degree]", "moment [N m]"),
+}
 
 
 def _label(run: xr.Dataset, dim: str, n: int) -> str:
@@ -49,22 +63,30 @@ def as_csv(run: xr.Dataset) -> bytes:
     return out.getvalue().encode()
 
 
+def _paired(run: xr.Dataset, load: str, way: str) -> Iterator[tuple[str, Array, Array]]:
+    """Yield label, way and load (stages,) of all that went somewhere: sizes of vectors."""
+    for name in map(str, run.data_vars):
+        other = name.removesuffix(load) + way
+        if not name.endswith(load) or other not in run or not run[name].size:
+            continue
+        for n in range(run.sizes[str(run[name].dims[1])]):
+            gone, felt = (np.linalg.norm(run[one].values[:, n], axis=-1) for one in (other, name))
+            if np.ptp(gone) > 0:
+                yield f"{name.removesuffix(load)} {n}", gone, felt
+
+
 def as_svg(run: xr.Dataset) -> bytes:
-    """Return the curves as a drawing: force over way where the run knows both, else numbers over the stage."""
+    """Return the curves as a drawing: loads over ways and turns where the run knows both, else numbers by stage."""
     from matplotlib.figure import Figure
 
-    pairs = [(str(n), f"{str(n)[:-6]}_shift") for n in run.data_vars if str(n).endswith("_force")]
-    pairs = [(f, s) for f, s in pairs if s in run and run[f].size]
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-    if pairs:
-        axes = figure.subplots()
-        for force, shift in pairs:
-            for n in range(run.sizes[str(run[force].dims[1])]):
-                way, load = (np.linalg.norm(run[name].values[:, n], axis=-1) for name in (shift, force))
-                if np.ptp(way) > 0:
-                    axes.plot(1e3 * way, load, lw=1.2, label=f"{force[:-6]} {n}")
-        axes.set(xlabel="way [mm]", ylabel="force [N]")
-        axes.legend()
+    drawn = {kind: found for kind in _OVER if (found := list(_paired(run, *kind)))}
+    figure = Figure(figsize=(6.4, 4.2 * max(len(drawn), 1)), layout="constrained")
+    if drawn:
+        for axes, (kind, found) in zip(figure.subplots(len(drawn), 1, squeeze=False)[:, 0], drawn.items(), strict=True):
+            for label, way, load in found:
+                axes.plot(_OVER[kind].scale * way, load, lw=1.2, label=label)
+            axes.set(xlabel=_OVER[kind].across, ylabel=_OVER[kind].up)
+            axes.legend()
     else:
         plain = [c for c in columns(run) if " " not in c[0]][1:]
         for axes, (name, unit, values) in zip(

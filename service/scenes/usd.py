@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array
+from sweeps.errors import installing
 
 from ..errors import Unavailable
+from ..formats import materialx
 from . import props
 from .kinds import Kind
 from .moving import FPS
@@ -42,9 +44,7 @@ def _encode(
     try:
         from pxr import Gf, Sdf, Usd, UsdGeom, Vt
     except ImportError:
-        raise Unavailable(
-            "USD needs the package usd-core.", advice="pip install 'wizen[usd]', or ask for glb."
-        ) from None
+        raise Unavailable("USD needs the package usd-core.", advice=f"{installing('usd')} Or ask for glb.") from None
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, unit)
@@ -135,7 +135,7 @@ def _material(stage: Any, made: dict[str, Any], kind: Kind) -> Any:
     return made[name]
 
 
-def _shader(stage: Any, path: str, roughness: float, coat: float, colour: tuple[float, ...] | None) -> Any:
+def _shader(stage: Any, path: str, roughness: float, coat: float, colour: tuple[float, float, float] | None) -> Any:
     """Define a preview surface, of one colour or of the vertices' own."""
     from pxr import Gf, Sdf, UsdGeom, UsdShade
 
@@ -158,6 +158,8 @@ def _shader(stage: Any, path: str, roughness: float, coat: float, colour: tuple[
         reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
         diffuse.ConnectToSource(reader.CreateOutput("result", Sdf.ValueTypeNames.Float3))
     material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    looks: dict[str, materialx.Source] = {"base_color": colour or "displayColor", "specular_roughness": roughness}
+    materialx.add(stage, material, {**looks, **({"coat": coat, "coat_roughness": 0.3} if coat else {})})
     return material
 
 

@@ -1,7 +1,8 @@
 """Universal Scene Description: one mesh whose points, and if need be triangles, are sampled over time.
 
 y is up and the unit of length is written where it is known. Colours are `displayColor` in linear light, fields of the
-vertices are primvars under their own names. Texture coordinates are face-varying, v upwards. Needs usd-core.
+vertices are primvars under their own names. Materials are preview surfaces, and MaterialX beside them. Texture
+coordinates are face-varying, v upwards. Needs usd-core.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from sweeps.errors import installing
 
 from ..errors import Unavailable
+from ..formats import materialx
 from .options import Options
 
 if TYPE_CHECKING:
@@ -214,6 +216,8 @@ def _materials(stage: Any, mesh: Any, sequence: Sequence, pictures: Pictures) ->
             found = _pictured(stage, path, what, pictures[what]) if what in pictures else _read(stage, path, what)
             shader.CreateInput(what, kind).ConnectToSource(found)
         material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+        colour, roughness = pictures.get("diffuseColor", "displayColor"), pictures.get("roughness", "roughness")
+        materialx.add(stage, material, {"base_color": colour, "specular_roughness": roughness})
         if len(parts) == 1:
             api.Bind(material)
             continue

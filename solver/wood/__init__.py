@@ -59,6 +59,7 @@ _NUMBERS = (
     "grip_force",
     "grip_torque",
     "grip_shift",
+    "grip_turn",
     "fragments",
     "fragment_mass",
     "fragment_place",

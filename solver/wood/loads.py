@@ -17,11 +17,11 @@ SUMS = {
     "grip_force": "grip_impulse",
     "grip_torque": "grip_moment",
 }
-READ = ("body_force", "body_torque", "body_shift", "grip_force", "grip_torque", "grip_shift")
+READ = ("body_force", "body_torque", "body_shift", "grip_force", "grip_torque", "grip_shift", "grip_turn")
 
 
 def _along(paths: list[tuple[list[float], list[Any]]], times: np.ndarray) -> np.ndarray:
-    """Return how far (n, m, 3) [m] things on m paths (times, places) have gone at n times."""
+    """Return how far (n, m, 3) things on m paths (times, places or rotation vectors) have gone at n times."""
     found = np.zeros((len(times), len(paths), 3))
     for k, (when, where) in enumerate(paths):
         places = np.array(where, float)
@@ -33,7 +33,8 @@ def _along(paths: list[tuple[list[float], list[Any]]], times: np.ndarray) -> np.
 def measured(name: str, rows: list[dict[str, Any]], params: WoodParams) -> np.ndarray:
     """Return a reading (n, m, 3): means since the stage before, of the first since time 0.
 
-    At time 0 nothing has acted yet, and forces are 0. Shifts are means, too, so that they belong to the forces.
+    At time 0 nothing has acted yet, and forces are 0. Shifts and turns are means, too, as the forces and moments that
+    belong to them.
     """
     times = np.concatenate([[0.0], [row["stage"] for row in rows]])
     if name in SUMS:
@@ -48,7 +49,7 @@ def measured(name: str, rows: list[dict[str, Any]], params: WoodParams) -> np.nd
         rest = [(0.0, (0.0, 0.0, 0.0))]
         paths = []
         for grip in params.grips:
-            ways = [(p.time, p.shift) for p in grip.path] or rest
+            ways = [(p.time, p.shift if name == "grip_shift" else p.turn) for p in grip.path] or rest
             paths.append(([w[0] for w in ways], [w[1] for w in ways]))
     gone = _along(paths, times)
     middle: np.ndarray = (gone[1:] + gone[:-1]) / 2

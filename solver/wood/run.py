@@ -177,7 +177,7 @@ def _dataset(
         "grip_impulse": ("stage", "grip", "component"),
         "grip_moment": ("stage", "grip", "component"),
         **dict.fromkeys(("body_force", "body_torque", "body_shift"), ("stage", "obstacle", "component")),
-        **dict.fromkeys(("grip_force", "grip_torque", "grip_shift"), ("stage", "grip", "component")),
+        **dict.fromkeys(("grip_force", "grip_torque", "grip_shift", "grip_turn"), ("stage", "grip", "component")),
         "fragment_mass": ("stage", "fragment"),
         "fragment_place": ("stage", "fragment", "component"),
         "fragment_length": ("stage", "fragment"),

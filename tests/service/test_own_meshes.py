@@ -19,6 +19,7 @@ from solver.contract import Need
 from solver.decay import SOLVER
 from sweeps.commands.terminal.meshfile import read
 
+from . import _materialx
 from ._gltf import parsed
 
 
@@ -156,6 +157,33 @@ def test_a_usdz_has_each_stage_s_textures_on_the_mesh_s_own_coordinates(
     # it rots: most texels are no longer red
     assert (fresh[:, 0] > 2 * fresh[:, 1]).mean() > 0.9
     assert old.mean() < fresh.mean() - 5 or np.abs(old - fresh).max() > 50
+
+
+@pytest.mark.parametrize("name", ["usdc", "usdz"])
+def test_materials_are_materialx_too(rotten: xr.Dataset, tmp_path: Path, name: str) -> None:
+    """As its own library reads them: from the vertices, or from the pictures that the preview surface takes."""
+    path = tmp_path / f"ring.{name}"
+    path.write_bytes(write(of_run(rotten), EXPORTS[name], Options(textures=64, step=12)))
+    found = _materialx.materials(stage := Usd.Stage.Open(str(path)))
+    assert len(found) == 2
+    for material in found:
+        assert _materialx.complaints(material) == ""
+        _, values = _materialx.read(material)
+        assert values["standard_surface"] == {"base": 1.0}
+        if name == "usdc":
+            assert values["base_color_of_vertices"]["geomprop"] == "displayColor"
+            assert values["specular_roughness_of_vertices"]["geomprop"] == "roughness"
+            assert stage.GetPrimAtPath("/decay").HasAttribute("primvars:roughness")
+            continue
+        for ours, theirs, space in (
+            ("base_color", "diffuseColor", "srgb_texture"),
+            ("specular_roughness", "roughness", "raw"),
+        ):
+            file = stage.GetPrimAtPath(f"{material.GetPath()}/{ours}_of_pictures").GetAttribute("inputs:file")
+            other = stage.GetPrimAtPath(f"{material.GetPath()}/{theirs}").GetAttribute("inputs:file")
+            assert [file.Get(at).path for at in (1, 13)] == [other.Get(at).path for at in (1, 13)]
+            assert file.GetColorSpace() == space
+            assert values["texcoord"]["geomprop"] == "st"
 
 
 def _data(path: Path, info: zipfile.ZipInfo) -> int:

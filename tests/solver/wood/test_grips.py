@@ -11,7 +11,8 @@ from solver.wood.model.bundle import lay
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 BAR = {"rods": 9, "vertices": 8, "length": 0.15, "radius": 0.01, "clamp": "start", **PLAIN}
 END = {"low": (0.1499, -1, -1), "high": (0.1501, 1, 1)}
-FIELDS = ("grip_impulse", "grip_moment", "rod_position", "work", "elastic_energy", "kinetic_energy")
+SUMS = ("grip_impulse", "grip_moment", "work", "elastic_energy", "kinetic_energy")
+FIELDS = (*SUMS, "grip_torque", "grip_turn", "rod_position")
 
 
 def run(values, *stages):
@@ -42,6 +43,9 @@ def test_a_grip_that_turns_takes_its_end_along_and_needs_a_moment():
     moment = np.diff(found.grip_moment.values[:, 0], axis=0)[0]
     assert moment[0] > 0
     assert np.abs(moment[1:]).max() < 0.2 * moment[0]
+    # what stands beside the mean moment is the mean turn of the same time
+    assert found.grip_turn.values[:, 0] == pytest.approx(np.outer([0.5 * 0.0025 / 0.003, 2.75 / 3], turn))
+    assert found.grip_torque.values[1, 0] == pytest.approx(moment / 0.0005)
     assert found.residual.values.max() < 1e-3
 
 
