@@ -2,8 +2,8 @@
 
 The double cantilever beam of `benchmarks.wood.fracture`, drawn apart a little, unbreakable. Force over opening is held
 against corrected beam theory (ISO 15024) and against plane elasticity of one half (scikit-fem, quadratic quads, what is
-not split held on the middle), which share no code with the bundle. The crack is counted twice: by the area that is split,
-and to the last bond, half an edge further: bonds sit at vertices, so that there the halves begin to bend.
+not split held on the middle), which share no code with the bundle. The crack is counted twice: by the area that is
+split, and to the last bond, half an edge further: bonds sit at vertices, so that there the halves begin to bend.
 """
 
 from __future__ import annotations
