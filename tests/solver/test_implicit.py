@@ -173,3 +173,6 @@ def test_a_patch_follows_the_whole_it_is_cut_from():
     np.testing.assert_allclose(found.deformed, whole(mesh.positions), atol=1e-9)
     for _, free in parities(model):
         assert not free[edge[inside]].any()
+    disturbed[inside] += 0.3 * model.free * np.sin(40 * mesh.positions[inside])
+    with pytest.raises(NotConverged, match="near a guess"):
+        equilibrium(model, 0.05, guess=dataclasses.replace(start, deformed=disturbed), alone=True)

@@ -56,8 +56,18 @@ def test_the_smooth_sphere_with_finite_bulk_modulus(case: dict[str, Any]) -> Non
     np.testing.assert_allclose(rigid.radii, expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("index", [2, 5, 7])
-@pytest.mark.parametrize("kappa_ratio", [None, 1000.0])
+# what a bulk modulus changes shows on thicker skins, too, at half the time
+@pytest.mark.parametrize(
+    ("index", "kappa_ratio"),
+    [
+        pytest.param(2, None, marks=pytest.mark.slow),
+        (2, 1000.0),
+        (5, None),
+        (5, 1000.0),
+        (7, None),
+        pytest.param(7, 1000.0, marks=pytest.mark.slow),
+    ],
+)
 def test_the_meridional_road_agrees_with_the_reference(index: int, kappa_ratio: float | None) -> None:
     case = REFERENCE["bifurcation"][index]
     exact = case["s_cr"] if kappa_ratio is None else case["s_cr_kappa_over_mu_1000"]
@@ -80,17 +90,48 @@ def test_the_meridional_road_converges() -> None:
     assert errors[1] < 2e-3
 
 
-@pytest.mark.parametrize(("gamma", "error"), [(10.0, -0.0019), (30.0, -0.0014)])
-def test_the_full_road_is_as_near_whatever_the_bulk_modulus(gamma: float, error: float) -> None:
+@pytest.mark.parametrize(
+    ("gamma", "error", "moduli"),
+    [
+        (10.0, -0.0019, (None, 1000.0)),
+        (30.0, -0.0014, (None,)),
+        pytest.param(30.0, -0.0014, (None, 1000.0), marks=pytest.mark.slow),
+    ],
+)
+def test_the_full_road_is_as_near_whatever_the_bulk_modulus(
+    gamma: float, error: float, moduli: tuple[float | None, ...]
+) -> None:
     """The limit of two coarse meshes is off by `error`, measured; one-sided differences of tangents see the modulus."""
     errors = []
-    for kappa_ratio in (None, 1000.0):
+    for kappa_ratio in moduli:
         found = full.crossings(sphere(0.4, 0.12, gamma), kappa_ratio=kappa_ratio, quality="preview")[1]
         exact = onset(sphere(0.4, 0.12, gamma), kappa_ratio=kappa_ratio).s_cr
         assert exact is not None
         errors.append(found[0].shrinkage / exact - 1)
-    assert errors == pytest.approx([error, error], abs=1e-3)
-    assert errors[0] == pytest.approx(errors[1], abs=2e-4)
+    assert errors == pytest.approx([error] * len(moduli), abs=1e-3)
+    assert errors[0] == pytest.approx(errors[-1], abs=2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", ["jujube2", "raisin"])
+def test_the_full_road_agrees_with_the_meridional_one_under_oblique_skins(preset: str) -> None:
+    """Upright columns: along rays elements are slanted by up to 40 degrees."""
+    params = SOLVER.parse({"te": 0.05}, preset)
+    assert isinstance(params, DehydrationParams)
+    truth = onset(params, kappa_ratio=1e5).s_cr
+    found = full.crossings(params)[1]
+    assert truth is not None
+    assert found[0].shrinkage == pytest.approx(truth, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_a_patch_of_plum_1() -> None:
+    """What finer meshes make of it, to 74 elements an edge, is .0842; along rays it came out as .0850."""
+    params = SOLVER.parse({}, "plum1")
+    assert isinstance(params, DehydrationParams)
+    model, found = full.crossings(params)
+    assert model.mesh.foot is not None
+    assert found[0].shrinkage == pytest.approx(0.0842, rel=3e-3)
 
 
 def test_both_roads_agree_on_the_linear_method_which_misses_the_exact_onset() -> None:

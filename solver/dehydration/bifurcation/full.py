@@ -1,7 +1,7 @@
 """The onset of any fruit, elliptic equators too: triquadratic elements between the symmetry planes, all parities.
 
 Thin skins buckle first in one place, and only the patch that holds the mode is meshed finely; its edge follows a coarse
-smooth state. s_cr is the limit of two meshes by the order that spheres show.
+smooth state. s_cr is the limit of two meshes by the order measured for each.
 Cost: some six factors of each mesh; of whole parts, unknowns grow with 1 / thickness^2, of patches with 1 / thickness.
 """
 
@@ -33,8 +33,10 @@ __all__ = ["crossings", "onset_full"]
 PER_WAVELENGTH = {"preview": (1.5, 2.1), "default": (2.0, 2.9), "fine": (2.9, 4.0)}
 #: The linear method's first modes are shorter (degree 23 instead of 14 on the sphere with te .04): it needs more.
 LINEAR_FINER = 1.6
-#: Order of s_cr in element size, measured on spheres: 3.0 to 3.5 between 1.9 and 4.8 elements a wrinkle.
-ORDER = 3.2
+#: Order of s_cr in element size of the whole part, measured on spheres, whose degrees are given: 3.0 to 3.5 between 1.9
+#: and 4.8 elements a wrinkle. Waves of a patch grow longer where short ones are too stiff: on plum 1 2.2 from 2.0 to 4
+#: elements a wrinkle and 2.7 from 2.9 to 5, on flat films (one column, phases at its sides) 2.3 to 2.9.
+ORDER, PATCH_ORDER = 3.2, 2.5
 #: Shear modulus of the skin over the core's past which elements stay as short as at it: 3.4 to a wrinkle are off by
 #: 1.9 % at 30, as 2.4 are at 10.
 STIFF = 10.0
@@ -49,9 +51,10 @@ FIRST_LOOK, NEXT_LOOK, FINE_LOOK = 0.85, 0.97, 0.975
 BACK = 0.96
 #: A look from farther below the onset than this is repeated from nearer.
 FAR = 0.93
-#: Radius of the first patch in wavelengths, its growth, and what a mode may have left beyond 3/4 of the radius.
-#: On plum 1 radii of 2.5, 3.5 and 4.9 gave .08676, .08645 and .08644.
-REACH, WIDER, LEFT = 3.5, 1.4, 0.25
+#: Radius of the first patch in wavelengths of its skin, its growth, and what a mode may have left beyond 3/4 of it.
+#: On plum 1, around the mode, radii of 2.6, 3.2, 4.3 and 5.6 gave .08696, .08680, .08676 and .08676; .60, .43, .25 and
+#: .02 were left.
+REACH, WIDER, LEFT = 3.3, 1.4, 0.45
 #: Stacks up to which the whole part is as good as a patch, and places within this of the first that are looked at.
 FEW, RIVALS, PLACES = 360, 1.05, 3
 #: Modes of other parities within this fraction above the first one are called ties.
@@ -165,7 +168,8 @@ class _Search:
         self.below, self.unstable = FINE_LOOK * best.shrinkage, np.inf
         last = self._repeated(model, guesses, 0.6, look.patch, look).first
         ratio = n / len(look.model.mesh.quad_of[0])
-        limit = last.shrinkage - (best.shrinkage - last.shrinkage) / (ratio**ORDER - 1)
+        order = ORDER if look.patch is None else PATCH_ORDER
+        limit = last.shrinkage - (best.shrinkage - last.shrinkage) / (ratio**order - 1)
         others = [
             Crossing(
                 max(each.shrinkage * limit / best.shrinkage, limit),
@@ -206,18 +210,20 @@ class _Search:
             centre, beyond = look.extent()
             if beyond <= LEFT:
                 return look
-            look = self._grown(Patch(centre, WIDER * look.patch.radius), per_wavelength, number + 1)
+            # the estimate may have been a patch's radius off: move there before growing
+            radius = look.patch.radius * (WIDER if number else 1.0)
+            look = self._grown(Patch(centre, radius), per_wavelength, number + 1)
         return look
 
     def _patches(self) -> list[Patch]:
         """Return the places that may come first, the first of all first."""
-        middles, expected, _ = self.places
-        order = np.argsort(expected)
-        radius, places = REACH * self.wavelength, list[Floats]()
+        middles, expected, _, thinned = self.places
+        order, places = np.argsort(expected), list[Patch]()
         for at in order[expected[order] <= RIVALS * expected[order[0]]]:
-            if all(np.linalg.norm(middles[at] - other) > 2 * radius for other in places):
-                places.append(middles[at])
-        return [Patch(centre, radius) for centre in places[:PLACES]]
+            radius = REACH * self.wavelength * float(thinned[at])
+            if all(np.linalg.norm(middles[at] - other.centre) > 2 * radius for other in places):
+                places.append(Patch(middles[at], radius))
+        return places[:PLACES]
 
     def _grown(self, patch: Patch, per_wavelength: float, number: int) -> Look:
         n = self._elements(patch, per_wavelength)
@@ -228,12 +234,17 @@ class _Search:
 
     def _elements(self, patch: Patch | None, per_wavelength: float) -> int:
         """Return the even number of elements per edge that has `per_wavelength` to a wrinkle where it counts."""
+        middles, onsets, widths, thinned = self.places
         if patch is None:
-            return max(2 * math.ceil(np.pi / 4 * per_wavelength / self.resolved), 4)
-        middles, _, widths = self.places
-        near = np.linalg.norm(middles - patch.centre, axis=1)
-        across, along = widths[near <= max(patch.radius, near.min())].max(axis=0)
+            there = onsets <= RIVALS * onsets.min()
+        else:
+            near = np.linalg.norm(middles - patch.centre, axis=1)
+            there = near <= max(patch.radius / 2, near.min())
+        # waves are as short as the skin is thin across
+        across, along = (widths / thinned[:, None])[there].max(axis=0)
         size = len(self.states.whole.mesh.quad_of[0]) * float(max(across, along / CRESTS))
+        if patch is None:
+            size = max(size, np.pi / 2)
         return max(2 * math.ceil(size * per_wavelength / self.resolved / 2), 4)
 
     def _repeated(

@@ -38,6 +38,8 @@ __all__ = ["States"]
 #: Core layer at the interface in wavelengths, how fast layers grow inwards, and layers of the skin: with one, no mesh
 #: gets nearer than .5 %.
 FIRST_LAYER, LAYER_GROWTH, SKIN_LAYERS = 0.25, 2.0, 2
+#: Layers of the core, from the interface, whose columns stand upright: three quarters of a wavelength.
+UPRIGHT = 2
 #: Elements per edge of the mesh that knows the smooth shape of the whole, and of that under a skin of long waves.
 SMOOTH, SMOOTH_LONG, LONG = 8, 4, 0.5
 #: Way from a smooth state up to which another is that one moved on, relative.
@@ -69,7 +71,8 @@ class States:
         wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
         # layers are shares of the flesh below each place: where it is thick they must not be too thick for waves
         core = layer_fractions(flesh_span(params)[1], FIRST_LAYER * min(wavelength, 0.4), LAYER_GROWTH)
-        mesh = build_quadratic_mesh(params, n, core, natural_symmetry(params), SKIN_LAYERS, patch)
+        foot = float(core[-UPRIGHT - 1]) if len(core) > UPRIGHT + 1 else None
+        mesh = build_quadratic_mesh(params, n, core, natural_symmetry(params), SKIN_LAYERS, patch, foot)
         return build_model(params, mesh, self.kappa_ratio)
 
     def path(
@@ -101,7 +104,8 @@ class States:
 
     def _settled(self, model: Model, start: Equilibrium) -> Equilibrium:
         s = start.shrinkage
-        return equilibrium(model, s, tolerance=self._tolerance(s), guess=start, context=self._quiet)
+        patch = bool(model.mesh.cut.any())
+        return equilibrium(model, s, tolerance=self._tolerance(s), guess=start, alone=patch, context=self._quiet)
 
     def smooth(self, shrinkage: float) -> tuple[BaseState, Floats]:
         """Return the whole's coarse smooth state and its nodes' displacement by s (nn, 3).

@@ -24,12 +24,15 @@ __all__ = [
     "CubedSphere",
     "FruitMesh",
     "Sampler",
+    "along_rays",
     "build_mesh",
     "corner_ratios",
     "cubed_sphere",
     "flesh_span",
     "inner_distance",
     "layer_fractions",
+    "meeting",
+    "right_side_out",
 ]
 
 
@@ -177,18 +180,10 @@ def build_mesh(fruit: Fruit, n: int, core: Floats, exocarp_layers: int = 2) -> F
 
     """
     sphere = cubed_sphere(n)
-    d = sphere.directions
-    colatitude = np.arccos(np.clip(d[:, 1], -1, 1))
-    interface = fruit.sarcocarp(colatitude, np.arctan2(d[:, 2], d[:, 0]))
-    outer = np.linalg.norm(interface, axis=1)
-    rays = interface / outer[:, None]
-    stone = inner_distance(fruit, rays)
-    skin = fruit.exocarp_thickness * np.arange(1, exocarp_layers + 1) / exocarp_layers
-    distance = np.concatenate(
-        [stone[:, None] + (outer - stone)[:, None] * core, outer[:, None] + skin[None, :]], axis=1
-    )
-    levels = distance.shape[1]
-    positions = (rays[:, None, :] * distance[..., None]).reshape(-1, 3)
+    rays, outer = meeting(fruit, sphere.directions)
+    columns = along_rays(fruit, rays, outer, core, exocarp_layers)
+    levels = columns.shape[1]
+    positions = columns.reshape(-1, 3)
 
     # corner bits (xi, eta, zeta): quads run (0,0) (1,0) (1,1) (0,1)
     base = sphere.quads[:, [0, 3, 1, 2]] * levels
@@ -196,14 +191,44 @@ def build_mesh(fruit: Fruit, n: int, core: Floats, exocarp_layers: int = 2) -> F
     corners = base[:, None, :, None] + layer[None, :, None, None] + np.array([0, 1])
     connectivity = corners.reshape(-1, 8)
     is_exocarp = np.tile(layer >= len(core) - 1, len(sphere.quads))
+    right_side_out(positions, connectivity)
+    depth = np.concatenate([core, np.ones(exocarp_layers)])
+    return FruitMesh(sphere, positions, connectivity, is_exocarp, rays, depth)
+
+
+def meeting(fruit: Fruit, towards: Floats) -> tuple[Floats, Floats]:
+    """Return unit rays (nc, 3) and where they meet the interface, from the centre, at parametric directions (nc, 3)."""
+    colatitude = np.arccos(np.clip(towards[:, 1], -1, 1))
+    interface = fruit.sarcocarp(colatitude, np.arctan2(towards[:, 2], towards[:, 0]))
+    outer = np.linalg.norm(interface, axis=1)
+    return interface / outer[:, None], outer
+
+
+def along_rays(fruit: Fruit, rays: Floats, outer: Floats, core: Floats, exocarp_layers: int) -> Floats:
+    """Return the nodes (nc, levels, 3) of columns along rays that meet the interface at distances `outer` (nc,)."""
+    stone = inner_distance(fruit, rays)
+    skin = fruit.exocarp_thickness * np.arange(1, exocarp_layers + 1) / exocarp_layers
+    distance = np.concatenate(
+        [stone[:, None] + (outer - stone)[:, None] * core, outer[:, None] + skin[None, :]], axis=1
+    )
+    found: Floats = rays[:, None, :] * distance[..., None]
+    return found
+
+
+def right_side_out(positions: Floats, connectivity: Ints) -> float:
+    """Return the least of `corner_ratios`.
+
+    Raises:
+        InvalidGeometry: it is not positive.
+
+    """
     worst = float(corner_ratios(positions, connectivity).min())
     if not worst > 0:
         raise InvalidGeometry(
             f"the mesh turns inside out (corner Jacobians of one element differ by the factor {worst:.3g}).",
             advice="Bring r2..r8 closer to each other, make the stone rounder, or ask for a finer quality.",
         )
-    depth = np.concatenate([core, np.ones(exocarp_layers)])
-    return FruitMesh(sphere, positions, connectivity, is_exocarp, rays, depth)
+    return worst
 
 
 class Sampler:

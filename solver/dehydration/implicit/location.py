@@ -6,10 +6,10 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...fem import HEX27
-from ...fruit import directions
 from ..fresh.mesh import _FACES as FACES
 from ..params import DehydrationParams
 from .mesh import QuadraticMesh
+from .upright import parametric, slanted
 
 __all__ = ["fold", "interpolate", "locate"]
 
@@ -26,20 +26,8 @@ def fold(mesh: QuadraticMesh, points: Floats) -> tuple[Floats, Floats]:
     return points * signs, signs
 
 
-def _parametric(params: DehydrationParams, points: Floats) -> Floats:
-    """Directions (k, 3) on the parametric sphere of the rays through points (k, 3)."""
-    squash = params.radii[7] / params.radii[3]
-    x, y, z = points[:, 0], points[:, 1], points[:, 2] / squash
-    table = np.linspace(0.0, np.pi, 2001)
-    gx, gy = params.generatrix(table)
-    # the outline seen from the centre turns one way (the fruit's validator): its polar angle can be inverted
-    polar = np.arctan2(np.maximum(gx, 0.0), gy)
-    colatitude = np.interp(np.arctan2(np.hypot(x, z), y), polar, table)
-    return directions(colatitude, np.arctan2(z, x))
-
-
 def _first_guess(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tuple[Ints, Floats]:
-    towards = _parametric(params, points)
+    towards = parametric(params, points)
     for axis in mesh.planes:
         towards[:, axis] = np.maximum(towards[:, axis], _NUDGE)
     heights = towards @ FACES[:, 0].T
@@ -69,10 +57,11 @@ def _first_guess(params: DehydrationParams, mesh: QuadraticMesh, points: Floats)
 def locate(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tuple[Ints, Floats]:
     """Return element (k,) and local coordinates (k, 3) of fresh points (k, 3) inside the mesh's part (see `fold`).
 
-    The element is that of the point's ray and depth; local coordinates then solve X(xi) = point, and may reach a
+    The element is that of the point's column and depth; local coordinates then solve X(xi) = point, and may reach a
     little beyond +-1 where the polynomial faces miss the fruit's surface. The element is negative beyond a patch.
     """
-    element, local = _first_guess(params, mesh, points)
+    straight = points if mesh.foot is None else slanted(params, points, mesh.foot)
+    element, local = _first_guess(params, mesh, straight)
     inside = np.flatnonzero(element >= 0)
     corners, target, at = mesh.positions[mesh.connectivity[element[inside]]], points[inside], local[inside]
     for _ in range(4):

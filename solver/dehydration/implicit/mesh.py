@@ -12,8 +12,9 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidInput
-from ..fresh.mesh import CubedSphere, build_mesh
+from ..fresh.mesh import CubedSphere, along_rays, corner_ratios, cubed_sphere, meeting, right_side_out
 from ..params import DehydrationParams
+from .upright import upright
 
 __all__ = ["Patch", "QuadraticMesh", "Symmetry", "build_quadratic_mesh", "graded_layers", "natural_symmetry"]
 
@@ -21,6 +22,8 @@ Symmetry = Literal["octant", "quarter", "whole"]
 
 #: Planes (as normal axes) that bound each part.
 PLANES: dict[Symmetry, tuple[int, ...]] = {"octant": (0, 1, 2), "quarter": (0, 2), "whole": ()}
+#: Share of the least corner ratio along rays that upright columns must keep.
+FLATTEST = 0.5
 
 
 class Patch(NamedTuple):
@@ -39,7 +42,8 @@ class QuadraticMesh:
     stacks: (ns, 9) columns under each quad of the surface. planes: normal axes of the symmetry planes that bound the
     mesh. quad_of: (6, n, n) stack of each quad of the cubed sphere, -1 where the part leaves it out.
     breaks: (layers + 1,) radial breakpoints: fraction of the flesh up to 1, then 1 + fraction of the exocarp.
-    cut: (columns,) those on the edge of a patch, which no symmetry holds.
+    cut: (columns,) those on the edge of a patch, which no symmetry holds. foot: share of the flesh's depth above which
+    columns stand upright (see `upright`), None where they follow rays.
     """
 
     sphere: CubedSphere
@@ -52,6 +56,7 @@ class QuadraticMesh:
     levels: int
     breaks: Floats
     cut: Bools
+    foot: float | None = None
 
     @property
     def columns(self) -> int:
@@ -84,47 +89,58 @@ def _with_middles(breaks: Floats) -> Floats:
 
 def build_quadratic_mesh(
     params: DehydrationParams, n: int, core: Floats, symmetry: Symmetry = "whole", exocarp_layers: int = 1,
-    patch: Patch | None = None,
+    patch: Patch | None = None, foot: float | None = None,
 ) -> QuadraticMesh:  # fmt: skip
     """Return the mesh with `n` quadratic elements per edge of the cubed sphere and core layers at fractions `core`.
 
-    patch: the stacks that are kept, by the middle of their outer faces; None keeps all.
+    patch: the stacks that are kept, by the middle of their outer faces along rays; None keeps all. foot: one of `core`,
+    above which columns stand upright; None has them follow rays, as they do where upright ones would cross.
 
-    Raises InvalidInput if a symmetric part is asked for with an odd `n`: its planes would cut elements in two.
+    Raises InvalidInput if a symmetric part is asked for with an odd `n`: its planes would cut elements in two;
+    InvalidGeometry where elements turn inside out.
     """
     planes = PLANES[symmetry]
     if n < 1 or (planes and n % 2):
         raise InvalidInput(
             f"n = {n} elements per edge cannot be cut along the symmetry planes.", advice="Use an even n of 2 or more."
         )
-    linear = build_mesh(params, 2 * n, _with_middles(core), 2 * exocarp_layers)
-    levels = linear.levels
-    grid = linear.sphere.faces
+    sphere = cubed_sphere(2 * n)
+    rays, outer = meeting(params, sphere.directions)
+    grid = sphere.faces
     quads = np.stack([grid[:, i : i + 2 * n : 2, j : j + 2 * n : 2] for i in range(3) for j in range(3)], axis=-1)
-    inside = np.ones(len(linear.rays), dtype=bool)
+    inside = np.ones(len(rays), dtype=bool)
     for axis in planes:
-        inside &= linear.rays[:, axis] > -1e-9
+        inside &= rays[:, axis] > -1e-9
     there = inside[quads].all(axis=-1)
     kept = there
     if patch is not None:
-        middles = linear.positions.reshape(-1, levels, 3)[quads[..., 4], -1]
+        middles = rays[quads[..., 4]] * (outer[quads[..., 4]] + params.exocarp_thickness)[..., None]
         kept = there & (np.linalg.norm(middles - patch.centre, axis=-1) <= patch.radius)
-    edge = np.zeros(len(linear.rays), dtype=bool)
+    edge = np.zeros(len(rays), dtype=bool)
     edge[quads[there & ~kept]] = True
     quad_of = np.where(kept, np.cumsum(kept.ravel()).reshape(kept.shape) - 1, -1)
     columns = np.unique(quads[kept])
-    number = np.full(len(linear.rays), -1)
+    number = np.full(len(rays), -1)
     number[columns] = np.arange(len(columns))
     stacks = number[quads[kept]]
-    positions = linear.positions.reshape(-1, levels, 3)[columns].copy()
-    for axis in planes:
-        positions[np.abs(linear.rays[columns, axis]) < 1e-9, :, axis] = 0.0
+    positions = along_rays(params, rays[columns], outer[columns], _with_middles(core), 2 * exocarp_layers)
+    levels = positions.shape[1]
     layers = (levels - 1) // 2
+    corners = stacks[:, None, [0, 2, 6, 8], None] * levels + 2 * np.arange(layers)[:, None, None] + np.array([0, 2])
+    worst = right_side_out(positions.reshape(-1, 3), corners.reshape(-1, 8))
+    if foot is not None:
+        raised = upright(params, positions.reshape(-1, 3), foot)
+        if float(corner_ratios(raised, corners.reshape(-1, 8)).min()) > FLATTEST * worst:
+            positions = raised.reshape(positions.shape)
+        else:
+            foot = None
+    for axis in planes:
+        positions[np.abs(rays[columns, axis]) < 1e-9, :, axis] = 0.0
     level = 2 * np.arange(layers)[:, None] + np.arange(3)
     connectivity = (stacks[:, None, :, None] * levels + level[None, :, None, :]).reshape(-1, 27)
     is_exocarp = np.tile(np.arange(layers) >= len(core) - 1, len(stacks))
     breaks = np.concatenate([core, 1 + np.arange(1, exocarp_layers + 1) / exocarp_layers])
     return QuadraticMesh(
-        linear.sphere, positions.reshape(-1, 3), connectivity, is_exocarp, stacks, planes, quad_of, levels, breaks,
-        edge[columns],
+        sphere, positions.reshape(-1, 3), connectivity, is_exocarp, stacks, planes, quad_of, levels, breaks,
+        edge[columns], foot,
     )  # fmt: skip

@@ -196,15 +196,18 @@ def equilibrium(
     tolerance: float = 1e-9,
     start: Equilibrium | None = None,
     guess: Equilibrium | None = None,
+    alone: bool = False,
     context: Context | None = None,
 ) -> Equilibrium:
     """Return the equilibrium at `shrinkage`, from `start` (default: fresh) in one increment or as many as it takes.
 
-    guess: a state near the wanted one, tried first. tolerance: of |R| / |sum of absolute element forces|. An increment
-    that does not converge is halved; one that does makes the next half as long again.
+    guess: a state near the wanted one, tried first; alone: and nothing after it, as no other has a patch's edge where
+    it belongs. tolerance: of |R| / |sum of absolute element forces|. An increment that does not converge is halved; one
+    that does makes the next half as long again.
 
     Raises:
         NotConverged: an increment below 1e-4 did not converge; last_stage and residual say how far it came.
+            With `alone`: the guess did not.
         Cancelled: by the context.
 
     """
@@ -212,8 +215,12 @@ def equilibrium(
     if guess is not None:
         try:
             return _solve(model, guess, shrinkage, tolerance, context)
-        except _Stuck:
-            pass
+        except _Stuck as stuck:
+            if alone:
+                raise NotConverged(
+                    f"no equilibrium was found near a guess at s = {shrinkage:.4f}.",
+                    advice="Ask for a finer quality.", residual=stuck.residual,
+                ) from None  # fmt: skip
     at = start or Equilibrium(0.0, model.mesh.positions, np.zeros((len(model.mesh.connectivity), PRESSURE.shape[1])))
     increment = shrinkage - at.shrinkage
     while at.shrinkage != shrinkage:
