@@ -42,8 +42,8 @@ def metric_of_lengths(lengths: Floats) -> Floats:
 
 
 def areas(g: Floats) -> Floats:
-    """Return the areas (f,) of metrics g (f, 3)."""
-    return 0.5 * np.sqrt(g[:, 0] * g[:, 2] - g[:, 1] ** 2)
+    """Return the areas (f,) of metrics g (f, 3); a triangle that has collapsed may be less than flat by rounding."""
+    return 0.5 * np.sqrt(np.maximum(g[:, 0] * g[:, 2] - g[:, 1] ** 2, 0.0))
 
 
 @njit(cache=True, error_model="numpy")

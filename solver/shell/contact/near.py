@@ -51,7 +51,8 @@ def near_of(metrics: tuple[Floats, ...], mesh: Topology, lengths: Floats, areas:
     altitudes = np.full(n, np.inf)
     for g in metrics:
         squares = np.maximum(np.maximum(g[:, 0], g[:, 2]), g[:, 0] + g[:, 2] - 2 * g[:, 1])
-        heights = np.sqrt((g[:, 0] * g[:, 2] - g[:, 1] ** 2) / squares)
+        # a triangle that has collapsed may be less than flat by rounding
+        heights = np.sqrt(np.maximum(g[:, 0] * g[:, 2] - g[:, 1] ** 2, 0.0) / squares)
         for corner in range(3):
             np.minimum.at(altitudes, mesh.triangles[:, corner], heights)
     owners = mesh.triangles.min(axis=1)

@@ -152,3 +152,20 @@ def test_edges_alone_stop_two_triangles_that_pass_edge_first():
     assert 0.2 < share < 0.3
     assert crossings(x + way, mesh.triangles).count
     assert not crossings(x + share * way, mesh.triangles).count
+
+
+def test_a_collapsed_triangle_has_neither_height_nor_area():
+    """Of three points on a line the squares may differ by rounding either way, which depends on the processor."""
+    rng, triangles = np.random.default_rng(0), np.array([[0, 1, 2], [0, 2, 3]])
+    mesh, squared = shell.topology(triangles, 4), []
+    for _ in range(200):
+        way, along = rng.normal(size=3), np.sort(rng.uniform(size=2))
+        x = np.array([[0.0, 0, 0], along[0] * way, way, rng.normal(size=3)])
+        g = shell.metric(x, triangles)
+        squared.append(g[0, 0] * g[0, 2] - g[0, 1] ** 2)
+        lengths = np.linalg.norm(x[mesh.edges[:, 0]] - x[mesh.edges[:, 1]], axis=1)
+        with np.errstate(all="raise"):
+            near = shell.near_of((g,), mesh, lengths, np.ones(4), 0.1)
+            assert shell.areas(g)[0] < 1e-7
+        assert np.all(near.altitudes[:3] < 1e-6)
+    assert min(squared) < 0 < max(squared)
