@@ -96,6 +96,11 @@ def test_large_tables_have_a_spline_at_every_sample() -> None:
         np.testing.assert_allclose(weights @ samples.points, place, atol=1e-9)
         # a spline follows what bends, where a linear mean cuts the corner
         assert weights @ (samples.points[:, 0] ** 2) == pytest.approx(place[0] ** 2, abs=0.012)
+    # at a sample, where no spline is asked, no more is lost than beside it
+    at = np.array([te[2, 3], gamma[2, 3]])
+    near = samples.weigh("thin", at, 6, 2.0)
+    assert near.samples.tolist() == [15]
+    assert thin.mix(near, samples.scale(at), [0]).lossy == pytest.approx(0, abs=1e-6)
     line = np.stack([np.linspace(0.15, 0.45, 4001), np.full(4001, 0.37)], axis=-1)
     rows = np.array([dense(place) for place in line])
     assert np.abs(np.diff(rows, axis=0)).max() < 4e-3
