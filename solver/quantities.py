@@ -176,7 +176,7 @@ register(
     grip_torque=Quantity("N m", "mean moment about its pivot that each grip put in since the stage before", "M"),
     grip_shift=Quantity("m", "mean way of each grip from its place at time 0, since the stage before", "u"),
     grip_turn=Quantity(
-        "rad", "mean rotation vector of each grip from its attitude at time 0, since the stage before", "phi"
+        "radian", "mean rotation vector of each grip from its attitude at time 0, since the stage before", "phi"
     ),
     fragments=Quantity("1", "pieces that hang together by whole rods and bonds", "n_f"),
     fragment_mass=Quantity("kg", "masses of the 32 heaviest fragments, the heaviest first; 0 where there is none", "m"),
