@@ -156,6 +156,7 @@ def test_plan_and_table_must_fit(site: None, tmp_path: Path) -> None:
     assert len(store.ledger.jobs("done", refine.name_of(plan).replace("plan", "grid"))) == 2
 
 
+@pytest.mark.slow
 def test_the_benchmark_on_dried_fruits_works(site: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its command, on a solver with a closed form: every row that the document shows comes out of it."""
     kept: dict[str, Any] = {}
