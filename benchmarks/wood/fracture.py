@@ -25,10 +25,10 @@ from solver.wood import SOLVER
 
 from .softening import Flexure
 
-__all__ = ["DCB", "ENF", "Trial", "measured", "trial"]
+__all__ = ["DCB", "ENF", "E_ACROSS", "WIDE", "E", "G", "Trial", "chi", "measured", "trial"]
 
 #: Spruce along the grain: E, across it, G [Pa]; toughness by opening and by sliding [J/m2]; width of the planks [m].
-_E, _ACROSS, _G, _OPENS, _SLIDES, _WIDE = 10e9, 0.5e9, 0.7e9, 250.0, 700.0, 0.02
+E, E_ACROSS, G, _OPENS, _SLIDES, WIDE = 10e9, 0.5e9, 0.7e9, 250.0, 700.0, 0.02
 #: Shear strength [Pa].
 _SHEARS = 8e6
 #: Forces are means between so many times.
@@ -40,8 +40,8 @@ _HEAD = ("test", "rods", "vertices", "seed", "force before", "highest", "mean af
 
 def chi() -> float:
     """Return by how much longer cracks are than they look, over half the plank's height (ISO 15024)."""
-    soft = 1.18 * np.sqrt(_E * _ACROSS) / _G
-    return float(np.sqrt(_E / (11 * _G) * (3 - 2 * (soft / (1 + soft)) ** 2)))
+    soft = 1.18 * np.sqrt(E * E_ACROSS) / G
+    return float(np.sqrt(E / (11 * G) * (3 - 2 * (soft / (1 + soft)) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,9 @@ def _opened(near: float, path: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _opens(cut: float) -> tuple[np.ndarray, np.ndarray]:
     """Force P and opening of a crack of length a: P^2 a^2 = G b EI and 2 P a^3 / (3 EI), a with its correction."""
-    bend = _E * _WIDE * _DCB_HIGH**3 / 12
+    bend = E * WIDE * _DCB_HIGH**3 / 12
     a = cut + chi() * _DCB_HIGH + np.linspace(0, 0.06, 400)
-    force = np.sqrt(_OPENS * _WIDE * bend) / a
+    force = np.sqrt(_OPENS * WIDE * bend) / a
     return np.append(0.0, 2 * force * a**3 / (3 * bend)), np.append(0.0, force)
 
 
@@ -98,7 +98,7 @@ def _slid(near: float, path: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _slides(cut: float) -> tuple[np.ndarray, np.ndarray]:
     """Beam theory with an interface that softens; a crack counts longer by .42 chi h (Williams 1989)."""
     more = 0.42 * chi() * _ENF_HIGH
-    theory = Flexure(_ENF_HIGH, _WIDE, _ENF_HALF, _E, _G, _SHEARS, _SLIDES, more)
+    theory = Flexure(_ENF_HIGH, WIDE, _ENF_HALF, E, G, _SHEARS, _SLIDES, more)
     d, force = theory.curve(cut - _ENF_OVER)
     # what turns back cannot be followed by a jaw
     rises = np.append(True, d[1:] > np.maximum.accumulate(d)[:-1])
@@ -122,13 +122,13 @@ def _path(trial: Trial) -> list[dict[str, Any]]:
 
 def trial(of: Trial, rods: int, vertices: int, seed: int = 0, **values: Any) -> Mapping[str, np.ndarray]:
     """Return displacements [m] and forces [N] between stages, and areas [m2] and energies [J] at stages."""
-    half, path = _WIDE / 2, _path(of)
+    half, path = WIDE / 2, _path(of)
     wood = {
         "length": of.length, "rods": rods, "vertices": vertices, "seed": seed, "unevenness": 0.0, "strain_limit": 1.0,
         "outline": [(-half, -of.high), (half, -of.high), (half, of.high), (-half, of.high)],
         "grain": {"stiffness": 0.0, "strength": 0.0}, "clamp": "start" if of is DCB else "none",
         "cuts": [{"low": (of.cut[0], -1, 0), "high": (of.cut[1], 1, 0)}],
-        "stiffness": _E, "transverse": _ACROSS, "shear": _G, "toughness": _OPENS, "toughness_sliding": _SLIDES,
+        "stiffness": E, "transverse": E_ACROSS, "shear": G, "toughness": _OPENS, "toughness_sliding": _SLIDES,
         "shear_strength": _SHEARS,
         "grips": of.grips(0.505 * of.length / (vertices - 1), path), "mass_scaling": of.scaling, "damping": 8.0,
     }  # fmt: skip
@@ -147,7 +147,7 @@ def trial(of: Trial, rods: int, vertices: int, seed: int = 0, **values: Any) -> 
 
 def measured(of: Trial, run: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Return what the curve is beside beam theory's, as ratios, and what the crack took."""
-    way, force = of.theory(float(run["area"][0]) / _WIDE)
+    way, force = of.theory(float(run["area"][0]) / WIDE)
     d, p, top = run["way"], run["force"], float(way[np.argmax(force)])
     before, after, all_ = (d > 0.4 * top) & (d < 0.8 * top), (d > top) & (d < way[-1]), (d > 0.4 * top) & (d < way[-1])
     wanted = np.interp(d, way, force)
@@ -193,7 +193,7 @@ def main(meshes: list[str]) -> None:
         sheet.add(
             (name, rods, vertices, seed, *(f"{got[k]:.3f}" for k in ("before", "highest", "mean", "rms")),
              f"{1e4 * got['area']:.2f}", f"{got['by_area']:.0f}", f"{cpu:.0f}"),
-            test=name, rods=int(rods), vertices=int(vertices), seed=int(seed), cut=float(run["area"][0]) / _WIDE,
+            test=name, rods=int(rods), vertices=int(vertices), seed=int(seed), cut=float(run["area"][0]) / WIDE,
             way_m=[float(f"{v:.4g}") for v in run["way"]], force_N=[float(f"{v:.4g}") for v in run["force"]],
             cpu_s=cpu, **got,
         )  # fmt: skip

@@ -36,8 +36,8 @@ def add(stage: Any, material: Any, inputs: Mapping[str, Source]) -> None:
         wanted = surface.CreateInput(name, Sdf.ValueTypeNames.Color3f if coloured else Sdf.ValueTypeNames.Float)
         if isinstance(source, str):
             wanted.ConnectToSource(_of_vertices(stage, path.AppendChild(f"{name}_of_vertices"), source, coloured))
-        elif isinstance(source, float):
-            wanted.Set(source)
+        elif isinstance(source, int | float):
+            wanted.Set(float(source))
         elif isinstance(source, tuple):
             wanted.Set(Gf.Vec3f(*source))
         else:

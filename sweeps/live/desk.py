@@ -22,7 +22,7 @@ _WINDOW, _BETWEEN = 2, 1 / 30
 _SLICE = 0.01
 #: Seconds without work after which the client gets every digit.
 _REST = 0.3
-#: Processor seconds after which a step that has no end waits for somebody who wants it: growth against all reason.
+#: Processor seconds after which a step that has no end waits for somebody who wants it.
 _LONG = 20.0
 _QUALITIES = ("preview", "default", "fine")
 
