@@ -43,7 +43,7 @@ def matched(data: bytes, suffix: str, size: float | None, **known: float) -> Any
     return answer.match(targets.read(data, suffix, size), TABLES, "default", known)
 
 
-@pytest.mark.parametrize("n", [64, 100])
+@pytest.mark.parametrize("n", [64, pytest.param(100, marks=pytest.mark.slow)])
 def test_a_turned_mirrored_moved_and_scaled_file_is_found_again(n: int) -> None:
     points = Rotation.random(random_state=3).apply(shape(n)) * [-1, 1, 1] * 7.5 + [3, -20, 100]
     page = matched(obj(points, closed_lattice(n)[:, ::-1]), ".obj", 7.5)
