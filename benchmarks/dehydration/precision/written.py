@@ -1,6 +1,6 @@
 """Whether the surfaces that a run writes pass through themselves, counted in the files by code of its own.
 
-    python -m benchmarks.dehydration.written
+    python -m benchmarks.dehydration.precision.written
 
 Each run is made by `wizen solve` and written by `wizen export` as OBJ: the finite elements' own surface, and the
 lattice's. Every pair of triangles without a common corner whose boxes meet is looked at, edge against triangle (Moller
