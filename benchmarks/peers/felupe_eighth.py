@@ -138,9 +138,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--mesh", type=Path, required=True, help="npz: points, cells (VTK's order), core, fixed, gamma")
     parser.add_argument("--stages", required=True, help="shrinkages, rising, with commas")
-    parser.add_argument(
-        "--start", type=Path, help="npz: nodes (stages, n, 3) to start stages from, and no march"
-    )
+    parser.add_argument("--start", type=Path, help="npz: nodes (stages, n, 3) to start stages from, and no march")
     parser.add_argument("--step", type=float, default=0.0025)
     parser.add_argument("--out", type=Path, required=True, help="npz: nodes (stages, n, 3)")
     asked = parser.parse_args()

@@ -40,6 +40,15 @@ def test_smooth_sphere_meets_the_closed_form():
     assert np.log(uneven[0] / uneven[2]) / np.log(18 / 8) == pytest.approx(2, abs=0.6)
 
 
+@pytest.mark.parametrize(("last", "is_smooth"), [(0.1, True), (0.14, False)])
+def test_a_stage_past_the_onset_that_is_still_smooth_is_told_of(last, is_smooth):
+    """The exact onset is at 0.0966; what is marched buckles at 0.108."""
+    params = SOLVER.parse({"te": 0.1, "gamma": 10, "mirrors": "xyz"})
+    run = SOLVER.solve(params, SOLVER.settle(Need(stages=(0.05, last), quality="preview", fields=("roughness",))))
+    assert (run["roughness"].values[-1] < 0.01) == is_smooth
+    assert run.attrs.get("note", "").startswith("s = 0.1: just past the onset (0.0966)") == is_smooth
+
+
 @pytest.mark.parametrize("quality", ["preview", "default"])
 def test_the_strain_energy_is_that_of_flesh(quality):
     """By quadrature of the closed form along a radius; the march's bulk modulus and rest volumes were 7 % off here."""
