@@ -208,6 +208,58 @@ def test_a_wound_is_put_where_the_shape_is_clicked(browser: Browser, studio: str
     visit.page.close()
 
 
+def test_a_frost_is_drawn_and_stops_the_rot(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1200, "height": 900}, bypass_csp=True)
+    page = visit.page
+    page.goto(at(studio, "room=decay&preset=apple&stages=0,4"))
+    visit.shown()
+    warm = page.locator("#seen dl").text_content()
+    page.locator("summary", has_text="Weather").click()
+    field = page.locator(".course .field-of").first  # of the temperature
+    box = field.bounding_box()
+    assert box is not None
+    field.click(position={"x": 3, "y": box["height"] / 2})
+    field.click(position={"x": 0.5 * box["width"], "y": box["height"] - 1})
+    points = page.locator(".course svg").first.get_by_role("slider")
+    assert points.count() == 2
+    # by hand to the ground, then by keys a little up and back again
+    first, plot = points.nth(0).bounding_box(), field.bounding_box()
+    assert first is not None
+    assert plot is not None
+    page.mouse.move(first["x"] + first["width"] / 2, first["y"] + first["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(plot["x"] + 4, plot["y"] + plot["height"] + 20, steps=4)
+    page.mouse.up()
+    points.nth(0).focus()
+    page.keyboard.press("ArrowUp")
+    assert "-9.3 degC" in (points.nth(0).get_attribute("aria-valuetext") or "")
+    page.keyboard.press("ArrowDown")
+    assert "-10 degC" in (points.nth(0).get_attribute("aria-valuetext") or "")
+    said = page.locator("code", has_text="wizen solve").inner_text()
+    [weather] = re.findall(r"--set 'weather=([^']*)'", said)
+    assert [each["temperature"] for each in json.loads(weather)] == pytest.approx([-10, -10], abs=1.5)
+    page.get_by_role("button", name="Run").click()
+    page.locator("#controls .note", has_text="Done in").wait_for(timeout=120_000)
+    visit.shown("shown.of == 2")
+    job = parse_qs(urlsplit(page.url).fragment)["job"][0]
+    done = httpx.get(f"{studio.split('/#')[0]}/v1/jobs/{job}").json()
+    assert [each["temperature"] for each in done["params"]["weather"]] == pytest.approx([-10, -10], abs=1.5)
+    fields = httpx.get(f"{studio.split('/#')[0]}/v1/jobs/{job}/fields?names=rotten_share").json()["fields"]
+    shares = fields["rotten_share"]["values"]
+    assert shares[-1] == pytest.approx(shares[0], abs=1e-6), "nothing grows in frost"
+    assert page.locator("#seen dl").text_content() != warm
+    page.add_script_tag(path=AXE)
+    assert page.evaluate("async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])") == []
+    # taken away again, the steady air holds
+    points.nth(1).focus()
+    page.keyboard.press("Delete")
+    page.locator(".course svg").first.get_by_role("slider").nth(0).focus()
+    page.keyboard.press("Delete")
+    assert "weather" not in page.locator("code", has_text="wizen solve").inner_text()
+    assert visit.complaints == []
+    page.close()
+
+
 def test_breaking_has_a_load_curve_in_newtons(browser: Browser, studio: str) -> None:
     visit = Visit(browser, viewport={"width": 1200, "height": 800})
     visit.page.goto(at(studio, "room=wood"))

@@ -2,6 +2,7 @@
 
 import type { Parameters, Schema, Values } from "../service/solvers";
 import { same } from "../service/solvers";
+import { between, Course, type Point } from "./course";
 import { button, details, digits, el } from "./dom";
 
 /** One value that can be edited. `get` throws what is wrong with it. */
@@ -173,7 +174,7 @@ function union(schema: Schema, label: string, defs: Record<string, Schema>, chan
   };
 }
 
-function list(schema: Schema, label: string, defs: Record<string, Schema>, changed: Changed): Editor & { add(value?: unknown): void } {
+function list(schema: Schema, label: string, defs: Record<string, Schema>, changed: Changed, next?: () => unknown): Editor & { add(value?: unknown): void } {
   const rows = el("div", { class: "rows" });
   const own: { root: HTMLElement; editor: Editor }[] = [];
   const one = schema.items as Schema;
@@ -191,7 +192,7 @@ function list(schema: Schema, label: string, defs: Record<string, Schema>, chang
     rows.append(row.root);
   };
   const more = button("Add", () => {
-    put();
+    put(next?.());
     changed();
   }, { "aria-label": `Add to ${label}` });
   return {
@@ -206,6 +207,41 @@ function list(schema: Schema, label: string, defs: Record<string, Schema>, chang
       put(value);
       changed();
     },
+  };
+}
+
+/** A list whose entries follow each other along one of their numbers: curves above the numbers. */
+function course(schema: Schema, label: string, defs: Record<string, Schema>, changed: Changed, start: () => Point): ReturnType<typeof list> {
+  const along = schema.along as string;
+  const item = resolved(schema.items as Schema, defs).schema;
+  const read = (): Point[] => rows.get() as Point[];
+  const told = (): void => {
+    try {
+      curves.show(read());
+    } catch {
+      // said beside the number
+    }
+    changed();
+  };
+  const rows = list(schema, label, defs, told, () => {
+    const points = read();
+    const last = points[points.length - 1];
+    const { maximum = Infinity, minimum = 0 } = (item.properties ?? {})[along];
+    return between(points, along, last ? Math.min(maximum, last[along] + 1) : minimum, start());
+  });
+  const curves = new Course(item, along, start, (points) => {
+    rows.set(points);
+    changed();
+  });
+  const hint = el("p", { class: "hint" }, "Click to add a point, drag it, or move it by arrow keys; Delete takes it away.");
+  return {
+    root: el("div", {}, hint, curves.root, details("As numbers", false, rows.root)),
+    get: rows.get,
+    set: (value) => {
+      rows.set(value);
+      curves.show((value as Point[] | undefined) ?? []);
+    },
+    add: rows.add,
   };
 }
 
@@ -325,10 +361,11 @@ export class Form {
   private field(name: string, given: Schema, isOpen: boolean): HTMLElement {
     const label = titled(name);
     const { schema: found } = resolved(given, this.defs);
-    const made = editor(given, label, this.defs, () => {
+    const changed = (): void => {
       this.count();
       this.changed();
-    });
+    };
+    const made = found.along ? course(found, label, this.defs, changed, () => this.steady(found)) : editor(given, label, this.defs, changed);
     const wrong = el("p", { class: "wrong", role: "status" });
     const about = [found.description, range(found)].filter(Boolean).join("; ");
     const field: Field = { name, editor: made, wrong };
@@ -342,6 +379,22 @@ export class Form {
     const opened = details(label, false, el("p", { class: "hint" }, about), made.root, wrong);
     field.summary = opened.querySelector("summary") as HTMLElement;
     return opened;
+  }
+
+  /** What holds where a course says nothing: the parameters of the same names, else the middle of what may be. */
+  private steady(list: Schema): Point {
+    const { properties = {} } = resolved(list.items as Schema, this.defs).schema;
+    const value = (name: string): number => {
+      try {
+        const own = this.fields.find((field) => field.name === name)?.editor.get();
+        if (typeof own === "number") return own;
+      } catch {
+        // said beside it
+      }
+      const { minimum = 0, maximum = 1 } = properties[name];
+      return (minimum + maximum) / 2;
+    };
+    return Object.fromEntries(Object.keys(properties).map((name) => [name, value(name)]));
   }
 
   private count(): void {
