@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -15,6 +16,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import httpx
 import pytest
+import trimesh
 
 from ._browser import MARKS, ROOT, Visit, serving
 
@@ -256,6 +258,51 @@ def test_a_frost_is_drawn_and_stops_the_rot(browser: Browser, studio: str) -> No
     page.locator(".course svg").first.get_by_role("slider").nth(0).focus()
     page.keyboard.press("Delete")
     assert "weather" not in page.locator("code", has_text="wizen solve").inner_text()
+    assert visit.complaints == []
+    page.close()
+
+
+@pytest.mark.parametrize("room", ["decay", "growth"])
+def test_a_mesh_of_ones_own_is_sent_run_and_shown(browser: Browser, studio: str, tmp_path: Path, room: str) -> None:
+    ring = tmp_path / "ring.obj"
+    trimesh.creation.torus(20.0, 8.0, major_sections=32, minor_sections=16).export(ring)
+    visit = Visit(browser, viewport={"width": 1200, "height": 900}, bypass_csp=True)
+    page = visit.page
+    page.goto(at(studio, f"room={room}"))
+    visit.shown()
+    page.locator("summary", has_text=re.compile("^Mesh$")).click()
+    chooser = page.locator(".meshfile input")
+    # a file that promises two thousand million points is refused beside the button, and nothing of it is sent on
+    evil = tmp_path / "evil.ply"
+    evil.write_bytes(
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 2000000000\nproperty float x\nproperty float y\n"
+        b"property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" + bytes(64)
+    )
+    chooser.set_input_files(evil)
+    page.locator(".meshfile .wrong", has_text="2000000000").wait_for()
+    # the browser itself says that a request was refused
+    assert [text for text in visit.complaints if "422" not in text] == []
+    visit.complaints.clear()
+    assert "mesh" not in page.locator("code", has_text="wizen solve").inner_text()
+    chooser.set_input_files(ring)
+    page.locator(".meshfile .note", has_text="512 points, 1024 triangles, closed").wait_for()
+    assert page.locator(".meshfile .wrong").inner_text() == ""
+    page.locator("#stages").fill("0, 4" if room == "decay" else "0.1, 0.2")
+    page.add_script_tag(path=AXE)
+    assert page.evaluate("async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])") == []
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.locator("#controls .note", has_text="Done in").wait_for(timeout=180_000)
+    visit.shown("shown.of == 2")
+    root = studio.split("/#")[0]
+    job = parse_qs(urlsplit(page.url).fragment)["job"][0]
+    assert len(httpx.get(f"{root}/v1/jobs/{job}").json()["params"]["mesh"]["points"]) == 512
+    shape = trimesh.load(io.BytesIO(httpx.get(f"{root}/v1/jobs/{job}/result?format=glb").content), file_type="glb")
+    assert sum(len(one.faces) for one in shape.geometry.values()) >= 1024
+    assert shape.extents.max() / shape.extents.min() == pytest.approx(3.5, rel=0.1), "a ring, as it was drawn"
+    with page.expect_download() as taken:
+        page.locator("a", has_text="Job as JSON").click()
+    assert len(json.loads(Path(taken.value.path()).read_text())["params"]["mesh"]["faces"]) == 1024
+    page.screenshot(path=f"/tmp/scene20/mesh-{room}.png")
     assert visit.complaints == []
     page.close()
 

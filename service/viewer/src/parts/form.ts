@@ -4,6 +4,7 @@ import type { Parameters, Schema, Values } from "../service/solvers";
 import { same } from "../service/solvers";
 import { between, Course, type Point } from "./course";
 import { button, details, digits, el } from "./dom";
+import { MeshFile } from "./meshfile";
 
 /** One value that can be edited. `get` throws what is wrong with it. */
 interface Editor {
@@ -266,6 +267,7 @@ function optional(inner: Editor, label: string, changed: Changed): Editor {
 
 function editor(given: Schema, label: string, defs: Record<string, Schema>, changed: Changed): Editor {
   const { schema, optional: may } = resolved(given, defs);
+  if (may && hasMesh(schema)) return new MeshFile(label, changed);
   const made = plain(schema, label, defs, changed);
   return may ? optional(made, label, changed) : made;
 }
@@ -286,7 +288,7 @@ const isList = (items: Schema, defs: Record<string, Schema>): boolean => {
   return schema.discriminator !== undefined || schema.properties !== undefined || schema.prefixItems !== undefined;
 };
 
-/** Vertices and triangles are no matter for a form. */
+/** Points and triangles are a matter for a file. */
 const hasMesh = (schema: Schema): boolean => Object.keys(schema.properties ?? {}).some((name) => ["vertices", "faces", "triangles"].includes(name));
 
 interface Field {
@@ -314,7 +316,7 @@ export class Form {
       const { schema: found } = resolved(given, this.defs);
       const entries = found.type === "array" && found.items && isList(found.items, this.defs);
       const made = this.field(name, given, Boolean(entries));
-      (entries ? lists : first.has(name) && found.type !== "object" ? main : rest).push(made);
+      (entries || hasMesh(found) ? lists : first.has(name) && found.type !== "object" ? main : rest).push(made);
     }
     this.root.append(...main, ...lists, ...(rest.length ? [details(`More parameters (${rest.length})`, false, ...rest)] : []));
   }
