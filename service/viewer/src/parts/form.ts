@@ -14,6 +14,8 @@ interface Editor {
 }
 
 type Changed = () => void;
+/** Stands for no word of a schema's. */
+const OWN = "\u0000";
 let numbered = 0;
 
 const clone = <T>(value: T): T => (value === undefined ? value : JSON.parse(JSON.stringify(value)));
@@ -265,7 +267,32 @@ function optional(inner: Editor, label: string, changed: Changed): Editor {
   };
 }
 
+/** A word, or a value of one's own. */
+function either(words: string[], inner: Editor, label: string, changed: Changed): Editor {
+  const pick = el("select", { "aria-label": `${label}: which` }, ...words.map((word) => el("option", { value: word }, word)), el("option", { value: OWN }, "as written"));
+  const show = (): void => void (inner.root.hidden = pick.value !== OWN);
+  pick.addEventListener("change", () => {
+    show();
+    changed();
+  });
+  show();
+  return {
+    root: el("div", { class: "either" }, pick, inner.root),
+    get: () => (pick.value === OWN ? inner.get() : pick.value),
+    set: (value) => {
+      pick.value = words.includes(value as string) ? (value as string) : OWN;
+      if (pick.value === OWN) inner.set(value);
+      show();
+    },
+  };
+}
+
 function editor(given: Schema, label: string, defs: Record<string, Schema>, changed: Changed): Editor {
+  const words = (given.anyOf ?? []).flatMap((one) => (typeof one.const === "string" ? [one.const] : []));
+  if (words.length && given.anyOf) {
+    const rest = given.anyOf.filter((one) => one.const === undefined);
+    if (rest.length) return either(words, editor({ ...given, anyOf: rest }, label, defs, changed), label, changed);
+  }
   const { schema, optional: may } = resolved(given, defs);
   if (may && hasMesh(schema)) return new MeshFile(label, changed);
   const made = plain(schema, label, defs, changed);
