@@ -191,7 +191,7 @@ def _preset(radii: tuple[float, ...], stone: tuple[float, float], te: float, gam
 
 #: The sphere of Figs. 6-9 and the six fruits of Table 1 (its wolfberry row lacks r8: a circular equator, r8 = r4), then
 #: six more, ovals of published proportions:
-#: raisin2: the slimmest fruit of Fig. 10, whose skin of 0.03 folds into the few deep creases of raisins as one buys them.
+#: raisin2: the slimmest fruit of Fig. 10, whose skin of 0.03 folds into few, deep creases, as of raisins one buys.
 #: potato: length over width 1.2 to 1.5 (grades of trade; "ellipsoidal", Tabatabaeefar, Int. Agrophysics 16 (2002) 301).
 #: banana: 27 mm thick, 140 mm long (the least that Regulation (EU) 1333/2011 lets be sold); straight, as all axes here.
 #: passionfruit: a globe of 4 to 7.5 cm. date: 3 to 7 by 2 to 3 cm, its stone 2 to 2.5 cm by 6 to 8 mm.

@@ -43,7 +43,10 @@ scene.environment = new T.PMREMGenerator(renderer).fromScene(new RoomEnvironment
 scene.environmentIntensity = 0.6;
 const loaded = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).loadAsync("/scene.glb");
 loaded.scene.scale.setScalar(1 / unit);
-loaded.scene.traverse((one) => { if (one.isMesh) one.castShadow = one.receiveShadow = true; one.frustumCulled = false; });
+loaded.scene.traverse((one) => {
+  if (one.isMesh) one.castShadow = one.receiveShadow = true;
+  one.frustumCulled = false;
+});
 const eye = new T.PerspectiveCamera(camera.fov, width / height, 0.1, 1000);
 eye.position.fromArray(camera.position);
 const away = eye.position.distanceTo(new T.Vector3().fromArray(camera.target));
@@ -53,10 +56,12 @@ sun.position.set(-0.39, 0.74, 0.3).multiplyScalar(away);
 sun.castShadow = true;
 sun.shadow.mapSize.set(2048, 2048);
 const wide = 0.48 * away;
-Object.assign(sun.shadow.camera, { left: -wide, right: wide, top: wide, bottom: -wide, near: 0.05 * away, far: 2.2 * away });
+const frustum = { left: -wide, right: wide, top: wide, bottom: -wide, near: 0.05 * away, far: 2.2 * away };
+Object.assign(sun.shadow.camera, frustum);
 sun.shadow.bias = -0.0006;
 sun.shadow.normalBias = 0.0013 * away;
-const floor = new T.Mesh(new T.PlaneGeometry(9 * away, 9 * away), new T.MeshStandardMaterial({ color: "#c9b08d", roughness: 0.9 }));
+const wood = new T.MeshStandardMaterial({ color: "#c9b08d", roughness: 0.9 });
+const floor = new T.Mesh(new T.PlaneGeometry(9 * away, 9 * away), wood);
 floor.rotation.x = -Math.PI / 2;
 floor.position.y = new T.Box3().setFromObject(loaded.scene).min.y;
 floor.receiveShadow = true;

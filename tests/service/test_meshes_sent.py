@@ -14,11 +14,15 @@ import trimesh
 
 
 def torus() -> bytes:
-    return bytes(trimesh.creation.torus(2.0, 0.5, major_sections=24, minor_sections=12).export(file_type="obj"), "ascii")
+    return bytes(
+        trimesh.creation.torus(2.0, 0.5, major_sections=24, minor_sections=12).export(file_type="obj"), "ascii"
+    )
 
 
 def glb_elsewhere() -> bytes:
-    text = json.dumps({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 36, "uri": "file:///etc/hostname"}]}).encode()
+    text = json.dumps(
+        {"asset": {"version": "2.0"}, "buffers": [{"byteLength": 36, "uri": "file:///etc/hostname"}]}
+    ).encode()
     text += b" " * (-len(text) % 4)
     return struct.pack("<III", 0x46546C67, 2, 20 + len(text)) + struct.pack("<II", len(text), 0x4E4F534A) + text
 
