@@ -22,6 +22,7 @@ from sweeps.formats import extend
 from .commands import export as cli_export
 from .commands import match as cli_match
 from .commands import scene as cli_scene
+from .limits import memory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,14 +82,15 @@ def serve(
 
     wizen serve --store /shared/fruits --scheduler tcp://10.0.0.1:8786
     """
-    own = (store or _own_store()) if studio else store
-    # a studio answers its owner, whose own meshes are large
-    body = _MESHES if studio and "WIZEN_MAX_BODY" not in os.environ else None
-    settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler, max_body=body)
-    secret = _fitted_out(settings.store) if studio else ""
-    listener = _listen(settings.host, settings.port)
-    _announce(settings, listener.getsockname()[1], secret)
-    _answer(settings, listener)
+    with memory.loading():
+        own = (store or _own_store()) if studio else store
+        # a studio answers its owner, whose own meshes are large
+        body = _MESHES if studio and "WIZEN_MAX_BODY" not in os.environ else None
+        settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler, max_body=body)
+        secret = _fitted_out(settings.store) if studio else ""
+        listener = _listen(settings.host, settings.port)
+        _announce(settings, listener.getsockname()[1], secret)
+        _answer(settings, listener)
 
 
 def _announce(settings: Settings, port: int, secret: str) -> None:

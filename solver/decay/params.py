@@ -9,11 +9,12 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ..fruit import Fruit
+from ..painted import Painted
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
 from .hyphae import FURS, Hyphae
 from .surfaces.imported import Mesh
-from .surfaces.places import Neighbour, Painted, Pressure, PressureMap, Wound
+from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 
