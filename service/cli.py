@@ -36,6 +36,10 @@ if TYPE_CHECKING:
 __all__ = ["app", "main"]
 
 
+#: Largest request body of a studio [bytes]: a mesh of 100,000 points as JSON, twice over.
+_MESHES = 32 << 20
+
+
 class PortInUse(SweepError):
     """Another program listens where the service should."""
 
@@ -80,7 +84,9 @@ def serve(
     """
     with memory.loading():
         own = (store or _own_store()) if studio else store
-        settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler)
+        # a studio answers its owner, whose own meshes are large
+        body = _MESHES if studio and "WIZEN_MAX_BODY" not in os.environ else None
+        settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler, max_body=body)
         secret = _fitted_out(settings.store) if studio else ""
         listener = _listen(settings.host, settings.port)
         _announce(settings, listener.getsockname()[1], secret)
