@@ -135,7 +135,7 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     assert set(operations) == {
         "index", "health", "tables", "table", "solvers", "solver", "shape", "info", "batch", "jobs", "ask", "job",
         "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan", "stages", "scenes",
-        "match",
+        "match", "mesh",
     }  # fmt: skip
     assert document["servers"]
     needs = {name: operation["security"] for name, operation in operations.items()}
