@@ -51,7 +51,7 @@ FIGURES: dict[str, tuple[str, tuple[float, ...], Callable[[float, float], dict[s
 def shown(params: DehydrationParams) -> Iterator[str]:
     """Yield the figures that show a fruit, by the names of their plans."""
     te, gamma, (long, round_) = params.exocarp_thickness, params.modulus_ratio, params.stone
-    if name_of(params) in PRESETS and set(params.radii) != {1.0}:
+    if name_of(params) in FRUITS:
         if (te, gamma) == (PRESETS[name_of(params)]["exocarp_thickness"], 10):
             yield "table1"
         return
