@@ -52,7 +52,7 @@ class MeshPage(BaseModel):
     responses=problems.responses(400, 401, 403, 413, 422),
     openapi_extra={"requestBody": {"required": True, "content": {kinds[0]: _BINARY for kinds in _KINDS.values()}}},
 )
-async def read(
+async def mesh(
     request: Request,
     token: Annotated[Token, Depends(requires("run"))],
     fit: Annotated[

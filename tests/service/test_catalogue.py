@@ -135,11 +135,11 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     assert set(operations) == {
         "index", "health", "tables", "table", "solvers", "solver", "shape", "info", "batch", "jobs", "ask", "job",
         "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan", "stages", "scenes",
-        "match",
+        "match", "mesh",
     }  # fmt: skip
     assert document["servers"]
     needs = {name: operation["security"] for name, operation in operations.items()}
-    assert {name for name, need in needs.items() if need == [{"token": []}]} == {"ask", "cancel"}
+    assert {name for name, need in needs.items() if need == [{"token": []}]} == {"ask", "cancel", "mesh"}
     assert needs["shape"] == [{}, {"token": []}]
     schemas = document["components"]["schemas"]
     thickness = schemas["JobRequest_dehydration"]["properties"]["params"]["properties"]["exocarp_thickness"]
