@@ -94,6 +94,7 @@ class DehydrationParams(Fruit):
 
     light: tuple[Brightness, Brightness, Brightness] = Field(
         (0.0, 0.0, 0.0),
+        # keys of runs that knew no light stay what they were
         exclude_if=lambda value: not any(value),
         description="Light l from the direction it points to: the flesh below the skin at angle a to it is lit by "
         "1 + |l| cos a, by 1 in its shade, and theta there is inversely proportional to it; at most 4 long",
@@ -179,5 +180,5 @@ class DehydrationParams(Fruit):
         if self.light_map is not None:
             chosen = self.light_map
             found = chosen.dark + (chosen.bright - chosen.dark) * painted(chosen.values, rays)
-        found += np.maximum(np.einsum("ni,i->n", rays, np.array(self.light)), 0.0)
-        return found
+        along: Floats = np.einsum("ni,i->n", rays, np.array(self.light))
+        return found + np.maximum(along, 0.0)
