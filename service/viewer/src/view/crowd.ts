@@ -32,7 +32,8 @@ export class Crowd implements Subject {
     scene.updateMatrixWorld(true);
     const reach = extent(scene);
     const size = reach.getSize(new Vector3());
-    const scale = SIZE / Math.max(size.x, size.z, 1e-9);
+    // a bowl is seen from above, where all of its width counts on a narrow screen
+    const scale = (scene.getObjectByName("bowl") ? 0.85 * SIZE : SIZE) / Math.max(size.x, size.z, 1e-9);
     const middle = reach.getCenter(new Vector3());
     scene.scale.setScalar(scale);
     scene.position.set(-scale * middle.x, -scale * reach.min.y, -scale * middle.z);
