@@ -63,7 +63,8 @@ def newton(energy: Curved, x: Floats) -> Iterator[Point]:
     shift, left = 0.0, np.inf
     while True:
         size = longest(g)
-        yield Point(x, f, size, left=left)
+        # without a force there is no step, whichever way the energy bends
+        yield Point(x, f, size, stuck=size == 0.0, left=left)
         if size == 0.0:
             return
         matrix, rigid, order = energy.hessian(x), energy.rigid(x), energy.analysis(x)

@@ -110,6 +110,7 @@ def _rested(energy: StepEnergy, x: Floats, goal: float, seed: int) -> Iterator[_
         if least or not np.isfinite(point.gradient):
             return
         bends, x = bending(energy, point.x, start, ASIDE * energy.state.length)
+        steps += bends == "down"
         again = bends == "down" or (bends == "up" and not point.stuck)
         yield _Found(point, steps, not again)
 
