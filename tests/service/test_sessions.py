@@ -344,6 +344,7 @@ def _pierced(x: np.ndarray, triangles: np.ndarray) -> int:
     )
 
 
+@pytest.mark.slow
 def test_a_session_says_where_its_sheet_passes_through_itself(live: Served) -> None:
     """Two squares that cross, as they may without contact, and the ball, which crosses nothing."""
     square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
