@@ -21,6 +21,7 @@ from . import catalogue, hours, maps, page, problems, results
 from .coding import Coding
 from .jobs import events as jobs_events
 from .jobs import fields as jobs_fields
+from .jobs import meshes as jobs_meshes
 from .jobs import results as jobs_results
 from .jobs import routes as jobs
 from .jobs.runner import JobRunner
@@ -118,8 +119,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for router in guarded:
         app.include_router(router, dependencies=guards, responses=declared)
     app.include_router(sessions.router)
-    app.include_router(jobs.writing, responses=problems.responses(414))
-    routers = (*guarded, catalogue.open_router, jobs.writing)
+    for router in (jobs.writing, jobs_meshes.router):
+        app.include_router(router, responses=problems.responses(414))
+    routers = (*guarded, catalogue.open_router, jobs.writing, jobs_meshes.router)
     app.state.paths = sorted({route.path for router in routers for route in router.routes if isinstance(route, Route)})
     page.install(app, settings.page)
     if settings.metrics:

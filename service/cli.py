@@ -22,6 +22,7 @@ from sweeps.formats import extend
 from .commands import export as cli_export
 from .commands import match as cli_match
 from .commands import scene as cli_scene
+from .limits import memory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
     from .shapes.compiling import Compiling
 
 __all__ = ["app", "main"]
+
+
+#: Largest request body of a studio [bytes]: a mesh of 100,000 points as JSON, twice over.
+_MESHES = 32 << 20
 
 
 class PortInUse(SweepError):
@@ -77,12 +82,15 @@ def serve(
 
     wizen serve --store /shared/fruits --scheduler tcp://10.0.0.1:8786
     """
-    own = (store or _own_store()) if studio else store
-    settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler)
-    secret = _fitted_out(settings.store) if studio else ""
-    listener = _listen(settings.host, settings.port)
-    _announce(settings, listener.getsockname()[1], secret)
-    _answer(settings, listener)
+    with memory.loading():
+        own = (store or _own_store()) if studio else store
+        # a studio answers its owner, whose own meshes are large
+        body = _MESHES if studio and "WIZEN_MAX_BODY" not in os.environ else None
+        settings = _settings(store=own, host=host, port=port, workers=workers, scheduler=scheduler, max_body=body)
+        secret = _fitted_out(settings.store) if studio else ""
+        listener = _listen(settings.host, settings.port)
+        _announce(settings, listener.getsockname()[1], secret)
+        _answer(settings, listener)
 
 
 def _announce(settings: Settings, port: int, secret: str) -> None:

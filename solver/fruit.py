@@ -190,7 +190,8 @@ def _preset(radii: tuple[float, ...], stone: tuple[float, float], te: float, gam
 
 
 #: The sphere of Figs. 6-9 and the six fruits of Table 1 (its wolfberry row lacks r8: a circular equator, r8 = r4), then
-#: five more, ovals of published proportions:
+#: six more, ovals of published proportions:
+#: raisin2: the slimmest fruit of Fig. 10, whose skin of 0.03 folds into few, deep creases, as of raisins one buys.
 #: potato: length over width 1.2 to 1.5 (grades of trade; "ellipsoidal", Tabatabaeefar, Int. Agrophysics 16 (2002) 301).
 #: banana: 27 mm thick, 140 mm long (the least that Regulation (EU) 1333/2011 lets be sold); straight, as all axes here.
 #: passionfruit: a globe of 4 to 7.5 cm. date: 3 to 7 by 2 to 3 cm, its stone 2 to 2.5 cm by 6 to 8 mm.
@@ -204,6 +205,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     "plum1": _preset((1, 0.88, 0.8, 0.8, 0.8, 0.88, 1, 0.48), (0.6, 0.5), 0.01),
     "plum2": _preset((1, 0.98, 0.93, 0.9, 0.93, 0.98, 1, 0.63), (0.3, 0.3), 0.03),
     "raisin": _preset((1, 0.7, 0.5, 0.45, 0.5, 0.7, 1, 0.45), (0.3, 0.2), 0.01),
+    "raisin2": _preset((1, 0.8321, 0.6547, 0.6, 0.6547, 0.8321, 1, 0.6), (0.3, 0.3), 0.03),
     "wolfberry": _preset((1, 0.7, 0.48, 0.42, 0.45, 0.62, 1, 0.42), (0.3, 0.2), 0.005),
     "potato": _preset((1, 0.91, 0.786, 0.74, 0.786, 0.91, 1, 0.74), (0.0, 0.0), 0.02),
     "banana": _preset((1, 0.389, 0.231, 0.2, 0.231, 0.389, 1, 0.2), (0.0, 0.0), 0.02),
@@ -219,6 +221,7 @@ SIZES: Mapping[str, float] = {
     "plum1": 0.022,
     "plum2": 0.022,
     "raisin": 0.0085,
+    "raisin2": 0.0085,
     "wolfberry": 0.009,
     "potato": 0.045,
     "banana": 0.09,

@@ -1,95 +1,126 @@
-"""A picture of a scene's file as three.js shows it: python -m benchmarks.scenes.picture SCENE.glb FILE.png.
+"""Draw a scene's file as three.js shows it, by the camera of its TOML: python -m benchmarks.scenes.picture.
 
-Needs the page's libraries (`make page`), the extra `browser`, and a Chromium.
+    wizen scene examples/scenes/bowl.toml --out bowl.glb
+    python -m benchmarks.scenes.picture examples/scenes/bowl.toml bowl.glb docs/scenes-bowl.png
+
+three.js and its decoder are the page's own (`make page`); the browser is Chromium, without a graphics card.
 """
 
 from __future__ import annotations
 
 import argparse
-import base64
-import functools
-import http.server
+import io
 import json
 import shutil
-import tempfile
-import threading
+import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from playwright.sync_api import sync_playwright
+from service.page import BUILT
 
-from benchmarks.figures import ROOT
+if TYPE_CHECKING:
+    from playwright.sync_api import Route
 
-LIBRARIES = ROOT / "service/viewer/node_modules/three"
-PAGE = """<!doctype html><title></title><style>body {margin: 0}</style>
-<script type="importmap">
-{"imports": {"three": "/three/build/three.module.js", "three/": "/three/examples/jsm/"}}
-</script>
+__all__ = ["FLAGS", "draw"]
+
+#: Draws in software, the same on every machine.
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+_PAGE = """<!doctype html><style>body { margin: 0 }</style><canvas id="view"></canvas><script type="importmap">
+{"imports": {"three": "/three/build/three.module.js", "three/addons/": "/three/examples/jsm/"}}</script>
 <script type="module">
 import * as T from "three";
-import { GLTFLoader } from "three/loaders/GLTFLoader.js";
-import { MeshoptDecoder } from "three/libs/meshopt_decoder.module.js";
-import { RoomEnvironment } from "three/environments/RoomEnvironment.js";
-const {position, target, fov, size: [w, h]} = SAID;
-const drawn = new T.WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
-drawn.setSize(w, h); drawn.toneMapping = T.ACESFilmicToneMapping; drawn.shadowMap.enabled = true;
-document.body.append(drawn.domElement);
-const scene = new T.Scene(); scene.background = new T.Color(0xd8d2c8);
-scene.environment = new T.PMREMGenerator(drawn).fromScene(new RoomEnvironment(), 0.04).texture;
-scene.environmentIntensity = 0.55;
-const camera = new T.PerspectiveCamera(fov, w / h, 0.001, 1000);
-camera.position.set(...position); camera.lookAt(...target);
-new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).load("/scene.glb", (file) => {
-  scene.add(file.scene);
-  const box = new T.Box3().setFromObject(file.scene), middle = box.getCenter(new T.Vector3());
-  const d = box.getSize(new T.Vector3()).length();
-  const sun = new T.DirectionalLight(0xfff2e0, 2.5);
-  sun.position.copy(middle).add(new T.Vector3(0.6 * d, 1.2 * d, 0.5 * d)); sun.target.position.copy(middle);
-  sun.castShadow = true; sun.shadow.mapSize.set(2048, 2048); sun.shadow.bias = -0.001;
-  Object.assign(sun.shadow.camera, {left: -d, right: d, top: d, bottom: -d, near: 0.01 * d, far: 4 * d});
-  const paint = new T.MeshStandardMaterial({color: 0xa89078, roughness: 0.9});
-  const floor = new T.Mesh(new T.PlaneGeometry(40 * d, 40 * d), paint);
-  floor.rotation.x = -Math.PI / 2; floor.receiveShadow = true;
-  scene.add(sun, sun.target, floor);
-  file.scene.traverse((one) => { if (one.isMesh) one.castShadow = one.receiveShadow = true; });
-  drawn.render(scene, camera); drawn.render(scene, camera);
-  document.title = drawn.domElement.toDataURL("image/png");
-}, undefined, (error) => { document.title = "failed: " + error; });
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
+import { MeshoptDecoder } from "three/addons/libs/meshopt_decoder.module.js";
+const { camera, unit, width, height } = SCENE;
+const renderer = new T.WebGLRenderer({ canvas: document.getElementById("view"), antialias: true });
+renderer.setSize(width, height);
+renderer.shadowMap.enabled = true;
+renderer.toneMapping = T.ACESFilmicToneMapping;
+renderer.toneMappingExposure = 0.78;
+const scene = new T.Scene();
+scene.environment = new T.PMREMGenerator(renderer).fromScene(new RoomEnvironment(), 0.04).texture;
+scene.environmentIntensity = 0.6;
+const loaded = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).loadAsync("/scene.glb");
+loaded.scene.scale.setScalar(1 / unit);
+loaded.scene.traverse((one) => {
+  if (one.isMesh) one.castShadow = one.receiveShadow = true;
+  one.frustumCulled = false;
+});
+const eye = new T.PerspectiveCamera(camera.fov, width / height, 0.1, 1000);
+eye.position.fromArray(camera.position);
+const away = eye.position.distanceTo(new T.Vector3().fromArray(camera.target));
+eye.lookAt(...camera.target);
+const sun = new T.DirectionalLight("#fff1dd", 2.6);
+sun.position.set(-0.39, 0.74, 0.3).multiplyScalar(away);
+sun.castShadow = true;
+sun.shadow.mapSize.set(2048, 2048);
+const wide = 0.48 * away;
+const frustum = { left: -wide, right: wide, top: wide, bottom: -wide, near: 0.05 * away, far: 2.2 * away };
+Object.assign(sun.shadow.camera, frustum);
+sun.shadow.bias = -0.0006;
+sun.shadow.normalBias = 0.0013 * away;
+const wood = new T.MeshStandardMaterial({ color: "#c9b08d", roughness: 0.9 });
+const floor = new T.Mesh(new T.PlaneGeometry(9 * away, 9 * away), wood);
+floor.rotation.x = -Math.PI / 2;
+floor.position.y = new T.Box3().setFromObject(loaded.scene).min.y;
+floor.receiveShadow = true;
+scene.add(loaded.scene, sun, floor);
+renderer.render(scene, eye);
+document.title = "drawn";
 </script>"""
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scene", type=Path)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--position", type=float, nargs=3, default=(0.0, 0.19, 0.13), help="of the camera [m]")
-    parser.add_argument("--target", type=float, nargs=3, default=(0.0, 0.016, 0.004), help="of the camera [m]")
-    parser.add_argument("--fov", type=float, default=36.0, help="vertical [degree]")
-    parser.add_argument("--size", type=int, nargs=2, default=(800, 500), help="pixels")
-    asked = parser.parse_args()
-    said = {name: getattr(asked, name) for name in ("position", "target", "fov", "size")}
-    with tempfile.TemporaryDirectory() as folder:
-        root = Path(folder)
-        (root / "three").symlink_to(LIBRARIES)
-        shutil.copy(asked.scene, root / "scene.glb")
-        (root / "index.html").write_text(PAGE.replace("SAID", json.dumps(said)))
-        handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
-        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        asked.out.write_bytes(_drawn(f"http://127.0.0.1:{server.server_port}/index.html", asked.size))
+def draw(file: Path, glb: Path, out: Path, width: int = 800) -> None:
+    """Write the picture (PNG of 256 colours) that a scene's camera takes of its file.
 
+    Raises:
+        FileNotFoundError: there is no Chromium, or the page was never built.
 
-def _drawn(address: str, size: tuple[int, int]) -> bytes:
-    flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
-        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.goto(address, wait_until="commit", timeout=300_000)
-        page.wait_for_function("document.title != ''", timeout=600_000)
-        title = page.title()
+    """
+    from PIL import Image
+    from playwright.sync_api import sync_playwright
+
+    three = BUILT.parent / "node_modules" / "three"
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None or not three.is_dir():
+        raise FileNotFoundError("Chromium and the page's packages are needed: apt-get install chromium, make page.")
+    said = tomllib.loads(file.read_text(encoding="utf-8"))
+    camera = said["camera"]
+    height = round(width * camera["height"] / camera["width"])
+    scene = {"camera": camera, "unit": said.get("unit", 1.0), "width": width, "height": height}
+
+    def answer(route: Route) -> None:
+        name = route.request.url.split("/", 3)[3]
+        if name == "":
+            route.fulfill(body=_PAGE.replace("SCENE", json.dumps(scene), 1), content_type="text/html")
+        elif name == "scene.glb":
+            route.fulfill(path=glb, content_type="model/gltf-binary")
+        elif name.startswith("three/"):
+            route.fulfill(path=three.parent / name, content_type="text/javascript")
+        else:
+            route.fulfill(status=404)
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
+        page = browser.new_page(viewport={"width": width, "height": height})
+        page.route("**/*", answer)
+        page.goto("http://scene.invalid/")
+        page.wait_for_function("document.title == 'drawn'", timeout=180_000)
+        picture = page.screenshot()
         browser.close()
-    if not title.startswith("data:"):
-        raise SystemExit(title)
-    return base64.b64decode(title.split(",")[1])
+    Image.open(io.BytesIO(picture)).convert("RGB").quantize(256).save(out, optimize=True)
+
+
+def main() -> None:
+    """Draw what the command line names."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene", type=Path, help="the scene's TOML, for its camera")
+    parser.add_argument("glb", type=Path, help="the scene's file")
+    parser.add_argument("out", type=Path, help="the picture")
+    parser.add_argument("--width", type=int, default=800, help="of the picture [pixel]")
+    given = parser.parse_args()
+    draw(given.scene, given.glb, given.out, given.width)
 
 
 if __name__ == "__main__":

@@ -96,17 +96,23 @@ def _toml(file: Path) -> dict[str, Any]:
 
 
 def _with_files(values: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a scene whose items have the parameters that they name files of, beside the scene's, in place of these.
+    """Return a scene with what it names files of, beside its own: parameters of items, and meshes of places.
 
     Raises:
-        InvalidOption: there is no such file.
+        InvalidOption: there is no such file, or it is no mesh.
 
     """
+    from sweeps.commands.terminal import meshfile
+
     items = values.get("items")
     for item in items if isinstance(items, list) else ():
         if isinstance(item, dict) and isinstance(item.get("params"), str):
             own = item.get("parameters")
             item["parameters"] = {**_toml(folder / item.pop("params")), **(own if isinstance(own, dict) else {})}
+    places = values.get("places")
+    for place in places if isinstance(places, list) else ():
+        if isinstance(place, dict) and isinstance(place.get("mesh"), str):
+            place["mesh"] = meshfile.read(folder / place["mesh"])
     return values
 
 

@@ -104,7 +104,7 @@ async def _follow(job: Job, look: Any, seen: str | None) -> AsyncIterator[str]:
         if seen != _id(job):
             kind = "progress" if job.state == state else "state"
             seen, state, spoken = _id(job), job.state, time.monotonic()
-            yield f"id: {seen}\nevent: {kind}\ndata: {view(job).model_dump_json()}\n\n"
+            yield f"id: {seen}\nevent: {kind}\ndata: {view(job, whole=False).model_dump_json()}\n\n"
         elif time.monotonic() - spoken >= _HEARTBEAT:
             spoken = time.monotonic()
             yield ": still here\n\n"

@@ -86,7 +86,7 @@ def jobs(
     if more is not None:
         pairs = {"state": state, "limit": limit, "after": more}
         following = link(f"/v1/jobs?{urlencode({k: v for k, v in pairs.items() if v is not None})}")
-    return JobList(jobs=[view(job) for job in found], next=following)
+    return JobList(jobs=[view(job, whole=False) for job in found], next=following)
 
 
 @reading.get("/v1/jobs/{id}", summary="One job", responses=problems.responses(404, 503))

@@ -23,6 +23,10 @@ __all__ = ["ENDED", "Expected", "Failure", "JobList", "JobRequest", "JobView", "
 ENDED: tuple[State, ...] = ("done", "failed", "cancelled")
 
 
+#: Values of one parameter that lists and events still show.
+_LONG = 2000
+
+
 class JobRequest(BaseModel):
     """What to compute: a solver, its parameters (over those of a preset), and what of the result is needed."""
 
@@ -72,7 +76,11 @@ class JobView(BaseModel):
     attempts: int = Field(description="How often it was begun")
     created: str = Field(description="When it was first asked for (UTC)")
     updated: str = Field(description="When it last changed (UTC)")
-    params: dict[str, Any] = Field(description="All parameters")
+    params: dict[str, Any] = Field(description="All parameters but those of `omitted`")
+    omitted: list[str] = Field(
+        default_factory=list,
+        description="Parameters too long for lists and events, as meshes: the job itself has them",
+    )
     need: dict[str, Any] = Field(description="All that is needed")
     problem: Failure | None = Field(None, description="Why it failed, or why its last attempt did")
     links: dict[str, str] = Field(description="Addresses of the job, its events, and its result once it is done")
@@ -85,12 +93,13 @@ class JobList(BaseModel):
     next: str | None = Field(None, description="Address of the next page, if there is one")
 
 
-def view(job: Job) -> JobView:
-    """Return what is said of a job."""
+def view(job: Job, whole: bool = True) -> JobView:
+    """Return what is said of a job, without its longest parameters unless the whole is asked for."""
     own = link(f"/v1/jobs/{job.key}")
     links = {"self": own, "events": f"{own}/events"}
     if job.state == "done":
         links["result"] = f"{own}/result"
+    omitted = [] if whole else [name for name, value in job.params.items() if _size(value, _LONG) > _LONG]
     return JobView(
         id=job.key,
         solver=job.solver,
@@ -102,11 +111,24 @@ def view(job: Job) -> JobView:
         attempts=job.attempts,
         created=_date(job.created),
         updated=_date(job.updated),
-        params=dict(job.params),
+        params={name: value for name, value in job.params.items() if name not in omitted},
+        omitted=omitted,
         need=dict(job.need),
         problem=_failure(job.error),
         links=links,
     )
+
+
+def _size(value: object, enough: int) -> int:
+    """Return how many values a value has, or any number above `enough`."""
+    if not isinstance(value, list | tuple | Mapping):
+        return 1
+    count = 0
+    for each in value.values() if isinstance(value, Mapping) else value:
+        count += _size(each, enough)
+        if count > enough:
+            break
+    return count
 
 
 def _failure(error: Mapping[str, Any] | None) -> Failure | None:

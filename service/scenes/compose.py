@@ -13,10 +13,10 @@ from solver.arrays import Array, Floats
 
 from ..errors import Wrong
 from ..shapes.live import LiveTables
-from . import detail, glb, report, seen, usd
+from . import detail, glb, props, report, seen, usd
 from .errors import InvalidScene, OverBudget
 from .kinds import Kind, Runs, distinct
-from .placing import Instances, bowls, place
+from .placing import Instances, place
 from .request import Scene
 
 __all__ = ["Made", "make"]
@@ -70,7 +70,7 @@ def make(
     shown = found.why == seen.SEEN
     visible, pixels = everything.only(shown), found.pixels[shown]
     lap("seen")
-    held = {"bowl": bowls(scene)} if scene.props else {}
+    held = props.held(scene) if scene.props else []
     encoders: dict[str, Callable[..., bytes]] = {"glb": glb.encode, "usdc": usd.usdc, "usda": usd.usda}
     encoder = encoders.get(to)
     compress = compress and to == "glb" and glb.compressor() is not None

@@ -19,7 +19,7 @@ from ..formats.about import GENERATOR
 from . import moving, props
 from .kinds import Kind
 from .meshes import VERTEX, Packed, Skin
-from .placing import Instances, Prop
+from .placing import Instances
 
 __all__ = ["compressor", "encode"]
 
@@ -103,12 +103,12 @@ def encode(
     kinds: Sequence[Kind],
     seen: Instances,
     n: Array,
-    held: Mapping[str, Sequence[Prop]],
+    held: Sequence[props.Prop],
     unit: float,
     compress: bool,
     known: Collection[str] = (),
 ) -> bytes:
-    """Return the file of the seen instances with their levels; `held` are props by what they are.
+    """Return the file of the seen instances with their levels; `held` is what stands there besides.
 
     unit: length of the scene's unit [m]. Each mesh says in its extras which shape it is, by an `etag` of what it is
     made of; of those that are `known` no more is there. They say too how long r1 is in their positions.
@@ -127,8 +127,7 @@ def encode(
             changing += [(len(nodes) + i, kinds[k]) for i in range(len(rows))]
             nodes += _one_by_one(kinds[k].label, seen.only(rows), *made[k, size])
     animations = moving.weights(file, changing)
-    for prop in held.get("bowl", ()):
-        nodes.append(props.bowl(file, meshes, materials, prop))
+    nodes += [props.node(file, meshes, materials, prop) for prop in held]
     used = {_INSTANCING} if still else set()
     used |= {_QUANTIZED} if len(n) else set()
     required = sorted(used | ({_MESHOPT} if compress and compressor() is not None else set()))

@@ -17,10 +17,11 @@ from solver.contract import SolverError
 from ..errors import Wrong
 from ..limits import waited
 from .errors import InvalidScene
+from .ground import scatter
 from .kinds import Kind
 from .request import Place, Scene
 
-__all__ = ["Instances", "Prop", "bowls", "place"]
+__all__ = ["Instances", "bowl_of", "place"]
 
 #: Share of a heaped bowl's room that fruits fill, and how much higher than its rim they may heap.
 _FILLED, _HEAPED = 0.55, 1.6
@@ -43,13 +44,6 @@ class Instances(NamedTuple):
     def only(self, which: Array) -> Instances:
         """Return some of them."""
         return Instances(*(values[which] for values in self))
-
-
-class Prop(NamedTuple):
-    """A bowl that stands in the scene."""
-
-    bowl: resting.Bowl
-    at: tuple[float, float, float]
 
 
 def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Instances, dict[str, resting.Rest]]:
@@ -96,7 +90,7 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
         except SolverError as error:
             raise InvalidScene.of([Wrong(f"places.{i}", error.message.rstrip("."), error.advice)]) from None
         except ValueError as error:
-            raise InvalidScene.of([Wrong(f"places.{i}.radius", str(error), "")]) from None
+            raise InvalidScene.of([Wrong(f"places.{i}.{'mesh' if rule.mesh else 'radius'}", str(error), "")]) from None
         centre[which] = rest.centre + rule.at
         turn[which] = rest.turn
         rests[rule.name] = rest
@@ -107,11 +101,6 @@ def _size(asked: str | None, kind: Kind, unit: float) -> float:
     """Return the length of a kind's own unit [scene unit]; that of tables is one unless the real one is asked for."""
     known = kind.metres if asked is not None or kind.topology is not None else None
     return 1.0 if known is None else known / unit
-
-
-def bowls(scene: Scene) -> list[Prop]:
-    """Return the bowls of a scene."""
-    return [Prop(_bowl(p), p.at) for p in scene.places if p.rule == "bowl"]
 
 
 def _individuals(seeds: Array, numbers: Array) -> tuple[Floats, Array, Floats]:
@@ -168,7 +157,11 @@ def _row(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
 
 
 def _scatter(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
-    """Scatter them over a square of the floor: a lattice of cells, one in each, jittered as far as cells allow."""
+    """Scatter them over a mesh, or a square of the floor: a lattice of cells, one in each, jittered as far as cells
+    allow.
+    """
+    if rule.mesh is not None:
+        return scatter(rule.mesh, rule.seed, found, kinds)
     assert rule.radius is not None
     random, reach = np.random.default_rng(rule.seed), _reach(found, kinds)
     count = len(reach)
@@ -184,14 +177,15 @@ def _scatter(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Re
     return resting.Rest(np.stack([x, _lowest(found, kinds), z], axis=1), found.turn, 0.0, True)
 
 
-def _bowl(rule: Place) -> resting.Bowl:
+def bowl_of(rule: Place) -> resting.Bowl:
+    """Return the bowl of a place."""
     assert rule.radius is not None
     return resting.Bowl(rule.radius, 0.05 * rule.radius)
 
 
 def _pour(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
     """Pour them; the result is kept, so that another camera or budget waits for no pile."""
-    bowl = _bowl(rule) if rule.rule == "bowl" else None
+    bowl = bowl_of(rule) if rule.rule == "bowl" else None
     if bowl is not None:
         room = math.pi * (bowl.rim - bowl.thickness) ** 2 * (bowl.sphere - (bowl.rim - bowl.thickness) / 3)
         volume = 4 / 3 * math.pi * float((_reach(found, kinds) ** 3).sum())

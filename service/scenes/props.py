@@ -1,26 +1,38 @@
-"""What stands in a scene besides fruits: bowls, as meshes of their own."""
+"""What stands in a scene besides its items, as meshes of their own: bowls, and what items were scattered over."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from solver.arrays import Array, Floats
 from solver.resting import Bowl
 
-from .placing import Prop
+from .ground import corner_normals
+from .placing import bowl_of
 
 if TYPE_CHECKING:
     from .glb import _File
+    from .request import Scene
 
-__all__ = ["bowl", "lathe"]
+__all__ = ["Prop", "held", "lathe", "node"]
 
 _AROUND, _ALONG = 64, 20
 _GLAZE = {
     "name": "glaze",
     "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.77, 0.7, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.35},
 }
+
+
+class Prop(NamedTuple):
+    """A mesh that stands in the scene: points, normals (v, 3) and triangles (f, 3), moved by `at`."""
+
+    name: str
+    points: Floats
+    normal: Floats
+    triangles: Array
+    at: tuple[float, float, float]
 
 
 def lathe(of: Bowl) -> tuple[Floats, Floats, Array]:
@@ -67,14 +79,26 @@ def lathe(of: Bowl) -> tuple[Floats, Floats, Array]:
     return points, facing3, triangles[area > 1e-12]
 
 
-def bowl(file: _File, meshes: list[dict[str, Any]], materials: list[dict[str, Any]], prop: Prop) -> dict[str, Any]:
-    """Append a bowl's mesh and material, and return its node."""
-    points, normal, triangles = lathe(prop.bowl)
-    points, normal = points.astype("<f4"), normal.astype("<f4")
+def held(scene: Scene) -> list[Prop]:
+    """Return what stands in a scene besides its items."""
+    found = []
+    for one in scene.places:
+        if one.rule == "bowl":
+            found.append(Prop("bowl", *lathe(bowl_of(one)), one.at))
+        elif one.mesh is not None:
+            points, faces = one.mesh.arrays
+            found.append(Prop("ground", points, corner_normals(points, faces), faces, one.at))
+    return found
+
+
+def node(file: _File, meshes: list[dict[str, Any]], materials: list[dict[str, Any]], prop: Prop) -> dict[str, Any]:
+    """Append a prop's mesh and material, and return its node."""
+    points, normal = prop.points.astype("<f4"), prop.normal.astype("<f4")
     both = file.view(points, "ATTRIBUTES", 34962), file.view(normal, "ATTRIBUTES", 34962)
     limits = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
-    flat = triangles.ravel().astype("<u2")
-    indices = file.accessor(file.view(flat, "TRIANGLES", 34963), 5123, "SCALAR", len(flat))
+    few = len(points) < 1 << 16
+    flat = prop.triangles.ravel().astype("<u2" if few else "<u4")
+    indices = file.accessor(file.view(flat, "TRIANGLES", 34963), 5123 if few else 5125, "SCALAR", len(flat))
     attributes = {
         "POSITION": file.accessor(both[0], 5126, "VEC3", len(points), **limits),
         "NORMAL": file.accessor(both[1], 5126, "VEC3", len(points)),
@@ -82,5 +106,5 @@ def bowl(file: _File, meshes: list[dict[str, Any]], materials: list[dict[str, An
     if _GLAZE not in materials:
         materials.append(_GLAZE)
     primitive = {"attributes": attributes, "indices": indices, "material": materials.index(_GLAZE)}
-    meshes.append({"name": "bowl", "primitives": [primitive]})
-    return {"name": "bowl", "mesh": len(meshes) - 1, "translation": list(prop.at)}
+    meshes.append({"name": prop.name, "primitives": [primitive]})
+    return {"name": prop.name, "mesh": len(meshes) - 1, "translation": list(prop.at)}

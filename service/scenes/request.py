@@ -12,6 +12,7 @@ from solver.contract import Quality
 
 from ..errors import Wrong
 from .errors import InvalidScene, SceneTooLarge
+from .ground import Ground
 
 __all__ = ["FORMATS", "MOST", "Budget", "Camera", "Item", "Place", "Scene", "Transform", "parse"]
 
@@ -61,14 +62,15 @@ class Camera(_Strict):
 class Place(_Strict):
     """A rule that places all items which name it, in the order of the items.
 
-    row: along x. scatter: on a square of the floor, apart from each other where there is room. bowl: poured into a bowl
-    whose lowest inner point is `at`. pile: poured onto the floor.
+    row: along x. scatter: on a square of the floor, or standing on a mesh along its normals, apart from each other.
+    bowl: poured into a bowl whose lowest inner point is `at`. pile: poured onto the floor.
     """
 
     name: str = Field("", max_length=40, description="What items call it")
     rule: Literal["row", "scatter", "bowl", "pile"] = Field(description="How items are placed")
     at: Vector = Field((0.0, 0.0, 0.0), description="Its middle, on the floor [scene unit]")
     radius: Length | None = Field(None, description="bowl: inner radius. scatter: half the side. [scene unit]")
+    mesh: Ground | None = Field(None, description="scatter: what they stand on, in place of the floor, moved by `at`")
     gap: float = Field(0.2, ge=0, le=1e6, description="row: between neighbours [scene unit]")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="Of the places and of how things fall")
 
@@ -197,7 +199,7 @@ class Scene(_Strict):
     places: tuple[Place, ...] = Field((), max_length=100)
     budget: Budget = Field(default_factory=Budget)
     unit: float = Field(1.0, gt=0, le=1e3, description="Length of the scene's unit [m]")
-    props: bool = Field(True, description="Bowls and the floor are in the file too")
+    props: bool = Field(True, description="Bowls and meshes that things stand on are in the file too")
     cull: bool = Field(True, description="Leave out what the camera does not see")
     known: tuple[Etag, ...] = Field(
         (), max_length=20_000, description="glb: etags of meshes that the asker has; they are named and not sent"
@@ -218,8 +220,13 @@ class Scene(_Strict):
                     f"items.{i}: {item.count} individuals need a place or transforms, or stand in each other"
                 )
         for i, place in enumerate(self.places):
-            if place.rule in ("bowl", "scatter") and place.radius is None:
-                raise ValueError(f"places.{i}: a {place.rule} needs a radius")
+            if place.mesh is not None and place.rule != "scatter":
+                raise ValueError(f"places.{i}: a {place.rule} has no mesh: leave it out, or take the rule scatter")
+            if place.rule in ("bowl", "scatter") and place.radius is None and place.mesh is None:
+                more = " or a mesh" if place.rule == "scatter" else ""
+                raise ValueError(f"places.{i}: a {place.rule} needs a radius{more}")
+            if place.radius is not None and place.mesh is not None:
+                raise ValueError(f"places.{i}: radius and mesh exclude each other: keep one of them")
         return self
 
 

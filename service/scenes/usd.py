@@ -6,7 +6,7 @@ Mirror images are prototypes of their own: an instancer's scales mirror the poin
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from ..formats import materialx
 from . import props
 from .kinds import Kind
 from .moving import FPS
-from .placing import Instances, Prop
+from .placing import Instances
 
 __all__ = ["usda", "usdc"]
 
@@ -31,7 +31,7 @@ def _encode(
     kinds: Sequence[Kind],
     seen: Instances,
     n: Array,
-    held: Mapping[str, Sequence[Prop]],
+    held: Sequence[props.Prop],
     unit: float,
     _: bool,
 ) -> bytes:
@@ -74,8 +74,8 @@ def _encode(
         instancer.CreateScalesAttr(Vt.Vec3fArray.FromNumpy(scales))
         extent = instancer.ComputeExtentAtTime(Usd.TimeCode.Default(), Usd.TimeCode.Default())
         instancer.CreateExtentAttr(extent)
-    for place, prop in enumerate(held.get("bowl", ())):
-        _bowl(stage, f"/scene/bowl{place}", prop, materials)
+    for place, prop in enumerate(held):
+        _prop(stage, f"/scene/{prop.name}{place}", prop, materials)
     with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
         path_ = Path(folder) / f"scene.{suffix}"
         stage.GetRootLayer().Export(str(path_))
@@ -163,10 +163,10 @@ def _shader(stage: Any, path: str, roughness: float, coat: float, colour: tuple[
     return material
 
 
-def _bowl(stage: Any, path: str, prop: Prop, made: dict[str, Any]) -> None:
+def _prop(stage: Any, path: str, prop: props.Prop, made: dict[str, Any]) -> None:
     from pxr import Gf, UsdGeom
 
     if "glaze" not in made:
         made["glaze"] = _shader(stage, "/scene/looks/glaze", 0.35, 0.0, (0.8, 0.77, 0.7))
-    found = _mesh(stage, path, *props.lathe(prop.bowl), made["glaze"])
+    found = _mesh(stage, path, prop.points, prop.normal, prop.triangles, made["glaze"])
     UsdGeom.XformCommonAPI(found.GetPrim()).SetTranslate(Gf.Vec3d(*prop.at))

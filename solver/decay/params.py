@@ -9,11 +9,12 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ..fruit import Fruit
+from ..painted import Painted
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
 from .hyphae import FURS, Hyphae
 from .surfaces.imported import Mesh
-from .surfaces.places import Neighbour, Painted, Pressure, PressureMap, Wound
+from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 
@@ -25,9 +26,11 @@ class Weather(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    day: float = Field(ge=0, le=120, description="Time since the wounds [day]")
-    temperature: float = Field(ge=-10, le=60, description="Temperature of air and fruit [degC]")
-    humidity: float = Field(ge=0, le=100, description="Relative humidity [percent]")
+    day: float = Field(ge=0, le=120, description="Time since the wounds", json_schema_extra={"units": "day"})
+    temperature: float = Field(
+        ge=-10, le=60, description="Temperature of air and fruit", json_schema_extra={"units": "degC"}
+    )
+    humidity: float = Field(ge=0, le=100, description="Relative humidity", json_schema_extra={"units": "percent"})
 
 
 class DecayParams(Fruit):
@@ -54,7 +57,7 @@ class DecayParams(Fruit):
         (),
         max_length=1000,
         description="The air in the course of time, in place of temperature and humidity; days in rising order",
-        json_schema_extra={"units": "1"},
+        json_schema_extra={"units": "1", "along": "day"},
     )
     porosity: float = Field(
         25.0, ge=0, le=100, description="Porosity of the skin (Table 2)", json_schema_extra={"units": "percent"}

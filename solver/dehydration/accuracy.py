@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 
 from ..contract import InvalidInput, Need, Quality
-from .fresh.loading import Loading
 from .params import DehydrationParams
 from .settings import choose, expected_cost
 
@@ -37,7 +36,7 @@ def expected_error(params: DehydrationParams, quality: Quality, last: float) -> 
     te, gamma = params.exocarp_thickness, params.modulus_ratio
     measured = (
         params.is_sphere
-        and Loading(params).uniform
+        and params.dries_evenly
         and _THICKNESS[0] <= te <= _THICKNESS[1]
         and _RATIO[0] <= gamma <= _RATIO[1]
         and 0 <= last <= _LAST

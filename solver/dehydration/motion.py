@@ -28,11 +28,13 @@ from .kernel import (
     new_state,
     out_of_reach,
     positions,
+    pressure_energy,
     rested,
     rests,
     reweigh,
     stiffness_bounds,
     weigh,
+    without_bulk,
 )
 from .kernel.fixed_point import QUANTUM
 from .kernel.layout import aligned_copy
@@ -260,9 +262,18 @@ class Motion:
         return dataclasses.replace(planes, mass=self.layout.mass, inverse_mass=self.layout.inverse_mass)
 
     def report(self, state: Fixed, rest: Floats, shrinkage: float) -> ElementReport:
-        """Return energies and volume ratios of the elements."""
+        """Return energies of what is marched, but for a constant of the rest volumes, and volume ratios (elements,)."""
         layout = self._ready(shrinkage, rest)
         return element_report(layout, state, 1 - shrinkage, one_point=True)
+
+    def strain_energy(self, state: Fixed, rest: Floats, shrinkage: float) -> float:
+        """Return the strain energy of the part [mu r1^3]: of flesh, whose bulk modulus is not the march's."""
+        theta, settings = 1 - shrinkage, self.settings
+        loaded = self.drive.loaded(self.layout, shrinkage)
+        sheared = element_report(without_bulk(loaded), state, theta, one_point=True).energy
+        dilatation = dilatations(self._ready(shrinkage, rest), state, theta)
+        share = settings.march_kappa_ratio / settings.kappa_ratio
+        return float((sheared + pressure_energy(loaded, dilatation, theta, share)).sum())
 
     def residual(self, state: Fixed, rest: Floats, shrinkage: float, damping: float) -> float:
         """Return the out-of-balance force, contact included: what one step from rest does to the momentum.

@@ -8,15 +8,20 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ..arrays import Floats
 from ..fruit import Fruit
+from ..painted import Painted, PaintedMap, painted
 
-__all__ = ["DehydrationParams", "Pattern"]
+__all__ = ["DehydrationParams", "LightMap", "Pattern"]
 
 Gradient = Annotated[float, Field(ge=-0.8, le=0.8)]
 Factor = Annotated[float, Field(ge=0.0, le=2.0)]
+Brightness = Annotated[float, Field(ge=-4.0, le=4.0)]
 
 #: Longest gradient of wetness, in 1/r1.
 STEEPEST = 0.8
+#: Brightest illumination that a run may have, in units of that at which flesh dries as the stage says.
+BRIGHTEST = 5.0
 
 
 class Pattern(BaseModel):
@@ -29,10 +34,19 @@ class Pattern(BaseModel):
     amplitude: float = Field(0.2, gt=0, le=0.5, description="Largest height, in exocarp thicknesses")
 
 
+class LightMap(PaintedMap):
+    """How brightly a fruit is lit from place to place, painted; without one, 1 all around."""
+
+    values: Painted = Field(min_length=1, description="n rows of 2 n values from 0 to 1, from the pole y > 0 down")
+    dark: float = Field(0.0, ge=0, le=BRIGHTEST, description="Illumination where the map is 0 [1]")
+    bright: float = Field(2.0, ge=0, le=BRIGHTEST, description="Illumination where the map is 1 [1]")
+
+
 class DehydrationParams(Fruit):
     """Liu et al. 2014: F = Fe Fd, Fd = I in the exocarp, rigid stone.
 
     In the sarcocarp Fd = diag(1 - a_i s (1 - g . X)): (1 - s) I unless wetness g or anisotropy a say otherwise.
+    Under an illumination E theta is inversely proportional to it: s E / (1 - s + s E) stands in place of s.
     """
 
     axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {
@@ -78,6 +92,21 @@ class DehydrationParams(Fruit):
         json_schema_extra={"units": "1", "axes": ["ax", "ay", "az"]},
     )
 
+    light: tuple[Brightness, Brightness, Brightness] | None = Field(
+        None,
+        # keys of runs that knew no light stay what they were
+        exclude_if=lambda value: value is None,
+        description="Light l from the direction it points to: the flesh below the skin at angle a to it is lit by "
+        "1 + |l| cos a, by 1 in its shade, and theta there is inversely proportional to it; at most 4 long",
+        json_schema_extra={"units": "1"},
+    )
+    light_map: LightMap | None = Field(
+        None,
+        exclude_if=lambda value: value is None,
+        description="A painted map of illumination in place of the 1 all around",
+        json_schema_extra={"units": "1"},
+    )
+
     mirrors: Literal["", "x", "y", "z", "xy", "xz", "yz", "xyz"] = Field(
         "",
         # keys of runs that knew no mirrors stay what they were
@@ -92,9 +121,13 @@ class DehydrationParams(Fruit):
     def _mirrored(self) -> Self:
         if "y" in self.mirrors and self.radii[:7] != self.radii[6::-1]:
             raise ValueError("the two ends of the fruit differ (r1..r7): leave y out of mirrors")
-        across = [name for name, slope in zip("xyz", self.wetness, strict=True) if slope and name in self.mirrors]
-        if across:
-            raise ValueError(f"wetness differs across a mirror plane: leave {', '.join(across)} out of mirrors")
+        for field in ("wetness", "light"):
+            parts = zip("xyz", getattr(self, field) or (0, 0, 0), strict=True)
+            across = [name for name, part in parts if part and name in self.mirrors]
+            if across:
+                raise ValueError(f"{field} differs across a mirror plane: leave {', '.join(across)} out of mirrors")
+        if self.mirrors and self.light_map is not None:
+            raise ValueError("a light map may differ across a mirror plane: leave out mirrors")
         if self.mirrors and self.imperfection_kind == "mode":
             raise ValueError(
                 "a buckling mode need not have the mirrors' symmetry: leave out mirrors, or start from waves"
@@ -108,6 +141,10 @@ class DehydrationParams(Fruit):
             raise ValueError(
                 f"wetness is {steep:.3g} long (at most {STEEPEST}): multiply wx, wy, wz by {STEEPEST / steep:.3g}"
             )
+        strength = float(np.linalg.norm(self.light or 0))
+        if strength > (BRIGHTEST - 1) * (1 + 1e-9):
+            most = BRIGHTEST - 1
+            raise ValueError(f"light is {strength:.3g} long (at most {most:g}): multiply it by {most / strength:.3g}")
         wettest, _ = self.local_share
         if wettest < 0:
             raise ValueError(
@@ -125,3 +162,24 @@ class DehydrationParams(Fruit):
         theta, phi = np.meshgrid(np.linspace(0, np.pi, 91), np.linspace(0, 2 * np.pi, 73), indexing="ij")
         along = np.einsum("tpi,i->tp", self.sarcocarp(theta, phi), self.wetness)
         return float(1 - along.max()), float(1 - along.min())
+
+    @property
+    def is_lit(self) -> bool:
+        """Whether some flesh is lit otherwise than the rest."""
+        return any(self.light or ()) or self.light_map is not None
+
+    @property
+    def dries_evenly(self) -> bool:
+        """Whether Fd = (1 - s) I everywhere."""
+        return not (self.is_lit or any(self.wetness)) and all(factor == 1.0 for factor in self.anisotropy)
+
+    def illumination(self, points: Floats) -> Floats:
+        """Return how brightly flesh at fresh points (n, 3) is lit, as the skin straight above it, shape (n,)."""
+        rays = points / np.maximum(np.sqrt(np.einsum("ni,ni->n", points, points)), 1e-9)[:, None]
+        found = np.ones(len(points))
+        if self.light_map is not None:
+            chosen = self.light_map
+            found = chosen.dark + (chosen.bright - chosen.dark) * painted(chosen.values, rays)
+        if self.light is not None:
+            found = found + np.maximum(np.einsum("ni,i->n", rays, np.array(self.light)), 0.0)
+        return found

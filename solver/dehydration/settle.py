@@ -88,10 +88,10 @@ def settle(
             advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             residual=residual,
         )
-    energy = float(report.energy.sum())
-    released = copies * (before - energy) if before is not None else None
+    released = copies * (before - float(report.energy.sum())) if before is not None else None
+    energy = copies * motion.strain_energy(state, rest, shrinkage)
     whole = motion.sector.whole(motion.surface(state))
-    return State(whole, shrinkage, residual, drift, motion.steps, least, copies * energy, released)
+    return State(whole, shrinkage, residual, drift, motion.steps, least, energy, released)
 
 
 def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> None:

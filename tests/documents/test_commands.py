@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from benchmarks.service import lookup
 from solver.contract import Need
@@ -127,6 +128,8 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
         shards.write(at / name, rotting(), "0" * 64)
     for name in ("patch.obj", "my.obj", "banana.glb"):
         trimesh.creation.icosphere(3).export(at / name)
+    for name in ("sun.png", "mask.png"):
+        Image.linear_gradient("L").save(at / name)
     # the package is served, too, where nothing else is named
     shutil.copytree(starter.ROOT / "tables" / "raisin", at / "demo" / "tables" / "raisin")
     with _served(at) as port:

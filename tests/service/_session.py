@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import struct
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any
 
 import numpy as np
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 
@@ -81,6 +82,13 @@ class Client:
 
     def close(self) -> None:
         self._open.close()
+
+    def end(self) -> None:
+        """End the session, and return once the service says that it has ended: there is room for another."""
+        self.send(do="close")
+        with suppress(ConnectionClosed):
+            self.until(lambda c: False)
+        self.close()
 
     def _take(self, data: bytes) -> None:
         magic, number, base, n, m, r, p, q, quantum, k, stage, residual, input_, ms, flags = struct.unpack_from(

@@ -60,6 +60,20 @@ def test_solvers(client: httpx.Client) -> None:
     assert set(solver["params"]["properties"]) == set(SOLVER.params.model_fields)
 
 
+def test_lists_along_an_axis_say_so(client: httpx.Client) -> None:
+    """The page draws curves of them, so that it needs to know their axis, its bounds and all units."""
+    page = client.get("/v1/solvers/decay").json()["params"]
+    weather = page["properties"]["weather"]
+    item = page["$defs"][weather["items"]["$ref"].rpartition("/")[2]]["properties"]
+    assert weather["along"] == "day"
+    assert {name: one["units"] for name, one in item.items()} == {
+        "day": "day",
+        "temperature": "degC",
+        "humidity": "percent",
+    }
+    assert all({"minimum", "maximum"} <= one.keys() for one in item.values())
+
+
 def test_health(client: httpx.Client, built: Path, tmp_path: Path) -> None:
     answer = client.get("/healthz")
     assert answer.status_code == 200
@@ -121,7 +135,7 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     assert set(operations) == {
         "index", "health", "tables", "table", "solvers", "solver", "shape", "info", "batch", "jobs", "ask", "job",
         "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan", "stages", "scenes",
-        "match",
+        "match", "mesh",
     }  # fmt: skip
     assert document["servers"]
     needs = {name: operation["security"] for name, operation in operations.items()}

@@ -215,8 +215,7 @@ def test_wrong_actions_change_nothing_and_say_what_to_change(live: Served) -> No
     client.do("brush", at=[1, 0, 0])
     client.rest()
     assert not np.array_equal(client.x, before)
-    client.send(do="close")
-    client.close()
+    client.end()
 
 
 def test_more_sessions_than_may_be_are_refused_and_room_comes_back(live: Served) -> None:
@@ -237,15 +236,11 @@ def test_more_sessions_than_may_be_are_refused_and_room_comes_back(live: Served)
         problem, closed = refused(Client(str(second.base_url), token=third, params=BALL, quality="preview"))
         assert (problem["type"], closed) == ("urn:wizen:problem:too-many-sessions", 4429)
     for one in open_ones:
-        one.send(do="close")
-        with pytest.raises(ConnectionClosed):
-            one.until(lambda c: False)
-        one.close()
+        one.end()
     assert not engines()
     last = live.client(token=third)
     assert last.opened()["say"] == "opened"
-    last.send(do="close")
-    last.close()
+    last.end()
 
 
 def test_a_lost_connection_is_taken_up_again_and_goes_on(live: Served) -> None:
@@ -275,8 +270,7 @@ def test_a_lost_connection_is_taken_up_again_and_goes_on(live: Served) -> None:
     third.number = 10
     third.do("undo")
     third.rest()
-    third.send(do="close")
-    third.close()
+    third.end()
 
 
 def test_a_client_that_answers_no_frames_gets_two_and_then_the_newest(live: Served) -> None:
@@ -292,8 +286,7 @@ def test_a_client_that_answers_no_frames_gets_two_and_then_the_newest(live: Serv
     client.until(lambda c: not c.frames[-1]["flags"] & 2)
     assert client.frames[-1]["stage"] == pytest.approx(0.3)
     assert len(client.frames) <= 4
-    client.send(do="close")
-    client.close()
+    client.end()
 
 
 def test_an_engine_that_is_killed_is_told_of(live: Served) -> None:
@@ -318,8 +311,7 @@ def test_a_step_without_an_equilibrium_is_an_error_and_the_session_goes_on(live:
     client.do("undo")
     client.rest()
     assert client.frames[-1]["stage"] == 0
-    client.send(do="close")
-    client.close()
+    client.end()
 
 
 def _pierced(x: np.ndarray, triangles: np.ndarray) -> int:
@@ -377,8 +369,7 @@ def test_quality_grows_the_same_script_on_another_mesh(live: Served) -> None:
     saved = client.ask("save")
     assert saved["say"] == "saved"
     assert saved["quality"] == "default"
-    client.send(do="close")
-    client.close()
+    client.end()
 
 
 @pytest.mark.slow
@@ -414,8 +405,7 @@ def test_seconds_of_sessions_count(tmp_path: Path) -> None:
         problem, closed = refused(found.client())
         assert closed == 4429
         assert "spent" in problem["detail"]
-        client.send(do="close")
-        client.close()
+        client.end()
 
 
 def test_a_solver_s_page_says_what_its_sessions_understand(client: Any) -> None:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
+
+import pytest
+
+from service.limits import memory
 
 #: Each takes a tenth of a second to a second to import.
 HEAVY = {
@@ -28,3 +33,15 @@ def test_the_first_answer_needs_no_heavy_library() -> None:
     # of a shape that does not fold: what folds is looked at for crossings by compiled code
     done = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True)
     assert HEAVY.isdisjoint(done.stdout.split())
+
+
+def test_the_garbage_collector_walks_again_once_the_service_is_loaded() -> None:
+    """Also where a second service of this process begins, and where loading ends with an error."""
+    for _ in range(2):
+        with memory.loading():
+            assert not gc.isenabled()
+            memory.keep("tests")
+            assert gc.isenabled()
+    with pytest.raises(OSError, match="no port"), memory.loading():
+        raise OSError("no port")
+    assert gc.isenabled()

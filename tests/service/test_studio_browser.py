@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -15,6 +16,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import httpx
 import pytest
+import trimesh
 
 from ._browser import MARKS, ROOT, Visit, serving
 
@@ -206,6 +208,115 @@ def test_a_wound_is_put_where_the_shape_is_clicked(browser: Browser, studio: str
     assert 40 < wounds[2]["colatitude"] < 110
     assert 0 < wounds[2]["azimuth"] < 90
     visit.page.close()
+
+
+def test_a_frost_is_drawn_and_stops_the_rot(browser: Browser, studio: str) -> None:
+    visit = Visit(browser, viewport={"width": 1200, "height": 900}, bypass_csp=True)
+    page = visit.page
+    page.goto(at(studio, "room=decay&preset=apple&stages=0,4"))
+    visit.shown()
+    warm = page.locator("#seen dl").text_content()
+    page.locator("summary", has_text="Weather").click()
+    field = page.locator(".course .field-of").first  # of the temperature
+    box = field.bounding_box()
+    assert box is not None
+    field.click(position={"x": 3, "y": box["height"] / 2})
+    field.click(position={"x": 0.5 * box["width"], "y": box["height"] - 1})
+    points = page.locator(".course svg").first.get_by_role("slider")
+    assert points.count() == 2
+    # by hand to the ground, then by keys a little up and back again
+    first, plot = points.nth(0).bounding_box(), field.bounding_box()
+    assert first is not None
+    assert plot is not None
+    page.mouse.move(first["x"] + first["width"] / 2, first["y"] + first["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(plot["x"] + 4, plot["y"] + plot["height"] + 20, steps=4)
+    page.mouse.up()
+    points.nth(0).focus()
+    page.keyboard.press("ArrowUp")
+    assert "-9.3 degC" in (points.nth(0).get_attribute("aria-valuetext") or "")
+    page.keyboard.press("ArrowDown")
+    assert "-10 degC" in (points.nth(0).get_attribute("aria-valuetext") or "")
+    said = page.locator("code", has_text="wizen solve").inner_text()
+    [weather] = re.findall(r"--set 'weather=([^']*)'", said)
+    assert [each["temperature"] for each in json.loads(weather)] == pytest.approx([-10, -10], abs=1.5)
+    page.get_by_role("button", name="Run").click()
+    page.locator("#controls .note", has_text="Done in").wait_for(timeout=120_000)
+    visit.shown("shown.of == 2")
+    job = parse_qs(urlsplit(page.url).fragment)["job"][0]
+    done = httpx.get(f"{studio.split('/#')[0]}/v1/jobs/{job}").json()
+    assert [each["temperature"] for each in done["params"]["weather"]] == pytest.approx([-10, -10], abs=1.5)
+    fields = httpx.get(f"{studio.split('/#')[0]}/v1/jobs/{job}/fields?names=rotten_share").json()["fields"]
+    shares = fields["rotten_share"]["values"]
+    assert shares[-1] == pytest.approx(shares[0], abs=1e-6), "nothing grows in frost"
+    assert page.locator("#seen dl").text_content() != warm
+    page.add_script_tag(path=AXE)
+    assert page.evaluate("async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])") == []
+    # taken away again, the steady air holds
+    points.nth(1).focus()
+    page.keyboard.press("Delete")
+    page.locator(".course svg").first.get_by_role("slider").nth(0).focus()
+    page.keyboard.press("Delete")
+    assert "weather" not in page.locator("code", has_text="wizen solve").inner_text()
+    assert visit.complaints == []
+    page.close()
+
+
+@pytest.mark.parametrize("room", ["decay", "growth"])
+def test_a_mesh_of_ones_own_is_sent_run_and_shown(browser: Browser, studio: str, tmp_path: Path, room: str) -> None:
+    ring = tmp_path / "ring.obj"
+    trimesh.creation.torus(20.0, 8.0, major_sections=32, minor_sections=16).export(ring)
+    visit = Visit(browser, viewport={"width": 1200, "height": 900}, bypass_csp=True)
+    page = visit.page
+    page.goto(at(studio, f"room={room}"))
+    visit.shown()
+    page.locator("summary", has_text=re.compile("^Mesh$")).click()
+    chooser = page.locator(".meshfile input")
+    # a file that promises two thousand million points is refused beside the button, and nothing of it is sent on
+    evil = tmp_path / "evil.ply"
+    evil.write_bytes(
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 2000000000\nproperty float x\nproperty float y\n"
+        b"property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" + bytes(64)
+    )
+    chooser.set_input_files(evil)
+    page.locator(".meshfile .wrong", has_text="2000000000").wait_for()
+    # the browser itself says that a request was refused
+    assert [text for text in visit.complaints if "422" not in text] == []
+    visit.complaints.clear()
+    assert "mesh" not in page.locator("code", has_text="wizen solve").inner_text()
+    chooser.set_input_files(ring)
+    page.locator(".meshfile .note", has_text="512 points, 1024 triangles, closed").wait_for()
+    assert page.locator(".meshfile .wrong").inner_text() == ""
+    page.locator("#stages").fill("0, 4" if room == "decay" else "0.1, 0.2")
+    page.add_script_tag(path=AXE)
+    assert page.evaluate("async () => (await axe.run()).violations.map(v => [v.id, v.nodes.map(n => n.html)])") == []
+    run = page.get_by_role("button", name="Run", exact=True)
+    if room == "growth":
+        # the mushroom's tools are where this ring is not: the solver says so, in the page
+        run.click()
+        page.get_by_text("off the surface, further than it reaches").first.wait_for()
+        visit.complaints.clear()
+        page.locator("#preset").select_option("pumpkin")
+        chooser.set_input_files(ring)
+        page.locator(".meshfile .note", has_text="512 points, 1024 triangles, closed").wait_for()
+        page.locator("#stages").fill("0.1, 0.2")
+    run.click()
+    page.locator("#controls .note", has_text="Done in").wait_for(timeout=180_000)
+    visit.shown("shown.of == 2")
+    root = studio.split("/#")[0]
+    job = parse_qs(urlsplit(page.url).fragment)["job"][0]
+    assert len(httpx.get(f"{root}/v1/jobs/{job}").json()["params"]["mesh"]["points"]) == 512
+    shape = trimesh.load(
+        io.BytesIO(httpx.get(f"{root}/v1/jobs/{job}/result?format=glb", timeout=60).content), file_type="glb"
+    )
+    assert sum(len(one.faces) for one in shape.geometry.values()) >= 1024
+    rounded = {"decay": 0.1, "growth": 0.3}[room]
+    assert shape.extents.max() / shape.extents.min() == pytest.approx(3.5, rel=rounded), "a ring, as it was drawn"
+    with page.expect_download() as taken:
+        page.locator("a", has_text="Job as JSON").click()
+    assert len(json.loads(Path(taken.value.path()).read_text())["params"]["mesh"]["faces"]) == 1024
+    assert visit.complaints == []
+    page.close()
 
 
 def test_breaking_has_a_load_curve_in_newtons(browser: Browser, studio: str) -> None:

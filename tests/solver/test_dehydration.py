@@ -40,6 +40,31 @@ def test_smooth_sphere_meets_the_closed_form():
     assert np.log(uneven[0] / uneven[2]) / np.log(18 / 8) == pytest.approx(2, abs=0.6)
 
 
+@pytest.mark.parametrize(("last", "is_smooth"), [(0.1, True), (0.14, False)])
+def test_a_stage_past_the_onset_that_is_still_smooth_is_told_of(last, is_smooth):
+    """The exact onset is at 0.0966; what is marched buckles at 0.108."""
+    params = SOLVER.parse({"te": 0.1, "gamma": 10, "mirrors": "xyz"})
+    run = SOLVER.solve(params, SOLVER.settle(Need(stages=(0.05, last), quality="preview", fields=("roughness",))))
+    assert (run["roughness"].values[-1] < 0.01) == is_smooth
+    assert run.attrs.get("note", "").startswith("s = 0.1: just past the onset (0.0966)") == is_smooth
+
+
+@pytest.mark.parametrize("quality", ["preview", "default"])
+def test_the_strain_energy_is_that_of_flesh(quality):
+    """By quadrature of the closed form along a radius; the march's bulk modulus and rest volumes were 7 % off here."""
+    params = SOLVER.parse({"te": 0.1, "gamma": 10, "mirrors": "xyz", "imperfection": 0})
+    run = SOLVER.solve(params, SOLVER.settle(Need(stages=(0.03, 0.05), quality=quality, fields=("strain_energy",))))
+    for s, found in zip(run["stage"].values, run["strain_energy"].values, strict=True):
+        exact, theta = 0.0, 1 - s
+        for low, high, mu, rest in ((0.4, 1.0, 1.0, theta), (1.0, 1.1, 10.0, 1.0)):
+            x, weights = np.polynomial.legendre.leggauss(12)
+            radius = (low + high) / 2 + (high - low) / 2 * x
+            around = sphere_radius(radius, theta, 0.4) / radius / rest
+            density = rest**3 * mu / 2 * (around**-4 + 2 * around**2 - 3)
+            exact += float((high - low) / 2 * weights @ (4 * np.pi * radius**2 * density))
+        assert found == pytest.approx(exact, rel=0.012)
+
+
 def test_finite_bulk_modulus_errs_in_proportion_to_its_inverse():
     exact = sphere_radius(np.array([1.04]), 0.95, 0.4)[0]
     soft, stiff = (np.mean(smooth_sphere(12, kappa)) - exact for kappa in (30.0, 120.0))

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from solver.contract import Context, InvalidGeometry, InvalidInput, Need
 from solver.dehydration.fresh.closed_form import sphere_radius
@@ -19,6 +20,7 @@ from solver.dehydration.kernel import (
     positions,
     reweigh,
 )
+from solver.painted import painted
 
 from ._loaded import SOLVER, drive_of, parse
 
@@ -89,6 +91,10 @@ def test_flesh_without_a_stone_starts_at_fd_x():
         ({"wetness": (0.6, 0.6, 0.0)}, InvalidGeometry, "at most 0.8"),
         ({"wetness": (0.9, 0.0, 0.0)}, InvalidInput, "wetness"),
         ({"ax": 2.5}, InvalidInput, "anisotropy"),
+        ({"light": (0, 3, 3)}, InvalidGeometry, "at most 4"),
+        ({"light": (0, 0, 2), "mirrors": "xz"}, InvalidGeometry, "light differs .* leave z out"),
+        ({"light_map": [[0, 1]], "mirrors": "x"}, InvalidGeometry, "leave out mirrors"),
+        ({"light_map": [[0, 1, 1]]}, InvalidInput, "has 2 values"),
         ({"imperfection_kind": "noise"}, InvalidInput, "imperfection_kind"),
     ],
 )
@@ -109,6 +115,8 @@ def test_flesh_must_not_swell_where_it_is_wettest():
         ({"anisotropy": (1, 2, 1)}, 0.5, "below 0.475"),
         ({"anisotropy": (1, 2, 1), "wetness": (0, 0.8, 0)}, -0.3, None),
         ({"r8": 2.0, "anisotropy": (2, 2, 2), "wz": 0.3}, -0.3, "stages above"),
+        ({"light": (0, 4, 0)}, 0.9, "stages below 0.792"),
+        ({"light": (0, 1, 0)}, -0.1, "light dries"),
     ],
 )
 def test_stages_that_the_loading_cannot_reach_are_refused(values, stage, words):
@@ -162,6 +170,44 @@ def test_the_wetness_of_a_turned_fruit_is_turned():
     by_ray = np.lexsort(np.round(mesh.rays, 6).T)
     turned = np.lexsort(np.round(mesh.rays[:, [2, 1, 0]], 6).T)
     assert x[by_ray][:, [2, 1, 0]] == pytest.approx(z[turned], abs=2e-5)
+
+
+def test_theta_is_inversely_proportional_to_the_light_that_flesh_has_had():
+    points = np.array([[0.9, 0, 0], [0.5, 0, 0], [0.6, 0, 0.8], [0, 0.7, 0], [-0.9, 0, 0]])
+    theta = Loading(parse(light=(3.0, 0, 0))).fd(points, 0.2)[:, 0]
+    assert theta[3:] == pytest.approx(0.8)  # at the terminator and in the shade
+    # 1 / theta - 1 is what has shone on it
+    assert (1 / theta - 1) / (1 / 0.8 - 1) == pytest.approx([4, 4, 1 + 3 * 0.6, 1, 1])
+
+
+def test_an_even_map_of_light_is_none():
+    plain, lit = Loading(parse()), Loading(parse(light_map=[[0.5, 0.5]]))
+    assert not lit.uniform
+    points = np.random.default_rng(3).normal(size=(50, 3))
+    assert lit.fd(points, 0.23) == pytest.approx(plain.fd(points, 0.23), abs=1e-15)
+
+
+def test_light_that_nobody_asked_for_changes_no_key():
+    assert {"light", "light_map"}.isdisjoint(parse().model_dump())
+
+
+@pytest.mark.parametrize("values", [{"light": (2.0, 0, 0)}, {"light_map": [[0, 0.9, 0.2, 0.3], [0.4, 0.5, 0.6, 1]]}])
+def test_a_lit_fruit_loses_the_volume_that_light_takes(values):
+    """The surface encloses what theta cubed, put through a quadrature of its own, leaves of flesh that keeps volume."""
+    params = parse(**values)
+    fresh, _, _ = relaxed(params, 0.0, steps=1)
+    surface, mesh, _ = relaxed(params, 0.08)
+    rays = np.random.default_rng(1).normal(size=(20000, 3))
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    lit = params.light_map is None
+    bright = 1 + 2 * np.maximum(rays[:, 0], 0) if lit else 2 * painted(params.light_map.values, rays)
+    theta = 1 / (1 + 0.08 / 0.92 * bright)
+    left = 4 / 3 * np.pi * (0.4**3 + (1 - 0.4**3) * (theta**3).mean() + 1.04**3 - 1)
+    shrunk = ConvexHull(surface).volume / ConvexHull(fresh).volume
+    assert shrunk == pytest.approx(left / (4 / 3 * np.pi * 1.04**3), rel=6e-3)
+    if lit:
+        radius = np.linalg.norm(surface, axis=1)
+        assert radius[mesh.rays[:, 0] < -0.8].mean() > radius[mesh.rays[:, 0] > 0.8].mean() + 0.03
 
 
 def test_layers_are_counted_on_the_thickest_flesh():

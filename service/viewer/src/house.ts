@@ -108,7 +108,28 @@ export function fromHash(): Words {
   return Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
 }
 
-/** Let the address bar say where the page stands, without a step in its history. */
+/** How long the address bar waits for a hand that still moves [ms]: browsers ask for the icon anew with every change. */
+const CALM = 250;
+let [coming, last]: [Words | undefined, number] = [undefined, 0];
+let timer = 0;
+
+/** Let the address bar say where the page stands, without a step in its history: at once, or when the hand rests. */
 export function keep(words: Words): void {
-  history.replaceState(null, "", `#${new URLSearchParams(words)}`);
+  coming = words;
+  clearTimeout(timer);
+  const since = performance.now() - last;
+  if (since > CALM) kept();
+  else timer = window.setTimeout(kept, CALM - since);
 }
+
+/** Write what waits to be written. */
+export function kept(): void {
+  if (coming) history.replaceState(null, "", `#${new URLSearchParams(coming)}`);
+  [coming, last] = [undefined, performance.now()];
+}
+
+// another room was gone to: what the last one would have said is past
+addEventListener("hashchange", () => {
+  clearTimeout(timer);
+  coming = undefined;
+});

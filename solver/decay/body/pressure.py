@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...fruit import directions
+from ...painted import painted
 from ..params import DecayParams
-from ..surfaces.places import painted
 from .flesh import Softened
 from .solid import Solid
 

@@ -16,11 +16,11 @@ from scipy.spatial import KDTree
 from ...arrays import Floats
 from ...contract import Context
 from ...fruit import directions
+from ...painted import painted
 from ..climate import Germination, flesh_activity, moisture, surface_activity, warmth
 from ..environment import air, evaporated, opened, reference_radius
 from ..params import DecayParams
 from ..surfaces.imported import extent_of, rays_from
-from ..surfaces.places import painted
 from ..surfaces.seeds import seeds
 from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
 from .colony import Colony

@@ -1,28 +1,15 @@
-"""Places on a fruit that a user points at: by angles, by a position, or painted as a map."""
+"""Places on a fruit that a user points at: by angles, or by a position."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
-from scipy import ndimage
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ...arrays import Floats
+from ...painted import PaintedMap
 
-__all__ = ["Neighbour", "Painted", "Place", "Pressure", "PressureMap", "Wound", "painted"]
-
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-def _square(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    if rows and {len(row) for row in rows} != {2 * len(rows)}:
-        raise ValueError(f"a painted map of {len(rows)} rows has {2 * len(rows)} values in each")
-    return rows
-
-
-#: Rows from the pole y > 0 down, each around the y axis from x towards z: n rows of 2 n values from 0 to 1.
-Painted = Annotated[tuple[tuple[Share, ...], ...], Field(max_length=512), AfterValidator(_square)]
+__all__ = ["Neighbour", "Place", "Pressure", "PressureMap", "Wound"]
 
 
 class Place(BaseModel):
@@ -72,12 +59,9 @@ class Pressure(Place):
     length: float = Field(1.0, ge=0.5, le=1.5, description="Rest length at the place, over what it would be [1]")
 
 
-class PressureMap(BaseModel):
+class PressureMap(PaintedMap):
     """A painted pressure map: where it is 1, stiffness and rest length are multiplied; it fades out with depth."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    values: Painted
     stiffness: float = Field(
         1.0, ge=0.01, le=100, description="Stiffness where the map is 1, over what it would be [1]"
     )
@@ -97,15 +81,3 @@ class Neighbour(BaseModel):
         description="Whether it gives way as this fruit does: bodies then meet in the plane midway between "
         "their skins, as two alike do; else it is a rigid ball",
     )
-
-
-def painted(rows: tuple[tuple[float, ...], ...], rays: Floats) -> Floats:
-    """Return a painted map at unit rays (v, 3), bilinear; beyond a pole the rows go on on the other side."""
-    values = np.array(rows, dtype=float)
-    n, m = values.shape
-    padded = np.concatenate([np.roll(values[:1], n, axis=1), values, np.roll(values[-1:], n, axis=1)])
-    down = np.arccos(np.clip(rays[:, 1], -1, 1)) * n / np.pi + 0.5
-    along = np.arctan2(rays[:, 2], rays[:, 0]) % (2 * np.pi) * m / (2 * np.pi)
-    padded = np.concatenate([padded, padded[:, :1]], axis=1)
-    found: Floats = ndimage.map_coordinates(padded, [down, along], order=1, mode="nearest")
-    return found

@@ -47,9 +47,9 @@ def onset(
         raise InvalidInput(
             f"kappa_ratio = {kappa_ratio:g} lies outside 5 to 1e6.", advice="Leave it out for incompressible layers."
         )
-    if any(params.wetness) or any(factor != 1.0 for factor in params.anisotropy):
+    if not params.dries_evenly:
         raise InvalidInput(
-            "the onset is known for flesh that shrinks evenly only.", advice="Leave out wetness and anisotropy."
+            "the onset is known for flesh that shrinks evenly only.", advice="Leave out wetness, anisotropy and light."
         )
     best: Road = "radial" if params.is_sphere else "meridional" if params.is_axisymmetric else "full"
     roads: tuple[Road, ...] = ("radial", "meridional", "full")

@@ -204,10 +204,10 @@ def base_state(
         NotConverged: no equilibrium was found.
 
     """
-    if any(params.wetness) or any(factor != 1.0 for factor in params.anisotropy):
+    if not params.dries_evenly:
         raise InvalidInput(
             "the smooth shape in the meridional plane needs flesh that shrinks evenly.",
-            advice="Leave out wetness and anisotropy.",
+            advice="Leave out wetness, anisotropy and light.",
         )
     if not params.is_axisymmetric:
         raise InvalidInput(

@@ -29,7 +29,7 @@ _KINETICS: Mapping[str, _Measured] = {
 }
 
 #: Presets whose fruit was measured.
-_FRUITS = {"raisin": "grape", "jujube1": "jujube", "jujube2": "jujube"}
+_FRUITS = {"raisin": "grape", "raisin2": "grape", "jujube1": "jujube", "jujube2": "jujube"}
 
 
 def shrinkage(left: float, water: float) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 from ...arrays import Floats
 from ...contract import Cancelled, Context, InvalidInput
 from ..params import DehydrationParams
-from .loading import Loading
 
 __all__ = ["bumps", "heights"]
 
@@ -34,10 +33,10 @@ def heights(params: DehydrationParams, directions: Floats, context: Context, hig
     """
     if params.imperfection_kind == "waves":
         return bumps(directions, context.generator(params.seed), highest)
-    if not Loading(params).uniform:
+    if not params.dries_evenly:
         raise InvalidInput(
             "buckling modes are known for homogeneous, isotropic drying only.",
-            advice='Leave out wetness and anisotropy, or set imperfection_kind to "waves".',
+            advice='Leave out wetness, anisotropy and light, or set imperfection_kind to "waves".',
         )
     from ..bifurcation import onset  # an eigenproblem: nothing that waves should pay for
 

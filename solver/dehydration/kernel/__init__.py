@@ -5,7 +5,7 @@
 holds its two compiled back ends (chosen by WIZEN_KERNEL = auto, vector or scalar).
 """
 
-from solver.dehydration.kernel.bulk import dilatations, rested, rests
+from solver.dehydration.kernel.bulk import dilatations, pressure_energy, rested, rests, without_bulk
 from solver.dehydration.kernel.diagnostics import ElementReport, element_report, kinetic_energy, strain_energy
 from solver.dehydration.kernel.fixed_point import out_of_reach, place, positions
 from solver.dehydration.kernel.layout import Layout, build_layout
@@ -39,10 +39,12 @@ __all__ = [
     "out_of_reach",
     "place",
     "positions",
+    "pressure_energy",
     "rested",
     "rests",
     "reweigh",
     "stiffness_bounds",
     "strain_energy",
     "weigh",
+    "without_bulk",
 ]

@@ -16,7 +16,7 @@ import dataclasses
 import numpy as np
 from numba import njit, prange
 
-from solver.dehydration.kernel.algebra import EXOCARP_WEIGHTS, INVERSE_VOLUME, MU
+from solver.dehydration.kernel.algebra import EXOCARP_WEIGHTS, INVERSE_VOLUME, KAPPA, MU
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.layout import Layout, aligned_copy
 from solver.dehydration.kernel.metric import EXOCARP_POINTS, GAUSS_POINTS
@@ -24,7 +24,7 @@ from solver.fem import HEX8
 
 from ...arrays import Floats, Ints, Ints32
 
-__all__ = ["dilatations", "rested", "rests"]
+__all__ = ["dilatations", "pressure_energy", "rested", "rests", "without_bulk"]
 
 
 #: dN_a/dxi_k (points, 8, 3) and weights of the exocarp's rule; the core's rule is exact for a trilinear hexahedron.
@@ -103,3 +103,24 @@ def rested(layout: Layout, g: Floats) -> Layout:
         single[:, INVERSE_VOLUME] /= core
         single[:, MU] /= np.cbrt(core) ** 2
     return dataclasses.replace(layout, core_planes=core_planes, exocarp_planes=skin_planes, one_point_planes=single)
+
+
+def without_bulk(layout: Layout) -> Layout:
+    """`layout` without bulk moduli: its energy is that of shear, and of the barrier."""
+    planes = [aligned_copy(p, np.float32) for p in (layout.core_planes, layout.exocarp_planes, layout.one_point_planes)]
+    for each in planes:
+        if len(each):
+            each[:, KAPPA] = 0
+    return dataclasses.replace(layout, core_planes=planes[0], exocarp_planes=planes[1], one_point_planes=planes[2])
+
+
+def pressure_energy(layout: Layout, dilatation: Floats, theta: float, share: float) -> Floats:
+    """Energy (ne,) of pressures kappa times `dilatation` (ne,) in flesh whose bulk modulus is kappa / `share`.
+
+    layout: without rest volumes, which hold what the march's bulk modulus alone would let go.
+    """
+    core, skin = layout.core_planes, layout.exocarp_planes
+    kappa, inverse = (layout.lanes(core[:, plane], skin[:, plane]) for plane in (KAPPA, INVERSE_VOLUME))
+    ratio = layout.lanes(np.full_like(core[:, KAPPA], theta**3), np.ones_like(skin[:, KAPPA]))
+    found: Floats = 0.5 * share * kappa * ratio / inverse * dilatation**2
+    return found

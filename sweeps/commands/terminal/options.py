@@ -122,9 +122,10 @@ def parameters(path: Path | None) -> dict[str, Any]:
 
 def _value(text: str) -> Any:
     if text.startswith("@"):
-        from . import meshfile
+        from . import meshfile, picturefile
 
-        return meshfile.read(Path(text[1:]))
+        path = Path(text[1:])
+        return picturefile.read(path) if path.suffix.lower() in picturefile.KINDS else meshfile.read(path)
     readers: list[Callable[[], Any]] = [lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)]
     if "," in text:
         readers.append(lambda: tomllib.loads(f"value = [{text}]")["value"])

@@ -7,10 +7,10 @@ from solver.contract import InvalidInput, Need
 from solver.decay import SOLVER
 from solver.decay.body.body import Body
 from solver.decay.fields.system import System
-from solver.decay.surfaces.places import painted
 from solver.decay.surfaces.seeds import seeds
 from solver.decay.surfaces.surface import geodesic, lay
 from solver.fruit import directions, lattice
+from solver.painted import painted
 
 
 def test_a_position_is_the_angles_under_it():

@@ -1,5 +1,6 @@
 // What people take away: files, commands, a link.
 
+import { kept } from "../house";
 import { button, el } from "./dom";
 
 /** A file by its address, and a command that makes it. */
@@ -23,7 +24,10 @@ export class Actions {
     this.row.replaceChildren(
       ...files.map(({ label, href, primary, name }) => el("a", { class: primary ? "button primary" : "button", href, download: name ?? "" }, label)),
       ...commands.map(({ label, text }) => button(`Copy as ${label}`, () => void this.copy(text, "Command copied."))),
-      button("Copy link", () => void this.copy(location.href, "Link copied.")),
+      button("Copy link", () => {
+        kept();
+        void this.copy(location.href, "Link copied.");
+      }),
     );
     const [first] = commands;
     this.lines.replaceChildren(...(first ? [el("code", { tabindex: "0", role: "note", "aria-label": `As ${first.label}` }, first.text)] : []));

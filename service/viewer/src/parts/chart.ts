@@ -13,7 +13,8 @@ export interface Curve {
   y: number[];
 }
 
-function shape(tag: string, attributes: Record<string, string | number>, text = ""): SVGElement {
+/** A part of a drawing. */
+export function shape(tag: string, attributes: Record<string, string | number>, text = ""): SVGElement {
   const made = document.createElementNS(NS, tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
   made.textContent = text;

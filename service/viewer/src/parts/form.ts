@@ -2,7 +2,9 @@
 
 import type { Parameters, Schema, Values } from "../service/solvers";
 import { same } from "../service/solvers";
+import { between, Course, type Point } from "./course";
 import { button, details, digits, el } from "./dom";
+import { MeshFile } from "./meshfile";
 
 /** One value that can be edited. `get` throws what is wrong with it. */
 interface Editor {
@@ -12,6 +14,8 @@ interface Editor {
 }
 
 type Changed = () => void;
+/** Stands for no word of a schema's. */
+const OWN = "\u0000";
 let numbered = 0;
 
 const clone = <T>(value: T): T => (value === undefined ? value : JSON.parse(JSON.stringify(value)));
@@ -173,7 +177,7 @@ function union(schema: Schema, label: string, defs: Record<string, Schema>, chan
   };
 }
 
-function list(schema: Schema, label: string, defs: Record<string, Schema>, changed: Changed): Editor & { add(value?: unknown): void } {
+function list(schema: Schema, label: string, defs: Record<string, Schema>, changed: Changed, next?: () => unknown): Editor & { add(value?: unknown): void } {
   const rows = el("div", { class: "rows" });
   const own: { root: HTMLElement; editor: Editor }[] = [];
   const one = schema.items as Schema;
@@ -191,7 +195,7 @@ function list(schema: Schema, label: string, defs: Record<string, Schema>, chang
     rows.append(row.root);
   };
   const more = button("Add", () => {
-    put();
+    put(next?.());
     changed();
   }, { "aria-label": `Add to ${label}` });
   return {
@@ -206,6 +210,41 @@ function list(schema: Schema, label: string, defs: Record<string, Schema>, chang
       put(value);
       changed();
     },
+  };
+}
+
+/** A list whose entries follow each other along one of their numbers: curves above the numbers. */
+function course(schema: Schema, label: string, defs: Record<string, Schema>, changed: Changed, start: () => Point): ReturnType<typeof list> {
+  const along = schema.along as string;
+  const item = resolved(schema.items as Schema, defs).schema;
+  const read = (): Point[] => rows.get() as Point[];
+  const told = (): void => {
+    try {
+      curves.show(read());
+    } catch {
+      // said beside the number
+    }
+    changed();
+  };
+  const rows = list(schema, label, defs, told, () => {
+    const points = read();
+    const last = points[points.length - 1];
+    const { maximum = Infinity, minimum = 0 } = (item.properties ?? {})[along];
+    return between(points, along, last ? Math.min(maximum, last[along] + 1) : minimum, start());
+  });
+  const curves = new Course(item, along, start, (points) => {
+    rows.set(points);
+    changed();
+  });
+  const hint = el("p", { class: "hint" }, "Click to add a point, drag it, or move it by arrow keys; Delete takes it away.");
+  return {
+    root: el("div", {}, hint, curves.root, details("As numbers", false, rows.root)),
+    get: rows.get,
+    set: (value) => {
+      rows.set(value);
+      curves.show((value as Point[] | undefined) ?? []);
+    },
+    add: rows.add,
   };
 }
 
@@ -228,8 +267,34 @@ function optional(inner: Editor, label: string, changed: Changed): Editor {
   };
 }
 
+/** A word, or a value of one's own. */
+function either(words: string[], inner: Editor, label: string, changed: Changed): Editor {
+  const pick = el("select", { "aria-label": `${label}: which` }, ...words.map((word) => el("option", { value: word }, word)), el("option", { value: OWN }, "as written"));
+  const show = (): void => void (inner.root.hidden = pick.value !== OWN);
+  pick.addEventListener("change", () => {
+    show();
+    changed();
+  });
+  show();
+  return {
+    root: el("div", { class: "either" }, pick, inner.root),
+    get: () => (pick.value === OWN ? inner.get() : pick.value),
+    set: (value) => {
+      pick.value = words.includes(value as string) ? (value as string) : OWN;
+      if (pick.value === OWN) inner.set(value);
+      show();
+    },
+  };
+}
+
 function editor(given: Schema, label: string, defs: Record<string, Schema>, changed: Changed): Editor {
+  const words = (given.anyOf ?? []).flatMap((one) => (typeof one.const === "string" ? [one.const] : []));
+  if (words.length && given.anyOf) {
+    const rest = given.anyOf.filter((one) => one.const === undefined);
+    if (rest.length) return either(words, editor({ ...given, anyOf: rest }, label, defs, changed), label, changed);
+  }
   const { schema, optional: may } = resolved(given, defs);
+  if (may && hasMesh(schema)) return new MeshFile(label, changed);
   const made = plain(schema, label, defs, changed);
   return may ? optional(made, label, changed) : made;
 }
@@ -250,7 +315,7 @@ const isList = (items: Schema, defs: Record<string, Schema>): boolean => {
   return schema.discriminator !== undefined || schema.properties !== undefined || schema.prefixItems !== undefined;
 };
 
-/** Vertices and triangles are no matter for a form. */
+/** Points and triangles are a matter for a file. */
 const hasMesh = (schema: Schema): boolean => Object.keys(schema.properties ?? {}).some((name) => ["vertices", "faces", "triangles"].includes(name));
 
 interface Field {
@@ -278,7 +343,7 @@ export class Form {
       const { schema: found } = resolved(given, this.defs);
       const entries = found.type === "array" && found.items && isList(found.items, this.defs);
       const made = this.field(name, given, Boolean(entries));
-      (entries ? lists : first.has(name) && found.type !== "object" ? main : rest).push(made);
+      (entries || hasMesh(found) ? lists : first.has(name) && found.type !== "object" ? main : rest).push(made);
     }
     this.root.append(...main, ...lists, ...(rest.length ? [details(`More parameters (${rest.length})`, false, ...rest)] : []));
   }
@@ -325,10 +390,11 @@ export class Form {
   private field(name: string, given: Schema, isOpen: boolean): HTMLElement {
     const label = titled(name);
     const { schema: found } = resolved(given, this.defs);
-    const made = editor(given, label, this.defs, () => {
+    const changed = (): void => {
       this.count();
       this.changed();
-    });
+    };
+    const made = found.along ? course(found, label, this.defs, changed, () => this.steady(found)) : editor(given, label, this.defs, changed);
     const wrong = el("p", { class: "wrong", role: "status" });
     const about = [found.description, range(found)].filter(Boolean).join("; ");
     const field: Field = { name, editor: made, wrong };
@@ -342,6 +408,22 @@ export class Form {
     const opened = details(label, false, el("p", { class: "hint" }, about), made.root, wrong);
     field.summary = opened.querySelector("summary") as HTMLElement;
     return opened;
+  }
+
+  /** What holds where a course says nothing: the parameters of the same names, else the middle of what may be. */
+  private steady(list: Schema): Point {
+    const { properties = {} } = resolved(list.items as Schema, this.defs).schema;
+    const value = (name: string): number => {
+      try {
+        const own = this.fields.find((field) => field.name === name)?.editor.get();
+        if (typeof own === "number") return own;
+      } catch {
+        // said beside it
+      }
+      const { minimum = 0, maximum = 1 } = properties[name];
+      return (minimum + maximum) / 2;
+    };
+    return Object.fromEntries(Object.keys(properties).map((name) => [name, value(name)]));
   }
 
   private count(): void {

@@ -13,6 +13,8 @@ import { ask, cancel, follow, isOf, job as findJob, numbers, result, stored, typ
 import { solver as askSolver, type Solver, type Values } from "../service/solvers";
 import { Film } from "../view/film";
 
+/** Longest request that a command line takes [characters]. */
+const LINE = 20_000;
 const QUALITIES = ["preview", "default", "fine"];
 
 /** The room of a solver; `looked` says that its shapes can be looked up, too. */
@@ -47,6 +49,7 @@ class Work {
   private loading: AbortController | undefined;
   private map: HTMLImageElement | undefined;
   private closed = false;
+  private own = "";
 
   constructor(
     private readonly house: House,
@@ -113,7 +116,7 @@ class Work {
     const named = this.words.job ? await findJob(this.words.job) : undefined;
     const fitting = all.find((one) => isOf(one, solver, this.preset));
     const shown = named?.state === "done" ? named : (fitting ?? (this.words.preset ? undefined : all[0]));
-    if (shown && shown !== fitting) this.adopt(shown);
+    if (shown && shown !== fitting) await this.adopt(shown);
     if (shown) void this.look(shown);
     else house.say(`${worded(this.preset)}: not computed yet`, "press Run", { level: "fair", text: "nothing to see yet", why: "No run of this preset is stored." });
     if (named && (named.state === "wanted" || named.state === "running")) void this.watch(named);
@@ -154,7 +157,9 @@ class Work {
   }
 
   /** Fill the form with what a run was asked. */
-  private adopt(found: Job): void {
+  private async adopt(listed: Job): Promise<void> {
+    const found = listed.omitted.length ? await findJob(listed.id) : listed;
+    if (this.closed) return;
     const preset = Object.keys(this.solver.presets).find((name) => isOf(found, this.solver, name));
     if (preset) this.preset = preset;
     (byId("preset") as HTMLSelectElement).value = this.preset;
@@ -410,8 +415,7 @@ class Work {
       const stages = one.need.stages;
       const range = `${digits(stages[0])} to ${withUnits(stages[stages.length - 1], this.solver.stages.units)}`;
       const open = button(this.title(one), () => {
-        this.adopt(one);
-        void this.look(one);
+        void this.adopt(one).then(() => this.look(one));
       });
       return el("li", {}, open, el("small", {}, `${one.need.quality}, ${this.solver.stages.symbol} ${range}`));
     });
@@ -422,21 +426,27 @@ class Work {
     const { solver, film } = this;
     let said = "";
     let sent = "";
+    let long = false;
     try {
       const { params, stages } = this.asked();
       const set = Object.entries(params).map(([name, value]) => ` --set '${name}=${typeof value === "string" ? value : JSON.stringify(value)}'`);
       said = `wizen solve ${solver.name} --preset ${this.preset}${set.join("")} --stages ${stages.join(",")} --quality ${this.quality} --out ${this.preset}.glb`;
       sent = JSON.stringify({ solver: solver.name, preset: this.preset, params, need: { stages, quality: this.quality, fields: this.fields() } });
+      long = sent.length > LINE;
     } catch {
       // said beside the form
     }
+    // a mesh is no matter for a command line
+    if (this.own) URL.revokeObjectURL(this.own);
+    this.own = long ? URL.createObjectURL(new Blob([sent], { type: "application/json" })) : "";
+    const asked = long ? [{ label: "Job as JSON", href: this.own, name: "job.json" }] : [];
     const file = (label: string, format: string, primary = false) => ({ label, href: film ? result(film.job, { format }) : "", primary });
     return {
-      files: film ? [file("Download GLB", "glb", true), file("USD", "usdc"), file("netCDF", "netcdf")] : [],
+      files: [...(film ? [file("Download GLB", "glb", true), file("USD", "usdc"), file("netCDF", "netcdf")] : []), ...asked],
       commands: said
         ? [
-            { label: "wizen", text: said },
-            { label: "curl", text: `curl '${absolute("v1/jobs")}' -H "Authorization: Bearer $TOKEN" -H 'Content-Type: application/json' -d '${sent.replace(/'/g, "'\\''")}'` },
+            ...(long ? [] : [{ label: "wizen", text: said }]),
+            { label: "curl", text: `curl '${absolute("v1/jobs")}' -H "Authorization: Bearer $TOKEN" -H 'Content-Type: application/json' -d ${long ? "@job.json" : `'${sent.replace(/'/g, "'\\''")}'`}` },
           ]
         : [],
     };

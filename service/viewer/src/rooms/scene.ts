@@ -11,6 +11,10 @@ import { solver } from "../service/solvers";
 import { Crowd } from "../view/crowd";
 
 const MOST = 1000;
+/** Kinds to begin with. */
+const FIRST = 3;
+/** Length of the scene's unit [m]. */
+const UNIT = 0.01;
 const AGAIN = 3000; // [ms] until shapes are asked for again that did not come
 const RULES: [string, string][] = [
   ["bowl", "in a bowl (falls until it rests)"],
@@ -18,6 +22,8 @@ const RULES: [string, string][] = [
   ["scatter", "scattered on the floor"],
   ["row", "in a row"],
 ];
+/** From where one sees into a bowl, off the vertical [radian]. */
+const INTO_BOWL = 0.75;
 /** More than these take longer to fall than an answer may take. */
 const FALLING = 150;
 /** What any machine that draws this page turns without a jerk. */
@@ -28,29 +34,55 @@ interface Kind {
   preset: string;
   table: Table;
   chosen: boolean;
+  /** Length of r1 [m], where such fruits have a size of their own. */
+  metres?: number;
 }
 
 export const scene: Room = async (house, words) => {
   const [all, covered] = await Promise.all([tables(), families()]);
   const kinds: Kind[] = [];
-  const worn = new Set<string>(); // one of each skin to begin with
   for (const family of covered) {
     const table = all.find((one) => one.name === family.name && !one.complaint);
     const preset = family.presets.find((name) => !kinds.some((kind) => kind.preset === name));
     if (!table || !preset) continue;
-    const skin = Object.keys((await solver(table.solver)).looks.shades).find((name) => preset.startsWith(name));
-    const first = skin !== undefined && !worn.has(skin) && worn.size < 3;
-    if (first) worn.add(skin);
-    kinds.push({ preset, table, chosen: first });
+    const { sizes } = await solver(table.solver);
+    kinds.push({ preset, table, chosen: false, metres: sizes[preset] });
   }
-  if (kinds.length && !worn.size) kinds[0].chosen = true;
+  if (kinds.length) await choose(kinds);
   if (!kinds.length) throw new Problem("No table holds a preset.", "Scenes are made of presets that tables hold: build one with `wizen table build`.", "");
   return new Many(house, kinds, words).open();
+};
+
+/** Begin with one of each of the first skins: the last of its presets, which are those worth a second try. */
+async function choose(kinds: Kind[]): Promise<void> {
+  const { looks, presets } = await solver(kinds[0].table.solver);
+  const order = Object.keys(presets);
+  for (const skin of Object.keys(looks.shades)) {
+    if (kinds.filter((kind) => kind.chosen).length === FIRST) break;
+    const worn = kinds.filter((kind) => kind.preset.startsWith(skin)).sort((a, b) => order.indexOf(b.preset) - order.indexOf(a.preset));
+    if (worn.length) worn[0].chosen = true;
+  }
+  if (!kinds.some((kind) => kind.chosen)) kinds[0].chosen = true;
+}
+
+/** A number in whole parts by weights. */
+const weighed = (total: number, weights: number[]): number[] => {
+  const sum = weights.reduce((a, b) => a + b, 0);
+  let [seen, given] = [0, 0];
+  return weights.map((weight) => {
+    seen += weight;
+    const part = Math.round((total * seen) / sum) - given;
+    given += part;
+    return part;
+  });
 };
 
 /** A number in so many whole parts, as even as may be. */
 const shares = (total: number, parts: number): number[] =>
   Array.from({ length: parts }, (_, i) => Math.floor(total / parts) + (i < total % parts ? 1 : 0));
+
+/** Length of r1 in the scene. */
+const reach = ({ metres }: Kind): number => (metres ?? UNIT) / UNIT;
 
 class Many {
   private readonly counts = new Map<string, HTMLInputElement>();
@@ -70,6 +102,7 @@ class Many {
   private settled = 0;
   private turning = 0;
   private closed = false;
+  private risen = false;
   private updates: number[] = [];
 
   constructor(
@@ -84,11 +117,13 @@ class Many {
     const stage = Number(words.stage ?? NaN);
     const step = 10 ** (Math.floor(Math.log10(this.highest - this.lowest)) - 2);
     Object.assign(this.dry, { min: String(this.lowest), max: String(this.highest), step: String(step) });
-    this.dry.value = String(Number.isFinite(stage) ? stage : this.lowest + 0.6 * (this.highest - this.lowest));
+    this.dry.value = String(Number.isFinite(stage) ? stage : this.lowest + 0.83 * (this.highest - this.lowest));
     const given = Number(words.count ?? NaN);
-    const shared = shares(Number.isFinite(given) ? Math.min(MOST, Math.max(1, given)) : 60, kinds.filter((kind) => kind.chosen).length);
+    // as much of each: few large ones, many small ones
+    const weights = kinds.filter((kind) => kind.chosen).map((kind) => reach(kind) ** -3);
+    const shared = weighed(Number.isFinite(given) ? Math.min(MOST, Math.max(1, given)) : 90, weights);
     for (const kind of kinds) {
-      const count = kind.chosen ? shared.pop() : 0;
+      const count = kind.chosen ? shared.shift() : 0;
       this.counts.set(kind.preset, el("input", { type: "number", min: "0", max: String(MOST), value: String(count), id: `count-${kind.preset}` }));
     }
     this.asking = new Latest<number, Float32Array[]>(
@@ -162,9 +197,9 @@ class Many {
 
   private wanted(): Wanted {
     const items = this.kinds
-      .map(({ preset }) => ({ preset, count: Math.round(Number(this.counts.get(preset)?.value)) }))
+      .map(({ preset, metres }) => ({ preset, metres, count: Math.round(Number(this.counts.get(preset)?.value)) }))
       .filter(({ count }) => count > 0)
-      .map(({ preset, count }) => ({ preset, stage: this.stage, count, seed: 3, vary: 0.15, size: 1, place: "here" }));
+      .map(({ preset, count, metres }) => ({ preset, stage: this.stage, count, seed: 3, vary: 0.15, size: metres ? ("real" as const) : 1, place: "here" }));
     const total = items.reduce((sum, { count }) => sum + count, 0);
     if (!total) throw new Problem("The scene is empty.", "Give at least one of the fruits a number.", "");
     if (items.some(({ count }) => !Number.isFinite(count) || count > MOST) || total > MOST) {
@@ -174,11 +209,14 @@ class Many {
     if (falls && total > FALLING) {
       throw new Problem(`${total} fruits take minutes to fall, longer than an answer may.`, `Take ${FALLING} at most, lay them on the floor, or run the command below.`, "");
     }
-    const radius = falls ? Math.max(3, 1.15 * Math.cbrt(total)) : 1.5 * Math.ceil(Math.sqrt(total));
+    const lengths = this.kinds.flatMap((kind) => (this.counts.get(kind.preset)?.value === "0" ? [] : [[Number(this.counts.get(kind.preset)?.value), reach(kind)]]));
+    const bulk = Math.cbrt(lengths.reduce((sum, [count, r1]) => sum + count * r1 ** 3, 0));
+    const widest = Math.max(...lengths.map(([, r1]) => r1));
+    const radius = falls ? Math.max(3 * widest, 1.4 * bulk) : 1.5 * widest * Math.ceil(Math.sqrt(total));
     const place = { name: "here", rule: this.rule, seed: 1, ...(this.rule === "bowl" || this.rule === "scatter" ? { radius: Number(radius.toFixed(2)) } : {}) };
     const far = radius / 6;
     const camera = { ...CAMERA, position: CAMERA.position.map((x) => Number((x * Math.max(1, far)).toFixed(2))) };
-    return { unit: 0.01, cull: false, budget: { triangles: TRIANGLES }, camera, places: [place], items };
+    return { unit: UNIT, cull: false, budget: { triangles: TRIANGLES }, camera, places: [place], items };
   }
 
   /** Ask for the scene as it stands. */
@@ -199,6 +237,8 @@ class Many {
       this.crowd = crowd;
       this.settled = asked.items[0].stage;
       this.house.stand(crowd);
+      if (!this.risen && this.rule === "bowl") this.house.studio.rise(INTO_BOWL);
+      this.risen = true;
       this.told(report, performance.now() - begin);
       this.said.textContent = "";
     } catch (error) {

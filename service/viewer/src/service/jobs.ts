@@ -13,6 +13,8 @@ export interface Job {
   expected: { seconds: number; bytes: number } | null;
   updated: string;
   params: Values;
+  /** Parameters that only the job itself says, as meshes. */
+  omitted: string[];
   need: { stages: number[]; quality: string; fields: string[]; resolution: number | null };
   problem: { detail: string; advice: string } | null;
   links: { self: string; events: string; result?: string };
@@ -49,6 +51,7 @@ export async function stored(solver: string): Promise<Job[]> {
 /** Whether a job ran a preset as it stands: all that the preset says, and the solver's defaults beside it. */
 export function isOf(found: Job, solver: Solver, preset: string): boolean {
   const said = solver.presets[preset] ?? {};
+  if (found.omitted.length) return false;
   return Object.entries(found.params).every(([name, value]) => {
     if (name === "seed") return true;
     const meant = name in said ? said[name] : solver.params.properties[name]?.default;

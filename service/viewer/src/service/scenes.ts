@@ -8,7 +8,8 @@ export interface Item {
   count: number;
   seed: number;
   vary: number;
-  size: number;
+  /** Length of r1, or as large as such fruits are. */
+  size: number | "real";
   place: string;
 }
 

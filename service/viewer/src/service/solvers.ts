@@ -26,6 +26,8 @@ export interface Schema {
   oneOf?: Schema[];
   discriminator?: { propertyName: string; mapping: Record<string, string> };
   axes?: string[];
+  /** Of a list: the number along which its entries follow each other. */
+  along?: string;
   $ref?: string;
 }
 
@@ -47,6 +49,8 @@ export interface Solver {
   default_fields: string[];
   presets: Record<string, Values>;
   preset_stages: Record<string, number[]>;
+  /** Length of r1 by preset [m]. */
+  sizes: Record<string, number>;
   looks: Look;
   qualities: Record<string, { relative_error: number | null; resolution: number | null }>;
   /** Where and how it is worked on live, if it can be. */

@@ -92,7 +92,7 @@ export class Crowd implements Subject {
   }
 }
 
-/** The box that holds every vertex of every copy: those of the copies' boxes are larger. */
+/** The box that holds every vertex of every copy, or what is above a bowl: those of the copies' boxes are larger. */
 function extent(scene: Object3D): Box3 {
   const reach = new Box3();
   const [at, own, turn] = [new Vector3(), new Matrix4(), new Matrix4()];
@@ -107,5 +107,11 @@ function extent(scene: Object3D): Box3 {
       for (let i = 0; i < position.count; i += step) reach.expandByPoint(at.fromBufferAttribute(position, i).applyMatrix4(own));
     }
   });
+  // what rolled away from a bowl is not what is looked at
+  const bowl = scene.getObjectByName("bowl");
+  if (bowl instanceof Mesh) {
+    const { min, max } = new Box3().setFromObject(bowl);
+    for (const axis of ["x", "z"] as const) [reach.min[axis], reach.max[axis]] = [min[axis], max[axis]];
+  }
   return reach;
 }

@@ -240,6 +240,13 @@ export class Studio {
     }
   }
 
+  /** See it from an angle off the vertical [radian]. */
+  rise(angle: number): void {
+    const where = new Spherical().setFromVector3(this.camera.position.clone().sub(this.target));
+    where.phi = angle;
+    this.place(where);
+  }
+
   private place(where: Spherical): void {
     where.phi = Math.min(Math.max(where.phi, 0.05), this.controls.maxPolarAngle);
     where.radius = Math.min(Math.max(where.radius, this.controls.minDistance), this.controls.maxDistance);

@@ -1,0 +1,191 @@
+"""How often the page changes what it shows, in a browser that draws in software: python -m benchmarks.scenes.page.
+
+Each row is driven as a hand would (a slider that never rests, a film, a growth that plays) for some seconds, twice:
+drawn by SwiftShader on the processor, and with the draw calls left out, so that what remains is the page's own work
+and the service's. A graphics card draws what SwiftShader needs seconds for: the second figure is the bound that it
+leaves. Draw calls are counted in the browser's own WebGL functions, instanced ones apart. Page and service: processor
+seconds of the page's thread and of the server, over the updates; what both take together is the least time from one
+update to the next.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import psutil
+
+from benchmarks.figures import Sheet
+from benchmarks.scenes.picture import FLAGS
+from benchmarks.service.__main__ import running
+from service.commands.studio import fit_out
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+#: Counts draw calls and frames; `?draw=0` in `drawn` leaves the calls out.
+_COUNT = """() => {
+  window.counted = { single: 0, instanced: 0, copies: 0, renders: 0, shown: 0 };
+  const gl = WebGL2RenderingContext.prototype;
+  for (const [name, kind] of [["drawElements", "single"], ["drawArrays", "single"],
+      ["drawElementsInstanced", "instanced"], ["drawArraysInstanced", "instanced"]]) {
+    const real = gl[name];
+    gl[name] = function (...words) {
+      counted[kind]++;
+      if (kind === "instanced") counted.copies += words[words.length - 1];
+      if (window.drawn) real.apply(this, words);
+    };
+  }
+  let before = 0;
+  const count = () => {
+    const calls = counted.single + counted.instanced;
+    if (calls > before) counted.renders++;
+    before = calls;
+    requestAnimationFrame(count);
+  };
+  requestAnimationFrame(count);
+}"""
+#: Moves a slider to and fro for some milliseconds, and counts what is shown meanwhile.
+_DRIVE = """async ([selector, milliseconds]) => {
+  const view = document.getElementById("view");
+  const seen = new MutationObserver((all) => (counted.shown += all.length));
+  seen.observe(view, { attributes: true, attributeFilter: ["data-shown"] });
+  const input = selector && document.querySelector(selector);
+  const begin = performance.now();
+  Object.assign(counted, { single: 0, instanced: 0, copies: 0, renders: 0, shown: 0 });
+  while (performance.now() - begin < milliseconds) {
+    // as a screen's frames come, not faster
+    await new Promise((done) => setTimeout(done, 16));
+    if (input) {
+      const share = 0.5 + 0.45 * Math.sin((performance.now() - begin) / 700);
+      input.value = Number(input.min) + share * (Number(input.max) - Number(input.min));
+      input.dispatchEvent(new Event("input", { bubbles: true }));
+    }
+  }
+  seen.disconnect();
+  return { ...counted, seconds: (performance.now() - begin) / 1000, at: JSON.parse(view.dataset.shown) };
+}"""
+
+
+class _Row(NamedTuple):
+    name: str
+    words: str
+    #: What is moved; what is chosen and clicked first.
+    slider: str = ""
+    quality: str = ""
+    clicks: tuple[str, ...] = ()
+
+
+_ROWS = (
+    _Row("dry: one fruit, s moves", "s=0.2", "#axis-s"),
+    _Row("scene: 1,000 fruits on the floor, all dried", "room=scene&rule=scatter&count=1000", "#dry"),
+    _Row("grow: live, playing", "room=growth&live=1&preset=mushroom", quality="default", clicks=("Begin", "Grow")),
+)
+
+
+@contextmanager
+def _opened(browser: Browser, address: str, row: _Row, is_drawn: bool) -> Iterator[Page]:
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.add_init_script(f"window.drawn = {str(is_drawn).lower()}; ({_COUNT})()")
+    page.goto(address)
+    if row.quality:
+        page.locator("#quality").select_option(row.quality)
+    for label in row.clicks[:1]:
+        page.get_by_role("button", name=label).first.click()
+    page.wait_for_function("() => document.getElementById('view').dataset.shown", timeout=300_000)
+    page.wait_for_timeout(1500)
+    for label in row.clicks[1:]:
+        page.get_by_role("button", name=label).first.click()
+    yield page
+    page.close()
+
+
+def _metrics(session: Any) -> dict[str, float]:
+    return {one["name"]: one["value"] for one in session.send("Performance.getMetrics")["metrics"]}
+
+
+def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, is_drawn: bool, seconds: float) -> Any:
+    """Return what was shown a second, and what one change took of the page's thread and of the service."""
+    with _opened(browser, f"{address}&{row.words}", row, is_drawn) as page:
+        page.evaluate(_DRIVE, [row.slider, 1500])  # what is compiled and opened once
+        session = page.context.new_cdp_session(page)
+        session.send("Performance.enable", {"timeDomain": "threadTicks"})
+        before, spent = _metrics(session), sum(server.cpu_times()[:4])
+        seen = page.evaluate(_DRIVE, [row.slider, 1000 * seconds])
+        after, spent = _metrics(session), sum(server.cpu_times()[:4]) - spent
+    count = max(1, seen["shown"])
+    task = 1000 * (after["TaskDuration"] - before["TaskDuration"]) / count
+    served = 1000 * spent / count
+    return {
+        "what": row.name,
+        "drawn": is_drawn,
+        "updates_s": seen["shown"] / seen["seconds"],
+        "frames_s": seen["renders"] / seen["seconds"],
+        "page_ms": task,
+        "script_ms": 1000 * (after["ScriptDuration"] - before["ScriptDuration"]) / count,
+        "service_cpu_ms": served,
+        "calls_frame": seen["single"] / max(1, seen["renders"]),
+        "instanced_frame": seen["instanced"] / max(1, seen["renders"]),
+        "copies_frame": seen["copies"] / max(1, seen["renders"]),
+        "at": seen["at"],
+    }
+
+
+def main() -> None:
+    """Measure all rows, and keep them."""
+    from playwright.sync_api import sync_playwright
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=8.0, help="for each row [s]")
+    seconds = parser.parse_args().seconds
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        sys.exit("Chromium is needed: apt-get install chromium")
+    sheet = Sheet(
+        "page",
+        [
+            "room",
+            "drawing",
+            "frames a second",
+            "updates a second",
+            "page, each",
+            "service, each",
+            "bound",
+            "draw calls a frame",
+            "of them instanced",
+        ],
+    )
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        secret = fit_out(Path(folder) / "store")
+        command = [sys.executable, "-m", "service.cli", "serve", "--port", "{port}"]
+        with running(command, "/healthz", WIZEN_STORE=str(Path(folder) / "store")) as (server, port, _):
+            browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
+            for row in _ROWS:
+                for is_drawn in (True, False):
+                    address = f"http://127.0.0.1:{port}/#token={secret}"
+                    run = _measure(browser, psutil.Process(server.pid), address, row, is_drawn, seconds)
+                    calls = run["calls_frame"] + run["instanced_frame"]
+                    cells = [
+                        row.name,
+                        "in software" if is_drawn else "left out",
+                        f"{run['frames_s']:.1f}" if is_drawn else "",
+                        f"{run['updates_s']:.1f}",
+                        f"{run['page_ms']:.1f} ms",
+                        f"{run['service_cpu_ms']:.1f} ms",
+                        f"{1000 / (run['page_ms'] + run['service_cpu_ms']):.0f} a second",
+                        f"{calls:.0f}",
+                        f"{run['instanced_frame']:.0f}, of {run['copies_frame']:.0f} copies",
+                    ]
+                    sheet.add(cells, **run)
+            browser.close()
+    sheet.keep()
+
+
+if __name__ == "__main__":
+    main()
