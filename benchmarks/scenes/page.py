@@ -1,11 +1,10 @@
 """How often the page changes what it shows, in a browser that draws in software: python -m benchmarks.scenes.page.
 
-Each row is driven as a hand would (a slider that never rests, a film, a growth that plays) for some seconds, twice:
-drawn by SwiftShader on the processor, and with the draw calls left out, so that what remains is the page's own work
-and the service's. A graphics card draws what SwiftShader needs seconds for: the second figure is the bound that it
-leaves. Draw calls are counted in the browser's own WebGL functions, instanced ones apart. Page and service: processor
-seconds of the page's thread and of the server, over the updates; what both take together is the least time from one
-update to the next.
+Each row is driven as a hand would (a slider that never rests, a growth that plays) for some seconds, twice: drawn by
+SwiftShader on the processor, and with the draw calls left out, so that what remains is the page's own work and the
+service's. A graphics card draws what SwiftShader needs seconds for: the second figure is the bound that it leaves. Draw
+calls are counted in the browser's own WebGL functions, instanced ones apart. Page and service: processor seconds of
+the page's thread and of the server, over the updates; both together are the least time from one update to the next.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from service.commands.studio import fit_out
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-#: Counts draw calls and frames; `?draw=0` in `drawn` leaves the calls out.
+#: Counts draw calls and frames; where `drawn` is false the calls are left out.
 _COUNT = """() => {
   window.counted = { single: 0, instanced: 0, copies: 0, renders: 0, shown: 0 };
   const gl = WebGL2RenderingContext.prototype;

@@ -92,10 +92,10 @@ class DehydrationParams(Fruit):
         json_schema_extra={"units": "1", "axes": ["ax", "ay", "az"]},
     )
 
-    light: tuple[Brightness, Brightness, Brightness] | None = Field(
-        None,
+    light: tuple[Brightness, Brightness, Brightness] = Field(
+        (0.0, 0.0, 0.0),
         # keys of runs that knew no light stay what they were
-        exclude_if=lambda value: value is None,
+        exclude_if=lambda value: not any(value),
         description="Light l from the direction it points to: the flesh below the skin at angle a to it is lit by "
         "1 + |l| cos a, by 1 in its shade, and theta there is inversely proportional to it; at most 4 long",
         json_schema_extra={"units": "1"},
@@ -122,7 +122,7 @@ class DehydrationParams(Fruit):
         if "y" in self.mirrors and self.radii[:7] != self.radii[6::-1]:
             raise ValueError("the two ends of the fruit differ (r1..r7): leave y out of mirrors")
         for field in ("wetness", "light"):
-            parts = zip("xyz", getattr(self, field) or (0, 0, 0), strict=True)
+            parts = zip("xyz", getattr(self, field), strict=True)
             across = [name for name, part in parts if part and name in self.mirrors]
             if across:
                 raise ValueError(f"{field} differs across a mirror plane: leave {', '.join(across)} out of mirrors")
@@ -141,7 +141,7 @@ class DehydrationParams(Fruit):
             raise ValueError(
                 f"wetness is {steep:.3g} long (at most {STEEPEST}): multiply wx, wy, wz by {STEEPEST / steep:.3g}"
             )
-        strength = float(np.linalg.norm(self.light or 0))
+        strength = float(np.linalg.norm(self.light))
         if strength > (BRIGHTEST - 1) * (1 + 1e-9):
             most = BRIGHTEST - 1
             raise ValueError(f"light is {strength:.3g} long (at most {most:g}): multiply it by {most / strength:.3g}")
@@ -166,7 +166,7 @@ class DehydrationParams(Fruit):
     @property
     def is_lit(self) -> bool:
         """Whether some flesh is lit otherwise than the rest."""
-        return any(self.light or ()) or self.light_map is not None
+        return any(self.light) or self.light_map is not None
 
     @property
     def dries_evenly(self) -> bool:
@@ -180,6 +180,5 @@ class DehydrationParams(Fruit):
         if self.light_map is not None:
             chosen = self.light_map
             found = chosen.dark + (chosen.bright - chosen.dark) * painted(chosen.values, rays)
-        if self.light is not None:
-            found = found + np.maximum(np.einsum("ni,i->n", rays, np.array(self.light)), 0.0)
-        return found
+        along: Floats = np.einsum("ni,i->n", rays, np.array(self.light))
+        return found + np.maximum(along, 0.0)

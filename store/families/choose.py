@@ -66,7 +66,11 @@ class Families:
 
     def presets_of(self, info: TableInfo) -> list[str]:
         """Return the presets that lie in a table, whatever else is said."""
-        return [name for name, values in self._presets.items() if not compare(info, values, self._counting(values))]
+        return [
+            name
+            for name, values in self._presets.items()
+            if not compare(info, values, self._counting(values), self._usual)
+        ]
 
     def choose(self, said: Mapping[str, Any], stage: float | None, preset: str | None = None) -> Fit | None:
         """Return the fit of the family that answers, None if there is none; its `missing` axes have no value yet."""
@@ -78,7 +82,7 @@ class Families:
         holding = [
             still.fit
             for still in self._still(preset, frozenset(own))
-            if not compare(still.fit.info, {**still.known, **values}, [*names, *still.tied])
+            if not compare(still.fit.info, {**still.known, **values}, [*names, *still.tied], self._usual)
         ]
         if len(holding) < 2:
             return holding[0] if holding else None
@@ -97,8 +101,8 @@ class Families:
         unsaid = [name for name in self._counting(rest) if name not in info.axes]
         return Fit(
             info,
-            tuple(compare(info, values, self._counting(values))),
-            tuple(compare(info, {**rest, **values}, unsaid)),
+            tuple(compare(info, values, self._counting(values), self._usual)),
+            tuple(compare(info, {**rest, **values}, unsaid, self._usual)),
             tuple(name for name in info.axes if name not in values),
         )
 
@@ -111,7 +115,7 @@ class Families:
             known = given if self._is_own(info) else {**rest, **given}
             counting = [k for k in self._counting(known) if k not in info.axes or k in given]
             tied = tuple(k for k in counting if k in info.tied and info.tied[k].leader in names)
-            misses = compare(info, known, [k for k in counting if k not in tied])
+            misses = compare(info, known, [k for k in counting if k not in tied], self._usual)
             if not misses:
                 missing = tuple(k for k in info.axes if k not in given and k not in names)
                 found.append(_Still(Fit(info, (), (), missing), known, tied))

@@ -88,8 +88,13 @@ def apart(a: Any, b: Any) -> float:
     return abs(math.log(a / b)) if a > 0 and b > 0 else abs(a - b)
 
 
-def compare(info: TableInfo, values: Mapping[str, Any], names: Iterable[str]) -> list[Miss]:
-    """Return what a table misses of the `names` among `values`, the stage among them."""
+def compare(
+    info: TableInfo, values: Mapping[str, Any], names: Iterable[str], usual: Mapping[str, Any] | None = None
+) -> list[Miss]:
+    """Return what a table misses of the `names` among `values`, the stage among them.
+
+    What a table says nothing of is as `usual`: parameters that came later, or are written only where they differ.
+    """
     found = []
     for name in names:
         asked = values[name]
@@ -103,7 +108,7 @@ def compare(info: TableInfo, values: Mapping[str, Any], names: Iterable[str]) ->
             continue
         tie = info.tied.get(name)
         if tie is None:
-            held, tolerance = info.fixed.get(name), _EQUAL
+            held, tolerance = info.fixed[name] if name in info.fixed else (usual or {}).get(name), _EQUAL
         else:
             lead = values.get(tie.leader)
             held, tolerance = tie(float(lead) if isinstance(lead, int | float) else tie.at[0]), TIED

@@ -139,7 +139,7 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     }  # fmt: skip
     assert document["servers"]
     needs = {name: operation["security"] for name, operation in operations.items()}
-    assert {name for name, need in needs.items() if need == [{"token": []}]} == {"ask", "cancel"}
+    assert {name for name, need in needs.items() if need == [{"token": []}]} == {"ask", "cancel", "mesh"}
     assert needs["shape"] == [{}, {"token": []}]
     schemas = document["components"]["schemas"]
     thickness = schemas["JobRequest_dehydration"]["properties"]["params"]["properties"]["exocarp_thickness"]

@@ -47,7 +47,7 @@ def test_a_mesh_becomes_a_jobs_parameter(queue_only: httpx.Client) -> None:
     sent = queue_only.post("/v1/meshes", content=torus(), headers={"Content-Type": "model/obj"})
     assert sent.status_code == 200, sent.text
     page: dict[str, Any] = sent.json()
-    given = trimesh.load(trimesh.util.wrap_as_stream(torus().decode()), file_type="obj", process=False)
+    given = trimesh.load_mesh(trimesh.util.wrap_as_stream(torus().decode()), file_type="obj", process=False)
     points = np.array(page["mesh"]["points"])
     assert page["borders"] == 0
     assert (page["points"], page["faces"]) == (len(points), len(given.faces)) == (288, 576)

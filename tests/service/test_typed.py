@@ -96,6 +96,8 @@ def test_every_answer_is_as_declared(both: tuple[httpx.Client, Store]) -> None:
     page.get("result", f"{own}/result", params={"format": "json", "fields": "stage,volume"})
     page.get("results", "/v1/results")
     page.check("match", client.post("/v1/match", params={"table": "default"}, json={"roughness": 0.01}))
+    obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    page.check("mesh", client.post("/v1/meshes", content=obj, headers={"Content-Type": "model/obj"}))
     fruit = {"parameters": {"te": 0.035, "gamma": 20}, "stage": 0.2, "transforms": [{}, {"position": [0, 0, 99]}]}
     scene = {"camera": {"position": [0, 0, 9]}, "items": [fruit]}
     page.check("scenes", client.post("/v1/scenes", params={"format": "json"}, json=scene))

@@ -80,6 +80,21 @@ def test_how_a_run_was_done_counts_only_where_it_is_named(families: Families) ->
     assert stored.made(families.infos[0], SOLVER) == {"mirrors": "xz"}
 
 
+def test_what_a_table_says_nothing_of_is_the_default(families: Families) -> None:
+    """Tables made before a parameter was there, or of runs that write it only where it differs, go on to answer."""
+    older = [
+        dataclasses.replace(info, fixed={k: v for k, v in info.fixed.items() if not k.startswith(("light", "wx"))})
+        for info in families.infos
+    ]
+    fewer = Families(older, stored.base(SOLVER), families._places)
+    assert chosen(fewer, {}, "raisin") == "raisin"
+    assert chosen(fewer, {"te": 0.035, "gamma": 20.0, "light": [0.0, 0.0, 0.0], "wx": 0.0}) == "sphere"
+    assert chosen(fewer, {"te": 0.035, "gamma": 20.0, "light": [1.0, 0.0, 0.0]}) is None
+    assert chosen(fewer, {"te": 0.035, "gamma": 20.0, "wx": 0.1}) is None
+    [near, *_] = fewer.nearest({"te": 0.035, "gamma": 20.0, "light": [1.0, 0.0, 0.0]}, 0.2)
+    assert [(miss.name, miss.held) for miss in near.misses] == [("light", (0.0, 0.0, 0.0))]
+
+
 def test_of_several_the_one_with_the_nearest_sample_answers(families: Families) -> None:
     assert chosen(families, {"te": 0.0319, "gamma": 10.0}) == "thin"
     assert chosen(families, {"te": 0.0301, "gamma": 10.0}) == "sphere"

@@ -73,7 +73,7 @@ def test_things_stand_on_a_hill_along_its_normals_apart() -> None:
     found = instances(scene.data)
     shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at({}, 0.2, resolution=128)
     assert shape.position is not None
-    whole = np.concatenate([shape.position.reshape(-1, 3), shape.poles])  # type: ignore[list-item]
+    whole = np.concatenate([shape.position.reshape(-1, 3), shape.poles])
     moved = HILL.copy().apply_translation([1, 2, 3])
     feet = []
     for (_, world, *_), middle, up in zip(found, middles, ups, strict=True):
@@ -172,7 +172,7 @@ def test_the_command_reads_a_file_beside_the_scene(tmp_path: Path) -> None:
     out = tmp_path / "out.glb"
     done = CliRunner().invoke(app, ["scene", str(tmp_path / "good.toml"), "--out", str(out), "--plain"])
     assert done.exit_code == 0, done.output
-    whole = trimesh.load(io.BytesIO(out.read_bytes()), file_type="glb")
+    whole = trimesh.load_scene(io.BytesIO(out.read_bytes()), file_type="glb")
     assert any(len(one.faces) == len(HILL.faces) for one in whole.geometry.values())
     # one that promises more than it holds
     (tmp_path / "evil.stl").write_bytes(bytes(80) + struct.pack("<I", 10**9) + bytes(50))
