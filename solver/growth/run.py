@@ -76,7 +76,7 @@ def _row(
     left = residual(state, params)
     row: dict[str, Any] = {
         "stage": stage,
-        "converged": left <= tolerance,
+        "converged": left <= tolerance and state.minimum,
         "residual": left,
         "iterations": state.iterations,
         "seconds": seconds,

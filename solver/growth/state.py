@@ -35,7 +35,9 @@ class State:
     time: growth time. x: (n, 3). mesh: topology. g: rest metrics (f, 3). rest: rest angles (h,). shares: (n, k) of
     hot surfaces that have started. held: (n, 3) directions that are held, bool. spots, curves: by number of the tool.
     forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far. drift: (n, 3) how fast
-    the shape moved in the last step, None at the start. matter: (n, ...) what rides on the material (`matter`).
+    the shape moved in the last step, None at the start. minimum: whether it was shown, when it was settled to be
+    handed over, that the energy bends up along every way as far as its digits tell. matter: (n, ...) what rides on the
+    material (`matter`).
     """
 
     time: float
@@ -50,6 +52,7 @@ class State:
     forces: float = 0.0
     iterations: int = 0
     drift: Floats | None = None
+    minimum: bool = False
     matter: dict[str, Floats] = field(default_factory=dict)
 
     @cached_property

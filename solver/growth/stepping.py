@@ -23,6 +23,7 @@ from .settling.active import Habit
 from .settling.energy import StepEnergy, vertex_areas
 from .settling.equilibrium import balanced, begun
 from .settling.impossible import check_held, check_outward
+from .settling.minimise import longest
 from .settling.tangent import Tangent
 from .settling.touching import touches
 from .state import State
@@ -88,7 +89,7 @@ class Steps:
         """
         way = end.x - start.x
         way -= way.mean(axis=0)
-        looks = min(max(int(np.ceil(np.abs(way).max() / end.length)), 1), _LOOKS)
+        looks = min(max(int(np.ceil(longest(way) / end.length)), 1), _LOOKS)
         for k in range(looks):
             if crossings(end.x - k / looks * way, end.mesh.triangles).count:
                 return False

@@ -7,8 +7,11 @@ import time
 from collections.abc import Callable, Generator, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from solver.contract import InvalidInput, LiveEngine, OverBudget, Params, Quality, Solver, SolverError
 from solver.contract.words import SHORT
+from solver.geometry.crossings import crossings
 from solver.meshes import Frame
 
 from .frames import EXACT, MORE, Encoder, Told
@@ -76,6 +79,8 @@ class Desk:
         self._sent, self._input = 0.0, 0
         #: Whether there is something to show, and whether the client has what is there but for roundings.
         self._is_new, self._is_rough = True, False
+        #: Pairs of triangles of the last frame at rest that pass through each other; None while the shape is under way.
+        self._crossings: int | None = None
         self._worked = 0.0
         #: Processor seconds spent on the step under way.
         self._spent = 0.0
@@ -310,6 +315,8 @@ class Desk:
         flags = (EXACT if self._exact else 0) | (MORE if rough else 0)
         told = Told(stage, residual, self._input, spent, flags)
         self._show(self._encoder.frame(frame, told, exact=not rough))
+        # as the client has it, in single precision
+        self._crossings = None if rough else crossings(frame.vertices.astype(np.float32), frame.triangles).count
         self._unseen.add(self._encoder.number)
         self._sent, self._is_new, self._is_rough, self._exact = time.monotonic(), False, rough, None
 
@@ -323,6 +330,7 @@ class Desk:
             "undo": engine.gestures,
             "redo": engine.undone,
             "quality": engine.quality,
+            "crossings": self._crossings,
         }
         if told != self._told:
             self._told = told

@@ -314,6 +314,48 @@ def test_a_step_without_an_equilibrium_is_an_error_and_the_session_goes_on(live:
     client.end()
 
 
+def _pierced(x: np.ndarray, triangles: np.ndarray) -> int:
+    """Pairs of triangles without a common corner of which an edge of one passes through the other, by volumes."""
+
+    def side(*corners: np.ndarray) -> float:
+        a, b, c, d = corners
+        return float(np.sign(np.dot(np.cross(b - a, c - a), d - a)))
+
+    def through(edge: np.ndarray, face: np.ndarray) -> bool:
+        p, q = edge
+        turns = {side(p, q, face[k], face[(k + 1) % 3]) for k in range(3)}
+        return side(*face, p) * side(*face, q) < 0 and len(turns) == 1
+
+    corners = x.astype(float)[triangles]
+    pairs = [(a, b) for b in range(len(triangles)) for a in range(b) if not {*triangles[a]} & {*triangles[b]}]
+    return sum(
+        any(
+            through(one[[k, (k + 1) % 3]], other) for k in range(3) for one, other in (corners[[a, b]], corners[[b, a]])
+        )
+        for a, b in pairs
+    )
+
+
+@pytest.mark.slow
+def test_a_session_says_where_its_sheet_passes_through_itself(live: Served) -> None:
+    """Two squares that cross, as they may without contact, and the ball, which crosses nothing."""
+    square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    points = square + [[x + 0.1, 0.45, y - 0.4] for x, y, _ in square]
+    mesh = {"points": points, "faces": [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]}
+    for params in ({"mesh": mesh, "tools": [], "contact": 0.0, "step": 0.05}, BALL):
+        client = live.client(params)
+        client.opened()
+        assert client.do("add", tool={"kind": "surface", "where": {"kind": "everywhere"}, "stretch": [1.2, 1.2]})
+        client.rest()
+        client.until(lambda c: c.state.get("crossings") is not None)
+        found = _pierced(client.x, client.triangles) if "mesh" in params else 0
+        assert client.state["crossings"] == found
+        assert (found > 0) == ("mesh" in params)
+        assert any(said.get("crossings", 0) is None for said in client.told), "nothing is said of a shape on its way"
+        client.send(do="close")
+        client.close()
+
+
 def test_quality_grows_the_same_script_on_another_mesh(live: Served) -> None:
     client = live.client()
     client.opened()

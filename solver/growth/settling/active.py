@@ -15,7 +15,7 @@ from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..state import State
 from .energy import StepEnergy, ahead
-from .minimise import Point
+from .minimise import Point, longest
 from .tangent import Tangent
 
 __all__ = ["Habit", "Settled", "settle"]
@@ -161,7 +161,7 @@ def settle(
             x[part.vertices[part.free]] = point.x[part.free]
         yield
     value, forces = energy(x)
-    if float(np.abs(forces).max()) <= goal:
+    if longest(forces) <= goal:
         return Settled(x, max(spent - 1, 0), Habit(part))
     yield
     further = ahead(energy, state, dt)

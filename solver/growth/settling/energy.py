@@ -19,6 +19,7 @@ from ...shell.normals import normals
 from ..params import Bending, Solid
 from ..state import State
 from .loads import area_vectors, depth_in, half_way
+from .minimise import longest
 from .tangent import LEAF, Tangent
 from .touching import Touching
 
@@ -135,7 +136,7 @@ class StepEnergy:
         return StepEnergy(state, self.material, self._pressure, self.solids, *rest)
 
     def rounding(self, x: Floats) -> float:
-        """Return the largest gradient component that is rounding: what it changes by where x moves by last digits.
+        """Return the largest force that is rounding: what it changes by where x moves by last digits.
 
         And what no step can take away, because the energy changes by less than its own rounding: (2 stiffness x
         rounding of the energy)^(1/2), with the stiffness of a membrane's vertex and the energy's terms in magnitude.
@@ -147,7 +148,7 @@ class StepEnergy:
         if self.load is not None:
             terms += float(np.abs(self.load * (x - self.state.x)).sum())
         digits = np.finfo(float).eps
-        return float(np.abs(moved - gradient).max() + np.sqrt(2 * _STIFFEST * digits * terms))
+        return float(longest(moved - gradient) + np.sqrt(2 * _STIFFEST * digits * terms))
 
     def allowed(self, x: Floats, way: Floats, wanted: float) -> float:
         """Return how much of `way` (n, 3), at most `wanted`, may be gone from x in one step."""

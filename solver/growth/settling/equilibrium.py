@@ -7,15 +7,15 @@ from collections.abc import Generator, Iterator
 import numpy as np
 
 from ...arrays import Floats
-from ...contract import Context, NotConverged, Unstable
-from ...shell.normals import normals
+from ...contract import NotConverged, Unstable
 from ..params import GrowthParams
 from ..state import State
 from .active import Habit, Settled, settle
 from .energy import StepEnergy, ahead
 from .impossible import check_near
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
-from .newton import newton
+from .newton import ASIDE, bending, newton
+from .nudges import across, nudged
 
 __all__ = ["balanced", "begun"]
 
@@ -25,8 +25,6 @@ _WAYS = {"quasi_newton": quasi_newton, "lbfgs": lbfgs, "cg": conjugate_gradients
 _STALLED = 400
 #: Thickness over edges beyond which a sheet is no shell of its triangles.
 _THICK = 2.0
-#: Waves that nudge a perfect shape: height over the thickness, and waves over the shape's width.
-_NUDGE, _WAVES = 0.2, (1, 2, 4)
 
 
 def begun(
@@ -70,7 +68,7 @@ def balanced(
             if spent > most:
                 break
             yield
-        begin = _nudged(energy, point.x, point.energy, params.seed) if nudges else point.x
+        begin = _off(energy, point, params.seed) if nudges else point.x
         nudges -= 1
         if begin is point.x:
             break
@@ -83,6 +81,13 @@ def balanced(
             residual=point.gradient / state.length,
         )
     return point, spent
+
+
+def _off(energy: StepEnergy, point: Point, seed: int) -> Floats:
+    """Return where a shape goes on from a point of balance: off it where that is a saddle."""
+    if not energy.curved:
+        return nudged(energy, point.x, point.energy, seed)
+    return bending(energy, point.x, across(energy, point.x, seed), ASIDE * energy.state.length)[1]
 
 
 def _advice(params: GrowthParams, state: State) -> str:
@@ -107,21 +112,3 @@ def _down(energy: StepEnergy, begin: Floats, way: str) -> Iterator[Point]:
         if not point.stuck:
             yield point
     yield from _WAYS[way](energy, point.x)
-
-
-def _nudged(energy: StepEnergy, x: Floats, least: float, seed: int) -> Floats:
-    """Return x with small waves if that lowers the energy, else x itself.
-
-    A perfect shape sits on its symmetry, in balance but not at rest: only so it finds the way out.
-    """
-    found, generator = x, Context.generator(seed)
-    normal = np.where(energy.free, normals(x, energy.state.mesh.triangles), 0.0)
-    for waves in _WAVES:
-        ways = generator.normal(size=(16, 3)) * (2 * np.pi * waves / float(np.ptp(x, axis=0).max()))
-        height = np.cos(x @ ways.T + generator.uniform(0, 2 * np.pi, 16)).sum(axis=1) / 4
-        way = (_NUDGE * energy.material.thickness * height)[:, None] * normal
-        trial = x + energy.allowed(x, way, 1.0) * way
-        value = energy(trial)[0]
-        if value < least:
-            found, least = trial, value
-    return found

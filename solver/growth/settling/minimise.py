@@ -13,7 +13,7 @@ from numba import njit
 
 from ...arrays import Floats
 
-__all__ = ["Energy", "Point", "conjugate_gradients", "descend", "lbfgs", "quasi_newton"]
+__all__ = ["Energy", "Point", "conjugate_gradients", "descend", "lbfgs", "longest", "quasi_newton"]
 
 
 _ARMIJO, _SHORTEST = 1e-4, 1e-9
@@ -50,12 +50,22 @@ class Energy(Protocol):
 
 
 class Point(NamedTuple):
-    """A point on the way: position, energy, largest gradient component; stuck: no step lowers the energy."""
+    """A point on the way: position, energy, largest force on a vertex; stuck: no step lowers the energy.
+
+    left: how far Newton's own step from the point before led, which is what was left to the least of the energy there;
+    infinite where the step was another one, as it must be where the energy bends down.
+    """
 
     x: Floats
     energy: float
     gradient: float
     stuck: bool = False
+    left: float = np.inf
+
+
+def longest(vectors: Floats) -> float:
+    """Return the length of the longest of vectors (n, 3), which stays where all are turned: a component would not."""
+    return float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max()))
 
 
 def descend(
@@ -144,7 +154,7 @@ class _Memory:
             y = self._y[self._last]
             z = q * (self._products[self._last] / _dot(y, y))
         else:
-            z = q * (1e-3 / max(np.abs(q).max(), 1e-300))
+            z = q * (1e-3 / max(longest(q), 1e-300))
         _outward(z.reshape(-1), *ring)
         return -z
 
@@ -155,7 +165,7 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
     since, fresh, mark, idle = 0, False, np.inf, 0
     anew = preconditioned and not energy.ready
     while True:
-        size = float(np.abs(g).max())
+        size = longest(g)
         yield Point(x, f, size)
         if preconditioned and since >= _BURST:
             anew, since, mark = size > _HELPS * mark, 0, size
@@ -195,7 +205,7 @@ def _bfgs(energy: Energy, x: Floats, length: int, preconditioned: bool) -> Itera
         idle = idle + 1 if value == f else 0
         x, f, g = x + t * d, value, gradient
         if idle == _IDLE:
-            yield Point(x, f, float(np.abs(g).max()), stuck=True)
+            yield Point(x, f, longest(g), stuck=True)
             return
         since, fresh = since + 1, False
 
@@ -214,9 +224,9 @@ def conjugate_gradients(energy: Energy, x: Floats) -> Iterator[Point]:
     """Nonlinear conjugate gradients (Polak-Ribiere+), as the paper has them; the first trial step is a secant's."""
     f, g = energy(x)
     idle = 0
-    d, trial = -g, 1e-2 / max(float(np.abs(g).max()), 1e-300) * 1e-1
+    d, trial = -g, 1e-2 / max(longest(g), 1e-300) * 1e-1
     while True:
-        size = float(np.abs(g).max())
+        size = longest(g)
         yield Point(x, f, size)
         slope = float(np.vdot(g, d))
         if slope >= 0:
@@ -239,7 +249,7 @@ def conjugate_gradients(energy: Energy, x: Floats) -> Iterator[Point]:
         idle = idle + 1 if value == f else 0
         trial, x, f = t, x + t * d, value
         if idle == _IDLE:
-            yield Point(x, f, float(np.abs(gradient).max()), stuck=True)
+            yield Point(x, f, longest(gradient), stuck=True)
             return
         d = -gradient + max(0.0, float(np.vdot(gradient, gradient - g) / np.vdot(g, g))) * d
         g = gradient

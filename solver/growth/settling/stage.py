@@ -8,22 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ... import shell
+from ...arrays import Floats
 from ...contract import Unstable
 from ..params import GrowthParams, present
 from ..state import State
 from .energy import StepEnergy
-from .minimise import Point, quasi_newton
-from .newton import newton
+from .minimise import Point, longest, quasi_newton
+from .newton import ASIDE, bending, newton
+from .nudges import across
 from .tangent import Tangent
 
 __all__ = ["force_unit", "residual", "settled"]
 
 #: How far Newton's last step may have moved a vertex, over the mean rest edge: a soft shape swings far on small forces.
-_NEAR = 0.003
+_NEAR = 3e-6
 #: Times that pressure is laid along the present normals, and steps to an equilibrium after each.
 _TURNS, _MOST = 30, 400
 
@@ -41,10 +44,11 @@ def residual(state: State, params: GrowthParams) -> float:
 def settled(state: State, params: GrowthParams, tolerance: float, distance: float) -> Iterator[State]:
     """Settle a state until no force is above tolerance x `force_unit`, or as far as it goes; yields after each step.
 
-    And until nothing moves any more: Newton's last step, which is the distance that is left, is below 0.3 % of an edge.
+    And until nothing moves any more: Newton's own step, which is the distance that is left, is below 0.03 % of an edge,
+    and the energy bends up along every way. A shape in balance on a saddle is nudged off it.
     Pressure follows the normals, which were frozen on the way here: within each step where the surface is closed, else
-    it is laid again until nothing changes. The last value is the result, `forces` of which is what is left.
-    distance: that parts keep from each other, 0 where none come near.
+    it is laid again until nothing changes. The last value is the result, `forces` of which is what is left, and
+    `minimum` whether it is one. distance: that parts keep from each other, 0 where none come near.
 
     Raises:
         Unstable: the shape left the finite.
@@ -63,27 +67,64 @@ def settled(state: State, params: GrowthParams, tolerance: float, distance: floa
         following=params.bending == "hinges",
     )
     goal = tolerance * force_unit(state, material)
-    way = newton if energy.curved else quasi_newton
-    near = _NEAR * state.length if energy.curved else np.inf
-    point, steps = Point(state.x, *_measured(energy, state)), 0
+    way = _rested if energy.curved else _balanced
+    x, steps = state.x, 0
     for _ in range(_TURNS):
-        for count, nearer in enumerate(way(energy, point.x)):
-            moved = float(np.abs(nearer.x - point.x).max()) if count else np.inf
-            steps += nearer.x is not point.x
-            point = nearer
-            if not np.isfinite(point.gradient):
+        for found in way(energy, x, goal, params.seed):
+            if not np.isfinite(found.point.gradient):
                 raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=state.time)
-            if (point.gradient <= goal and moved <= near) or point.stuck or count >= _MOST:
-                break
             yield state
-        energy.follow(point.x)
-        left = _measured(energy, replace(state, x=point.x))[1]
+        x, steps = found.point.x, steps + found.steps
+        energy.follow(x)
+        left = _measured(energy, replace(state, x=x))
         if left <= goal or energy.following or not params.pressure:
             break
     iterations = state.iterations + steps
-    yield replace(state, x=point.x, forces=left / state.length, iterations=iterations)
+    yield replace(state, x=x, forces=left / state.length, iterations=iterations, minimum=found.minimum)
 
 
-def _measured(energy: StepEnergy, state: State) -> tuple[float, float]:
-    value, gradient = energy(state.x)
-    return value, float(np.abs(gradient).max())
+class _Found(NamedTuple):
+    """A point on the way down, steps so far, and whether it is shown to be a minimum."""
+
+    point: Point
+    steps: int
+    minimum: bool
+
+
+def _rested(energy: StepEnergy, x: Floats, goal: float, seed: int) -> Iterator[_Found]:
+    """Go down from x (n, 3) by Newton's method; yields after each step."""
+    near, steps, again = _NEAR * energy.state.length, 0, True
+    start = across(energy, x, seed)
+    while again and steps < _MOST:
+        last = x
+        for point in newton(energy, x):
+            moved = longest(point.x - last)
+            steps += point.x is not last
+            least = point.gradient <= goal and point.left <= near
+            yield _Found(point, steps, least)
+            # a shifted step may be short on a saddle, and elsewhere
+            short = point.gradient <= goal and point.left == np.inf and point.x is not last and moved <= near
+            last = point.x
+            if least or short or point.stuck or steps >= _MOST or not np.isfinite(point.gradient):
+                break
+        if least or not np.isfinite(point.gradient):
+            return
+        bends, x = bending(energy, point.x, start, ASIDE * energy.state.length)
+        steps += bends == "down"
+        again = bends == "down" or (bends == "up" and not point.stuck)
+        yield _Found(point, steps, not again)
+
+
+def _balanced(energy: StepEnergy, x: Floats, goal: float, _seed: int) -> Iterator[_Found]:
+    """Go down from x (n, 3) where there are no second derivatives: that nothing pushes is all that is asked for."""
+    steps, last = 0, x
+    for point in quasi_newton(energy, x):
+        steps += point.x is not last
+        last = point.x
+        yield _Found(point, steps, True)
+        if point.gradient <= goal or point.stuck or steps >= _MOST:
+            return
+
+
+def _measured(energy: StepEnergy, state: State) -> float:
+    return longest(energy(state.x)[1])

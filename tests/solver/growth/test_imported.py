@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from solver import shell
 from solver.contract import Context, InvalidInput, Need
@@ -27,6 +28,36 @@ def test_a_mesh_grows_as_the_shape_that_it_was_taken_from():
     run = SOLVER.solve(GrowthParams.parse(common | own), Need.parse({"stages": [0.25], "fields": ["mesh_position"]}))
     assert np.isfinite(run["mesh_position"].values).all()
     assert run.sizes["vertex"] >= 162
+
+
+@pytest.mark.parametrize("imperfection", [0.0, 0.02])
+@pytest.mark.parametrize(
+    ("shape", "tool", "more"),
+    [
+        ("disc", {"kind": "surface", "where": {"kind": "rim", "width": 0.4}, "stretch": (1.3, 1.3)}, {}),
+        (
+            "sphere",
+            {"kind": "spot", "at": [0.6, 0.0, 0.8], "radius": 0.9, "stretch": (2.0, 1.2), "frame": [0, 1, 0]},
+            {"pressure": 0.02},
+        ),
+        ("torus", {"kind": "surface", "where": {"kind": "everywhere"}, "frame": [0, 0, 1], "stretch": (1.2, 1.0)}, {}),
+    ],
+)
+def test_turning_the_input_turns_the_result(shape: str, tool: dict, more: dict, imperfection: float):
+    mesh, turn = start(shape, 120, 2.0), Rotation.from_euler("xyz", [0.4, 1.1, -2.0])
+    found = []
+    for turned in (Rotation.identity(), turn):
+        # a place and the direction that lengths are told along belong to the input
+        put = tool | {name: turned.apply(tool[name]).tolist() for name in ("at", "frame") if name in tool}
+        common = {"tools": [put], "step": 0.25, "thickness": 0.1, "imperfection": imperfection} | more
+        params = GrowthParams.parse(common | words(turned.apply(mesh.x), mesh.triangles))
+        state = Engine(params, 120, history=False).reach(1.0, Context())
+        found.append(turned.inv().apply(state.x - state.x.mean(axis=0)))
+        moved = np.abs(found[-1] - (mesh.x - mesh.x.mean(axis=0))).max() if len(state.x) == len(mesh.x) else np.inf
+        assert moved > 0.01, "there is something to turn"
+    # where nothing is held a body may lie anywhere: laid on the other as a whole
+    onto = Rotation.align_vectors(found[0], found[1])[0].apply(found[1])
+    assert np.abs(onto - found[0]).max() <= 1e-6
 
 
 def test_open_and_closed_meshes_are_taken():

@@ -63,8 +63,10 @@ def grown_strip(border):
         "tools": [{"kind": "surface", "where": edge, "frame": (1, 0, 0), "stretch": (STRETCH, 1.0)}],
         "remesh": 0,
         "step": STEP,
+        # five times less than usual: ripples of the start are seen before those of the edge
+        "imperfection": 0.004,
     }
-    return Engine(GrowthParams.parse(values), 6000, 1e-6)
+    return Engine(GrowthParams.parse(values), 6000, 1e-7)
 
 
 def edge_of(state):
@@ -81,7 +83,11 @@ def edge_of(state):
 @pytest.mark.slow
 @pytest.mark.parametrize("border", [0.0, 0.15])
 def test_ripples_of_a_growing_edge_come_when_a_plates_do_and_are_as_long(border):
-    """Measured: k 4.18 for 4.04 (border 0) and 5.75 for 5.58; onset at 1.16 and 1.00 of the plate's."""
+    """Measured: k 4.18 for 4.04 (border 0) and 5.42 for 5.58; onset at 1.01 and 0.91 of the plate's.
+
+    To 1e-6 the sheet lagged behind growth, its onset said 1.16 and 1.00; from 1e-7 to 1e-8 nothing changes. A
+    step is 0.05 of the threshold, and so finely is the onset known.
+    """
     engine = grown_strip(border)
     state, material = engine.state, Material(THICKNESS)
     low = state.x[state.held[:, 2], 1].max()
@@ -93,8 +99,8 @@ def test_ripples_of_a_growing_edge_come_when_a_plates_do_and_are_as_long(border)
         found, height = edge_of(engine.state)
         if height > 0.1 * THICKNESS:
             onset = min(onset, engine.state.time * np.log(STRETCH))
-    assert found == pytest.approx(expected, rel=0.1)
-    assert 0.95 < onset / least < 1.2
+    assert found == pytest.approx(expected, rel=0.05)
+    assert 0.9 < onset / least < 1.2
 
 
 def test_bending_by_mean_curvature_does_not_hold_short_ripples():

@@ -1,5 +1,7 @@
 """What is returned is in balance on the mesh, and against the rest state, that are returned with it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.settling import newton
 from solver.growth.settling.energy import StepEnergy
+from solver.growth.settling.stage import settled
 from solver.growth.settling.tangent import Tangent
 
 RIM = {"kind": "surface", "where": {"kind": "rim", "width": 0.3}, "stretch": (1.5, 1.0)}
@@ -66,6 +69,22 @@ def test_what_is_returned_is_settled_on_its_own_mesh(words):
     assert len(state.x) > begun, "the mesh was cut on the way"
     assert largest_force(engine, state) <= 1.05e-3 * felt
     assert largest_force(engine, engine.reach(0.85, Context())) <= 1.05e-3 * felt, "between whole steps as well"
+
+
+def test_a_flat_sheet_that_must_buckle_is_not_settled_on_its_saddle():
+    """Its rim is too long, and nothing pushes it out of its plane; the energy's curvatures are a dense matrix's."""
+    params = GrowthParams.parse({"shape": "disc", "imperfection": 0.0, "tools": []})
+    flat = Engine(params, 120).state
+    middle = flat.x[flat.mesh.triangles].mean(axis=1)
+    grown = replace(flat, g=flat.g * (1 + 0.5 * (middle**2).sum(axis=1))[:, None])
+    *_, found = settled(grown, params, 1e-3, 0.0)
+    assert found.minimum
+    assert not flat.x[:, 2].any(), "it starts in its plane"
+    assert np.ptp(found.x[:, 2]) > params.thickness
+    energy = StepEnergy(found, shell.Material(params.thickness), 0.0, (), Tangent(found.mesh))
+    curvatures = np.linalg.eigvalsh(energy.hessian(found.x).toarray())
+    assert (np.abs(curvatures[:6]) < 1e-8).all(), "it may be moved and turned"
+    assert curvatures[6] > 1e-8, "and costs energy along every other way"
 
 
 def test_stages_do_not_depend_on_each_other():

@@ -145,11 +145,12 @@ class Live {
     house.canvas.dataset.shown = JSON.stringify({ stage: surface.stage, vertices: surface.positions.length / 3, input: surface.input, exact: surface.exact });
   }
 
-  private told({ working, until, undo, redo }: State): void {
+  private told({ working, until, undo, redo, crossings }: State): void {
     this.working = working && until !== 0;
     this.play.textContent = this.working ? "❚❚ Pause" : `▶ ${this.solver.looks.advance}`;
     this.undo.disabled = undo === 0;
     this.redo.disabled = redo === 0;
+    this.said.textContent = crossings ? `The sheet passes through itself in ${crossings} pairs of triangles.` : "";
     Object.assign(this.house.canvas.dataset, { undo: String(undo), redo: String(redo) });
   }
 

@@ -15,6 +15,8 @@ export interface State {
   until: number | null;
   undo: number;
   redo: number;
+  /** Pairs of triangles that pass through each other; null while the shape is under way. */
+  crossings: number | null;
   vertices: number;
 }
 
