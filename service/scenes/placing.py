@@ -17,9 +17,9 @@ from solver.contract import SolverError
 from ..errors import Wrong
 from ..limits import waited
 from .errors import InvalidScene
-from .ground import scatter
 from .kinds import Kind
 from .request import Place, Scene
+from .scattering import scatter
 
 __all__ = ["Instances", "bowl_of", "place"]
 

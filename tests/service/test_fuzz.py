@@ -30,8 +30,9 @@ CHECKS = (
 )
 
 
-#: What refuses a question: a list longer than the page allows may make a query longer than any may be.
-REFUSED = ["400", "401", "403", "404", "405", "406", "409", "414", "415", "422", "428", "429", "5xx"]
+#: What refuses a question: a list longer than the page allows may make a query longer than any may be, and a scene's
+#: individuals are counted before they are looked at.
+REFUSED = ["400", "401", "403", "404", "405", "406", "409", "413", "414", "415", "422", "428", "429", "5xx"]
 
 
 def fuzz(
@@ -49,6 +50,8 @@ def fuzz(
         command = [sys.executable, "-m", "schemathesis.cli", "run", f"{client.base_url}/openapi.json"]
         command += ["--header", f"Authorization: Bearer {secret}", "--checks", ",".join(CHECKS)]
         command += ["--max-examples", str(examples), "--phases", phases]
+        # bodies that are meshes alone are not made up: tests/service/test_meshes_sent.py sends them
+        command += ["--exclude-path", "/v1/meshes"]
         command += ["--continue-on-failure", "--seed", "1", "--no-color", *options]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     print(done.stdout)
