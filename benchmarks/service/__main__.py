@@ -142,7 +142,7 @@ def start(before: Path | None, times: int = 7) -> list[dict[str, Any]]:
     trees = {"this checkout": ROOT} | ({"before": before.resolve()} if before else {})
     walls: dict[str, list[float]] = {name: [] for name in trees}
     busy: dict[str, list[float]] = {name: [] for name in trees}
-    command = [sys.executable, "-m", "uvicorn", "service.app:app", "--port", "{port}", "--log-level", "warning"]
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "{port}"]
     for _ in range(times):
         for name, tree in trees.items():
             own = str(tree / "store" / "starter")
