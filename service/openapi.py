@@ -31,7 +31,7 @@ Json = dict[str, Any]
 
 _CORRECTION = "|".join(methods.CORRECTIONS)
 #: Keywords in the solvers' schemas that JSON Schema does not know, and those whose values are no schemas.
-_OWN, _VALUES = ("units", "axes"), ("default", "const", "enum", "example", "examples", "required")
+_OWN, _VALUES = ("units", "axes", "along"), ("default", "const", "enum", "example", "examples", "required")
 _METHOD = rf"^({'|'.join(methods.WEIGHTINGS)})([+ ]({_CORRECTION}))*$"
 
 

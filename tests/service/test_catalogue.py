@@ -145,6 +145,9 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     thickness = schemas["JobRequest_dehydration"]["properties"]["params"]["properties"]["exocarp_thickness"]
     assert thickness["x-units"] == "r1"
     assert "units" not in thickness
+    weather = schemas["JobRequest_decay"]["properties"]["params"]["properties"]["weather"]
+    assert weather["x-along"] == "day"
+    assert "along" not in weather
 
 
 def test_nothing_at_an_address_is_said_without_the_openapi_page(built: Path) -> None:
