@@ -124,6 +124,9 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
     made = subprocess.run(["wizen", "table", "build", "--store", "demo"], cwd=at, env=_surroundings(), check=False)
     assert made.returncode == 0
     shutil.copytree(at / "demo", at / "held")
+    # and a run between the samples, which a table's answers are held against
+    between = {**job.params, "exocarp_thickness": 0.035, "modulus_ratio": 20}
+    lookup.put(Store.open(at / "held"), SOLVER.parse(between), Need.parse(job.need), rng)
     for name in ("orange.h5", "run.h5", "eighth.h5"):
         shards.write(at / name, rotting(), "0" * 64)
     for name in ("patch.obj", "my.obj", "banana.glb"):
