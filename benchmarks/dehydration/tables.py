@@ -113,21 +113,28 @@ def _fruits(record: Row) -> str:
 
 
 def _speed(record: Row) -> str:
-    """What each run took, by element and step, and the shares of its parts."""
-    lines = []
+    """What each run took, by element and step, the shares of its parts, and what a second thread gains."""
+    lines, alone = [], {}
     for row in record["runs"]:
-        each = row["cpu"] / (row["steps"] * row["elements"])
+        if row["threads"] == 1:
+            alone[row["quality"], row["te"], row["mirrors"]] = row["seconds"]
+    for row in record["runs"]:
         shares = [f"{100 * part / row['seconds']:.0f} %" for part in row["parts"].values()]
         part = "eighth" if row["mirrors"] == "xyz" else "whole"
         settled = f"{sum(row['converged'])} of {len(row['converged'])}"
         name = f"{row['quality']}, te {row['te']:g}, {part}"
+        one = alone.get((row["quality"], row["te"], row["mirrors"])) if row["threads"] > 1 else None
         lines.append(
             [
-                name, str(row["elements"]), str(row["steps"]), f"{row['cpu']:.3g}",
-                f"{1e9 * each:.0f}", *shares, settled,
+                name, str(row["threads"]), str(row["elements"]), str(row["steps"]), f"{row['seconds']:.3g}",
+                _part(row["seconds"]), "" if one is None else f"{one / row['seconds']:.2f}", f"{row['cpu']:.3g}",
+                f"{1e9 * row['cpu'] / (row['steps'] * row['elements']):.0f}", *shares, settled,
             ]
         )  # fmt: skip
-    head = ("run", "elements", "steps", "processor seconds", "ns per element and step")
+    head = (
+        *("run", "threads", "elements", "steps", "seconds", "of 7200 s", "over one thread", "processor seconds"),
+        "ns per element and step",
+    )  # fmt: skip
     return markdown((*head, *record["runs"][0]["parts"], "stages settled"), lines)
 
 

@@ -32,6 +32,9 @@ _SLICE = 0.01
 #: next. A march's volumes lag by 0.03 of shrinkage; those of a smooth start know no pressure.
 _PRESSINGS, _PRESSINGS_AT_START, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 3, 150, 0.12
 
+#: Height of bumps (rms) below which a sphere is smooth [te], and the latest onset of other fruits over the start.
+_SMOOTH, _LATE_ONSET = 0.1, 3.0
+
 #: Shrinkage that a stage may be off a rung by rounding.
 _ROUNDING = 1e-9
 
@@ -134,4 +137,19 @@ class Path:
         return rest
 
     def _settle(self, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> State:
-        return settle(self.motion, state, velocity, rest, shrinkage, self._with_release)
+        def smooth(state: Fixed) -> bool:
+            return self._may_be_smooth(state, shrinkage)
+
+        return settle(self.motion, state, velocity, rest, shrinkage, self._with_release, smooth)
+
+    def _may_be_smooth(self, state: Fixed, shrinkage: float) -> bool:
+        """Whether a state may have no buckles yet: of a sphere one sees it, of another fruit the shrinkage tells."""
+        params = self.motion.params
+        if shrinkage <= self._settings.start:
+            return False
+        if params.pattern is not None:
+            return False  # it begins with wrinkles that anybody sees
+        if not (params.is_sphere and params.dries_evenly):
+            return shrinkage < _LATE_ONSET * self._settings.start
+        radius = np.linalg.norm(self.motion.surface(state), axis=1)
+        return float(radius.std()) < _SMOOTH * params.exocarp_thickness

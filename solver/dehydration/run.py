@@ -16,7 +16,6 @@ from .fresh.mesh import FruitMesh
 from .measures.delivery import Delivery
 from .measures.descriptors import Descriptors, Surface
 from .measures.penetration import of_quads
-from .nearly import is_smooth, note
 from .params import DehydrationParams
 from .path import Path, State
 from .settings import choose
@@ -141,11 +140,9 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
         "kappa_over_mu": settings.kappa_ratio,
         "unit_of_length": "r1",
     }
-    smooth = []
     try:
         for done, shrinkage in enumerate(need.stages, 1):
             state = path.stage(shrinkage, last)
-            smooth += [shrinkage] * is_smooth(params, state.surface)
             record.add(state, state.residual <= settings.residual and state.drift <= settings.drift)
             context.report(
                 shrinkage / last if last > 0 else done / len(need.stages), f"shrinkage s = {shrinkage:.3f} settled"
@@ -155,5 +152,4 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
             error.partial = record.dataset(attrs)
             error.last_stage = record.rows[-1]["stage"]
         raise
-    said = note(params, settings, smooth)
-    return record.dataset(attrs | ({"note": said} if said else {}))
+    return record.dataset(attrs)

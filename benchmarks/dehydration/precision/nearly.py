@@ -1,12 +1,13 @@
-"""How far past the onset a run still hands over the smooth sphere: python -m benchmarks.dehydration.precision.nearly.
+"""Whether buckles stand from the onset on: python -m benchmarks.dehydration.precision.nearly.
 
-The exact onset at the bulk modulus of flesh and at that of the march, and the roughness of eighths at stages between
-and past them (record dehydration-nearly).
+The exact onset of spheres, and the roughness of eighths at stages before it, at it and past it (record
+dehydration-nearly).
 """
 
 from __future__ import annotations
 
 import argparse
+import time
 
 from benchmarks.figures import Sheet
 from solver.contract import Need
@@ -16,8 +17,8 @@ from solver.dehydration.settings import choose
 
 _FRUITS = ((0.02, 10), (0.04, 10), (0.04, 30), (0.1, 10), (0.1, 30))
 #: Stages, over the onset of flesh.
-_PAST = (0.95, 1.02, 1.05, 1.1, 1.15, 1.2, 1.3, 1.5)
-_HEAD = ("te", "gamma", "onset", "the march's", "over it", *(f"{past:g}" for past in _PAST), "what the run says")
+_PAST = (0.95, 0.98, 1.01, 1.02, 1.05, 1.1, 1.2, 1.5)
+_HEAD = ("te", "gamma", "onset", *(f"{past:g}" for past in _PAST), "stages settled", "processor seconds")
 
 
 def main() -> None:
@@ -27,17 +28,17 @@ def main() -> None:
         params = SOLVER.parse({"te": te, "gamma": gamma, "mirrors": "xyz"})
         assert isinstance(params, DehydrationParams)
         settings = choose(params, "preview", 0.1)
-        begins, ends = (onset(params, kappa_ratio=k).s_cr for k in (settings.kappa_ratio, settings.march_kappa_ratio))
+        begins = onset(params, kappa_ratio=settings.kappa_ratio).s_cr
         assert begins is not None
-        assert ends is not None
         need = Need(stages=tuple(round(begins * past, 5) for past in _PAST), quality="preview", fields=("roughness",))
+        cpu = time.process_time()
         run = SOLVER.solve(params, SOLVER.settle(need, of=(params,)))
-        rough = (run["roughness"].values / te).tolist()
+        cpu = time.process_time() - cpu
+        rough, converged = (run["roughness"].values / te).tolist(), run["converged"].values.tolist()
         sheet.add(
-            (f"{te:g}", gamma, f"{begins:.4f}", f"{ends:.4f}", f"{ends / begins - 1:+.0%}",
-             *(f"{value:.2f}" for value in rough), run.attrs.get("note", "").partition(":")[0]),
-            te=te, gamma=gamma, onset=begins, march=ends, past=list(_PAST), roughness=rough,
-            note=run.attrs.get("note"), converged=run["converged"].values.tolist(),
+            (f"{te:g}", gamma, f"{begins:.4f}", *(f"{value:.2f}" for value in rough),
+             f"{sum(converged)} of {len(converged)}", f"{cpu:.0f}"),
+            te=te, gamma=gamma, onset=begins, past=list(_PAST), roughness=rough, converged=converged, cpu=cpu,
         )  # fmt: skip
     sheet.keep()
 

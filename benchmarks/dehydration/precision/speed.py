@@ -1,8 +1,8 @@
 """Where the processor's time of a dehydration run goes: python -m benchmarks.dehydration.precision.speed [--only WORD].
 
-gamma 10, four stages to s = 0.3, with the threads that NUMBA_NUM_THREADS allows. Parts are told apart by a profile:
-calls of the march's kernel, which holds forces, contact and masses, and what a stage's lattice and descriptors take.
-Kept after each run; cases that the record of this version has are not run again.
+gamma 10, four stages to s = 0.3, each on two threads and on one, for the gain of the second (thin skins on two only).
+Parts are told apart by a profile: calls of the march's kernel, which holds forces, contact and masses, and what a
+stage's lattice and descriptors take. Kept after each run; cases that the record of this version has are not run again.
 """
 
 from __future__ import annotations
@@ -13,27 +13,35 @@ import pstats
 import time
 from typing import Any
 
+import numba
+
 from benchmarks.figures import RESULTS, keep, load
 from solver.contract import Context, Need
 from solver.dehydration import SOLVER
 
 NAME = "dehydration-speed"
 STAGES = (0.1, 0.15, 0.2, 0.3)
-#: Quality, te and mirrors, the cheapest first.
+#: Quality, te, mirrors and threads, the cheapest first.
 CASES = (
-    ("preview", 0.04, "xyz"),
-    ("preview", 0.02, "xyz"),
-    ("default", 0.04, "xyz"),
-    ("preview", 0.04, ""),
-    ("default", 0.02, "xyz"),
-    ("default", 0.04, ""),
-    ("preview", 0.01, "xyz"),
+    ("preview", 0.04, "xyz", 2),
+    ("preview", 0.04, "xyz", 1),
+    ("default", 0.04, "xyz", 2),
+    ("default", 0.04, "xyz", 1),
+    ("preview", 0.02, "xyz", 2),
+    ("preview", 0.02, "xyz", 1),
+    ("preview", 0.04, "", 2),
+    ("preview", 0.04, "", 1),
+    ("default", 0.02, "xyz", 2),
+    ("default", 0.04, "", 2),
+    ("preview", 0.01, "xyz", 2),
 )
+KEYS = ("quality", "te", "mirrors", "threads")
 #: Parts by file and function.
 PARTS = {"march and settling steps": ("march.py", "advance"), "lattice and descriptors": ("run.py", "add")}
 
 
-def _measured(quality: str, te: float, mirrors: str) -> dict[str, Any]:
+def _measured(quality: str, te: float, mirrors: str, threads: int) -> dict[str, Any]:
+    numba.set_num_threads(threads)
     params = SOLVER.parse({"te": te, "gamma": 10.0, "mirrors": mirrors}, "sphere")
     need = Need(stages=STAGES, quality=quality, resolution=64)
     profile = cProfile.Profile()
@@ -48,7 +56,8 @@ def _measured(quality: str, te: float, mirrors: str) -> dict[str, Any]:
         for name, (path, function) in PARTS.items()
     }
     return {
-        "quality": quality, "te": te, "mirrors": mirrors, "seconds": time.perf_counter() - begin, "cpu": cpu,
+        "quality": quality, "te": te, "mirrors": mirrors, "threads": threads, "cpu": cpu,
+        "seconds": time.perf_counter() - begin,
         "steps": int(found["iterations"].values[-1]), "elements": int(found.attrs["elements"]),
         "converged": found["converged"].values.tolist(), "parts": parts,
     }  # fmt: skip
@@ -56,7 +65,7 @@ def _measured(quality: str, te: float, mirrors: str) -> dict[str, Any]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", help='cases whose "quality te mirrors" contains this')
+    parser.add_argument("--only", default="", help='cases whose "quality te mirrors threads" contains this')
     asked = parser.parse_args()
     SOLVER.solve(
         SOLVER.parse({"te": 0.1, "mirrors": "xyz"}, "sphere"), Need(stages=(0.1,), quality="preview"), Context()
@@ -64,7 +73,7 @@ def main() -> None:
     known = load(NAME) if (RESULTS / f"{NAME}.json").exists() else {}
     rows = known["runs"] if known.get("version") == SOLVER.version else []
     for case in CASES:
-        if asked.only in "{} {} {}".format(*case) and case not in [(r["quality"], r["te"], r["mirrors"]) for r in rows]:
+        if asked.only in "{} {} {} {}".format(*case) and case not in [tuple(r[name] for name in KEYS) for r in rows]:
             rows.append(_measured(*case))
             print(rows[-1], flush=True)
             keep(NAME, rows, "dehydration")

@@ -12,7 +12,7 @@ from numba import njit
 from ...arrays import Ints, Ints32, Singles
 from .data import INLINE, OPTIONS, Long, Single
 
-__all__ = ["first_cell", "overlap", "sort_into_cells"]
+__all__ = ["overlapping", "sort_into_cells", "spread"]
 
 WORLD = np.float32(2**20)
 """Cells counted from the origin in each direction; what lies farther out (or is not finite) touches nothing."""
@@ -86,21 +86,39 @@ def sort_into_cells(boxes: Singles, grown: Single, cell: Single, keys: Ints, ord
     return cell
 
 
+@njit(**OPTIONS)
+def spread(
+    boxes: Singles, reach: Single, grown: Single, cell: Single, keys: Ints, order: Ints32, entries: int,
+    low: Singles, high: Singles, marks: Ints32,
+) -> None:  # fmt: skip
+    """Write what two entries are held against side by side: boxes, the upper corner moved by `reach`, and marks.
+
+    Bit i of a mark: the entry's cell is the first that its triangle overlaps in direction i.
+    """
+    for entry in range(entries):
+        t, mark = order[entry], 0
+        first = cell_key(
+            _cells(boxes, t, 0, grown, cell)[0],
+            _cells(boxes, t, 1, grown, cell)[0],
+            _cells(boxes, t, 2, grown, cell)[0],
+        )
+        for i in range(3):
+            low[entry, i], high[entry, i] = boxes[t, i], boxes[t, 3 + i] + reach
+            bits = 0x1FFFFF << (21 * i)
+            mark |= int((keys[entry] & bits) == (first & bits)) << i
+        marks[entry] = mark
+
+
 @njit(**INLINE)
-def overlap(boxes: Singles, t: int, u: int, reach: Single) -> bool:
-    """Whether the boxes of two triangles come nearer than `reach` in every direction."""
+def overlapping(keys: Ints, low: Singles, high: Singles, marks: Ints32, i: int, j: int) -> bool:
+    """Whether the triangles of entries i and j come nearer than the reach in every direction, and are met here.
+
+    Two boxes share a least corner, in a cell that in each direction is the first of one of the two: there alone the
+    pair is met. No branches: most pairs fail somewhere, nobody knows where.
+    """
     return bool(
-        boxes[t, 0] <= boxes[u, 3] + reach and boxes[u, 0] <= boxes[t, 3] + reach
-        and boxes[t, 1] <= boxes[u, 4] + reach and boxes[u, 1] <= boxes[t, 4] + reach
-        and boxes[t, 2] <= boxes[u, 5] + reach and boxes[u, 2] <= boxes[t, 5] + reach
+        (keys[i] == keys[j]) & ((marks[i] | marks[j]) == 7)
+        & (low[i, 0] <= high[j, 0]) & (low[j, 0] <= high[i, 0])
+        & (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
+        & (low[i, 2] <= high[j, 2]) & (low[j, 2] <= high[i, 2])
     )  # fmt: skip
-
-
-@njit(**INLINE)
-def first_cell(boxes: Singles, t: int, u: int, grown: Single, cell: Single) -> int:
-    """The cell of the least corner of what two grown boxes share: the one in which the pair is met."""
-    i = np.int64(np.floor((max(boxes[t, 0], boxes[u, 0]) - grown) / cell))
-    j = np.int64(np.floor((max(boxes[t, 1], boxes[u, 1]) - grown) / cell))
-    k = np.int64(np.floor((max(boxes[t, 2], boxes[u, 2]) - grown) / cell))
-    key: int = cell_key(i, j, k)
-    return key

@@ -22,8 +22,8 @@ PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS = 0, 1, 2, 3, 4, 5, 6
 """Entries of `Contact.counts`; LIVE: pairs near enough to be looked at in this step, READS: nodes that they need."""
 ENTRIES = 16
 """Room for cell entries per triangle; one grown by half the reach overlaps about 6 cells."""
-BATCH = 1024
-"""Pairs of triangles that the search meets before it looks at their features."""
+BATCH, ROUND = 1024, 65536
+"""Pairs of triangles whose nodes are entered before their edges, and those that are looked at side by side."""
 BINS = 16
 """Classes of distance that pairs are sorted into at a search, so that a step looks at the near ones alone."""
 
@@ -51,7 +51,11 @@ class Contact(NamedTuple):
     keys: Ints  # (ENTRIES nt,) cell of each entry
     order: Ints32  # (ENTRIES nt,) triangle of each entry, sorted by bucket
     starts: Ints32  # (buckets + 1,) first of each bucket in `order`; buckets is a power of two
-    met: Ints32  # (BATCH, 2) pairs of triangles that the search has met and not yet looked at
+    low: Singles  # (ENTRIES nt, 3) least coordinates of each entry's triangle
+    high: Singles  # (ENTRIES nt, 3) largest ones, and the reach
+    marks: Ints32  # (ENTRIES nt,) bit i: the entry's cell is the first that its triangle overlaps in direction i
+    met: Ints32  # (ROUND, 2) pairs of triangles that the search has met and not yet looked at
+    near: Ints32  # (ROUND,) bits of their features that are in reach
     found: Ints32  # (capacity, 5) as the search meets them: four nodes, kind
     away: Singles  # (capacity, 2) their distance and clearance
     pairs: Ints32  # (capacity, 5) the same in classes of distance: four nodes, kind (0: node and triangle)
@@ -110,7 +114,11 @@ def make_contact(
         searched=np.full((ns, 3), 1e15, single),
         before=np.zeros((ns, 3), single),
         boxes=np.zeros((nt, 6), single),
-        met=np.zeros((BATCH, 2), integer),
+        low=np.zeros((ENTRIES * nt, 3), single),
+        high=np.zeros((ENTRIES * nt, 3), single),
+        marks=np.zeros(ENTRIES * nt, integer),
+        met=np.zeros((ROUND, 2), integer),
+        near=np.zeros(ROUND, integer),
         keys=np.zeros(ENTRIES * nt, np.int64),
         order=np.zeros(ENTRIES * nt, integer),
         starts=np.zeros((1 << int(2 * nt - 1).bit_length()) + 1, integer),

@@ -11,11 +11,25 @@ The candidates stay complete while no node has moved farther than a quarter of `
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from ...arrays import Ints32, Singles
-from .cells import first_cell, overlap, sort_into_cells
-from .data import BATCH, BINS, HITS, INLINE, LIVE, NEEDED, OPTIONS, PAIRS, READS, SEARCHES, Contact, Single
+from .cells import overlapping, sort_into_cells, spread
+from .data import (
+    BATCH,
+    BINS,
+    HITS,
+    INLINE,
+    LIVE,
+    NEEDED,
+    OPTIONS,
+    PAIRS,
+    READS,
+    ROUND,
+    SEARCHES,
+    Contact,
+    Single,
+)
 from .distance import edge_edge, node_triangle
 
 GENTLE = np.float32(0.7071)
@@ -108,56 +122,108 @@ def _enter(
     return place + 1
 
 
+@njit(**INLINE)
+def _nodes_near(
+    triangles: Ints32, own: Ints32, boxes: Singles, x: Singles, source: Ints32, mine: int, theirs: int, reach: Single,
+    out: Singles,
+) -> int:  # fmt: skip
+    """Bits of the nodes that triangle `mine` answers for and that are within reach of `theirs`."""
+    near, b, c, d = 0, triangles[theirs, 0], triangles[theirs, 1], triangles[theirs, 2]
+    images = source[b] != b and source[c] != c and source[d] != d
+    for i in range(3):
+        a = own[mine, i]
+        if a < 0:
+            break
+        if (a == b) | (a == c) | (a == d) or (images and source[a] != a):
+            continue
+        meets = True
+        for k in range(3):
+            meets &= x[a, k] <= boxes[theirs, 3 + k] + reach and x[a, k] >= boxes[theirs, k] - reach
+        if meets and node_triangle(x, a, b, c, d, out) < reach:
+            near |= 1 << i
+    return near
+
+
+@njit(**INLINE)
+def _edges_near(
+    own: Ints32, boxes: Singles, x: Singles, source: Ints32, t: int, u: int, reach: Single, out: Singles
+) -> int:
+    """Bits 3 i + j of the edges i and j that triangles t and u answer for and that are within reach of each other."""
+    near = 0
+    for i in range(3):
+        a, b = own[t, i, 0], own[t, i, 1]
+        if a < 0:
+            break
+        meets = True
+        for k in range(3):
+            meets &= min(x[a, k], x[b, k]) <= boxes[u, 3 + k] + reach
+            meets &= boxes[u, k] <= max(x[a, k], x[b, k]) + reach
+        if not meets:
+            continue
+        images = source[a] != a and source[b] != b
+        for j in range(3):
+            c, d = own[u, j, 0], own[u, j, 1]
+            if c < 0:
+                break
+            if (a == c) | (a == d) | (b == c) | (b == d) or (images and source[c] != c and source[d] != d):
+                continue
+            meets = True
+            for k in range(3):
+                meets &= min(x[a, k], x[b, k]) <= max(x[c, k], x[d, k]) + reach
+                meets &= min(x[c, k], x[d, k]) <= max(x[a, k], x[b, k]) + reach
+            if meets:
+                edge_edge(x, a, b, c, d, out)
+                if out[7] < reach:
+                    near |= 1 << (3 * i + j)
+    return near
+
+
+@njit(parallel=True, **OPTIONS)
+def _look(
+    met: Ints32, near: Ints32, count: int, triangles: Ints32, own_nodes: Ints32, own_edges: Ints32, boxes: Singles,
+    x: Singles, source: Ints32, reach: Single,
+) -> None:  # fmt: skip
+    """Bits of the features in reach of the first `count` pairs met: 3 + 3 of nodes, 9 of edges; side by side."""
+    for part in prange((count + BATCH - 1) // BATCH):
+        out = np.empty(8, np.float32)
+        for m in range(part * BATCH, min((part + 1) * BATCH, count)):
+            t, u = met[m, 0], met[m, 1]
+            found = _nodes_near(triangles, own_nodes, boxes, x, source, t, u, reach, out)
+            found |= _nodes_near(triangles, own_nodes, boxes, x, source, u, t, reach, out) << 3
+            near[m] = found | _edges_near(own_edges, boxes, x, source, t, u, reach, out) << 6
+
+
 @njit(**OPTIONS)
 def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
     """Enter all pairs of features in reach that the first `count` pairs of triangles met answer for."""
-    triangles, boxes, x, source = contact.triangles, contact.boxes, contact.searched, contact.source
-    own_nodes, own_edges, met = contact.own_nodes, contact.own_edges, contact.met
+    triangles, x, met, near = contact.triangles, contact.searched, contact.met, contact.near
+    own_nodes, own_edges = contact.own_nodes, contact.own_edges
     rest, clearance, found, away = contact.rest, contact.clearance, contact.found, contact.away
+    _look(met, near, count, triangles, own_nodes, own_edges, contact.boxes, x, contact.source, reach)
     place = contact.counts[NEEDED]
-    for m in range(2 * count):
-        mine, theirs = met[m // 2, m % 2], met[m // 2, 1 - m % 2]
-        b, c, d = triangles[theirs, 0], triangles[theirs, 1], triangles[theirs, 2]
-        images = source[b] != b and source[c] != c and source[d] != d
-        for i in range(3):
-            a = own_nodes[mine, i]
-            if a < 0:
-                break
-            if (a == b) | (a == c) | (a == d) or (images and source[a] != a):
+    for first in range(0, count, BATCH):
+        last = min(first + BATCH, count)
+        for m in range(2 * first, 2 * last):
+            bits = near[m // 2] >> (3 * (m % 2)) & 7
+            if bits == 0:
                 continue
-            near = True
-            for k in range(3):
-                near &= x[a, k] <= boxes[theirs, 3 + k] + reach and x[a, k] >= boxes[theirs, k] - reach
-            if near:
-                distance = node_triangle(x, a, b, c, d, out)
-                if distance < reach:
+            mine, theirs = met[m // 2, m % 2], met[m // 2, 1 - m % 2]
+            b, c, d = triangles[theirs, 0], triangles[theirs, 1], triangles[theirs, 2]
+            for i in range(3):
+                if bits >> i & 1:
+                    a = own_nodes[mine, i]
+                    distance = node_triangle(x, a, b, c, d, out)
                     place = _enter(rest, clearance, found, away, place, a, b, c, d, 0, distance, out)
-    for m in range(count):
-        t, u = met[m, 0], met[m, 1]
-        for i in range(3):
-            a, b = own_edges[t, i, 0], own_edges[t, i, 1]
-            if a < 0:
-                break
-            near = True
-            for k in range(3):
-                near &= min(x[a, k], x[b, k]) <= boxes[u, 3 + k] + reach
-                near &= boxes[u, k] <= max(x[a, k], x[b, k]) + reach
-            if not near:
+        for m in range(first, last):
+            bits = near[m] >> 6
+            if bits == 0:
                 continue
-            images = source[a] != a and source[b] != b
-            for j in range(3):
-                c, d = own_edges[u, j, 0], own_edges[u, j, 1]
-                if c < 0:
-                    break
-                if (a == c) | (a == d) | (b == c) | (b == d) or (images and source[c] != c and source[d] != d):
-                    continue
-                near = True
-                for k in range(3):
-                    near &= min(x[a, k], x[b, k]) <= max(x[c, k], x[d, k]) + reach
-                    near &= min(x[c, k], x[d, k]) <= max(x[a, k], x[b, k]) + reach
-                if near:
-                    edge_edge(x, a, b, c, d, out)
-                    if out[7] < reach:
+            t, u = met[m, 0], met[m, 1]
+            for i in range(3):
+                for j in range(3):
+                    if bits >> (3 * i + j) & 1:
+                        a, b, c, d = own_edges[t, i, 0], own_edges[t, i, 1], own_edges[u, j, 0], own_edges[u, j, 1]
+                        edge_edge(x, a, b, c, d, out)
                         place = _enter(rest, clearance, found, away, place, a, b, c, d, 1, out[7], out)
     contact.counts[NEEDED] = place
 
@@ -165,18 +231,17 @@ def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
 @njit(**OPTIONS)
 def _visit(contact: Contact, reach: Single, cell: Single) -> None:
     """Go through all pairs of triangles in reach and take in their features."""
-    keys, order, starts, boxes, met = contact.keys, contact.order, contact.starts, contact.boxes, contact.met
-    half, count, out = np.float32(0.5) * reach, 0, np.zeros(8, np.float32)
+    keys, order, starts, met = contact.keys, contact.order, contact.starts, contact.met
+    low, high, marks = contact.low, contact.high, contact.marks
+    count, out = 0, np.zeros(8, np.float32)
+    half, entries = np.float32(0.5) * reach, starts[starts.size - 1]
+    spread(contact.boxes, reach, half, cell, keys, order, entries, low, high, marks)
     for bucket in range(starts.size - 1):
         for i in range(starts[bucket], starts[bucket + 1]):
-            t, key = order[i], keys[i]
             for j in range(i + 1, starts[bucket + 1]):
-                u = order[j]
-                if keys[j] != key or not overlap(boxes, t, u, reach) or first_cell(boxes, t, u, half, cell) != key:
-                    continue
-                met[count, 0], met[count, 1] = t, u
-                count += 1
-                if count == BATCH:
+                met[count, 0], met[count, 1] = order[i], order[j]
+                count += overlapping(keys, low, high, marks, i, j)
+                if count == ROUND:
                     _take_in(contact, count, reach, out)
                     count = 0
     _take_in(contact, count, reach, out)
