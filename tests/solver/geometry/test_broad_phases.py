@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.dehydration.contact.cells import first_cell, overlap, sort_into_cells
+from solver.dehydration.contact.cells import overlapping, sort_into_cells, spread
 from solver.geometry.boxes import touching
 from solver.geometry.crossings import split_quads
 
@@ -14,15 +14,15 @@ from .._skins import cubed_sphere
 
 @njit(error_model="numpy")
 def _met(boxes, reach, cell, keys, order, starts, found):
-    half, count = np.float32(0.5) * reach, 0
+    entries, count = starts[-1], 0
+    low, high = np.zeros((entries, 3), np.float32), np.zeros((entries, 3), np.float32)
+    marks = np.zeros(entries, np.int32)
+    spread(boxes, reach, np.float32(0.5) * reach, cell, keys, order, entries, low, high, marks)
     for bucket in range(starts.size - 1):
         for i in range(starts[bucket], starts[bucket + 1]):
             for j in range(i + 1, starts[bucket + 1]):
-                t, u = order[i], order[j]
-                if keys[j] != keys[i] or not overlap(boxes, t, u, reach):
-                    continue
-                if first_cell(boxes, t, u, half, cell) == keys[i]:
-                    found[count, 0], found[count, 1] = min(t, u), max(t, u)
+                if overlapping(keys, low, high, marks, i, j):
+                    found[count, 0], found[count, 1] = min(order[i], order[j]), max(order[i], order[j])
                     count += 1
     return count
 
