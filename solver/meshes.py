@@ -7,7 +7,9 @@ numbers count from the first vertex of their own stage, with `vertex_count(stage
 fields of its vertices are `(vertex)`. Triangles turn counter-clockwise seen from outside. The length of a unit in
 metres stands in `attrs["metres_per_unit"]` where it is known. A mesh that keeps its triangles may come with texture
 coordinates of their corners, `texture_coordinate(texture_vertex, uv)` with v upwards and `texture_triangle(face,
-corner)`, and with `face_material(face)`, numbers of the names in `attrs["materials"]`, a JSON list.
+corner)`, and with `face_material(face)`, numbers of the names in `attrs["materials"]`, a JSON list. One that changes
+its triangles has them end to end as well, with `texture_count(stage)`; its texture triangles count from the first
+texture vertex of their own stage.
 """
 
 from __future__ import annotations

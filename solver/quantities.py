@@ -133,6 +133,7 @@ register(
 register(
     mesh_position=Quantity("1", "position of a vertex, in the solver's unit of length", "x"),
     triangle=Quantity("1", "the three vertices of a triangle, from 0, counter-clockwise from outside", "-"),
+    texture_count=Quantity("1", "number of texture coordinates of this stage's mesh", "n_t"),
     texture_coordinate=Quantity("1", "texture coordinates of a corner, v upwards", "uv"),
     texture_triangle=Quantity("1", "the texture coordinates of a triangle's three corners, from 0", "-"),
     face_material=Quantity("1", "the material of a triangle, from 0, as named in the attribute materials", "-"),

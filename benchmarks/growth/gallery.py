@@ -35,7 +35,7 @@ _COLUMNS = 5
 _TIMES, _ABREAST = (0.35, 0.7, 1.0), 2
 #: What lies flat is looked at from above, a strip from its side.
 _VIEWS = {"b-leaf": (60, 60), "c": (60, 60), "c-pumpkin": (35, 22), "c-flower": (60, 55), "d-bed": (55, 35)}
-_VIEWS |= {"e-cloth": (35, 25), "f-cabbage": (35, 22), "h-fern": (35, 22)}
+_VIEWS |= {"e-cloth": (35, 25), "f-cabbage": (35, 22), "h-fern": (35, 22), "h-lettuce": (50, 50)}
 
 
 def grown(path: Path, quality: str, keep: Path | None) -> xr.Dataset:

@@ -93,32 +93,40 @@ class _File:
         array = triangles.ravel().astype("<u2" if small else "<u4")
         return self.buffer.add(array, USHORT if small else UINT, "SCALAR", INDICES)
 
-    def _parts(self, triangles: np.ndarray, count: int) -> list[int]:
-        """Return the indices of each material's triangles."""
+    def _parts(self, triangles: np.ndarray, count: int, material: np.ndarray | None = None) -> list[int]:
+        """Return the indices of each material's triangles; material (f,): of triangles that are one stage's alone."""
         parts = self.sequence.materials
         if len(parts) == 1:
             return [self._indices(triangles, count)]
+        if material is not None:
+            return [self._indices(triangles[material == number], count) for number in np.unique(material)]
         return [self._indices(triangles[of], count) for _, of in parts]
 
     def _attributes(self, surface: Surface) -> Json:
-        points = surface.vertices[self.copies]
+        seam = surface.seam
+        copies = self.copies if seam is None else seam.copies
+        points = surface.vertices[copies]
         found: Json = {
             "POSITION": self.buffer.add(points, FLOAT, "VEC3", VERTICES, bounds(points)),
-            "NORMAL": self.buffer.add(surface.normals()[self.copies], FLOAT, "VEC3", VERTICES),
+            "NORMAL": self.buffer.add(surface.normals()[copies], FLOAT, "VEC3", VERTICES),
         }
-        if self.uv is not None:
+        if seam is not None:
+            found["TEXCOORD_0"] = self.buffer.add(seam.uv.astype("f4"), FLOAT, "VEC2", VERTICES)
+        elif self.uv is not None:
             found["TEXCOORD_0"] = self.uv
         if surface.colour is not None and not self.options.textures:
-            found["COLOR_0"] = self.buffer.add(np.clip(surface.colour, 0, 1)[self.copies], FLOAT, "VEC3", VERTICES)
+            found["COLOR_0"] = self.buffer.add(np.clip(surface.colour, 0, 1)[copies], FLOAT, "VEC3", VERTICES)
         for name, values in surface.fields.items():
             word = "_" + re.sub("[^A-Z0-9_]", "_", name.upper())
-            found[word] = self.buffer.add(values[self.copies], FLOAT, "SCALAR", VERTICES)
+            found[word] = self.buffer.add(values[copies], FLOAT, "SCALAR", VERTICES)
         return found
 
     def _primitives(self, surface: Surface) -> list[Json]:
         """Return a primitive for each material, which all have the same vertices."""
         if self.shared is None or not self.sequence.kept:
-            indices = self._parts(surface.triangles, len(surface.vertices))
+            own = surface.seam
+            triangles, rows = (surface.triangles, surface.vertices) if own is None else (own.triangles, own.uv)
+            indices = self._parts(triangles, len(rows), surface.material)
             if self.sequence.kept:
                 self.shared = indices
         else:

@@ -19,15 +19,18 @@ from .seam import Seam
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Texels", "drawn", "laid", "own", "texels"]
+__all__ = ["Texels", "drawn", "laid", "materials", "own", "texels"]
 
 
-def own(run: xr.Dataset) -> Seam | None:
-    """Return the texture coordinates that a result's mesh came with; None if it has none."""
+def own(run: xr.Dataset, index: int = 0) -> Seam | None:
+    """Return the texture coordinates that a result's mesh has, at a stage where triangles change; None if none."""
     if "texture_coordinate" not in run:
         return None
     uv, corners = run["texture_coordinate"].values.astype(float), run["texture_triangle"].values.astype(np.int64)
     triangles = run["triangle"].values.astype(np.int64)
+    if "texture_count" in run:
+        faces, rows = (_part(run[name].values, index) for name in ("face_count", "texture_count"))
+        uv, corners, triangles = uv[rows], corners[faces], triangles[faces]
     copies = np.full(len(uv), -1)
     copies[corners] = triangles
     if (copies[corners] == triangles).all() and (copies >= 0).all():
@@ -35,6 +38,19 @@ def own(run: xr.Dataset) -> Seam | None:
     # a pair of numbers that several vertices share is one for each of them
     pairs, back = np.unique(np.stack([corners.ravel(), triangles.ravel()], axis=1), axis=0, return_inverse=True)
     return Seam(uv[pairs[:, 0]] * [1, -1] + [0, 1], pairs[:, 1], back.reshape(-1, 3).astype("u4"))
+
+
+def materials(run: xr.Dataset, index: int) -> Array | None:
+    """Return numbers of the materials (f,) of a stage's triangles, where those change; None where they have none."""
+    if "face_material" not in run:
+        return None
+    return np.asarray(run["face_material"].values[_part(run["face_count"].values, index)])
+
+
+def _part(counts: Array, index: int) -> slice:
+    """Return which rows are a stage's, of arrays that hold all stages end to end."""
+    end = int(counts[: index + 1].sum())
+    return slice(end - int(counts[index]), end)
 
 
 def laid(run: xr.Dataset) -> xr.Dataset:

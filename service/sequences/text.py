@@ -70,7 +70,7 @@ def _obj(sequence: Sequence, surface: Surface) -> bytes:
         points = np.column_stack([points, (colours.encoded(surface.colour) / 255).astype("f4")])
     parts.append(_rows(b"v", points))
     corners = surface.triangles.astype(np.int64) + 1
-    seam = sequence.seam
+    seam = surface.seam or sequence.seam
     if seam is None:
         parts.append(_rows(b"f", corners))
     else:

@@ -51,6 +51,9 @@ class Surface(NamedTuple):
     colour: Singles | None = None
     roughness: Singles | None = None
     fur: Fur | None = None
+    #: Texture coordinates and materials of its own, where triangles change from stage to stage; else the sequence's.
+    seam: Seam | None = None
+    material: Array | None = None
 
     def normals(self) -> Singles:
         """Return outward unit normals (v, 3), weighted by area; (0, 1, 0) where no triangle has any."""
@@ -106,11 +109,17 @@ class Sequence:
     def seam(self) -> Seam | None:
         """Texture coordinates, where the surface has some."""
         n = self.lattice
-        return Seam(mesh.texture(n), mesh.seam(n), mesh.seam_triangles(n)) if n else charts.own(self.run)
+        if n:
+            return Seam(mesh.texture(n), mesh.seam(n), mesh.seam_triangles(n))
+        # where triangles change each surface has its own
+        return charts.own(self.run) if self.kept else None
 
     @property
     def materials(self) -> tuple[tuple[str, NDArray[np.intp]], ...]:
-        """The mesh's own materials: names, and the triangles of each; one without a name where it has none."""
+        """The mesh's own materials: names, and the triangles of each, of all stages where those change.
+
+        One without a name where it has none.
+        """
         if "face_material" not in self.run:
             return (("", np.arange(self.run.sizes.get("face", 0))),) if not self.lattice else (("", np.empty(0, int)),)
         names, owned = json.loads(self.run.attrs["materials"]), self.run["face_material"].values
@@ -255,7 +264,10 @@ class Sequence:
             vertices, triangles = np.asarray(found.vertices, "f4"), np.asarray(found.triangles, "u4")
             if self.run.attrs.get("up") == "z":
                 vertices = vertices[:, [0, 2, 1]] * np.array([1, 1, -1], "f4")
-            return Surface(stage, vertices, triangles, fields)
+            if self.kept:
+                return Surface(stage, vertices, triangles, fields)
+            seam, material = charts.own(self.run, index), charts.materials(self.run, index)
+            return Surface(stage, vertices, triangles, fields, seam=seam, material=material)
         position = _positions(self.run, index)
         vertices = mesh.vertices(position, spectra.poles(spectra.spectrum(position)))
         fields = {name: _flat(values) for name, values in lattice_fields(self.run, index).items()}

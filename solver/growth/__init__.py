@@ -48,7 +48,7 @@ def _extent(params: GrowthParams) -> Extent:
 
 SOLVER = Solver(
     name="growth",
-    version="7",
+    version="8",
     title="Growth of thin shells",
     params=GrowthParams,
     fields=("mesh_position", "elastic_strain", *CHANNELS, "mesh_area", "stored_energy", "rest_area"),

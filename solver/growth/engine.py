@@ -32,6 +32,8 @@ __all__ = ["Engine", "Undone"]
 
 #: How long a solid was there that is taken away with the step in which it came [growth time].
 _INSTANT = 1e-9
+#: Steps of a stage that settles free, after which it is looked whether parts pass through each other.
+_LOOK = 8
 
 
 class Undone(NamedTuple):
@@ -230,15 +232,20 @@ class Engine:
         """Do what `reach` does; yields after every piece of work."""
         self._give_up()
         state, distance = yield from self._reached(time)
-        found = yield from self._settled(state, distance)
-        if self.params.contact is None and not distance and not self._way.apart(state, found):
+        free = self.params.contact is None and not distance
+        found = yield from self._settled(state, distance, free)
+        if found is None or (free and not self._way.apart(state, found)):
             found = yield from self._settled(state, self.params.thickness)
+            assert found is not None  # it is not free
         check_outward(found, self._volume, self.state.time, self.params)
         return found
 
-    def _settled(self, found: State, distance: float) -> Generator[None, None, State]:
-        for nearer in settled(found, self.script, self.tolerance, distance):
+    def _settled(self, found: State, distance: float, free: bool = False) -> Generator[None, None, State | None]:
+        """Settle a state; None where it may move as if parts passed through each other, and they do on the way."""
+        for taken, nearer in enumerate(settled(found, self.script, self.tolerance, distance), 1):
             found = nearer
+            if free and taken % _LOOK == 0 and crossings(found.x, found.mesh.triangles).count:
+                return None
             yield
         return found
 

@@ -10,6 +10,7 @@ from .matter import matter
 from .params import GrowthParams
 from .shapes import Mesh
 from .state import State
+from .textured import corners_of, faces_of
 from .tooling.places import share
 from .tooling.placing import border
 
@@ -41,4 +42,6 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         spots={},
         curves={},
         matter=matter(params.ribs, params.colours, mesh, border(top), params.seed),
+        corners=corners_of(params.mesh),
+        faces=faces_of(params.mesh),
     )

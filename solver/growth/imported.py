@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..contract import InvalidGeometry
-from ..contract.mesh import GivenMesh
+from ..contract.mesh import GivenMesh, check_textures
 
 if TYPE_CHECKING:
     from .. import shell
@@ -29,12 +29,23 @@ class OwnMesh(GivenMesh):
     faces: tuple[tuple[int, int, int], ...] = Field(
         min_length=1, max_length=200_000, description="Triangles, counter-clockwise from outside, vertices from 0"
     )
+    uv: tuple[tuple[float, float], ...] = Field(
+        (),
+        max_length=600_000,
+        description="Texture coordinates, v upwards; they ride on the sheet [1]",
+    )
+    uv_faces: tuple[tuple[int, int, int], ...] = Field(
+        (), max_length=200_000, description="The triangles' corners, as numbers of texture coordinates from 0"
+    )
+    materials: tuple[str, ...] = Field((), max_length=256, description="Names of materials, for files made of it")
+    face_materials: tuple[int, ...] = Field((), max_length=200_000, description="The material of each triangle, from 0")
 
     @model_validator(mode="after")
     def _is_a_surface(self) -> Self:
         # parameters and schemas are read without what compiles
         from .. import shell
 
+        check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
         points, faces = np.array(self.points), np.array(self.faces, np.int64)
         try:
             top = shell.topology(faces, len(points))

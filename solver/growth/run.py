@@ -22,6 +22,7 @@ from .settling.energy import elastic
 from .settling.stage import residual
 from .shown import shown
 from .state import State
+from .textured import named, textured
 
 __all__ = ["run"]
 
@@ -54,19 +55,21 @@ def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     engine = Engine(params, settings.vertices, settings.tolerance, history=False)
     rows: list[dict[str, Any]] = []
     frames: list[Frame] = []
+    states: list[State] = []
     try:
         for stage in need.stages:
             state = engine.reach(stage, context)
             rows.append(_row(state, params, need, settings.tolerance, stage, time.perf_counter() - begun))
             if _MESH & set(need.fields):
                 fields = shown(state, params.colours, need.fields)
+                states.append(state)
                 frames.append(Frame(state.x, state.mesh.triangles, fields))
             context.report(stage / max(need.stages[-1], 1e-9), f"growth time {stage:g} settled")
     except SolverError as error:
-        error.partial = _dataset(rows, frames, need, params) if rows else None
+        error.partial = _dataset(rows, frames, states, need, params) if rows else None
         error.last_stage = rows[-1]["stage"] if rows else None
         raise
-    return _dataset(rows, frames, need, params)
+    return _dataset(rows, frames, states, need, params)
 
 
 def _row(
@@ -91,7 +94,9 @@ def _row(
     return row
 
 
-def _dataset(rows: list[dict[str, Any]], frames: list[Frame], need: Need, params: GrowthParams) -> xr.Dataset:
+def _dataset(
+    rows: list[dict[str, Any]], frames: list[Frame], states: list[State], need: Need, params: GrowthParams
+) -> xr.Dataset:
     data: dict[str, Any] = {}
     for name in rows[0]:
         values = np.array([row[name] for row in rows])
@@ -99,9 +104,9 @@ def _dataset(rows: list[dict[str, Any]], frames: list[Frame], need: Need, params
             data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
     if frames:
-        data |= changing(frames[: len(rows)], need.dtype)
+        data |= changing(frames[: len(rows)], need.dtype) | textured(states[: len(rows)])
         coords["component"] = ["x", "y", "z"]
-    attrs = {"path": params.solver, "factor": definite.chosen(), "up": "z"}
+    attrs = {"path": params.solver, "factor": definite.chosen(), "up": "z"} | (named(params.mesh) if frames else {})
     through = [row for row in rows if row["crossings"]]
     if through:
         worst = max(through, key=lambda row: int(row["crossings"]))

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from .. import shell
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Ints
 from .anchors import Anchors
 
 __all__ = ["Spot", "State"]
@@ -37,7 +37,8 @@ class State:
     forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far. drift: (n, 3) how fast
     the shape moved in the last step, None at the start. minimum: whether it was shown, when it was settled to be
     handed over, that the energy bends up along every way as far as its digits tell. matter: (n, ...) what rides on the
-    material (`matter`).
+    material (`matter`). corners: (f, 3, k) what rides on triangles, and differs along seams: uv. faces: (f,) numbers
+    that triangles hand down: material.
     """
 
     time: float
@@ -54,6 +55,8 @@ class State:
     drift: Floats | None = None
     minimum: bool = False
     matter: dict[str, Floats] = field(default_factory=dict)
+    corners: dict[str, Floats] = field(default_factory=dict)
+    faces: dict[str, Ints] = field(default_factory=dict)
 
     @cached_property
     def length(self) -> float:

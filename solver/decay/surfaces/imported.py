@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...arrays import Floats
-from ...contract.mesh import GivenMesh
+from ...contract.mesh import GivenMesh, check_textures
 from .surface import Extent, Surface
 
 __all__ = ["Mesh", "extent_of", "rays_from"]
@@ -43,15 +43,7 @@ class Mesh(GivenMesh):
             raise ValueError(
                 f"a triangle names a vertex that is not there: they are numbered 0 to {len(self.points) - 1}"
             )
-        for name, given, known in (
-            ("uv_faces", self.uv_faces, len(self.uv)),
-            ("face_materials", self.face_materials, len(self.materials)),
-        ):
-            if given and (len(given) != len(self.faces) or np.min(given) < 0 or np.max(given) >= known):
-                count = len(self.faces)
-                raise ValueError(f"{name} has a row for each of the {count} triangles, of numbers below {known}")
-        if self.uv and not self.uv_faces:
-            raise ValueError("uv without uv_faces belongs to no triangle")
+        check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
         return self
 
 

@@ -15,6 +15,7 @@ from ..state import State
 from .plane import cross, metric
 from .rebuild import FOLD, rebuilt
 from .rest import edge_squares
+from .seams import seams
 
 __all__ = ["collapse"]
 
@@ -22,7 +23,7 @@ __all__ = ["collapse"]
 def collapse(state: State, shortest: float) -> tuple[State, Ints]:
     """Return the state without rest edges below `shortest`, and where its vertices (n',) were before.
 
-    Of an edge one vertex goes and the other stays where it is. Borders, held vertices and folds stay.
+    Of an edge one vertex goes and the other stays where it is. Borders, held vertices, folds and seams stay.
     """
     mesh = state.mesh
     squares = edge_squares(state.g, mesh)
@@ -33,9 +34,10 @@ def collapse(state: State, shortest: float) -> tuple[State, Ints]:
     fixed = np.asarray(state.held.any(axis=1))
     fixed[mesh.edges[mesh.border]] = True
     folded = np.abs(shell.angles(state.x, mesh.hinges)) > FOLD
-    fixed[mesh.hinges[folded][:, :2]] = True
+    fixed[mesh.hinges[folded | seams(state)][:, :2]] = True
     rings = _rings(mesh)
     triangles, g = mesh.triangles.copy(), state.g.copy()
+    riding = {name: values.copy() for name, values in state.corners.items()}
     taken, gone = np.zeros(len(state.x), bool), np.zeros(len(triangles), bool)
     for edge in short[np.argsort(squares[short], kind="stable")]:
         i, j = (int(v) for v in mesh.edges[edge])
@@ -55,6 +57,8 @@ def collapse(state: State, shortest: float) -> tuple[State, Ints]:
         kept, metrics = found
         gone[fan] = True
         gone[fan[kept]] = False
+        for values in riding.values():
+            _follow(values, triangles, fan, kept, i, j)
         triangles[fan[kept]] = np.where(triangles[fan[kept]] == i, j, triangles[fan[kept]])
         g[fan[kept]] = metrics
     if not gone.any():
@@ -62,7 +66,16 @@ def collapse(state: State, shortest: float) -> tuple[State, Ints]:
     left = np.unique(triangles[~gone])
     number = np.full(len(state.x), -1)
     number[left] = np.arange(len(left))
-    return rebuilt(state, number[triangles[~gone]], g[~gone], left), left
+    riding = {name: values[~gone] for name, values in riding.items()}
+    faces = {name: values[~gone] for name, values in state.faces.items()}
+    return rebuilt(state, number[triangles[~gone]], g[~gone], left, riding, faces), left
+
+
+def _follow(values: Floats, triangles: Ints, fan: Ints, kept: Ints, i: int, j: int) -> None:
+    """Let corners at i, which is on no seam, have the values (f, 3, k) at j as they are seen from there."""
+    beside, corner = np.argwhere(triangles[fan] == j)[0]
+    rows, at = np.nonzero(triangles[fan[kept]] == i)
+    values[fan[kept][rows], at] = values[fan[beside], corner]
 
 
 def _rings(mesh: shell.Topology) -> list[Ints]:

@@ -57,7 +57,7 @@ def cut(state: State, longest: float) -> tuple[State, Ints]:
         return np.concatenate([values, 0.5 * (values[i] + values[j])])
 
     x = carried(state.x)
-    triangles, g, b, touched = _children(state, first, middles)
+    triangles, g, b, touched, riding, faces = _children(state, first, middles)
     new = shell.topology(triangles, len(x))
     rest = _rest(state, new, g, b, touched)
 
@@ -75,6 +75,8 @@ def cut(state: State, longest: float) -> tuple[State, Ints]:
         drift=None if state.drift is None else carried(state.drift),
         shares={k: carried(v) for k, v in state.shares.items()},
         matter={k: carried(v) for k, v in state.matter.items()},
+        corners=riding,
+        faces=faces,
         held=np.concatenate([state.held, state.held[i] & state.held[j]]),
         spots={k: tuple(moved(spot) for spot in spots) for k, spots in state.spots.items()},
         curves={k: on_surface(a, state.x, mesh.triangles, corners) for k, a in state.curves.items()},
@@ -82,8 +84,10 @@ def cut(state: State, longest: float) -> tuple[State, Ints]:
     return found, mesh.edges[marked]
 
 
-def _children(state: State, first: Ints, middles: Ints) -> tuple[Ints, Floats, Floats, Bools]:
-    """Return triangles, metrics and second forms (f', 3) after cutting, and which triangles are new."""
+def _children(
+    state: State, first: Ints, middles: Ints
+) -> tuple[Ints, Floats, Floats, Bools, dict[str, Floats], dict[str, Ints]]:
+    """Return triangles, metrics and second forms (f', 3) after cutting, which are new, and what rides on them."""
     mesh = state.mesh
     forms = np.stack([state.g, shell.from_angles(state.rest, state.g, mesh)])
     turn = (first[:, None] + np.arange(3)) % 3
@@ -95,16 +99,26 @@ def _children(state: State, first: Ints, middles: Ints) -> tuple[Ints, Floats, F
     turned = _seen(forms, ends[:, 1] - ends[:, 0], ends[:, 2] - ends[:, 0])
     six = np.concatenate([corners, edges], axis=1)
     keep = case == 0
+    seen = {name: np.take_along_axis(v, turn[:, :, None], axis=1) for name, v in state.corners.items()}
+    riding = {name: [v[keep]] for name, v in state.corners.items()}
+    parents = [np.flatnonzero(keep)]
     parts = [(mesh.triangles[keep], forms[:, keep], np.zeros(int(keep.sum()), bool))]
     for kind, children in _CHILDREN.items():
         rows = case == kind
         for a, b, c in children:
             shape = (int(rows.sum()), 2)
             one, two = np.broadcast_to(_WHERE[b] - _WHERE[a], shape), np.broadcast_to(_WHERE[c] - _WHERE[a], shape)
+            parents.append(np.flatnonzero(rows))
+            u, v = _WHERE[[a, b, c]].T
+            for name, values in seen.items():
+                riding[name].append(np.einsum("cj,fjk->fck", np.stack([1 - u - v, u, v], -1), values[rows]))
             parts.append((six[rows][:, [a, b, c]], _seen(turned[:, rows], one, two), np.ones(shape[0], bool)))
     triangles = np.concatenate([p[0] for p in parts])
     both = np.concatenate([p[1] for p in parts], axis=1)
-    return triangles, both[0], both[1], np.concatenate([p[2] for p in parts])
+    owners = np.concatenate(parents)
+    carried = {name: np.concatenate(values) for name, values in riding.items()}
+    faces = {name: values[owners] for name, values in state.faces.items()}
+    return triangles, both[0], both[1], np.concatenate([p[2] for p in parts]), carried, faces
 
 
 def _seen(forms: Floats, u: Floats, v: Floats) -> Floats:

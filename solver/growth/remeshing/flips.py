@@ -15,6 +15,7 @@ from ..state import State
 from .plane import angle, cross, metric
 from .rebuild import FOLD, rebuilt
 from .rest import flat_hinges
+from .seams import seams, turned
 
 __all__ = ["flip"]
 
@@ -36,7 +37,8 @@ def flip(state: State) -> State:
     p, q, r, s = (corners[:, k] for k in range(4))
     convex = (cross(q - s, r - s) > 0) & (cross(r - s, p - s) > 0)
     now = np.abs(shell.angles(state.x, mesh.hinges[some]))
-    wanted = np.flatnonzero((excess > _MARGIN) & convex & (now < FOLD) & (np.abs(state.rest[some]) < FOLD))
+    even = (now < FOLD) & (np.abs(state.rest[some]) < FOLD) & ~seams(state)[some]
+    wanted = np.flatnonzero((excess > _MARGIN) & convex & even)
     if not len(wanted):
         return state
     taken, chosen = np.zeros(len(mesh.triangles), bool), []
@@ -63,7 +65,7 @@ def flip(state: State) -> State:
     triangles[a], triangles[b] = np.stack([k, m, j], -1), np.stack([m, k, i], -1)
     p, q, r, s = (corners[chosen, c] for c in range(4))
     g[a], g[b] = metric(r, s, q), metric(s, r, p)
-    return rebuilt(state, triangles, g, np.arange(len(state.x)))
+    return rebuilt(state, triangles, g, np.arange(len(state.x)), turned(state, hinges), state.faces)
 
 
 def _unfolded(state: State, some: Ints) -> Floats:

@@ -18,8 +18,10 @@ __all__ = ["FOLD", "rebuilt"]
 FOLD = 0.5
 
 
-def rebuilt(state: State, triangles: Ints, g: Floats, left: Ints) -> State:
-    """Return the state on new triangles; left (n',): vertices that stay.
+def rebuilt(
+    state: State, triangles: Ints, g: Floats, left: Ints, riding: dict[str, Floats], faces: dict[str, Ints]
+) -> State:
+    """Return the state on new triangles; left (n',): vertices that stay; riding, faces: `corners`, `faces` of a state.
 
     Hinges that were there keep their rest angles; new ones are bent like the old ones about their ends.
     """
@@ -48,6 +50,8 @@ def rebuilt(state: State, triangles: Ints, g: Floats, left: Ints) -> State:
         shares={k: v[left] for k, v in state.shares.items()},
         held=state.held[left],
         matter={k: v[left] for k, v in state.matter.items()},
+        corners=riding,
+        faces=faces,
         drift=None if state.drift is None else state.drift[left],
         spots={k: tuple(replace(spot, anchor=moved(spot.anchor)) for spot in v) for k, v in state.spots.items()},
         curves={k: moved(a) for k, a in state.curves.items()},

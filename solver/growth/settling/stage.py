@@ -42,7 +42,7 @@ def residual(state: State, params: GrowthParams) -> float:
 
 
 def settled(state: State, params: GrowthParams, tolerance: float, distance: float) -> Iterator[State]:
-    """Settle a state until no force is above tolerance x `force_unit`, or as far as it goes; yields after each step.
+    """Settle a state until no force is above tolerance x `force_unit`, or as far as it goes; yields on the way.
 
     And until nothing moves any more: Newton's own step, which is the distance that is left, is below 0.03 % of an edge,
     and the energy bends up along every way. A shape in balance on a saddle is nudged off it.
@@ -73,7 +73,7 @@ def settled(state: State, params: GrowthParams, tolerance: float, distance: floa
         for found in way(energy, x, goal, params.seed):
             if not np.isfinite(found.point.gradient):
                 raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=state.time)
-            yield state
+            yield replace(state, x=found.point.x)
         x, steps = found.point.x, steps + found.steps
         energy.follow(x)
         left = _measured(energy, replace(state, x=x))

@@ -44,22 +44,14 @@ def search(x: Floats, mesh: Topology, near: Near, distance: float, room: float, 
     """Return what may come within reach while no vertex moves by more than `room`.
 
     And, for what lies near each other along the sheet, while no edge's ends part by more than `change`: places that
-    are k edges apart part by no more than k times that. length: of an edge.
+    are k edges apart part by no more than k times that, nor by more than both can move. length: of an edge.
     """
     even = flat(x, mesh.triangles, near.start, near.other)
     spans = _spans(x, near.edge_start, near.edges)
+    balls = _owned(x, near.edge_start, near.edges)
     reach = distance + 2 * room
-    size = reach + 2 * float(spans.max())
-    corner = x.min(axis=0)
-    # a grid no finer than what fits into memory
-    size = max(size, float(np.ptp(x, axis=0).max()) / 200)
-    cells = np.floor((x - corner) / size).astype(np.int64)
-    wide = cells.max(axis=0) + 3
-    keys = ((cells[:, 0] + 1) * wide[1] + cells[:, 1] + 1) * wide[2] + cells[:, 2] + 1
-    order = np.argsort(keys, kind="stable")
-    begin = np.searchsorted(keys[order], np.arange(int(np.prod(wide)) + 1))
-    places = _near_places(x, near.start, near.other, even, spans, near.way, distance, change / length)
-    places = np.concatenate([places, _far_places(x, order, begin, keys, wide, near.start, near.other, spans, reach)])
+    places = _near_places(*balls, near.start, near.other, even, spans, near.way, distance, change / length, 2 * room)
+    places = np.concatenate([places, _far_places(*balls, *_cells(*balls, reach), near.start, near.other, reach)])
     faces = len(near.faces)
     # triangles and edges are gone through alike
     parts = np.concatenate([near.faces, near.edges[:, [0, 1, 1]]])
@@ -67,7 +59,7 @@ def search(x: Floats, mesh: Topology, near: Near, distance: float, room: float, 
     middles, radii = np.concatenate([of_faces[0], of_edges[0]]), np.concatenate([of_faces[1], of_edges[1]])
     own = near.start, near.other, near.way, near.altitudes, near.face_start, faces + near.edge_start
     stencils, kinds, felt, beyond, close = _stencils(
-        x, places, *own, parts, middles, radii, spans, distance, reach, change / length
+        x, places, *own, parts, middles, radii, *balls, spans, distance, reach, change / length
     )
     beyond[:close] *= length
     # near ones come first
@@ -75,6 +67,20 @@ def search(x: Floats, mesh: Topology, near: Near, distance: float, room: float, 
     stencils, kinds = stencils[order], kinds[order]
     a, b, c, d = near.areas[stencils.T]
     return Pairs(stencils, kinds, felt[order], np.where(kinds == EDGES, (a + b + c + d) / 12, a), beyond[order], close)
+
+
+def _cells(middles: Floats, radii: Floats, reach: float) -> tuple[Ints, Ints, Ints, Ints]:
+    """Return balls by their cells of a grid: (order, begin), their cells (n,), and how many cells there are each way.
+
+    What comes within reach is in the same cell or next to it.
+    """
+    # a grid no finer than what fits into memory
+    size = max(reach + 2 * float(radii.max()), float(np.ptp(middles, axis=0).max()) / 200)
+    cells = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64)
+    wide = cells.max(axis=0) + 3
+    keys = ((cells[:, 0] + 1) * wide[1] + cells[:, 1] + 1) * wide[2] + cells[:, 2] + 1
+    order = np.argsort(keys, kind="stable")
+    return order, np.searchsorted(keys[order], np.arange(int(np.prod(wide)) + 1)), keys, wide
 
 
 def _ascending(values: Floats) -> Ints:
@@ -111,17 +117,22 @@ def _spans(x: Floats, start: Ints, edges: Ints) -> Floats:
 
 @njit(cache=True, error_model="numpy")
 def _near_places(
-    x: Floats, start: Ints, other: Ints, even: Bools, spans: Floats, way: Floats, distance: float, change: float
-) -> Ints:
-    """Return pairs of vertices (m, 3: both, 1) near along the sheet, where it is not flat, that may own what meets."""
+    middles: Floats, radii: Floats, start: Ints, other: Ints, even: Bools, spans: Floats, way: Floats,
+    distance: float, change: float, most: float,
+) -> Ints:  # fmt: skip
+    """Return pairs of vertices (m, 3: both, 1) near along the sheet, where it is not flat, that may own what meets.
+
+    middles (n, 3), radii (n,): of balls about what each owns. most: by which places part at most.
+    """
     found, count = np.empty((len(other), 3), np.int64), 0
-    for v in range(len(x)):
+    for v in range(len(middles)):
         if even[v]:
             continue
         for at in range(start[v], start[v + 1]):
             u = other[at]
-            room = distance + _APART * (way[at] + spans[u] + spans[v]) * change + spans[u] + spans[v]
-            if _square(x, u, v) <= room * room:
+            parted = min(_APART * (way[at] + spans[u] + spans[v]) * change, most)
+            room = distance + parted + radii[u] + radii[v]
+            if not _apart(middles[v, 0], middles[v, 1], middles[v, 2], middles, u, room):
                 found[count, 0], found[count, 1], found[count, 2] = v, u, 1
                 count += 1
     return found[:count].copy()
@@ -129,57 +140,52 @@ def _near_places(
 
 @njit(cache=True, error_model="numpy")
 def _far_places(
-    x: Floats, order: Ints, begin: Ints, keys: Ints, wide: Ints, start: Ints, other: Ints, spans: Floats, reach: float
-) -> Ints:
+    middles: Floats, radii: Floats, order: Ints, begin: Ints, keys: Ints, wide: Ints, start: Ints, other: Ints,
+    reach: float,
+) -> Ints:  # fmt: skip
     """Return pairs of vertices (m, 3: the lower, the higher, 0) far along the sheet that may own what meets."""
     found, count = np.empty((1024, 3), np.int64), 0
-    mark = np.full(len(x), -1)
-    for v in range(len(x)):
+    mark = np.full(len(middles), -1)
+    for v in range(len(middles)):
+        ox, oy, oz = middles[v, 0], middles[v, 1], middles[v, 2]
         for at in range(start[v], start[v + 1]):
             mark[other[at]] = v
         for k in range(27):
             cell = keys[v] + ((k // 9 - 1) * wide[1] + (k // 3) % 3 - 1) * wide[2] + k % 3 - 1
             for at in range(begin[cell], begin[cell + 1]):
                 u = order[at]
-                if u <= v or mark[u] == v:
+                if u <= v or mark[u] == v or _apart(ox, oy, oz, middles, u, reach + radii[u] + radii[v]):
                     continue
-                room = reach + spans[u] + spans[v]
-                if _square(x, u, v) <= room * room:
-                    if count == len(found):
-                        found = np.concatenate((found, found))
-                    found[count, 0], found[count, 1], found[count, 2] = v, u, 0
-                    count += 1
+                if count == len(found):
+                    found = np.concatenate((found, found))
+                found[count, 0], found[count, 1], found[count, 2] = v, u, 0
+                count += 1
     return found[:count].copy()
-
-
-@njit(cache=True, error_model="numpy")
-def _square(x: Floats, u: int, v: int) -> float:
-    found: float = (x[u, 0] - x[v, 0]) ** 2 + (x[u, 1] - x[v, 1]) ** 2 + (x[u, 2] - x[v, 2]) ** 2
-    return found
 
 
 @njit(cache=True, error_model="numpy")
 def _stencils(
     x: Floats, places: Ints, start: Ints, other: Ints, way: Floats, altitudes: Floats, face_start: Ints,
-    edge_start: Ints, parts: Ints, middles: Floats, radii: Floats, spans: Floats, distance: float, far: float,
-    change: float,
+    edge_start: Ints, parts: Ints, middles: Floats, radii: Floats, owned: Floats, sizes: Floats, spans: Floats,
+    distance: float, far: float, change: float,
 ) -> tuple[Ints, Ints, Floats, Floats, int]:  # fmt: skip
     """Return stencils, kinds, reaches of what pairs of vertices own, how far beyond, and how many of them are near.
 
     parts (f + e, 3): corners of triangles, then those of edges, the higher twice; middles, radii: of balls about them.
+    owned, sizes: those of balls about what each vertex owns.
     """
     room, count, close, last = 1024, 0, 0, -1
     stencils, kinds, numbers = np.empty((room, 4), np.int64), np.empty(room, np.int64), np.empty((2, room))
     q, w, gap = np.empty(4, np.int64), np.empty(4), np.empty(3)
     ways, lows = np.full(len(x), np.inf), _lowest(altitudes, parts)
-    owned, sizes = _owned(x, edge_start, parts)
     for place in range(len(places)):
         v, u, near = places[place, 0], places[place, 1], places[place, 2] == 1
         if near and v != last:
             _lay_out(ways, start, other, way, last, v)
             last = v
         apart = _APART * (ways[u] + spans[u] + spans[v]) if near else 1.0
-        furthest = distance + apart * change if near else far
+        parted = min(apart * change, far - distance) if near else far - distance
+        furthest = distance + parted
         # 0: v and faces of u, 1: u and faces of v, 2: edges of both; near ones come both ways
         for kind in range(3):
             if near and (kind == 1 or (kind == 2 and u < v)):
@@ -204,7 +210,7 @@ def _stencils(
                         continue
                     rest = _rest(ways, i, j, k, back, min(low, lows[b]))
                     felt = min(distance, _SHARE * rest) if near else distance
-                    limit = felt + apart * change if near else far
+                    limit = felt + parted
                     q[0], q[1], q[2], q[3] = point, second if kind == 2 else i, i if kind == 2 else j, k
                     square = nearest(x, q, what, w, gap)
                     if square > limit * limit:
@@ -245,17 +251,17 @@ def _apart(ox: float, oy: float, oz: float, middles: Floats, m: int, distance: f
 
 
 @njit(cache=True, error_model="numpy")
-def _owned(x: Floats, edge_start: Ints, parts: Ints) -> tuple[Floats, Floats]:
+def _owned(x: Floats, edge_start: Ints, edges: Ints) -> tuple[Floats, Floats]:
     """Return middles (n, 3) and radii (n,) of balls about what each vertex owns."""
     middles, radii = x.copy(), np.zeros(len(x))
     for v in range(len(x)):
         first, end = edge_start[v], edge_start[v + 1]
         for d in range(3):
             for e in range(first, end):
-                middles[v, d] += x[parts[e, 1], d]
+                middles[v, d] += x[edges[e, 1], d]
             middles[v, d] /= end - first + 1
         for e in range(first - 1, end):
-            u, square = v if e < first else parts[e, 1], 0.0
+            u, square = v if e < first else edges[e, 1], 0.0
             for d in range(3):
                 square += (x[u, d] - middles[v, d]) ** 2
             radii[v] = max(radii[v], np.sqrt(square))

@@ -11,6 +11,7 @@ from solver.geometry.crossings import crossings
 from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
+from solver.growth.settling import stage
 from solver.growth.settling.energy import StepEnergy
 from solver.growth.settling.minimise import quasi_newton
 from solver.growth.settling.tangent import Tangent
@@ -101,6 +102,29 @@ def test_what_comes_near_only_when_a_stage_settles_is_kept_apart_too():
         counts.append(crossings(state.x, state.mesh.triangles).count)
     assert counts[0] > 100
     assert counts[1] == 0
+
+
+def test_a_stage_that_settles_free_is_left_when_parts_pass_through_each_other(monkeypatch):
+    """Not at its end: what comes after the crossing is thrown away."""
+    tool = {"kind": "surface", "where": {"kind": "everywhere"}, "frame": (1, 0, 0), "stretch": (1, 1), "curl": (4.0, 0)}
+    values = {"shape": "strip", "aspect": 6.0, "thickness": 0.03, "step": 0.25, "remesh": 0, "tools": [tool]}
+    taken = []
+
+    def counted(state, params, tolerance, distance):
+        taken.append([distance])
+        for nearer in stage.settled(state, params, tolerance, distance):
+            taken[-1].append(crossings(nearer.x, nearer.mesh.triangles).count)
+            yield nearer
+
+    monkeypatch.setattr("solver.growth.engine.settled", counted)
+    state = Engine(GrowthParams.parse(values), 60, 1e-3).reach(1.0, Context())
+    (free, *crossed), (kept, *apart) = taken
+    assert (free, kept) == (0.0, 0.03)
+    assert crossed[-1] > 0
+    # looked at every eight steps
+    assert sum(count > 0 for count in crossed) <= 8
+    assert not any(apart)
+    assert not crossings(state.x, state.mesh.triangles).count
 
 
 def test_a_shape_that_passes_through_itself_is_refused_unless_it_may(monkeypatch):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import bsr_array
 
 from solver import shell
 from solver.contract import Context
@@ -11,7 +12,7 @@ from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.settling import newton
 from solver.growth.settling.energy import StepEnergy
-from solver.growth.settling.stage import settled
+from solver.growth.settling.stage import residual, settled
 from solver.growth.settling.tangent import Tangent
 
 RIM = {"kind": "surface", "where": {"kind": "rim", "width": 0.3}, "stretch": (1.5, 1.0)}
@@ -85,6 +86,22 @@ def test_a_flat_sheet_that_must_buckle_is_not_settled_on_its_saddle():
     curvatures = np.linalg.eigvalsh(energy.hessian(found.x).toarray())
     assert (np.abs(curvatures[:6]) < 1e-8).all(), "it may be moved and turned"
     assert curvatures[6] > 1e-8, "and costs energy along every other way"
+    # rounding does not decide whether that is seen: as many coordinates are pinned as there are rigid motions
+    matrix, rigid = energy.hessian(found.x), energy.rigid(found.x)
+    blocks = newton._definite(matrix, energy.diagonal, rigid, 0.0)
+    pinned = bsr_array((blocks, matrix.indices, matrix.indptr)).toarray()
+    assert np.linalg.eigvalsh(pinned)[0] > 1e-8
+    assert np.count_nonzero(pinned - matrix.toarray()) == rigid.shape[1] == 6
+
+
+@pytest.mark.parametrize(("thickness", "softer"), [(0.01, True), (0.5, False)])
+def test_the_residual_is_relative_to_the_softer_of_bending_and_membrane(thickness: float, softer: bool):
+    """Largest force over D / l, D = t^2 / (6 (1 - nu)), where that is less than the membrane's mu l."""
+    params = GrowthParams.parse({"thickness": thickness, "poisson": 0.25, "tools": []})
+    state = replace(Engine(params, 2000).state, forces=3e-4)
+    folded = thickness**2 / (6 * (1 - 0.25)) / state.length
+    assert (folded < state.length) == softer
+    assert residual(state, params) == pytest.approx(3e-4 * state.length / min(folded, state.length), rel=1e-12)
 
 
 def test_stages_do_not_depend_on_each_other():

@@ -141,6 +141,35 @@ def test_what_was_not_found_is_out_of_reach_after_the_room_was_used():
     assert now <= before
 
 
+def hairpin():
+    """A strip with half a turn about a sharp fold, as it is and flat: its legs are near each other at rest, too."""
+    points, faces = sheet(12, 3, 0.1)
+    along, radius = points[:, 0] - points[:, 0].mean(), 0.06
+    turn = np.clip(along / radius, -np.pi / 2, np.pi / 2)
+    out = radius * np.cos(turn) - np.maximum(np.abs(along) - radius * np.pi / 2, 0)
+    x = np.stack([out, points[:, 1], radius * np.sin(turn)], -1)
+    return x, points, shell.topology(faces, len(x))
+
+
+def test_near_ones_are_listed_as_far_as_both_can_move_and_no_further():
+    """However much edges may change: after the legs have moved towards each other what is in reach was listed."""
+    x, flat, mesh = hairpin()
+    distance, room = 0.03, 0.05
+    near = near_in(flat, mesh, 2 * distance + 0.5)
+    found = shell.search(x, mesh, near, distance, room, 1.0, 0.1)
+    assert found.near == len(found.kinds) > 50
+    weights, gap = np.empty(4), np.empty(3)
+    squares = [nearest(x, q, k, weights, gap) for q, k in zip(found.stencils, found.kinds, strict=True)]
+    assert (np.sqrt(squares) <= found.reach + 2 * room + 1e-12).all()
+    moved = x.copy()
+    moved[:, 2] -= room * np.sign(x[:, 2])
+    before = {(int(k), *q) for k, q in zip(found.kinds, found.stencils.tolist(), strict=True)}
+    again = shell.search(moved, mesh, near, distance, 0.0, 0.0, 0.1)
+    now = {(int(again.kinds[k]), *again.stencils[k].tolist()) for k in shell.within(moved, again)}
+    assert len(now) > 10
+    assert now <= before
+
+
 def test_edges_alone_stop_two_triangles_that_pass_edge_first():
     """Two triangles cross at right angles, edge through edge: no vertex comes near the other's face."""
     x = np.array([[-1, 0, 0], [1, 0, 0], [0, 0, -2], [0, -1, 0.3], [0, 1, 0.3], [0, 0, 2.3]], float)
