@@ -146,7 +146,7 @@ class Live {
     const { symbol } = this.solver.stages;
     this.house.say(`${worded(this.preset)}, ${symbol} = ${digits(surface.stage)}`, `live, ${this.quality}`, {
       level: surface.exact ? "good" : "fair",
-      text: surface.exact ? "settled as a batch run settles" : `live: residual ${surface.residual.toExponential(1)}`,
+      text: surface.exact ? "settled as a batch run settles" : surface.residual ? `live: residual ${surface.residual.toExponential(1)}` : "as it begins",
       why: "Settle brings it to the equilibrium that a batch run of the saved file gives.",
     });
     this.counts.textContent = `${(surface.positions.length / 3).toLocaleString("en")} vertices, ${(surface.triangles.length / 3).toLocaleString("en")} triangles`;
