@@ -87,7 +87,7 @@ def portrait(store: Store, families: Families, info: TableInfo) -> tuple[dict[st
 def thumbnail(
     table: ShapeTable, point: Mapping[str, float], stage: float, pixels: int = 160, presets: Sequence[str] = ()
 ) -> bytes:
-    """Return a PNG (pixels, pixels) of a shape, in the colours of its solver that its presets or its table are named after.
+    """Return a PNG (pixels, pixels) of a shape, in the colours that its table or its presets are named after.
 
     Raises:
         InvalidGeometry: no shape has these parameters.
