@@ -22,6 +22,8 @@ from .views.addresses import link
 
 __all__ = ["router"]
 
+#: Other pictures of the same tables have other addresses and tags: browsers keep them for a day.
+_DRAWN = "-2"
 router = APIRouter(tags=["catalogue"])
 
 _PNG, _TOML = problems.files(["image/png"]), problems.files(["application/toml"])
@@ -45,7 +47,7 @@ def maps(request: Request) -> dict[str, Any]:
         links: dict[str, str] = {
             "self": link(f"/v1/tables/{name}"),
             "shapes": link(f"/v1/shapes/{info.solver}?table={name}"),
-            "thumbnail": link(f"/v1/maps/{name}/thumbnail.png?v={info.digest[:12]}"),
+            "thumbnail": link(f"/v1/maps/{name}/thumbnail.png?v={info.digest[:12]}{_DRAWN}"),
         }
         if info.plan:
             links["plan"] = link(f"/v1/maps/{name}/plan.toml")
@@ -63,12 +65,13 @@ def thumbnail(request: Request, name: str = Path(description="Name of a table; G
     """Draw a family's preset, or its middle sample, dried up."""
     live: LiveTables = request.app.state.tables
     info, _, families = _known(live, name)
-    headers = {"ETag": f'"{info.digest[:32]}-thumbnail"', "Cache-Control": "public, max-age=86400"}
+    headers = {"ETag": f'"{info.digest[:32]}-thumbnail{_DRAWN}"', "Cache-Control": "public, max-age=86400"}
     if matches(request.headers.get("if-none-match", ""), headers["ETag"]):
         return Response(status_code=304, headers=headers)
     table = live.get(name)
     point, stage = covering.portrait(live.store, families, table.info)
-    return Response(_drawn(table, tuple(point.items()), stage), headers=headers, media_type="image/png")
+    drawn = _drawn(table, tuple(point.items()), stage, tuple(families.presets_of(table.info)))
+    return Response(drawn, headers=headers, media_type="image/png")
 
 
 @router.get(
@@ -92,8 +95,8 @@ def _known(live: LiveTables, name: str) -> tuple[TableInfo, Solver, Families]:
 
 
 @lru_cache(maxsize=64)
-def _drawn(table: ShapeTable, point: tuple[tuple[str, float], ...], stage: float) -> bytes:
+def _drawn(table: ShapeTable, point: tuple[tuple[str, float], ...], stage: float, presets: tuple[str, ...]) -> bytes:
     try:
-        return covering.thumbnail(table, dict(point), stage)
+        return covering.thumbnail(table, dict(point), stage, presets=presets)
     except InvalidGeometry:
-        return covering.thumbnail(table, table.sample(table.size // 2), stage)
+        return covering.thumbnail(table, table.sample(table.size // 2), stage, presets=presets)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -84,8 +84,10 @@ def portrait(store: Store, families: Families, info: TableInfo) -> tuple[dict[st
     return {name: values[name][len(values[name]) // 2] for name in info.axes}, stage
 
 
-def thumbnail(table: ShapeTable, point: Mapping[str, float], stage: float, pixels: int = 160) -> bytes:
-    """Return a PNG (pixels, pixels) of a shape, in the colours of its solver that its table is named after.
+def thumbnail(
+    table: ShapeTable, point: Mapping[str, float], stage: float, pixels: int = 160, presets: Sequence[str] = ()
+) -> bytes:
+    """Return a PNG (pixels, pixels) of a shape, in the colours that its table or its presets are named after.
 
     Raises:
         InvalidGeometry: no shape has these parameters.
@@ -97,7 +99,7 @@ def thumbnail(table: ShapeTable, point: Mapping[str, float], stage: float, pixel
 
     shape = table.at(point, stage, resolution=96)
     assert shape.position is not None  # asked for by default
-    tint = _tint(table.info)
+    tint = _tint(table.info, presets)
     colour = None if tint is None else np.broadcast_to(tint, shape.position.shape)
     out = io.BytesIO()
     Image.fromarray(render(shape.position, shape.poles, pixels, colour=colour)).save(out, "PNG", optimize=True)
@@ -118,11 +120,12 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
     for name in store.table_names():
         table = ShapeTable.open(store, name, surfaces=registry.surface)
         solver = registry.get(table.info.solver)
-        point, stage = portrait(store, stored.families(store, solver), table.info)
+        families = stored.families(store, solver)
+        point, stage = portrait(store, families, table.info)
         shape = table.at(point, stage, resolution=128)
         assert shape.position is not None  # asked for by default
         said = ", ".join(f"{axis} {value:g}" for axis, value in point.items())
-        colour = _tint(table.info)
+        colour = _tint(table.info, families.presets_of(table.info))
         skin = None if colour is None else np.broadcast_to(colour, shape.position.shape)
         note = f"{name}: {said}, {solver.stages.symbol} {stage:g}"
         panels.append(Panel(shape.position, shape.poles, note, skin))
@@ -131,10 +134,13 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
     return sheet([panels[i : i + columns] for i in range(0, len(panels), columns)], pixels=pixels)
 
 
-def _tint(info: TableInfo) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """Return the colour, linear light, of the shade that begins a table's name; None where there is none."""
+def _tint(info: TableInfo, presets: Sequence[str]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """Return the colour, linear light, of the shade that begins a table's name, else that of one of its presets.
+
+    None where there is none.
+    """
     shades = registry.get(info.solver).looks.shades
-    name = next((name for name in shades if info.name.startswith(name)), None)
+    name = next((name for one in (info.name, *presets) for name in shades if one.startswith(name)), None)
     if name is None:
         return None
     text = shades[name].ridge[0]

@@ -1,6 +1,6 @@
 """How often the page changes what it shows, in a browser that draws in software: python -m benchmarks.scenes.page.
 
-Each row is driven as a hand would (a slider that never rests, a growth that plays) for some seconds, twice: drawn by
+Each row is driven as a hand would (a slider that never rests, a growth that plays, a brush) for some seconds, twice: drawn by
 SwiftShader on the processor, and with the draw calls left out, so that what remains is the page's own work and the
 service's. A graphics card draws what SwiftShader needs seconds for: the second figure is the bound that it leaves. Draw
 calls are counted in the browser's own WebGL functions, instanced ones apart. Page and service: processor seconds of
@@ -51,11 +51,13 @@ _COUNT = """() => {
   requestAnimationFrame(count);
 }"""
 #: Moves a slider to and fro for some milliseconds, and counts what is shown meanwhile.
-_DRIVE = """async ([selector, milliseconds]) => {
+_DRIVE = """async ([selector, milliseconds, label]) => {
   const view = document.getElementById("view");
   const seen = new MutationObserver((all) => (counted.shown += all.length));
   seen.observe(view, { attributes: true, attributeFilter: ["data-shown"] });
   const input = selector && document.querySelector(selector);
+  const press = label && [...document.querySelectorAll("button")].find((one) => one.textContent === label);
+  let held = -1;
   const begin = performance.now();
   Object.assign(counted, { single: 0, instanced: 0, copies: 0, renders: 0, shown: 0 });
   while (performance.now() - begin < milliseconds) {
@@ -66,6 +68,9 @@ _DRIVE = """async ([selector, milliseconds]) => {
       input.value = Number(input.min) + share * (Number(input.max) - Number(input.min));
       input.dispatchEvent(new Event("input", { bubbles: true }));
     }
+    const now = press ? JSON.parse(view.dataset.shown).input : held;
+    if (now !== held) press.click();
+    held = now;
   }
   seen.disconnect();
   return { ...counted, seconds: (performance.now() - begin) / 1000, at: JSON.parse(view.dataset.shown) };
@@ -79,12 +84,19 @@ class _Row(NamedTuple):
     slider: str = ""
     quality: str = ""
     clicks: tuple[str, ...] = ()
+    #: A button that is pressed whenever what is shown holds what the last press did.
+    press: str = ""
 
 
+_DAB = "Dab in the middle"
 _ROWS = (
     _Row("dry: one fruit, s moves", "s=0.2", "#axis-s"),
     _Row("scene: 1,000 fruits on the floor, all dried", "room=scene&rule=scatter&count=1000", "#dry"),
     _Row("grow: live, playing", "room=growth&live=1&preset=mushroom", quality="default", clicks=("Begin", "Grow")),
+    *(
+        _Row(f"grow: live, painted, {quality}", "room=growth&live=1&preset=leaf", "", quality, ("Begin",), _DAB)
+        for quality in ("default", "fine")
+    ),
 )
 
 
@@ -112,11 +124,11 @@ def _metrics(session: Any) -> dict[str, float]:
 def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, is_drawn: bool, seconds: float) -> Any:
     """Return what was shown a second, and what one change took of the page's thread and of the service."""
     with _opened(browser, f"{address}&{row.words}", row, is_drawn) as page:
-        page.evaluate(_DRIVE, [row.slider, 1500])  # what is compiled and opened once
+        page.evaluate(_DRIVE, [row.slider, 1500, row.press])  # what is compiled and opened once
         session = page.context.new_cdp_session(page)
         session.send("Performance.enable", {"timeDomain": "threadTicks"})
         before, spent = _metrics(session), sum(server.cpu_times()[:4])
-        seen = page.evaluate(_DRIVE, [row.slider, 1000 * seconds])
+        seen = page.evaluate(_DRIVE, [row.slider, 1000 * seconds, row.press])
         after, spent = _metrics(session), sum(server.cpu_times()[:4]) - spent
     count = max(1, seen["shown"])
     task = 1000 * (after["TaskDuration"] - before["TaskDuration"]) / count

@@ -19,6 +19,7 @@ from .params import DecayParams
 from .settings import choose, nodes, stepped
 from .surfaces.shape import Shape
 from .surfaces.surface import sampler
+from .told import note
 
 __all__ = ["run"]
 
@@ -57,7 +58,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
                     continue
                 row = _row(day, 0, 0.0, True)
                 _finish(rows, row, shape, (shape.lost(day), None), begun, need, context)
-            return _dataset(rows, need, attrs, shape)
+            return _dataset(rows, need, attrs, shape, note(params, rows))
         with_mould = bool(wanted & MOULD)
         context.report(0.0, f"laying {settings.vertices} points on the fruit")
         system = System(params, settings.cells, with_mould, shape.surface)
@@ -81,10 +82,10 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             _finish(rows, row, shape, (reached.state.water, rot), begun, need, context)
     except SolverError as error:
         if rows:
-            error.partial = _dataset(rows, need, attrs, shape)
+            error.partial = _dataset(rows, need, attrs, shape, note(params, rows))
             error.last_stage = rows[-1]["stage"]
         raise
-    return _dataset(rows, need, attrs, shape)
+    return _dataset(rows, need, attrs, shape, note(params, rows))
 
 
 def _finish(
@@ -139,8 +140,9 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
     return row
 
 
-def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shape: Shape) -> xr.Dataset:
+def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shape: Shape, said: str) -> xr.Dataset:
     assert need.resolution is not None
+    attrs = {**attrs, **({"note": said} if said else {})}
     data: dict[str, Any] = {}
     if "triangle" in need.fields:
         data["triangle"] = (("face", "corner"), shape.triangles)

@@ -14,7 +14,7 @@ from PIL import Image
 
 from solver.dehydration import SOLVER
 from solver.fruit import lattice
-from store import tables
+from store import starter, tables
 from store.store import Store
 
 from ..store.conftest import displacement, fill
@@ -137,6 +137,21 @@ def test_maps_say_what_is_covered(client: httpx.Client) -> None:
     again = client.get(raisin["links"]["thumbnail"], headers={"If-None-Match": answer.headers["etag"]})
     assert again.status_code == 304
     assert client.get("/v1/maps/rasin/thumbnail.png").status_code == 404
+
+
+def test_a_picture_has_the_colours_of_its_fruit() -> None:
+    """`prolate` is a table's name and no fruit's: raisin2, which it holds, is as dark as raisins are."""
+    with client_of(starter.ROOT) as client:
+        maps = {one["name"]: one for one in client.get("/v1/maps").json()["maps"]}
+        colours = {}
+        for name, preset in (("raisin", "raisin"), ("prolate", "raisin2"), ("jujube1", "jujube1")):
+            assert maps[name]["presets"] == [preset]
+            picture = Image.open(io.BytesIO(client.get(maps[name]["links"]["thumbnail"]).content))
+            middle = np.asarray(picture, float)[60:100, 60:100].reshape(-1, 3).mean(axis=0)
+            colours[name] = middle / middle.sum()
+    apart = {name: float(np.abs(colours["prolate"] - colours[name]).max()) for name in ("raisin", "jujube1")}
+    assert apart["raisin"] < 0.02
+    assert apart["jujube1"] > 0.1
 
 
 def test_a_family_of_a_single_fruit(tmp_path: Path) -> None:

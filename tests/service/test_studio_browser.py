@@ -99,6 +99,9 @@ def test_every_room_fits_every_screen_and_everybody(browser: Browser, studio: st
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
     tab = visit.page.locator("#rooms [aria-current]")
     assert tab.count() == 1
+    last = visit.page.locator("#rooms a").last.bounding_box()
+    assert last is not None
+    assert last["x"] + last["width"] <= width, "all rooms are in sight"
     if room != "gallery":
         # how far to trust it is in sight without scrolling, and so is how it came about
         for one in (".badge", ".tier"):
@@ -373,9 +376,49 @@ def test_a_thousand_fruits_dry_together(browser: Browser, studio: str) -> None:
     visit.page.close()
 
 
+def test_fruits_stand_on_a_mesh_of_ones_own(browser: Browser, studio: str, tmp_path: Path) -> None:
+    ball = tmp_path / "ball.obj"
+    trimesh.creation.icosphere(subdivisions=3, radius=7).export(ball)
+    visit = Visit(browser, viewport={"width": 1000, "height": 800})
+    page = visit.page
+    page.goto(at(studio, "room=scene&rule=scatter&count=12"))
+    visit.shown("shown.copies == 12")
+    page.get_by_label("Placed").select_option("mesh")
+    assert "no mesh to stand on yet" in page.get_by_role("alert").inner_text()
+    page.get_by_label("Mesh: a file").set_input_files(ball)
+    page.locator(".meshfile .note", has_text="642 points, 1280 triangles, closed").wait_for()
+    page.locator("#trust", has_text="12 of 12 shown").wait_for()
+    page.get_by_label("Longest side").fill("14")
+    with page.expect_response("**/v1/scenes?*") as answer:
+        page.get_by_label("Longest side").press("Enter")
+    assert answer.value.status == 200
+    page.get_by_text("At rest").wait_for()
+    with page.expect_download() as taken:
+        page.get_by_role("link", name="Scene as TOML").click()
+    scene = tomllib.loads(Path(taken.value.path()).read_text())
+    (place,) = scene["places"]
+    assert (place["rule"], len(place["mesh"]["faces"])) == ("scatter", 1280)
+    sizes = [sum(x * x for x in point) ** 0.5 for point in place["mesh"]["points"]]
+    assert sizes == pytest.approx([7.0] * 642, rel=1e-4), "half of 14 cm, in the scene's centimetres"
+    # the very file, as the command takes it
+    (tmp_path / "scene.toml").write_text(Path(taken.value.path()).read_text())
+    said = subprocess.run(
+        [sys.executable, "-m", "service.cli", "scene", "scene.toml", "--json"],
+        check=True,
+        capture_output=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert json.loads(said.stdout)["instances"] == 12
+    assert visit.complaints == []
+    page.close()
+
+
 def test_the_gallery_leads_to_what_it_shows(browser: Browser, studio: str) -> None:
     visit = Visit(browser, viewport={"width": 1000, "height": 700})
     visit.page.goto(at(studio, "room=gallery"))
+    names = visit.page.locator(".cards a").all_inner_texts()
+    assert len(names) == len(set(names)), "no two cards say the same"
     visit.page.get_by_role("link", name=re.compile("^apple a run")).click()
     assert visit.shown("shown.of")["of"] >= 2
     visit.page.get_by_role("link", name="Gallery").click()

@@ -32,6 +32,25 @@ def test_density_stays_and_the_books_close_while_a_fruit_rots_and_dries(preset):
     assert run.density.values[0] == pytest.approx(1, abs=0.01)
     assert run.density.values.min() > 0.8
     assert run.density.values.max() < 1.15
+    assert "note" not in run.attrs
+
+
+def test_a_fruit_lighter_than_fruits_are_says_why():
+    """Each reason by taking it away: without the stone and without the skin the same peach is nearer to its weight."""
+    values = {"body": "quasi-static", "te": 0.03, "skin": {"shrinkage": 0.5}}
+    need = Need(fields=("density",), stages=(10.0,), quality="preview")
+    found = {}
+    for name, change in (("both", {}), ("no stone", {"stone": (0, 0)}), ("no skin", {"skin": None})):
+        run = SOLVER.solve(SOLVER.parse(values | change, "peach"), need)
+        found[name] = float(run.density.values[0]), run.attrs.get("note", "")
+    light, said = found["both"]
+    assert light < 0.8
+    assert said.startswith(f"on day 10 the density is {light:.2f} of the fresh fruit's: ")
+    assert "stone" in said
+    assert "skin" in said
+    for name in ("no stone", "no skin"):
+        assert found[name][0] > light + 0.05
+        assert found[name][1] == ""
 
 
 def test_the_floor_carries_what_the_books_say_is_left():

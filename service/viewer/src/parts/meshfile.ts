@@ -21,6 +21,8 @@ export class MeshFile {
   constructor(
     label: string,
     private readonly changed: () => void,
+    hint = "Its middle becomes the origin, half its longest side 1.",
+    private readonly next = "Run to see what comes of it.",
   ) {
     const accept = Object.keys(MESHES).map((suffix) => `.${suffix}`).join(",");
     this.input = el("input", { type: "file", accept, "aria-label": `${label}: a file` });
@@ -29,7 +31,7 @@ export class MeshFile {
       changed();
     });
     this.input.addEventListener("change", () => void this.take());
-    this.root = el("div", { class: "meshfile" }, el("p", { class: "hint" }, "OBJ, PLY, GLB or STL. Its middle becomes the origin, half its longest side 1."), this.input, this.said, this.wrong, this.out);
+    this.root = el("div", { class: "meshfile" }, el("p", { class: "hint" }, `OBJ, PLY, GLB or STL. ${hint}`), this.input, this.said, this.wrong, this.out);
     this.set(null);
   }
 
@@ -55,7 +57,7 @@ export class MeshFile {
       const given = await readMesh(file);
       this.set(given.mesh);
       const border = given.borders ? `open, ${counted(given.borders, "edge")} with one triangle` : "closed";
-      this.said.textContent = `${file.name}: ${this.said.textContent}, ${border}. Run to see what comes of it.`;
+      this.said.textContent = `${file.name}: ${this.said.textContent}, ${border}. ${this.next}`;
     } catch (error) {
       this.set(null);
       this.wrong.textContent = error instanceof Problem ? error.message : String(error);

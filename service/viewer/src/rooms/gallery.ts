@@ -37,7 +37,7 @@ function shelf(entry: Entry, solver: Solver, covered: Family[], jobs: Job[], pai
     const job = jobs.find((one) => isOf(one, solver, preset));
     return { rank: family ? 0 : job ? 1 : 2, root: card(entry, solver, preset, family, job, painter) };
   });
-  const others = own.filter((family) => !family.presets.length).map((family) => ({ rank: 0, root: tableCard(entry, family) }));
+  const others = own.filter((family) => !family.presets.length).map((family) => ({ rank: 0, root: tableCard(entry, family, own) }));
   const all = [...cards, ...others].sort((a, b) => a.rank - b.rank);
   const there = all.filter(({ rank }) => rank < 2).length;
   return el(
@@ -68,10 +68,10 @@ function card(entry: Entry, solver: Solver, preset: string, family: Family | und
   return linked(`#${words}`, worded(preset), note, picture);
 }
 
-function tableCard(entry: Entry, family: Family): HTMLElement {
+function tableCard(entry: Entry, family: Family, all: Family[]): HTMLElement {
   const words = new URLSearchParams({ room: entry.name, table: family.name });
   for (const [name, value] of Object.entries(family.portrait)) words.set(name, String(value));
-  return linked(`#${words}`, titled(family), `live, ${ranges(family).join(", ")}`, image(family));
+  return linked(`#${words}`, titled(family), `live, ${ranges(family, all).join(", ")}`, image(family));
 }
 
 const image = (family: Family): HTMLElement =>

@@ -3,6 +3,7 @@
 import { keep, type House, type Room, type Words } from "../house";
 import { button, details, digits, el, select, worded } from "../parts/dom";
 import { Form } from "../parts/form";
+import { Calm } from "../parts/live";
 import { needToken } from "../parts/token";
 import { Problem } from "../service/http";
 import { Session, type Saved, type State, type Surface } from "../service/sessions";
@@ -30,6 +31,7 @@ class Live {
   private readonly redo = button("Redo", () => this.session?.send("redo"));
   private readonly brush: Form | undefined;
   private readonly others: [string, Form][];
+  private readonly words = new Calm();
   private session: Session | undefined;
   private working = false;
   private isPainting = false;
@@ -86,6 +88,7 @@ class Live {
     return () => {
       removeEventListener("pagehide", leave);
       leave();
+      this.words.stop();
       this.painting(false);
       this.sheet.dispose();
     };
@@ -135,14 +138,18 @@ class Live {
     if (sheet.take(surface)) house.studio.aim();
     house.studio.reshaped();
     this.dabs = Math.max(this.dabs, surface.input);
+    this.words.do(() => this.tell(surface));
+    house.canvas.dataset.shown = JSON.stringify({ stage: surface.stage, vertices: surface.positions.length / 3, input: surface.input, exact: surface.exact });
+  }
+
+  private tell(surface: Surface): void {
     const { symbol } = this.solver.stages;
-    house.say(`${worded(this.preset)}, ${symbol} = ${digits(surface.stage)}`, `live, ${this.quality}`, {
+    this.house.say(`${worded(this.preset)}, ${symbol} = ${digits(surface.stage)}`, `live, ${this.quality}`, {
       level: surface.exact ? "good" : "fair",
-      text: surface.exact ? "settled as a batch run settles" : `live: residual ${surface.residual.toExponential(1)}`,
+      text: surface.exact ? "settled as a batch run settles" : surface.residual ? `live: residual ${surface.residual.toExponential(1)}` : "as it begins",
       why: "Settle brings it to the equilibrium that a batch run of the saved file gives.",
     });
     this.counts.textContent = `${(surface.positions.length / 3).toLocaleString("en")} vertices, ${(surface.triangles.length / 3).toLocaleString("en")} triangles`;
-    house.canvas.dataset.shown = JSON.stringify({ stage: surface.stage, vertices: surface.positions.length / 3, input: surface.input, exact: surface.exact });
   }
 
   private told({ working, until, undo, redo, crossings }: State): void {

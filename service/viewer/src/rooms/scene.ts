@@ -4,8 +4,9 @@ import { keep, type House, type Room } from "../house";
 import { Actions } from "../parts/actions";
 import { button, counted, digits, el, select, terms, worded } from "../parts/dom";
 import { Latest } from "../parts/live";
+import { MeshFile } from "../parts/meshfile";
 import { absolute, Problem } from "../service/http";
-import { asToml, scene as askScene, type Report, type Scene as Wanted } from "../service/scenes";
+import { asToml, scene as askScene, type Ground, type Report, type Scene as Wanted } from "../service/scenes";
 import { families, named, tables, type Table } from "../service/shapes";
 import { solver } from "../service/solvers";
 import { Crowd } from "../view/crowd";
@@ -16,10 +17,14 @@ const FIRST = 3;
 /** Length of the scene's unit [m]. */
 const UNIT = 0.01;
 const AGAIN = 3000; // [ms] until shapes are asked for again that did not come
+const ON_MESH = "mesh";
+/** Share of a mesh's area that feet may cover: past a half of it hardly any place is found by chance. */
+const COVERED = 0.2;
 const RULES: [string, string][] = [
   ["bowl", "in a bowl (falls until it rests)"],
   ["pile", "in a pile (falls until it rests)"],
   ["scatter", "scattered on the floor"],
+  [ON_MESH, "scattered on a mesh of your own"],
   ["row", "in a row"],
 ];
 /** From where one sees into a bowl, off the vertical [radian]. */
@@ -84,6 +89,13 @@ const shares = (total: number, parts: number): number[] =>
 /** Length of r1 in the scene. */
 const reach = ({ metres }: Kind): number => (metres ?? UNIT) / UNIT;
 
+/** Area of a mesh, by half the cross products of its triangles. */
+const areaOf = ({ points, faces }: Ground): number =>
+  faces.reduce((sum, [a, b, c]) => {
+    const [u, v] = [points[b], points[c]].map((p) => p.map((x, k) => x - points[a][k]));
+    return sum + Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+  }, 0);
+
 class Many {
   private readonly counts = new Map<string, HTMLInputElement>();
   private readonly facts = el("section", { id: "trust", "aria-label": "What the service says of the scene" });
@@ -92,6 +104,14 @@ class Many {
   private readonly dry = el("input", { type: "range", id: "dry" });
   private readonly value = el("span", { class: "value" });
   private readonly actions = new Actions(() => this.take());
+  private readonly ground = new MeshFile("Mesh", () => void this.compose(), "They stand on its triangles, along their normals; y is up.", "");
+  private readonly longest = el("input", { type: "number", id: "longest", min: "0.1", step: "any", placeholder: "as they need" });
+  private readonly standing = el(
+    "section",
+    { "aria-label": "What they stand on" },
+    this.ground.root,
+    el("div", { class: "field" }, el("label", { for: "longest" }, "Longest side [cm]"), this.longest),
+  );
   private readonly asking: Latest<number, Float32Array[]>;
   private readonly lowest: number;
   private readonly highest: number;
@@ -139,6 +159,8 @@ class Many {
   open(): () => void {
     const { house } = this;
     for (const input of this.counts.values()) input.addEventListener("change", () => void this.compose());
+    this.longest.addEventListener("change", () => void this.compose());
+    this.standing.hidden = this.rule !== ON_MESH;
     this.dry.addEventListener("input", () => {
       this.word();
       this.asking.put(this.stage);
@@ -152,8 +174,10 @@ class Many {
         el("div", { class: "slider" }, el("label", { for: "dry" }, "Dryness of all ", el("var", {}, this.symbol)), this.value, el("div", { class: "track" }, this.dry)),
         select("Placed", "rule", RULES, this.rule, (rule) => {
           this.rule = rule;
+          this.standing.hidden = rule !== ON_MESH;
           void this.compose();
         }),
+        this.standing,
         el(
           "fieldset",
           { class: "counts" },
@@ -189,6 +213,7 @@ class Many {
 
   private thousand(): void {
     this.rule = "scatter";
+    this.standing.hidden = true;
     (this.house.panel.querySelector("#rule") as HTMLSelectElement).value = this.rule;
     const used = [...this.counts.values()].filter((input) => Number(input.value) > 0);
     for (const [i, count] of shares(MOST, used.length).entries()) used[i].value = String(count);
@@ -212,11 +237,22 @@ class Many {
     const lengths = this.kinds.flatMap((kind) => (this.counts.get(kind.preset)?.value === "0" ? [] : [[Number(this.counts.get(kind.preset)?.value), reach(kind)]]));
     const bulk = Math.cbrt(lengths.reduce((sum, [count, r1]) => sum + count * r1 ** 3, 0));
     const widest = Math.max(...lengths.map(([, r1]) => r1));
-    const radius = falls ? Math.max(3 * widest, 1.4 * bulk) : 1.5 * widest * Math.ceil(Math.sqrt(total));
-    const place = { name: "here", rule: this.rule, seed: 1, ...(this.rule === "bowl" || this.rule === "scatter" ? { radius: Number(radius.toFixed(2)) } : {}) };
+    const ground = this.rule === ON_MESH ? this.grounded(Math.PI * lengths.reduce((sum, [count, r1]) => sum + count * r1 ** 2, 0)) : undefined;
+    const radius = ground ? Math.max(...ground.points.flat().map(Math.abs)) : falls ? Math.max(3 * widest, 1.4 * bulk) : 1.5 * widest * Math.ceil(Math.sqrt(total));
+    const rule = ground ? "scatter" : this.rule;
+    const place = ground ? { name: "here", rule, seed: 1, mesh: ground } : { name: "here", rule, seed: 1, ...(this.rule === "bowl" || this.rule === "scatter" ? { radius: Number(radius.toFixed(2)) } : {}) };
     const far = radius / 6;
     const camera = { ...CAMERA, position: CAMERA.position.map((x) => Number((x * Math.max(1, far)).toFixed(2))) };
     return { unit: UNIT, cull: false, budget: { triangles: TRIANGLES }, camera, places: [place], items };
+  }
+
+  /** The mesh of one's own, as large as is said, else so that feet of this area find room [scene's unit]. */
+  private grounded(feet: number): Ground {
+    const given = this.ground.get() as Ground | null;
+    if (!given) throw new Problem("There is no mesh to stand on yet.", "Choose a file.", "");
+    const said = Number(this.longest.value) / 2;
+    const half = said > 0 ? said : Math.sqrt(feet / (COVERED * areaOf(given)));
+    return { points: given.points.map((point) => point.map((x) => Number((half * x).toPrecision(6)))), faces: given.faces };
   }
 
   /** Ask for the scene as it stands. */

@@ -7,7 +7,7 @@ import { Detail } from "../parts/detail";
 import { button, counted, details, digits, el } from "../parts/dom";
 import { Exact } from "../parts/exact";
 import { familyChoice, familyOf, titled } from "../parts/families";
-import { Latest } from "../parts/live";
+import { Calm, Latest } from "../parts/live";
 import { Player } from "../parts/play";
 import { at, clamp, presetsIn, scales, shareOf, type Scale } from "../parts/state";
 import { showFacts, showTrust, tierOf, verdict } from "../parts/trust";
@@ -63,6 +63,9 @@ class Shapes {
   private readonly player: Player;
   private readonly sliders: Slider[];
   private readonly questions: Latest<Question, Answer>;
+  /** Laying words out costs as much as the shape: nobody reads them thirty times a second. */
+  private readonly words = new Calm();
+  private readonly taken = new Calm();
   private skin: string;
   private method: string;
   private resting = 0;
@@ -84,7 +87,7 @@ class Shapes {
     const meant = presetsIn(table, solver)[wanted.preset ?? ""] ?? {};
     for (const [name, value] of Object.entries(meant)) if (wanted[name] === undefined) this.point[name] = value;
     const shades = Object.keys(this.look.shades);
-    this.skin = wanted.skin in this.look.shades ? wanted.skin : (shades.find((name) => table.name.startsWith(name)) ?? shades[0]);
+    this.skin = wanted.skin in this.look.shades ? wanted.skin : skinOf(shades, [wanted.preset ?? "", table.name, ...Object.keys(presetsIn(table, solver))]);
     this.method = table.methods.known.includes(wanted.method) ? wanted.method : table.methods.default;
     this.detail = new Detail(table.max_resolution);
     this.actions = new Actions(() => this.take());
@@ -113,6 +116,7 @@ class Shapes {
   open(covered: Promise<Family[]>): () => void {
     const { house } = this;
     house.stand(this.fruit);
+    this.facts.addEventListener("toggle", () => this.number());
     const choice = el("div", { class: "choice families-wait" });
     house.panel.replaceChildren(
       el("p", { id: "subject" }, `${this.solver.title} · ${counted(this.table.samples)} · `, el("a", { href: `#room=${this.solver.name}&run=1` }, "all parameters")),
@@ -138,6 +142,8 @@ class Shapes {
       this.closed = true;
       this.player.stop();
       clearTimeout(this.resting);
+      this.words.stop();
+      this.taken.stop();
     };
   }
 
@@ -175,16 +181,28 @@ class Shapes {
     fruit.wear(this.look.shades[this.skin], shareOf(this.stage, point[this.stage.name]));
     fruit.show(answer.points, answer.n, moving);
     house.studio.reshaped();
-    showTrust(this.trust, answer.about, `${answer.milliseconds.toFixed(0)} ms, ${(answer.bytes / 1024).toFixed(0)} kB`);
-    showFacts(this.facts.querySelector("div") as HTMLElement, answer.about);
     this.shown = { answer, at: point };
-    this.caption();
+    if (moving) this.words.do(() => this.tell(answer));
+    else {
+      this.words.stop();
+      this.tell(answer);
+    }
     Object.assign(house.canvas.dataset, {
       shown: JSON.stringify({ n: answer.n, ...point }),
       method: answer.about.method,
       exact: String(answer.about.exact),
       tier: answer.about.tier,
     });
+  }
+
+  private tell(answer: Answer): void {
+    showTrust(this.trust, answer.about, `${answer.milliseconds.toFixed(0)} ms, ${(answer.bytes / 1024).toFixed(0)} kB`);
+    if (this.facts.open) this.number();
+    this.caption();
+  }
+
+  private number(): void {
+    if (this.shown) showFacts(this.facts.querySelector("div") as HTMLElement, this.shown.answer.about);
   }
 
   private caption(): void {
@@ -221,7 +239,7 @@ class Shapes {
   private changed(): void {
     this.ask(true);
     this.rest();
-    this.actions.refresh();
+    this.taken.do(() => this.actions.refresh());
     this.keep();
   }
 
@@ -328,6 +346,10 @@ class Shapes {
     return ways;
   }
 }
+
+/** The skin whose name begins one of these, else the first. */
+const skinOf = (shades: string[], names: string[]): string =>
+  names.map((one) => shades.find((shade) => one.startsWith(shade))).find((found) => found !== undefined) ?? shades[0];
 
 const shares = (axes: Scale[], given: Record<string, number>): Point =>
   Object.fromEntries(axes.filter((axis) => axis.name in given).map((axis) => [axis.name, at(axis, given[axis.name])]));

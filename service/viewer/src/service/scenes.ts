@@ -2,6 +2,12 @@
 
 import { get } from "./http";
 
+/** What things stand on, in the scene's unit. */
+export interface Ground {
+  points: number[][];
+  faces: number[][];
+}
+
 export interface Item {
   preset: string;
   stage: number;
@@ -16,7 +22,7 @@ export interface Item {
 export interface Scene {
   unit: number;
   camera: { position: number[]; target: number[]; fov: number; width: number; height: number };
-  places: { name: string; rule: string; radius?: number; seed: number }[];
+  places: { name: string; rule: string; radius?: number; mesh?: Ground; seed: number }[];
   items: Item[];
   cull: boolean;
   budget: { triangles?: number };
@@ -43,7 +49,10 @@ export async function scene(wanted: Scene, format: string, compress: boolean, si
   return { data: await response.arrayBuffer(), report: JSON.parse(response.headers.get("Wizen-Scene") ?? "{}") };
 }
 
-const toml = (value: unknown): string => JSON.stringify(value);
+const toml = (value: unknown): string =>
+  typeof value === "object" && value !== null && !Array.isArray(value)
+    ? `{${Object.entries(value).map(([name, one]) => `${name} = ${toml(one)}`).join(", ")}}`
+    : JSON.stringify(value);
 
 /** The scene as the file that `wizen scene` takes. */
 export function asToml({ unit, camera, places, items, cull, budget }: Scene): string {

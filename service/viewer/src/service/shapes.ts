@@ -32,6 +32,7 @@ export interface Family {
   samples: number;
   quality: string | null;
   axes: Record<string, { values: number[] }>;
+  fixed: Record<string, unknown>;
   presets: string[];
   portrait: Point;
   links: { thumbnail: string };

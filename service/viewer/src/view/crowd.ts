@@ -2,7 +2,7 @@
 
 import { Box3, BufferAttribute, type BufferGeometry, Group, InstancedMesh, Matrix4, Mesh, type Object3D, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { copied, type Subject } from "./studio";
+import { copied, HOME, type Subject } from "./studio";
 import { normals } from "./surface";
 
 const SIZE = 2.7; // what the longest side is scaled to
@@ -22,6 +22,7 @@ export class Crowd implements Subject {
   readonly object = new Group();
   readonly lattices: Lattice[] = [];
   height = 1;
+  readonly width: number;
 
   static async of(data: ArrayBuffer): Promise<Crowd> {
     const { scene } = await loader.parseAsync(data, "");
@@ -37,6 +38,7 @@ export class Crowd implements Subject {
     const middle = reach.getCenter(new Vector3());
     scene.scale.setScalar(scale);
     scene.position.set(-scale * middle.x, -scale * reach.min.y, -scale * middle.z);
+    this.width = scale * (size.x * Math.cos(HOME.theta) + size.z * Math.sin(HOME.theta));
     this.height = Math.min(1.5, scale * size.y);
     this.object.add(scene);
     scene.traverse((one) => {

@@ -19,6 +19,7 @@ export class Sheet implements Subject {
   constructor() {
     this.mesh.castShadow = this.mesh.receiveShadow = true;
     this.mesh.frustumCulled = false;
+    this.mesh.visible = false; // drawn without normals once, its material would stay faceted
     this.mesh.rotation.x = -Math.PI / 2; // engines have z up
     this.inner.add(this.mesh);
     this.object.add(this.inner);
@@ -38,6 +39,7 @@ export class Sheet implements Subject {
       position.needsUpdate = true;
     }
     geometry.computeVertexNormals();
+    this.mesh.visible = true;
     geometry.computeBoundingSphere(); // rays look at it first
     return this.fit();
   }

@@ -27,7 +27,8 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
-const HOME = new Spherical(6.3, 1.24, 0.55);
+export const HOME = new Spherical(6.3, 1.24, 0.55);
+const FOV = 25;
 const TARGET = new Vector3(0, 0.86, 0);
 
 /** What can stand on the table. */
@@ -35,6 +36,8 @@ export interface Subject {
   readonly object: Object3D;
   /** How tall it is, where the fruit of radius 1 is about 1.8. */
   readonly height: number;
+  /** How wide it is, as seen from home; where it is wider than tall. */
+  readonly width?: number;
   /** Move on by milliseconds; true while there is more to do. */
   step(milliseconds: number): boolean;
   /** A copy that stays as it is now, to compare with. */
@@ -44,7 +47,7 @@ export interface Subject {
 export class Studio {
   readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(25, 1, 0.5, 40);
+  private readonly camera = new PerspectiveCamera(FOV, 1, 0.5, 40);
   private readonly controls: OrbitControls;
   private readonly target = TARGET.clone();
   private subject: Subject | undefined;
@@ -90,6 +93,7 @@ export class Studio {
     if (this.subject) this.scene.remove(this.subject.object);
     this.subject = subject;
     if (subject) this.scene.add(subject.object);
+    this.resize();
     this.aim();
     this.reshaped();
   }
@@ -146,7 +150,7 @@ export class Studio {
     const ratio = this.renderer.getPixelRatio();
     for (const one of [shown?.object, kept]) if (one) one.visible = false;
     this.scene.add(subject.object);
-    const camera = new PerspectiveCamera(25, width / height, 0.5, 40);
+    const camera = new PerspectiveCamera(FOV, width / height, 0.5, 40);
     const middle = new Vector3(0, 0.48 * subject.height, 0);
     camera.position.setFromSpherical(new Spherical(5.6, 1.2, 0.55)).add(middle);
     camera.lookAt(middle);
@@ -280,7 +284,9 @@ export class Studio {
     const width = this.pinned ? Math.floor(clientWidth / 2) : clientWidth;
     this.camera.aspect = width / height;
     // the fruit fills the shorter side
-    this.camera.fov = width < height ? (2 * Math.atan(Math.tan((25 * Math.PI) / 360) / this.camera.aspect) * 180) / Math.PI : 25;
+    const tall = Math.tan((FOV * Math.PI) / 360) / Math.min(1, this.camera.aspect);
+    const wide = (this.subject?.width ?? 0) / (2 * HOME.radius * this.camera.aspect);
+    this.camera.fov = (2 * Math.atan(Math.max(tall, wide)) * 180) / Math.PI;
     this.camera.updateProjectionMatrix();
     this.invalidate();
   }
