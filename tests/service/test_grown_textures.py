@@ -107,6 +107,7 @@ def test_usd_binds_one_material_where_triangles_change(run, tmp_path: Path):
     """Parts of a mesh are numbers of triangles, which are others at each stage."""
     path = tmp_path / "square.usdc"
     path.write_bytes(write(prepared(run, Options()), EXPORTS["usdc"], Options()))
-    mesh = UsdGeom.Mesh(Usd.Stage.Open(str(path)).GetDefaultPrim())
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh(stage.GetDefaultPrim())
     assert not UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsets()
     assert UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0]
