@@ -203,7 +203,8 @@ def _materials(stage: Any, mesh: Any, sequence: Sequence, pictures: Pictures) ->
 
     if not sequence.coloured:
         return
-    parts = sequence.materials
+    # where triangles change from stage to stage none of them stays in its part
+    parts = sequence.materials if sequence.kept else (("", np.empty(0, int)),)
     api = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
     for number, (name, faces) in enumerate(parts):
         path = mesh.GetPath().AppendChild(f"material{number}")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from pxr import Usd, UsdGeom, UsdShade
 
 from service.sequences import EXPORTS, STILLS, Options, prepared, write
 from solver.contract import Need
@@ -50,7 +51,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     tool = {"kind": "surface", "where": {"kind": "everywhere"}, "stretch": (GROWN, GROWN)}
     held = {"where": {"kind": "everywhere"}, "axes": ["z"]}
     values = {"mesh": mesh, "tools": [tool], "imperfection": 0.0, "remesh": 1.5, "step": 0.1, "attached": [held]}
-    need = Need(fields=("mesh_position",), stages=STAGES, quality="preview")
+    need = Need(fields=("mesh_position", "red", "green", "blue"), stages=STAGES, quality="preview")
     found = SOLVER.solve(SOLVER.parse(values), need)
     assert found.vertex_count.values[1] > 2 * found.vertex_count.values[0]
     assert found.attrs["materials"] == '["left", "right"]'
@@ -100,3 +101,13 @@ def test_a_textured_file_without_growth_keeps_its_numbers(run, tmp_path: Path):
     first = int(run.face_count.values[0])
     assert first == len(mesh["faces"])
     assert np.array_equal(run.texture_coordinate.values[corners[:first]], uv)
+
+
+def test_usd_binds_one_material_where_triangles_change(run, tmp_path: Path):
+    """Parts of a mesh are numbers of triangles, which are others at each stage."""
+    path = tmp_path / "square.usdc"
+    path.write_bytes(write(prepared(run, Options()), EXPORTS["usdc"], Options()))
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh(stage.GetDefaultPrim())
+    assert not UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsets()
+    assert UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0]
