@@ -7,10 +7,10 @@ import numpy as np
 from .. import shell
 from ..contract import Context
 from .matter import matter
+from .own.textured import corners_of, faces_of
 from .params import GrowthParams
 from .shapes import Mesh
 from .state import State
-from .textured import corners_of, faces_of
 from .tooling.places import share
 from .tooling.placing import border
 

@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
 from ..contract import Params
-from .imported import OwnMesh
 from .matter import Colour, Rib
+from .own.imported import OwnMesh
 from .shapes import Shape
 from .tooling.places import Place
 from .tooling.tools import HotSurface, Tool

@@ -16,13 +16,13 @@ from ..linalg import definite
 from ..meshes import Frame, changing
 from .engine import Engine
 from .looks import CHANNELS
+from .own.textured import named, textured
 from .params import GrowthParams
 from .settings import choose
 from .settling.energy import elastic
 from .settling.stage import residual
 from .shown import shown
 from .state import State
-from .textured import named, textured
 
 __all__ = ["run"]
 

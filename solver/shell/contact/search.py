@@ -222,8 +222,7 @@ def _stencils(
                     stencils[count] = q
                     # of near ones over the edges in between, each of which adds its change
                     kinds[count], numbers[0, count], numbers[1, count] = what, felt, (np.sqrt(square) - felt) / apart
-                    count += 1
-                    close += near
+                    count, close = count + 1, close + near
     return stencils[:count], kinds[:count], numbers[0, :count], numbers[1, :count], close
 
 

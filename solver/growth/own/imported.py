@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..contract import InvalidGeometry
-from ..contract.mesh import GivenMesh, check_textures
+from ...contract import InvalidGeometry
+from ...contract.mesh import GivenMesh, check_textures
 
 if TYPE_CHECKING:
-    from .. import shell
-    from .shapes import Mesh
+    from ... import shell
+    from ..shapes import Mesh
 
 __all__ = ["OwnMesh"]
 
@@ -43,7 +43,7 @@ class OwnMesh(GivenMesh):
     @model_validator(mode="after")
     def _is_a_surface(self) -> Self:
         # parameters and schemas are read without what compiles
-        from .. import shell
+        from ... import shell
 
         check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
         points, faces = np.array(self.points), np.array(self.faces, np.int64)
@@ -63,7 +63,7 @@ class OwnMesh(GivenMesh):
 
     def shape(self) -> Mesh:
         """Return it as a start shape, without the points that no triangle has."""
-        from .shapes import Mesh
+        from ..shapes import Mesh
 
         used, faces = np.unique(np.array(self.faces, np.int64), return_inverse=True)
         return Mesh(np.array(self.points)[used], faces.reshape(-1, 3))

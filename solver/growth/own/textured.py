@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ...arrays import Floats, Ints
+from ..state import State
 from .imported import OwnMesh
-from .state import State
 
 __all__ = ["corners_of", "faces_of", "named", "textured"]
 
