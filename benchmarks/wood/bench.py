@@ -200,7 +200,7 @@ def _drawn(out: Path) -> None:
     from matplotlib.figure import Figure
 
     runs = [run for run in load("wood-bench")["runs"] if "way" in run]
-    figure = Figure(figsize=(9, 7.4), layout="constrained")
+    figure = Figure(figsize=(9, 8.2), layout="constrained")
     rows: Any = [["bending", "DCB", "ENF"], *([n] * 3 for n in SPECIES)]
     grid = figure.subplot_mosaic(rows, height_ratios=(3, *[1.2] * len(SPECIES)))
     for test in ("bending", "DCB", "ENF"):
@@ -209,12 +209,13 @@ def _drawn(out: Path) -> None:
             name = run["species"] if run["seed"] <= 1 else None
             grid[test].plot(1e3 * np.array(run["way"]), run["force"], style, color=colour, lw=1, label=name)
         grid[test].set(title=test, xlabel="way [mm]", ylabel="force [N]")
-    grid["bending"].legend(fontsize=8)
+    figure.legend(*grid["bending"].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
     for run in (r for r in runs if r.get("edges")):
         lines = 1e3 * np.array(run["edges"].split(), float).reshape(-1, 2, 2)
         axes = grid[run["species"]]
         axes.add_collection(LineCollection(list(lines), linewidths=0.5, colors="saddlebrown"))
-        axes.set(xlim=(-5, 415), ylim=(-40, 20), ylabel=f"{run['species']}, z [mm]", aspect="equal")
+        axes.set(xlim=(-5, 415), ylim=(-40, 20), ylabel="z [mm]", aspect="equal")
+        axes.set_title(run["species"], fontsize=9, loc="left")
     figure.savefig(out, dpi=90)
 
 

@@ -129,7 +129,10 @@ def internal(
     were whole, each (2, b) [J].
     """
     wide = plan.vertex.shape[1]
-    bonded = plan.lane[-1] > 0 or len(plan.part) > 2
+    bonded = False
+    for p in range(first, last):
+        # a part's last lane is the end of its bonds
+        bonded = bonded or plan.lane[plan.part[p + 1] + p] > 0
     if bonded:
         _slopes(x, plan, lean)
     edge = np.empty((ROWS, plan.edge.shape[2]))

@@ -155,3 +155,18 @@ def test_the_bound_of_strain_is_above_what_it_bounds_and_near(seed):
     for p in range(len(state.scratch.found)):
         own = ratio[state.scratch.plan.part[p] : state.scratch.plan.part[p + 1]]
         assert own.max() <= state.scratch.found[p, 3] * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("reach", [0.0, 1.6], ids=["loose", "bonded"])
+def test_slopes_are_computed_where_something_is_bonded(reach):
+    """Of several parts none has bonds, or all: without, the slopes' array stays what it was."""
+    wood = lay(SOLVER.parse({"rods": 30, "vertices": 20, "reach": reach}), 20)
+    state = begin(wood)
+    assert len(state.scratch.plan.part) > 3
+    state.scratch.lean[:] = np.nan
+    books, impulse = state.books, state.impulse
+    assert march(
+        wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, wood.pins, state.scratch, False, 0.0, 1e-9, 1, 0.0,
+        books, impulse,
+    )  # fmt: skip
+    assert np.isnan(state.scratch.lean).all() == (reach == 0.0)
