@@ -233,7 +233,8 @@ class Shapes {
 
   private rest(): void {
     clearTimeout(this.resting);
-    this.resting = window.setTimeout(() => this.ask(false), REST);
+    // what a hand did while the page was busy drawing comes first
+    this.resting = window.setTimeout(() => (this.resting = window.setTimeout(() => this.ask(false), 0)), REST);
   }
 
   private changed(): void {
