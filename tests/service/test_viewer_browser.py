@@ -88,10 +88,10 @@ def test_looks_and_skins(visit: Visit, address: str) -> None:
     visit.page.get_by_role("button", name="Furrowed").click()
     assert visit.shown("shown.n >= 192 && shown.s == 0.25")["gamma"] == 50
     before = visit.picture()
-    visit.page.get_by_role("button", name="Plum").click()
+    visit.page.get_by_role("button", name="plum", exact=True).click()
     assert visit.picture() != before
     assert "skin=plum" in visit.page.url
-    assert visit.page.get_by_role("button", name="Plum").get_attribute("aria-pressed") == "true"
+    assert visit.page.get_by_role("button", name="plum", exact=True).get_attribute("aria-pressed") == "true"
     assert visit.complaints == []
 
 

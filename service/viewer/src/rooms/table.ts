@@ -214,6 +214,8 @@ class Shapes {
 
   private answered(answer: Answer, q: Question, last: boolean): void {
     if (this.closed) return;
+    // the finest comes late: whoever has gone on meanwhile is not thrown back, the next answer is under way
+    if (!q.moving && JSON.stringify(q.point) !== JSON.stringify(this.point)) return;
     if (q.moving) this.detail.learn(q.resolution, answer.milliseconds);
     this.display(answer, q.point, q.moving);
     if (!q.moving) this.exact.judge(answer.about);
@@ -233,7 +235,8 @@ class Shapes {
 
   private rest(): void {
     clearTimeout(this.resting);
-    this.resting = window.setTimeout(() => this.ask(false), REST);
+    // what a hand did while the page was busy drawing comes first
+    this.resting = window.setTimeout(() => (this.resting = window.setTimeout(() => this.ask(false), 0)), REST);
   }
 
   private changed(): void {
