@@ -173,6 +173,11 @@ class DehydrationParams(Fruit):
         """Whether Fd = (1 - s) I everywhere."""
         return not (self.is_lit or any(self.wetness)) and all(factor == 1.0 for factor in self.anisotropy)
 
+    @property
+    def stays_spherical(self) -> bool:
+        """Whether the smooth fruit is a sphere at every shrinkage."""
+        return self.is_sphere and self.dries_evenly
+
     def illumination(self, points: Floats) -> Floats:
         """Return how brightly flesh at fresh points (n, 3) is lit, as the skin straight above it, shape (n,)."""
         rays = points / np.maximum(np.sqrt(np.einsum("ni,ni->n", points, points)), 1e-9)[:, None]

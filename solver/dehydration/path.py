@@ -149,7 +149,7 @@ class Path:
             return False
         if params.pattern is not None:
             return False  # it begins with wrinkles that anybody sees
-        if not (params.is_sphere and params.dries_evenly):
+        if not params.stays_spherical:
             return shrinkage < _LATE_ONSET * self._settings.start
         radius = np.linalg.norm(self.motion.surface(state), axis=1)
         return float(radius.std()) < _SMOOTH * params.exocarp_thickness

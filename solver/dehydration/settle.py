@@ -23,8 +23,8 @@ _LOOKS = 15
 _REST_STEPS = 200
 
 #: Swings that a state is left to itself to show whether it is stable, and the rms way of the surface [te] after which
-#: it was not: of spheres, and of fruits that may have buckles, whose soft ways are longer. 1 % past the onset the bumps
-#: of a fresh fruit are buckles after 2,000 steps at n = 18, which is 3.6 swings.
+#: it was not: of what is seen to be smooth, and of what may have buckles, whose soft ways are longer. 1 % past the
+#: onset the bumps of a fresh fruit are buckles after 2,000 steps at n = 18, which is 3.6 swings.
 _TRIAL_SWINGS, _LEFT, _LEFT_BUCKLED = 4, 0.05, 0.25
 
 
@@ -80,10 +80,10 @@ def settle(
         return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
     copies = motion.sector.copies
     before = float(motion.report(state, rest, shrinkage).energy.sum()) if with_release else None
-    spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage, 0)
+    spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
     looked_at = smooth is not None and spent < settings.settle_steps and smooth(state)
     if looked_at and _leaves(motion, state, velocity, rest, shrinkage):
-        _, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage, 0)
+        _, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
     report = motion.report(state, rest, shrinkage)
     least = float(report.least_ratio.min())
     if least <= 0:
@@ -99,11 +99,11 @@ def settle(
 
 
 def _come_to_rest(
-    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, spent: int
+    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float
 ) -> tuple[int, float, float]:
-    """Swing and calm by turns; return the steps spent so far, the residual and the drift."""
+    """Swing and calm by turns; return the steps spent, the residual and the drift."""
     settings = motion.settings
-    residual, drift = np.inf, np.inf
+    spent, residual, drift = 0, np.inf, np.inf
     while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
         if spent or shrinkage > settings.start:
             _swing(motion, state, velocity, rest, shrinkage)
@@ -134,7 +134,7 @@ def _leaves(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrin
     tried, speed = state.copy(), np.zeros_like(velocity)
     count = _TRIAL_SWINGS * settings.swing_steps
     motion.run(tried, speed, rest, count, shrinkage, shrinkage, settings.swing_damping)
-    if _way(motion, tried, surface) < (_LEFT if motion.params.is_sphere else _LEFT_BUCKLED):
+    if _way(motion, tried, surface) < (_LEFT if motion.params.stays_spherical else _LEFT_BUCKLED):
         motion.masses, motion.steps = masses, steps  # as if it had not been looked at
         return False
     state[:], velocity[:] = tried, 0
