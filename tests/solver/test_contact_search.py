@@ -10,7 +10,7 @@ from solver.dehydration.contact.data import ACTIVE, HITS, LIVE, PAIRS, SEARCHES,
 from solver.dehydration.contact.search import find_pairs
 from solver.geometry.crossings import crossings, split_quads
 
-from ._skins import SINGLE, cubed_sphere, state, touching, two_plates
+from ._skins import SINGLE, cubed_sphere, grooved, state, touching, two_plates
 
 
 def wrinkled(points, amplitude):
@@ -134,6 +134,30 @@ def test_pairs_that_are_not_looked_at_could_not_have_counted(turn):
     assert np.mean(near != far) > 0.1  # what is not looked at has a bound in its place
     assert np.all(near <= far + 1e-6)
     assert contact.counts[ACTIVE] > 0
+
+
+def test_neighbours_that_need_no_look_had_nothing_in_reach():
+    points, quads = cubed_sphere(16)
+    first = grooved(points, 0.3)
+    trusting, doubting = (make_contact(np.arange(len(points)), quads, first, 0.01) for _ in range(2))
+    doubting.looked[:], doubting.doubts[1] = 0, len(doubting.triangles)  # never measured, nothing is ever sure
+    trusted, measured, most = [], [], 0
+    for step, width in enumerate(np.linspace(0.3, 0.0, 40)):
+        x = state(wrinkled(grooved(points, width), 0.002 * step))
+        for contact in (trusting, doubting):
+            contact.searched[:] = 1e15
+            find_pairs(contact, x)
+        assert trusting.counts.tolist() == doubting.counts.tolist()
+        for name in ("pairs", "apart", "limits"):
+            one, two = (getattr(contact, name)[: contact.counts[PAIRS]] for contact in (trusting, doubting))
+            assert one.tobytes() == two.tobytes()
+        most = max(most, trusting.counts[PAIRS])
+        trusted.append(trusting.sure.mean())
+        measured.append(trusting.looked.tobytes())
+    assert not doubting.sure.any()
+    assert most > 100
+    assert min(trusted[1:]) > 0.5
+    assert len(set(measured)) < 30
 
 
 def test_full_list_is_reported_and_can_grow():

@@ -34,6 +34,7 @@ CASES = (
     ("default", 0.02, "xyz", 2),
     ("default", 0.04, "", 2),
     ("preview", 0.01, "xyz", 2),
+    ("default", 0.01, "xyz", 2),
 )
 KEYS = ("quality", "te", "mirrors", "threads")
 #: Parts by file and function.

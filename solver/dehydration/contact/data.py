@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arrays import Ints, Ints32, Singles
+from ...arrays import Bools, Ints, Ints32, Singles
 from ...geometry.crossings import split_quads
-from .features import features
+from .features import features, neighbours
 
 Single = np.float32
 Long = np.int64
@@ -40,6 +40,12 @@ class Contact(NamedTuple):
     own_nodes: Ints32  # (nt, 3) corners that this triangle answers for, each node once; -1: another one does
     own_edges: Ints32  # (nt, 3, 2) ends of the edges that it answers for, each edge once; -1: another one does
     source: Ints32  # (ns,) node that this one is a mirror image of; itself where it is none
+    around: Ints32  # (na, 7) pairs of triangles around a node, and two features of theirs: four nodes, kind
+    least: Singles  # (nt,) distance of those to the nearest around it, of the features named above, at `looked`
+    looked: Singles  # (ns, 3) positions when `least` was measured
+    bent: Singles  # (nt, 2) how far corners have come against each other since, its own and those of any around it
+    sure: Bools  # (nt,) whether nothing around it can have come into reach
+    doubts: Ints  # (2,) triangles that are not sure, now and when `least` was measured
     rest: Singles  # (ns, 3) positions in the fresh fruit
     ellipsoid: Singles  # (2, 3) centre of the rest bounding box and its squared inverse half widths
     clearance: np.float32  # gap that contact keeps
@@ -100,12 +106,13 @@ def make_contact(
     ns, nt = len(nodes), len(triangles)
     pairs = capacity or 16 * ns
     single, integer = np.float32, np.int32
+    origin = np.arange(ns, dtype=integer) if source is None else np.ascontiguousarray(source, integer)
     return Contact(
         surface_nodes=nodes,
         triangles=triangles,
         own_nodes=own_nodes,
         own_edges=own_edges,
-        source=np.arange(ns, dtype=integer) if source is None else np.ascontiguousarray(source, integer),
+        source=origin,
         rest=positions.astype(single),
         ellipsoid=np.stack([(low + high) / 2, half**-2.0]).astype(single),
         clearance=single(clearance),
@@ -128,8 +135,22 @@ def make_contact(
         moved=np.zeros(1, single),
         reads=np.zeros(ns, integer),
         counts=np.zeros(7, np.int64),
+        **_trusted(triangles, own_nodes, own_edges, origin),
         **_room(pairs),
     )
+
+
+def _trusted(triangles: Ints32, own_nodes: Ints32, own_edges: Ints32, source: Ints32) -> dict[str, Any]:
+    """The arrays that say which neighbours need no look."""
+    nt = len(triangles)
+    return {
+        "around": neighbours(triangles, own_nodes, own_edges, source),
+        "least": np.zeros(nt, np.float32),
+        "looked": np.full((len(source), 3), 1e15, np.float32),
+        "bent": np.zeros((nt, 2), np.float32),
+        "sure": np.zeros(nt, np.bool_),
+        "doubts": np.zeros(2, np.int64),
+    }
 
 
 def _room(pairs: int) -> dict[str, Any]:

@@ -1,4 +1,5 @@
-"""Which triangle answers for each node and edge of a skin, so that pairs of triangles meet each pair of features once.
+"""Which triangle answers for each node and edge of a skin, so that pairs of triangles meet each pair of features once,
+and which of those pairs belong to neighbours.
 
 Representative triangles: Curtis, Tamstorf & Manocha 2008, doi 10.1145/1342250.1342260.
 """
@@ -9,7 +10,7 @@ import numpy as np
 
 from ...arrays import Ints32
 
-__all__ = ["features"]
+__all__ = ["features", "neighbours"]
 
 
 def features(triangles: Ints32, nodes: int) -> tuple[Ints32, Ints32]:
@@ -32,3 +33,41 @@ def features(triangles: Ints32, nodes: int) -> tuple[Ints32, Ints32]:
         np.take_along_axis(nodes_of, first_nodes, axis=1),
         np.ascontiguousarray(np.take_along_axis(edges_of, first_edges[..., None], axis=1)),
     )
+
+
+def neighbours(triangles: Ints32, own_nodes: Ints32, own_edges: Ints32, source: Ints32) -> Ints32:
+    """Return what triangles that share a node, but not two of their features, may do to each other: (na, 7).
+
+    Two triangles, then the features: a node and the corners of the other triangle (kind 0), or the ends of two edges
+    (kind 1). source (ns,): nodes that others are images of; images alone do nothing.
+    """
+    pairs = _sharing(triangles)
+    image = source != np.arange(len(source))
+    found = []
+    for t, u in (pairs.T, pairs.T[::-1]):
+        for i in range(3):
+            a, other = own_nodes[t, i], triangles[u]
+            apart = (a >= 0) & (other != a[:, None]).all(axis=1) & ~(image[a] & image[other].all(axis=1))
+            found.append(np.column_stack([t, u, a, other, np.zeros_like(a)])[apart])
+    t, u = pairs.T
+    for i in range(3):
+        for j in range(3):
+            mine, theirs = own_edges[t, i], own_edges[u, j]
+            apart = (mine[:, 0] >= 0) & (theirs[:, 0] >= 0) & (mine[:, :, None] != theirs[:, None]).all(axis=(1, 2))
+            apart &= ~(image[mine].all(axis=1) & image[theirs].all(axis=1))
+            found.append(np.column_stack([t, u, mine, theirs, np.ones_like(t)])[apart])
+    return np.ascontiguousarray(np.concatenate(found), np.int32)
+
+
+def _sharing(triangles: Ints32) -> Ints32:
+    """Return the pairs (np, 2) of triangles (nt, 3) that share a node, the lesser first, each once."""
+    corners = triangles.ravel()
+    order = np.argsort(corners, kind="stable")
+    starts = np.flatnonzero(np.r_[True, np.diff(corners[order]) > 0])
+    counts = np.diff(np.r_[starts, len(corners)])
+    found = []
+    for many in np.unique(counts):
+        around = order[starts[counts == many][:, None] + np.arange(many)] // 3
+        first, second = np.triu_indices(many, 1)
+        found.append(np.stack([around[:, first], around[:, second]], axis=-1).reshape(-1, 2))
+    return np.unique(np.sort(np.concatenate(found), axis=1), axis=0).astype(np.int32)

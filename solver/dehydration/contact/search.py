@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from ...arrays import Ints32, Singles
+from ...arrays import Bools, Ints32, Singles
 from .cells import overlapping, sort_into_cells, spread
 from .data import (
     BATCH,
@@ -31,6 +31,7 @@ from .data import (
     Single,
 )
 from .distance import edge_edge, node_triangle
+from .sure import share_a_node, trust
 
 GENTLE = np.float32(0.7071)
 """Cosine to the ellipsoid's normal above which nothing faces anything: two such normals are within 90 degrees."""
@@ -181,13 +182,16 @@ def _edges_near(
 @njit(parallel=True, **OPTIONS)
 def _look(
     met: Ints32, near: Ints32, count: int, triangles: Ints32, own_nodes: Ints32, own_edges: Ints32, boxes: Singles,
-    x: Singles, source: Ints32, reach: Single,
+    x: Singles, source: Ints32, sure: Bools, reach: Single,
 ) -> None:  # fmt: skip
     """Bits of the features in reach of the first `count` pairs met: 3 + 3 of nodes, 9 of edges; side by side."""
     for part in prange((count + BATCH - 1) // BATCH):
         out = np.empty(8, np.float32)
         for m in range(part * BATCH, min((part + 1) * BATCH, count)):
             t, u = met[m, 0], met[m, 1]
+            if (sure[t] | sure[u]) and share_a_node(triangles, t, u):
+                near[m] = 0
+                continue
             found = _nodes_near(triangles, own_nodes, boxes, x, source, t, u, reach, out)
             found |= _nodes_near(triangles, own_nodes, boxes, x, source, u, t, reach, out) << 3
             near[m] = found | _edges_near(own_edges, boxes, x, source, t, u, reach, out) << 6
@@ -199,7 +203,7 @@ def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
     triangles, x, met, near = contact.triangles, contact.searched, contact.met, contact.near
     own_nodes, own_edges = contact.own_nodes, contact.own_edges
     rest, clearance, found, away = contact.rest, contact.clearance, contact.found, contact.away
-    _look(met, near, count, triangles, own_nodes, own_edges, contact.boxes, x, contact.source, reach)
+    _look(met, near, count, triangles, own_nodes, own_edges, contact.boxes, x, contact.source, contact.sure, reach)
     place = contact.counts[NEEDED]
     for first in range(0, count, BATCH):
         last = min(first + BATCH, count)
@@ -311,6 +315,7 @@ def find_pairs(contact: Contact, x: Singles) -> int:
     reach = contact.clearance + contact.margin
     half = np.float32(0.5) * reach
     _enclose(contact, reach)
+    trust(contact, reach)
     cell = contact.size + reach
     cell = sort_into_cells(contact.boxes, half, cell, contact.keys, contact.order, contact.starts)
     _visit(contact, reach, cell)
