@@ -1,0 +1,139 @@
+"""Whether a sheet stays apart from itself, told from what was near when it was last looked at.
+
+Looking all over a sheet takes as long as some steps to its equilibrium. Between two looks nothing has met that was
+further apart than it could move: places far from each other along the sheet by what both moved, places near each other
+by what the edges in between changed. Only what was nearer is looked at. What is told is the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import shell
+from ...arrays import Bools, Floats, Ints
+from ...geometry.crossings import crossings
+from ..state import State
+from .energy import vertex_areas
+from .minimise import longest
+from .touching import lengths_of, near_in, touches
+
+__all__ = ["Watch"]
+
+#: Room for moves over the mean rest edge, at least and at most, and over the longest move that was seen.
+_ROOM, _FURTHEST, _AHEAD = 0.1, 0.5, 3.0
+#: By which share edges may change, as vectors and in length.
+_CHANGE, _DRIFT = 0.06, 0.08
+#: Most looks on the way of one step.
+_LOOKS = 16
+#: Beside rounding.
+_SURE = 1 + 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class _Along:
+    """What is near each other along a sheet with edges of such lengths (e,): what may be, and what surely is."""
+
+    lengths: Floats
+    near: shell.Near
+    surely: shell.Near
+
+
+@dataclass(frozen=True, eq=False)
+class _Close:
+    """Pairs (m, 2) of triangles that may cross until edges have changed by their share, from x (n, 3) on."""
+
+    x: Floats
+    pairs: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class _Far:
+    """What is far from each other along the sheet and may meet until vertices have moved by the room, from x on."""
+
+    x: Floats
+    room: float
+    pairs: shell.Pairs
+
+
+class Watch:
+    """Tells of states of one run whether parts pass through each other, or come nearer each other than a distance."""
+
+    def __init__(self, distance: float) -> None:
+        self._distance = distance
+        self._mesh: shell.Topology | None = None
+        self._along: _Along | None = None
+        self._close: _Close | None = None
+        self._far: _Far | None = None
+
+    def apart(self, start: Floats, end: State) -> bool:
+        """Return whether no part of the sheet is as near another as the distance at the end of a straight way.
+
+        On the way it is looked whether anything crosses, as often as vertices move by an edge. At its start (n, 3)
+        nothing does.
+        """
+        way = end.x - start
+        way -= way.mean(axis=0)
+        size, mesh = longest(way), end.mesh
+        looks = min(max(int(np.ceil(size / end.length)), 1), _LOOKS)
+        if mesh is not self._mesh:
+            self._mesh, self._along, self._close, self._far = mesh, None, None, None
+        if size > _FURTHEST * end.length:
+            through = any(crossings(end.x - k / looks * way, mesh.triangles).count for k in range(looks))
+            return not through and not touches(end, self._distance, vertex_areas(end))
+        along = self._along_now(end)
+        close, far = self._close_now(along, end, way), self._far_now(along, end, size)
+        # what meets on the way was no further apart at its end than both ends moved
+        if len(shell.within(end.x, far.pairs, 2 * _SURE * size / self._distance)):
+            through = any(crossings(end.x - k / looks * way, mesh.triangles).count for k in range(looks))
+        else:
+            through = any(shell.any_cross(end.x - k / looks * way, mesh.triangles, close.pairs) for k in range(looks))
+        return not through and not self._touches(along, far, end)
+
+    def _along_now(self, state: State) -> _Along:
+        """Return what is near along a state's sheet; ways, and the longest that count, change by no more than edges."""
+        lengths, known = lengths_of(state), self._along
+        if known is None or (np.abs(lengths - known.lengths) > _DRIFT * known.lengths).any():
+            more = _SURE * (1 + _DRIFT) / (1 - _DRIFT)
+            near = near_in(state, self._distance, vertex_areas(state), more)
+            known = self._along = _Along(lengths, near, near.within(1 / more**2))
+            self._close = self._far = None
+        return known
+
+    def _close_now(self, along: _Along, end: State, way: Floats) -> _Close:
+        """Return what may cross on a way (n, 3) and is near each other along the sheet."""
+        known, edges = self._close, end.mesh.edges
+        if known and max(shell.changed(x, known.x, edges, along.lengths) for x in (end.x, end.x - way)) <= _CHANGE:
+            return known
+        here = end.x - way
+        change = max(_CHANGE, _SURE * shell.changed(here, end.x, edges, along.lengths))
+        # from any place of one to any of the other: a way that counts, and an edge at either end
+        reach = _SURE * change * (along.near.limit + 2 * float(along.lengths.max()))
+        known = self._close = _Close(end.x, shell.close_faces(end.x, end.mesh.triangles, reach))
+        return known
+
+    def _far_now(self, along: _Along, end: State, size: float) -> _Far:
+        """Return what may meet on a way of such a size to a state and is far from each other along the sheet."""
+        known = self._far
+        if known and longest(end.x - known.x) + size <= known.room:
+            return known
+        room = min(max(_ROOM * end.length, _AHEAD * size), _FURTHEST * end.length)
+        there = end.x, end.mesh, along.surely, self._distance, _SURE * room, 0.0, end.length
+        known = self._far = _Far(end.x, room, shell.search(*there, only="far"))
+        return known
+
+    def _touches(self, along: _Along, far: _Far, state: State) -> bool:
+        """Return what `touches` does: it is asked where the sheet is bent, and where something far is within reach."""
+        x, mesh = state.x, state.mesh
+        met = shell.within(x, far.pairs)
+        ends = shell.owners(far.pairs.stencils[met], far.pairs.kinds[met])
+        rows: Bools = ~shell.flat(x, mesh.triangles, along.near.start, along.near.other)
+        rows[ends[:, 0]] = True
+        if not rows.any():
+            return False
+        near = near_in(state, self._distance, vertex_areas(state), rows=rows)
+        if not near.holds(ends).all():
+            return True
+        pairs = shell.search(x, mesh, near, self._distance, 0.0, 0.0, state.length, only="near")
+        return len(shell.within(x, pairs)) > 0

@@ -1,0 +1,111 @@
+"""What is told from what was near before is what a look all over tells."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import shell
+from solver.geometry.crossings import crossings
+from solver.growth.engine import Engine
+from solver.growth.params import GrowthParams
+from solver.growth.settling import watch as module
+from solver.growth.settling.energy import vertex_areas
+from solver.growth.settling.minimise import longest
+from solver.growth.settling.touching import touches
+from solver.growth.settling.watch import Watch
+from tests.solver.shell._meshes import sheet
+
+DISTANCE = 0.03
+
+
+def told_all_over(start, end, distance):
+    """Return what `Watch.apart` does, from looks all over."""
+    way = end.x - start
+    way = way - way.mean(axis=0)
+    looks = min(max(int(np.ceil(longest(way) / end.length)), 1), 16)
+    faces = end.mesh.triangles
+    if any(crossings(end.x - k / looks * way, faces).count for k in range(looks)):
+        return False
+    return not touches(end, distance, vertex_areas(end))
+
+
+def strip():
+    """Return a state of a flat strip, its triangles somewhat uneven."""
+    points, faces = sheet(6, 24, 0.1)
+    shift = np.random.default_rng(1).uniform(-0.02, 0.02, (len(points), 2))
+    points = points + np.column_stack([shift, np.zeros(len(points))])
+    state = Engine(GrowthParams.parse({"shape": "disc"}), 60).state
+    mesh = shell.topology(faces, len(points))
+    g = shell.metric(points, mesh.triangles)
+    return replace(
+        state, x=points, mesh=mesh, g=g, rest=np.zeros(len(mesh.hinges)), held=np.zeros((len(points), 3), bool)
+    )
+
+
+def rolled(x, turn):
+    """Return a strip rolled up by an angle, over its own edge."""
+    angle = turn * x[:, 0] / np.ptp(x[:, 0])
+    radius = np.ptp(x[:, 0]) / turn
+    return np.stack([radius * np.sin(angle), x[:, 1], radius * (1 - np.cos(angle)) + 0.01 * x[:, 0]], axis=1)
+
+
+def folded(x, turn):
+    """Return a strip with a fold that sharpens."""
+    sharp = 1 / (1 + np.exp(-(x[:, 0] - x[:, 0].mean()) * 12))
+    angle = 0.5 * turn * sharp
+    ahead = np.cumsum(np.diff(np.sort(x[:, 0]), prepend=x[:, 0].min()) * np.cos(angle[np.argsort(x[:, 0])]))
+    up = np.cumsum(np.diff(np.sort(x[:, 0]), prepend=x[:, 0].min()) * np.sin(angle[np.argsort(x[:, 0])]))
+    place = np.argsort(np.argsort(x[:, 0]))
+    return np.stack([ahead[place], x[:, 1], up[place]], axis=1)
+
+
+@pytest.mark.parametrize("shape", [rolled, folded])
+@pytest.mark.parametrize("pace", [0.004, 0.02, 0.11, 0.6])
+def test_what_is_remembered_tells_what_looks_all_over_tell(shape, pace, monkeypatch):
+    """Until it first says no, which in small steps is where parts are as near as the distance."""
+    flat, watch = strip(), Watch(DISTANCE)
+    looks = []
+    monkeypatch.setattr(module.shell, "close_faces", lambda *a: looks.append(1) or shell.contact.close_faces(*a))
+    turn, before, told, steps = 4.6, shape(flat.x, 4.6), True, 0
+    while told and turn < 8:
+        turn, steps = turn + pace, steps + 1
+        end = replace(flat, x=shape(flat.x, turn))
+        told = watch.apart(before, end)
+        assert told == told_all_over(before, end, DISTANCE), turn
+        before = end.x
+    assert not told
+    assert pace > 0.01 or len(looks) < steps / 3
+
+
+def test_a_mesh_that_grows_in_place_is_looked_at_anew():
+    """What was far along the sheet is near when the edges have shrunk, and the other way round."""
+    flat = strip()
+    for factor in (0.97, 1.03):
+        watch, state = Watch(DISTANCE), flat
+        for turn in np.arange(5.0, 6.0, 0.02):
+            end = replace(state, x=rolled(flat.x, turn), g=state.g * factor)
+            told = watch.apart(rolled(flat.x, turn - 0.02), end)
+            assert told == told_all_over(rolled(flat.x, turn - 0.02), end, DISTANCE)
+            state = end
+            if not told:
+                break
+
+
+def test_a_run_that_remembers_is_a_run_that_does_not(monkeypatch):
+    """To the last byte, through remeshing, and where parts come near each other."""
+    params = GrowthParams.parse(
+        {"shape": "disc", "thickness": 0.02, "tools": [{"kind": "surface", "where": {"kind": "rim", "width": 0.4},
+                                                       "stretch": [3.0, 1.0]}], "step": 0.02}
+    )  # fmt: skip
+
+    def grown():
+        engine = Engine(params, 300)
+        engine.advance(np.inf, until=0.4)
+        return engine
+
+    one = grown()
+    monkeypatch.setattr(Watch, "apart", lambda self, start, end: told_all_over(start, end, self._distance))
+    other = grown()
+    assert one.state.x.tobytes() == other.state.x.tobytes()
+    assert one.distance == other.distance
