@@ -1,5 +1,6 @@
 """What is told from what was near before is what a look all over tells."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -109,3 +110,31 @@ def test_a_run_that_remembers_is_a_run_that_does_not(monkeypatch):
     other = grown()
     assert one.state.x.tobytes() == other.state.x.tobytes()
     assert one.distance == other.distance
+
+
+def hinged(x, turn):
+    """Return a strip folded along its middle, the further along the more: nothing is shorter than flat."""
+    middle = x[:, 0] - 0.2
+    angle = np.where(middle > 1e-9, turn * (1 + 0.3 * x[:, 1]), 0.0)
+    return np.stack([middle * np.cos(angle), x[:, 1], middle * np.sin(angle)], axis=1)
+
+
+def test_triangles_near_each_other_along_the_sheet_that_cross_are_listed():
+    """However far it is folded in small steps, without edges that grow shorter: those that cross were near before."""
+    x, y = np.meshgrid(np.arange(5) * 0.1, np.arange(9) * 0.1)
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    corner = np.array([5 * row + column for row in range(8) for column in range(4)])
+    faces = np.concatenate([corner[:, None] + [0, 1, 6], corner[:, None] + [0, 6, 5]])
+    mesh, watch, listed = shell.topology(faces, len(points)), Watch(1e-6), 0
+    flat = replace(strip(), x=points, mesh=mesh, g=shell.metric(points, faces), rest=np.zeros(len(mesh.hinges)))
+    for before, turn in itertools.pairwise(np.arange(1.0, 4.0, 0.02)):
+        end = replace(flat, x=hinged(points, turn))
+        along = watch._along_now(end)
+        close = watch._close_now(along, end, end.x - hinged(points, before))
+        known = {(min(pair), max(pair)) for pair in close.pairs.tolist()}
+        for a, b in crossings(end.x, faces).pairs.tolist():
+            corners = np.array([(p, q) for p in faces[a] for q in faces[b]])
+            if along.surely.holds(corners).any():
+                assert (a, b) in known, turn
+                listed += 1
+    assert listed > 100
