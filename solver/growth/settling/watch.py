@@ -23,8 +23,10 @@ __all__ = ["Watch"]
 
 #: Room for moves over the mean rest edge, at least and at most, and over the longest move that was seen.
 _ROOM, _FURTHEST, _AHEAD = 0.1, 0.5, 3.0
-#: By which share edges may change, as vectors and in length.
-_CHANGE, _DRIFT = 0.06, 0.08
+#: By which share edges may change in length; as vectors: most, and by which triangles may come nearer each other then,
+#: over the mean rest edge. A look pays if one step takes no more of it than a share.
+_DRIFT = 0.08
+_CHANGE, _NEARER, _PAYS = 0.06, 0.45, 0.5
 #: Most looks on the way of one step.
 _LOOKS = 16
 #: Beside rounding.
@@ -42,9 +44,10 @@ class _Along:
 
 @dataclass(frozen=True, eq=False)
 class _Close:
-    """Pairs (m, 2) of triangles that may cross until edges have changed by their share, from x (n, 3) on."""
+    """Pairs (m, 2) of triangles that may cross until edges have changed by a share, as vectors, from x (n, 3) on."""
 
     x: Floats
+    change: float
     pairs: Ints
 
 
@@ -85,7 +88,7 @@ class Watch:
         along = self._along_now(end)
         close, far = self._close_now(along, end, way), self._far_now(along, end, size)
         # what meets on the way was no further apart at its end than both ends moved
-        if len(shell.within(end.x, far.pairs, 2 * _SURE * size / self._distance)):
+        if close is None or len(shell.within(end.x, far.pairs, 2 * _SURE * size / self._distance)):
             through = any(crossings(end.x - k / looks * way, mesh.triangles).count for k in range(looks))
         else:
             through = any(shell.any_cross(end.x - k / looks * way, mesh.triangles, close.pairs) for k in range(looks))
@@ -101,17 +104,21 @@ class Watch:
             self._close = self._far = None
         return known
 
-    def _close_now(self, along: _Along, end: State, way: Floats) -> _Close:
-        """Return what may cross on a way (n, 3) and is near each other along the sheet."""
-        known, edges = self._close, end.mesh.edges
-        if known and max(shell.changed(x, known.x, edges, along.lengths) for x in (end.x, end.x - way)) <= _CHANGE:
-            return known
-        here = end.x - way
-        change = max(_CHANGE, _SURE * shell.changed(here, end.x, edges, along.lengths))
+    def _close_now(self, along: _Along, end: State, way: Floats) -> _Close | None:
+        """Return what may cross on a way (n, 3) and is near each other along the sheet; None where it is long."""
+        known, edges, begin = self._close, end.mesh.edges, end.x - way
+        if known:
+            change = max(shell.changed(x, known.x, edges, along.lengths) for x in (end.x, begin))
+            if change <= known.change:
+                return known
         # from any place of one to any of the other: a way that counts, and an edge at either end
-        reach = _SURE * change * (along.near.limit + 2 * float(along.lengths.max()))
-        known = self._close = _Close(end.x, shell.close_faces(end.x, end.mesh.triangles, reach))
-        return known
+        furthest = along.near.limit + 2 * float(along.lengths.max())
+        change = min(_CHANGE, _NEARER * end.length / furthest)
+        if shell.changed(begin, end.x, edges, along.lengths) > _PAYS * change:
+            return None
+        pairs = shell.close_faces(end.x, end.mesh.triangles, _SURE * change * furthest)
+        self._close = _Close(end.x, change, pairs)
+        return self._close
 
     def _far_now(self, along: _Along, end: State, size: float) -> _Far:
         """Return what may meet on a way of such a size to a state and is far from each other along the sheet."""

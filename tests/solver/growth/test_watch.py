@@ -131,6 +131,7 @@ def test_triangles_near_each_other_along_the_sheet_that_cross_are_listed():
         end = replace(flat, x=hinged(points, turn))
         along = watch._along_now(end)
         close = watch._close_now(along, end, end.x - hinged(points, before))
+        assert close
         known = {(min(pair), max(pair)) for pair in close.pairs.tolist()}
         for a, b in crossings(end.x, faces).pairs.tolist():
             corners = np.array([(p, q) for p in faces[a] for q in faces[b]])
