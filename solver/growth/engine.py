@@ -235,7 +235,7 @@ class Engine:
         state, distance = yield from self._reached(time)
         free = self.params.contact is None and not distance
         found = yield from self._settled(state, distance, free)
-        if found is None or (free and not self._way.watch.apart(state.x, found)):
+        if found is None or (free and not (yield from self._way.watch.apart(state.x, found))):
             found = yield from self._settled(state, self.params.thickness)
             assert found is not None  # it is not free
         check_outward(found, self._volume, self.state.time, self.params)

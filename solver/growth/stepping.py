@@ -71,7 +71,7 @@ class Steps:
         if self.params.contact is None and not carried.distance:
             clear = meshed is before or not crossings(meshed.x, meshed.mesh.triangles).count
             yield
-            if not (clear and self.watch.apart(meshed.x, state)):
+            if not (clear and (yield from self.watch.apart(meshed.x, state))):
                 yield
                 near = carried._replace(distance=self.params.thickness)
                 _, state, after = yield from self._taken(before, near, tools, solids, dt)

@@ -7,6 +7,7 @@ by what the edges in between changed. Only what was nearer is looked at. What is
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,11 +71,11 @@ class Watch:
         self._close: _Close | None = None
         self._far: _Far | None = None
 
-    def apart(self, start: Floats, end: State) -> bool:
-        """Return whether no part of the sheet is as near another as the distance at the end of a straight way.
+    def apart(self, start: Floats, end: State) -> Generator[None, None, bool]:
+        """Find whether no part of the sheet is as near another as the distance at the end of a straight way.
 
-        On the way it is looked whether anything crosses, as often as vertices move by an edge. At its start (n, 3)
-        nothing does.
+        Yields after pieces of the work. On the way it is looked whether anything crosses, as often as vertices move by
+        an edge. At its start (n, 3) nothing does.
         """
         way = end.x - start
         way -= way.mean(axis=0)
@@ -83,16 +84,24 @@ class Watch:
         if mesh is not self._mesh:
             self._mesh, self._along, self._close, self._far = mesh, None, None, None
         if size > _FURTHEST * end.length:
-            through = any(crossings(end.x - k / looks * way, mesh.triangles).count for k in range(looks))
-            return not through and not touches(end, self._distance, vertex_areas(end))
+            if (yield from _through(end, way, looks)):
+                return False
+            return not touches(end, self._distance, vertex_areas(end))
         along = self._along_now(end)
-        close, far = self._close_now(along, end, way), self._far_now(along, end, size)
+        yield
+        far = self._far_now(along, end, size)
+        yield
+        close = self._close_now(along, end, way)
+        yield
         # what meets on the way was no further apart at its end than both ends moved
         if close is None or len(shell.within(end.x, far.pairs, 2 * _SURE * size / self._distance)):
-            through = any(crossings(end.x - k / looks * way, mesh.triangles).count for k in range(looks))
+            through = yield from _through(end, way, looks)
         else:
             through = any(shell.any_cross(end.x - k / looks * way, mesh.triangles, close.pairs) for k in range(looks))
-        return not through and not self._touches(along, far, end)
+        if through:
+            return False
+        yield
+        return not self._touches(along, far, end)
 
     def _along_now(self, state: State) -> _Along:
         """Return what is near along a state's sheet; ways, and the longest that count, change by no more than edges."""
@@ -144,3 +153,12 @@ class Watch:
             return True
         pairs = shell.search(x, mesh, near, self._distance, 0.0, 0.0, state.length, only="near")
         return len(shell.within(x, pairs)) > 0
+
+
+def _through(end: State, way: Floats, looks: int) -> Generator[None, None, bool]:
+    """Look all over whether anything crosses on a way (n, 3) to a state; yields after each look."""
+    for k in range(looks):
+        if crossings(end.x - k / looks * way, end.mesh.triangles).count:
+            return True
+        yield
+    return False
