@@ -110,6 +110,6 @@ def test_a_surface_s_frame_that_stands_on_it_everywhere_is_refused():
         with pytest.raises(InvalidInput, match="stands on the surface wherever it acts") as found:
             Engine(GrowthParams.parse({"shape": "disc", "tools": [tool | uneven]}), 100).advance(np.inf, until=0.05)
         assert "such as" in (found.value.advice or "")
-        Engine(GrowthParams.parse({"shape": "sphere", "tools": [tool | uneven]}), 100).advance(np.inf, until=0.05)
+        Engine(GrowthParams.parse({"shape": "sphere", "tools": [tool | uneven]}), 1000).advance(np.inf, until=0.05)
     for fine in ({"stretch": (2.0, 2.0)}, {"stretch": (2.0, 1.0), "frame": (0.2, 0, 1)}):
         Engine(GrowthParams.parse({"shape": "disc", "tools": [tool | fine]}), 100).advance(np.inf, until=0.05)

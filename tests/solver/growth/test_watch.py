@@ -71,10 +71,11 @@ def folded(x, turn):
 
 
 @pytest.mark.parametrize("shape", [rolled, folded])
+@pytest.mark.parametrize("distance", [DISTANCE, 1e-4])
 @pytest.mark.parametrize("pace", [0.004, 0.02, 0.11, 0.6])
-def test_what_is_remembered_tells_what_looks_all_over_tell(shape, pace, monkeypatch):
+def test_what_is_remembered_tells_what_looks_all_over_tell(shape, pace, distance, monkeypatch):
     """Until it first says no, which in small steps is where parts are as near as the distance."""
-    flat, watch = strip(), Watch(DISTANCE)
+    flat, watch = strip(), Watch(distance)
     looks = []
     monkeypatch.setattr(module.shell, "close_faces", lambda *a: looks.append(1) or shell.contact.close_faces(*a))
     turn, before, told, steps = 4.6, shape(flat.x, 4.6), True, 0
@@ -82,10 +83,30 @@ def test_what_is_remembered_tells_what_looks_all_over_tell(shape, pace, monkeypa
         turn, steps = turn + pace, steps + 1
         end = replace(flat, x=shape(flat.x, turn))
         told = done(watch.apart(before, end))
-        assert told == told_all_over(before, end, DISTANCE), turn
+        assert told == told_all_over(before, end, distance), turn
         before = end.x
     assert not told
     assert pace > 0.01 or len(looks) < steps / 3
+
+
+def test_a_stiff_part_that_sinks_into_another_in_one_step_is_seen():
+    """No edge changes, and nothing is within the distance before the step or after it."""
+    flat, watch, distance = strip(), Watch(1e-4), 1e-4
+    n, x = len(flat.x), flat.x
+    tilted = np.column_stack([x[:, 0] * np.cos(0.3), x[:, 1] + 0.037, x[:, 0] * np.sin(0.3) + 0.2])
+    mesh = shell.topology(np.concatenate([flat.mesh.triangles, flat.mesh.triangles + n]), 2 * n)
+    both = np.concatenate([x, tilted])
+    g, nothing = shell.metric(both, mesh.triangles), np.zeros(len(mesh.hinges))
+    state = replace(flat, x=both, mesh=mesh, g=g, rest=nothing, held=np.zeros((2 * n, 3), bool))
+    down, told = np.repeat([0.0, -0.03], n)[:, None] * np.array([0.0, 0.0, 1.0]), True
+    for step in range(8):
+        end = replace(state, x=both + (step + 1) * down)
+        told = done(watch.apart(both + step * down, end))
+        assert told == told_all_over(both + step * down, end, distance), step
+        if not told:
+            break
+    assert step > 4
+    assert not told
 
 
 def test_a_mesh_that_grows_in_place_is_looked_at_anew():
