@@ -1,6 +1,7 @@
 """One stage as PLY (binary) or OBJ (text), and all of them as a zip with a table of the stages.
 
-PLY: colours as 8-bit sRGB, fields of the vertices as further float properties. OBJ: colours after the position (as
+PLY: colours as 8-bit sRGB, fields of the vertices as further float properties, texture coordinates of a mesh that came
+with some as `texcoord` of the faces, six numbers each, v upwards. OBJ: colours after the position (as
 Blender and MeshLab read them, sRGB from 0 to 1), texture coordinates where there are any, no normals.
 """
 
@@ -49,16 +50,24 @@ def _ply(sequence: Sequence, surface: Surface) -> bytes:
     if surface.colour is not None:
         shown = colours.encoded(surface.colour)
         columns += [(name, "uchar", shown[:, k]) for k, name in enumerate(("red", "green", "blue"))]
-    columns += [(name, "float", values) for name, values in surface.fields.items()]
+    # what colours are made of is there already
+    taken = {name for name, _, _ in columns}
+    columns += [(name, "float", values) for name, values in surface.fields.items() if name not in taken]
     rows = np.empty(len(surface.vertices), [(n, "<f4" if kind == "float" else "u1") for n, kind, _ in columns])
     for name, _, values in columns:
         rows[name] = values
-    faces = np.empty(len(surface.triangles), [("count", "u1"), ("corner", "<i4", 3)])
+    # those of a mesh that came with some; a lattice's follow from its vertices
+    seam = surface.seam or (None if sequence.lattice else sequence.seam)
+    parts = [("count", "u1"), ("corner", "<i4", 3)] + ([] if seam is None else [("six", "u1"), ("uv", "<f4", 6)])
+    faces = np.empty(len(surface.triangles), parts)
     faces["count"], faces["corner"] = 3, surface.triangles
+    if seam is not None:
+        faces["six"], faces["uv"] = 6, (seam.uv * [1, -1] + [0, 1])[seam.triangles].reshape(-1, 6)
     head = ["ply", "format binary_little_endian 1.0"]
     head += [f"comment {line}" for line in _said(sequence, surface)]
     head += [f"element vertex {len(rows)}", *(f"property {kind} {name}" for name, kind, _ in columns)]
-    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    head += ["end_header", ""] if seam is None else ["property list uchar float texcoord", "end_header", ""]
     return "\n".join(head).encode("ascii", "replace") + rows.tobytes() + faces.tobytes()
 
 

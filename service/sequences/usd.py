@@ -69,6 +69,8 @@ def composed(sequence: Sequence, options: Options, pictures: Pictures | None = N
         if number == 0 or not sequence.kept:
             # triangles that stay have no time of their own
             _triangles(mesh, surface, None if sequence.kept else at)
+        if surface.seam is not None:
+            _texture(mesh, surface.seam, at)
         _sample(mesh, surface, at)
         _threads(stage, mesh, sequence.threads(surface, options.threads), at)
     return stage
@@ -152,13 +154,15 @@ def _threads(stage: Any, mesh: Any, threads: Threads | None, at: float) -> None:
     heads.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(0.03, 0.03, 0.03)])
 
 
-def _texture(mesh: Any, seam: Seam) -> None:
-    from pxr import Sdf, UsdGeom, Vt
+def _texture(mesh: Any, seam: Seam, at: float | None = None) -> None:
+    """Write texture coordinates, those of a time where triangles change."""
+    from pxr import Sdf, Usd, UsdGeom, Vt
 
+    when = Usd.TimeCode.Default() if at is None else at
     primvars = UsdGeom.PrimvarsAPI(mesh)
     st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
-    st.Set(Vt.Vec2fArray.FromNumpy(np.column_stack([seam.uv[:, 0], 1 - seam.uv[:, 1]]).astype("f4")))
-    st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(seam.triangles.ravel(), np.int32)))
+    st.Set(Vt.Vec2fArray.FromNumpy(np.column_stack([seam.uv[:, 0], 1 - seam.uv[:, 1]]).astype("f4")), when)
+    st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(seam.triangles.ravel(), np.int32)), when)
 
 
 def _read(stage: Any, path: Any, what: str) -> Any:

@@ -25,7 +25,10 @@ def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
 
 def _live(params: GrowthParams, quality: Quality) -> LiveEngine:
     from .living.live import GrowingLive
+    from .living.warm import warm
 
+    # not in its first steps, while somebody waits for the first dab
+    warm()
     return GrowingLive(params, quality)
 
 

@@ -23,6 +23,7 @@ from .settling.active import Habit
 from .settling.impossible import check_outward, enclosed
 from .settling.stage import settled
 from .settling.tangent import Tangent
+from .settling.watch import Watch
 from .shapes import start
 from .state import State
 from .stepping import Carried, Steps
@@ -75,7 +76,7 @@ class Engine:
         #: Of a closed surface.
         self._volume = 0.0 if len(self.state.mesh.border) else enclosed(begun)
         longest, largest = params.remesh * self.state.length, MOST * len(self.state.x)
-        self._way = Steps(params, tolerance, most, longest, largest, self._volume)
+        self._way = Steps(params, tolerance, most, longest, largest, self._volume, Watch(params.thickness))
         self._carried = Carried(Tangent(self.state.mesh), Habit(), params.contact or 0.0)
         self._steps = 0
 
@@ -234,7 +235,7 @@ class Engine:
         state, distance = yield from self._reached(time)
         free = self.params.contact is None and not distance
         found = yield from self._settled(state, distance, free)
-        if found is None or (free and not self._way.apart(state, found)):
+        if found is None or (free and not (yield from self._way.watch.apart(state.x, found))):
             found = yield from self._settled(state, self.params.thickness)
             assert found is not None  # it is not free
         check_outward(found, self._volume, self.state.time, self.params)

@@ -11,8 +11,6 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
-
 from .. import shell
 from ..geometry.crossings import crossings
 from .matter import grown_further
@@ -20,21 +18,17 @@ from .params import GrowthParams, Solid, present
 from .plastic import forgotten
 from .remeshing.remesh import remesh
 from .settling.active import Habit
-from .settling.energy import StepEnergy, vertex_areas
+from .settling.energy import StepEnergy
 from .settling.equilibrium import balanced, begun
 from .settling.impossible import check_held, check_outward
-from .settling.minimise import longest
 from .settling.tangent import Tangent
-from .settling.touching import touches
+from .settling.watch import Watch
 from .state import State
 from .tooling.placing import branched, started
 from .tooling.rates import grown, rates
 from .tooling.tools import Tool
 
 __all__ = ["Carried", "Steps"]
-
-#: Most looks on the way of one step.
-_LOOKS = 16
 
 
 class Carried(NamedTuple):
@@ -51,7 +45,7 @@ class Steps:
     """How a run takes its steps.
 
     tolerance: residual; most: steps to an equilibrium. longest: rest edge that is not cut; largest: vertices at most.
-    volume: inside a closed surface, 0 of others.
+    volume: inside a closed surface, 0 of others. watch: of parts that come near each other.
     """
 
     params: GrowthParams
@@ -60,6 +54,7 @@ class Steps:
     longest: float
     largest: int
     volume: float
+    watch: Watch
 
     def step(
         self, before: State, carried: Carried, tools: Sequence[Tool], solids: Sequence[Solid], dt: float
@@ -76,24 +71,11 @@ class Steps:
         if self.params.contact is None and not carried.distance:
             clear = meshed is before or not crossings(meshed.x, meshed.mesh.triangles).count
             yield
-            if not (clear and self.apart(replace(state, x=meshed.x), state)):
+            if not (clear and (yield from self.watch.apart(meshed.x, state))):
                 yield
                 near = carried._replace(distance=self.params.thickness)
                 _, state, after = yield from self._taken(before, near, tools, solids, dt)
         return state, after
-
-    def apart(self, start: State, end: State) -> bool:
-        """Return whether no part of the sheet is as near another as its thickness at the end of a straight way.
-
-        On the way it is looked whether anything crosses, as often as vertices move by an edge.
-        """
-        way = end.x - start.x
-        way -= way.mean(axis=0)
-        looks = min(max(int(np.ceil(longest(way) / end.length)), 1), _LOOKS)
-        for k in range(looks):
-            if crossings(end.x - k / looks * way, end.mesh.triangles).count:
-                return False
-        return not touches(end, self.params.thickness, vertex_areas(end))
 
     @property
     def _material(self) -> shell.Material:

@@ -5,7 +5,22 @@ solver's unit of length), forces in mu l. Every kernel takes arrays and returns 
 """
 
 from .bending import angles, bending, bending_tangent, hinge_stiffness
-from .contact import Near, Pairs, barrier, barrier_diagonal, barrier_hessian, free_step, near_of, search, within
+from .contact import (
+    Near,
+    Pairs,
+    any_cross,
+    barrier,
+    barrier_diagonal,
+    barrier_hessian,
+    changed,
+    close_faces,
+    flat,
+    free_step,
+    near_of,
+    owners,
+    search,
+    within,
+)
 from .curvature import added_angles, from_angles, to_angles
 from .hessian import bending_hessian, membrane_hessian, volume_hessian
 from .material import Material
@@ -22,6 +37,7 @@ __all__ = [
     "Topology",
     "added_angles",
     "angles",
+    "any_cross",
     "areas",
     "barrier",
     "barrier_diagonal",
@@ -29,6 +45,9 @@ __all__ = [
     "bending",
     "bending_hessian",
     "bending_tangent",
+    "changed",
+    "close_faces",
+    "flat",
     "free_step",
     "from_angles",
     "hinge_stiffness",
@@ -40,6 +59,7 @@ __all__ = [
     "metric",
     "metric_of_lengths",
     "near_of",
+    "owners",
     "part_of",
     "pattern",
     "search",

@@ -111,3 +111,52 @@ def test_usd_binds_one_material_where_triangles_change(run, tmp_path: Path):
     mesh = UsdGeom.Mesh(stage.GetDefaultPrim())
     assert not UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsets()
     assert UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0]
+
+
+def test_ply_has_them_for_the_corners_of_its_faces(run):
+    data = write(prepared(run, Options(), 1.0, single=True), EXPORTS["ply"], Options())
+    head, body = data.split(b"end_header\n", 1)
+    words = [line.split() for line in head.decode().splitlines()]
+    assert ["property", "list", "uchar", "float", "texcoord"] in words
+    counts = {w[1]: int(w[2]) for w in words if w[0] == "element"}
+    kinds = [("<f4" if w[1] == "float" else "u1", w[2]) for w in words if w[0] == "property" and w[1] != "list"]
+    rows = np.frombuffer(body, [(name, kind) for kind, name in kinds], counts["vertex"])
+    face = np.dtype([("three", "u1"), ("corner", "<i4", 3), ("six", "u1"), ("uv", "<f4", 6)])
+    faces = np.frombuffer(body[rows.nbytes :], face)
+    assert len(faces) == counts["face"] == run.face_count.values[1]
+    assert set(faces["three"]) == {3}
+    assert set(faces["six"]) == {6}
+    places = np.stack([rows[axis] for axis in "xyz"], -1)[faces["corner"]]
+    right = places[:, :, 0].mean(axis=1) > 0
+    for chart in (0, 1):
+        own = right == chart
+        check(places[own].reshape(-1, 3), faces["uv"][own].reshape(-1, 2), chart, GROWN)
+
+
+def test_a_library_reads_the_ply(run, tmp_path: Path):
+    """And a mesh without texture coordinates has the faces that it had."""
+    trimesh = pytest.importorskip("trimesh")
+    path = tmp_path / "square.ply"
+    for one in (run, run.drop_vars(["texture_coordinate", "texture_triangle", "texture_count"])):
+        path.write_bytes(write(prepared(one, Options(), 1.0, single=True), EXPORTS["ply"], Options()))
+        assert len(trimesh.load_mesh(path, process=False).faces) == run.face_count.values[1]
+    assert b"texcoord" not in path.read_bytes()
+
+
+def test_usd_has_them_at_each_time(run, tmp_path: Path):
+    path = tmp_path / "square.usdc"
+    path.write_bytes(write(prepared(run, Options()), EXPORTS["usdc"], Options()))
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh(stage.GetDefaultPrim())
+    st = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st")
+    assert st.GetInterpolation() == UsdGeom.Tokens.faceVarying
+    times = mesh.GetPointsAttr().GetTimeSamples()
+    assert len(times) == len(STAGES)
+    for at, scale in zip(times, (1.0, GROWN), strict=True):
+        corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(at))
+        places, uv = np.array(mesh.GetPointsAttr().Get(at))[corners], np.array(st.ComputeFlattened(at))
+        assert len(uv) == len(corners)
+        right = places.reshape(-1, 3, 3)[:, :, 0].mean(axis=1) > 0
+        for chart in (0, 1):
+            own = np.repeat(right == chart, 3)
+            check(places[own], uv[own], chart, scale)

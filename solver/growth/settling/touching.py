@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from ... import shell
-from ...arrays import Floats, Ints
+from ...arrays import Bools, Floats, Ints
 from ...linalg.multifrontal import Analysis, analyse
 from ...shell.contact.steps import largest
 from ..state import State
 
-__all__ = ["Touching", "touches"]
+__all__ = ["Touching", "lengths_of", "near_in", "touches"]
 
 #: Room for moves, at first and at most, and for the change of an edge, over the mean rest edge.
 _FAR, _FURTHEST, _CHANGE = 0.2, 1.0, 0.12
@@ -29,7 +29,7 @@ class Touching:
     def __init__(self, state: State, distance: float, unit: float, areas: Floats) -> None:
         """distance: that parts keep. unit: force that bends an edge [mu l]. areas (n,): of the vertices at rest."""
         self._mesh, self._length, self._distance = state.mesh, _edge(state), distance
-        self._near = _near(state, distance, areas)
+        self._near = near_in(state, distance, areas)
         # pressure that bends a sheet as sharply as its mesh can show
         self._hardness = unit / state.length**2
         self._coupled: tuple[Ints, shell.Pattern, Analysis] | None = None
@@ -114,16 +114,23 @@ class Touching:
 
 def touches(state: State, distance: float, areas: Floats) -> bool:
     """Return whether anything of a state is within reach as `Touching` has it."""
-    near = _near(state, distance, areas)
+    near = near_in(state, distance, areas)
     found = shell.search(state.x, state.mesh, near, distance, 0.0, 0.0, state.length)
     return len(shell.within(state.x, found)) > 0
 
 
-def _near(state: State, distance: float, areas: Floats) -> shell.Near:
+def near_in(state: State, distance: float, areas: Floats, share: float = 1.0, rows: Bools | None = None) -> shell.Near:
+    """Return what is near each other along a state's sheet; see `shell.near_of`."""
     # where a step grows threefold what is near is near as it is, too: else it would push before it has room
-    rest, now = state.g, shell.metric(state.x, state.mesh.triangles)
-    lengths = np.minimum(_lengths(rest, state.mesh), _lengths(now, state.mesh))
-    return shell.near_of((rest, now), state.mesh, lengths, areas, distance)
+    metrics = state.g, shell.metric(state.x, state.mesh.triangles)
+    return shell.near_of(metrics, state.mesh, lengths_of(state), areas, distance, share, rows)
+
+
+def lengths_of(state: State) -> Floats:
+    """Return the lengths of edges (e,) at rest or as they are, the lesser."""
+    now = shell.metric(state.x, state.mesh.triangles)
+    found: Floats = np.minimum(_lengths(state.g, state.mesh), _lengths(now, state.mesh))
+    return found
 
 
 def _lengths(g: Floats, mesh: shell.Topology) -> Floats:

@@ -50,6 +50,7 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
             continue
         if isinstance(tool, HotSurface):
             shares[number] = share(tool.where, mesh, rim, seed + number)
+            _check_direction(number, tool, shares[number], mesh)
             if tool.later is not None:
                 shares[number] = np.stack([shares[number], share(tool.later, mesh, rim, seed + number)], -1)
         elif isinstance(tool, HotCurve):
@@ -123,11 +124,36 @@ def _check_frame(number: int, tool: HotSpot, anchor: Anchors, mesh: Mesh) -> Non
     size = float(np.linalg.norm(frame))
     if tool.stretch[0] != tool.stretch[1] and abs(_normal(anchor, mesh) @ frame) >= _STEEP * size:
         side, _ = _plane(_normal(anchor, mesh), np.eye(3)[int(np.argmin(np.abs(frame)))])
-        along = ", ".join(f"{value:.2g}" for value in side)
         raise InvalidInput(
             f"tool {number}: its frame {tool.frame} stands on the surface there: it has no direction along it.",
-            advice=f"Give a direction along the surface, such as ({along}).",
+            advice=f"Give a direction along the surface, such as ({_named(side)}).",
         )
+
+
+def _check_direction(number: int, tool: HotSurface, share: Floats, mesh: Mesh) -> None:
+    """Refuse a frame that stands on the surface wherever it acts, where along and across differ.
+
+    Raises:
+        InvalidInput: it has no direction along the surface.
+
+    """
+    same = tool.stretch[0] == tool.stretch[1] and tool.curl[0] == tool.curl[1]
+    some = mesh.triangles[share[mesh.triangles].any(axis=1)]
+    if same or tool.frame == "around" or not len(some):
+        return
+    frame = np.array(tool.frame)
+    p = mesh.x[some]
+    normals = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    if (np.abs(normals @ frame) >= _STEEP * np.linalg.norm(normals, axis=1) * np.linalg.norm(frame)).all():
+        side, _ = _plane(normals[0] / np.linalg.norm(normals[0]), np.eye(3)[int(np.argmin(np.abs(frame)))])
+        raise InvalidInput(
+            f"tool {number}: its frame {tool.frame} stands on the surface wherever it acts: it has no direction there.",
+            advice=f"Give a direction along the surface, such as ({_named(side)}), or 'around'.",
+        )
+
+
+def _named(way: Floats) -> str:
+    return ", ".join(f"{value:.2g}" for value in way)
 
 
 def _first(number: int, tool: HotSpot, mesh: Mesh, later: bool) -> Spot:

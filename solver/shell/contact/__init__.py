@@ -5,19 +5,25 @@ each other at rest, along the sheet, keeps no more than a share of its rest dist
 triangles is at rest where it is flat, and still cannot fold through itself.
 """
 
+from .apart import any_cross, changed, close_faces
 from .barrier import barrier, barrier_diagonal, barrier_hessian
-from .near import Near, near_of
-from .search import Pairs, search, within
+from .near import Near, flat, near_of
+from .search import Pairs, owners, search, within
 from .steps import free_step
 
 __all__ = [
     "Near",
     "Pairs",
+    "any_cross",
     "barrier",
     "barrier_diagonal",
     "barrier_hessian",
+    "changed",
+    "close_faces",
+    "flat",
     "free_step",
     "near_of",
+    "owners",
     "search",
     "within",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -23,7 +23,7 @@ class Near:
     """Vertices near each vertex along the rest state, in CSR, and what each vertex owns.
 
     start (n + 1,), other, way: near vertices and ways to them. altitudes (n,): least altitude of a rest triangle there.
-    faces, edges: (start, which) of what a vertex is the lowest of. areas (n,). edge_start, edge_end: all edges (e,).
+    faces, edges: (start, which) of what a vertex is the lowest of. areas (n,). limit: longest way that counts.
     """
 
     start: Ints
@@ -35,19 +35,43 @@ class Near:
     faces: Ints
     edges: Ints
     areas: Floats
+    limit: float
+
+    def within(self, share: float) -> Near:
+        """Return what is as near as a share of the limit."""
+        kept = self.way <= share * self.limit
+        start = np.concatenate([[0], np.cumsum(kept)])[self.start]
+        return replace(self, start=start, other=self.other[kept], way=self.way[kept], limit=share * self.limit)
+
+    def holds(self, pairs: Ints) -> Bools:
+        """Return of which pairs (m, 2) of vertices the second is near the first."""
+        n = len(self.start) - 1
+        keys = np.repeat(np.arange(n), np.diff(self.start)) * n + self.other
+        found: Bools = np.isin(pairs @ np.array([n, 1]), keys)
+        return found
 
 
-def near_of(metrics: tuple[Floats, ...], mesh: Topology, lengths: Floats, areas: Floats, distance: float) -> Near:
+def near_of(
+    metrics: tuple[Floats, ...],
+    mesh: Topology,
+    lengths: Floats,
+    areas: Floats,
+    distance: float,
+    share: float = 1.0,
+    rows: Bools | None = None,
+) -> Near:
     """Return what is near: by metrics (f, 3), the least altitude of which counts, lengths of edges (e,), areas (n,).
 
-    What is not near is at least `distance` away at rest.
+    What is not near is at least `distance` away at rest. share: of the longest ways that count, which to go. rows (n,):
+    vertices from which, if not from all.
     """
     n = mesh.vertices
-    limit = _DETOUR * (distance + 2 * float(lengths.max()))
+    limit = share * _DETOUR * (distance + 2 * float(lengths.max()))
+    asked = np.ones(n, np.bool_) if rows is None else rows
     ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
     order = np.argsort(ends[:, 0], kind="stable")
     indptr = np.searchsorted(ends[order, 0], np.arange(n + 1))
-    start, other, way = _ways(indptr, ends[order, 1], np.concatenate([lengths, lengths])[order], limit)
+    start, other, way = _ways(indptr, ends[order, 1], np.concatenate([lengths, lengths])[order], limit, asked)
     altitudes = np.full(n, np.inf)
     for g in metrics:
         squares = np.maximum(np.maximum(g[:, 0], g[:, 2]), g[:, 0] + g[:, 2] - 2 * g[:, 1])
@@ -68,12 +92,13 @@ def near_of(metrics: tuple[Floats, ...], mesh: Topology, lengths: Floats, areas:
         mesh.triangles[faces],
         mesh.edges,
         areas,
+        limit,
     )
 
 
 @njit(cache=True, error_model="numpy")
-def _ways(indptr: Ints, indices: Ints, lengths: Floats, limit: float) -> tuple[Ints, Ints, Floats]:
-    """Return the shortest ways along edges up to a limit, from each vertex, in CSR: a queue until nothing gains."""
+def _ways(indptr: Ints, indices: Ints, lengths: Floats, limit: float, rows: Bools) -> tuple[Ints, Ints, Floats]:
+    """Return the shortest ways along edges up to a limit, from some vertices, in CSR: a queue until nothing gains."""
     n = len(indptr) - 1
     start = np.zeros(n + 1, np.int64)
     room = 64 * n
@@ -82,6 +107,9 @@ def _ways(indptr: Ints, indices: Ints, lengths: Floats, limit: float) -> tuple[I
     queue, waits, seen = np.empty(n, np.int64), np.zeros(n, np.bool_), np.empty(n, np.int64)
     count = 0
     for v in range(n):
+        start[v + 1] = count
+        if not rows[v]:
+            continue
         found[v] = 0.0
         queue[0] = v
         first, waiting, known = 0, 1, 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,7 +12,7 @@ from ..topology import Topology
 from .distance import EDGES, FACE, nearest
 from .near import Near, flat
 
-__all__ = ["Pairs", "search", "within"]
+__all__ = ["Pairs", "owners", "search", "within"]
 
 #: Share of their rest distance along the sheet within which two places feel each other.
 _SHARE = 0.5
@@ -40,18 +40,34 @@ class Pairs(NamedTuple):
         return int(np.searchsorted(parts[0], change)), int(np.searchsorted(parts[1], 2 * move))
 
 
-def search(x: Floats, mesh: Topology, near: Near, distance: float, room: float, change: float, length: float) -> Pairs:
+def search(
+    x: Floats,
+    mesh: Topology,
+    near: Near,
+    distance: float,
+    room: float,
+    change: float,
+    length: float,
+    only: Literal["near", "far"] | None = None,
+) -> Pairs:
     """Return what may come within reach while no vertex moves by more than `room`.
 
     And, for what lies near each other along the sheet, while no edge's ends part by more than `change`: places that
-    are k edges apart part by no more than k times that, nor by more than both can move. length: of an edge.
+    are k edges apart part by no more than k times that, nor by more than both can move. length: of an edge. only: what
+    is near each other along the sheet, or what is far.
     """
-    even = flat(x, mesh.triangles, near.start, near.other)
     spans = _spans(x, near.edge_start, near.edges)
     balls = _owned(x, near.edge_start, near.edges)
     reach = distance + 2 * room
-    places = _near_places(*balls, near.start, near.other, even, spans, near.way, distance, change / length, 2 * room)
-    places = np.concatenate([places, _far_places(*balls, *_cells(*balls, reach), near.start, near.other, reach)])
+    places = np.empty((0, 3), np.int64)
+    if only != "far":
+        even = flat(x, mesh.triangles, near.start, near.other)
+        places = _near_places(
+            *balls, near.start, near.other, even, spans, near.way, distance, change / length, 2 * room
+        )
+    if only != "near":
+        far = _far_places(*balls, *_cells(*balls, reach), near.start, near.other, reach)
+        places = np.concatenate([places, far])
     faces = len(near.faces)
     # triangles and edges are gone through alike
     parts = np.concatenate([near.faces, near.edges[:, [0, 1, 1]]])
@@ -86,6 +102,12 @@ def _cells(middles: Floats, radii: Floats, reach: float) -> tuple[Ints, Ints, In
 def _ascending(values: Floats) -> Ints:
     """Return the order in which values (m,) ascend, equal ones as they stand."""
     return np.argsort(values, kind="stable")
+
+
+def owners(stencils: Ints, kinds: Ints) -> Ints:
+    """Return the vertices (m, 2), the lower first, that own the two parts of stencils (m, 4)."""
+    second = np.where(kinds == EDGES, stencils[:, 2], stencils[:, 1:].min(axis=1))
+    return np.sort(np.stack([stencils[:, 0], second], -1), axis=1)
 
 
 def within(x: Floats, pairs: Pairs, factor: float = 1.0) -> Ints:

@@ -7,6 +7,8 @@ import pytest
 
 from solver.contract import InvalidInput, Need, NotConverged, OverBudget, Unstable
 from solver.growth import SOLVER
+from solver.growth.engine import Engine
+from solver.growth.params import GrowthParams
 
 DISC = {"shape": "disc", "thickness": 0.05, "tools": [], "step": 0.1}
 HEAVY = DISC | {"gravity": [0, 0, -0.05]}
@@ -99,3 +101,15 @@ def test_a_sheet_thicker_than_its_triangles_is_not_told_to_be_thicker():
     with pytest.raises(NotConverged) as found:
         run({"shape": "disc", "thickness": 0.5, "tools": [rim]}, 1.0)
     assert "thinner" in found.value.advice
+
+
+def test_a_surface_s_frame_that_stands_on_it_everywhere_is_refused():
+    """On the flat disc there is no way along z; on a sphere there is, but for its poles."""
+    tool = {"kind": "surface", "where": {"kind": "everywhere"}, "frame": (0, 0, 1)}
+    for uneven in ({"stretch": (2.0, 1.0)}, {"stretch": (1.0, 1.0), "curl": (1.0, 0.0)}):
+        with pytest.raises(InvalidInput, match="stands on the surface wherever it acts") as found:
+            Engine(GrowthParams.parse({"shape": "disc", "tools": [tool | uneven]}), 100).advance(np.inf, until=0.05)
+        assert "such as" in (found.value.advice or "")
+        Engine(GrowthParams.parse({"shape": "sphere", "tools": [tool | uneven]}), 1000).advance(np.inf, until=0.05)
+    for fine in ({"stretch": (2.0, 2.0)}, {"stretch": (2.0, 1.0), "frame": (0.2, 0, 1)}):
+        Engine(GrowthParams.parse({"shape": "disc", "tools": [tool | fine]}), 100).advance(np.inf, until=0.05)
