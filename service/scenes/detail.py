@@ -132,7 +132,7 @@ def over(
         limit = getattr(budget, name)
         if limit is None or cost <= limit:
             continue
-        advice = f"Allow {math.ceil(cost)}."
+        advice = f"Allow {math.ceil(cost)}: dropping some is not enough."
         for gone in _candidates(name, kind, pixels):
             rest = np.ones(len(kind), bool)
             rest[gone] = False
