@@ -251,6 +251,19 @@ def test_over_http_as_file_and_as_numbers(client: httpx.Client) -> None:
     checked(client.post("/v1/scenes?format=glbb", json=body), 422, "invalid-query")
 
 
+def test_meshes_that_the_asker_holds_are_named_in_a_header_too(client: httpx.Client) -> None:
+    body = {"camera": CAMERA, "items": [at([-1, 0, 0]), {**at([1, 0, 0]), "preset": "jujube1"}]}
+    first = client.post("/v1/scenes", json=body)
+    tags = [mesh["extras"]["etag"] for mesh in parsed(first.content)[0]["meshes"]]
+    moved = {**body, "camera": {**CAMERA, "position": [0.3, 0, 12]}}
+    held = client.post("/v1/scenes", json=moved, headers={"If-None-Match": f'"{tags[0]}", W/"{tags[1]}", "other"'})
+    said = [mesh["extras"] for mesh in parsed(held.content)[0]["meshes"]]
+    assert [(one["etag"], one.get("known")) for one in said] == [(tag, True) for tag in tags]
+    assert len(held.content) < 0.1 * len(first.content)
+    whole = client.post("/v1/scenes", json=body, headers={"If-None-Match": f'"other", {first.headers["etag"]}'})
+    assert whole.status_code == 304
+
+
 def test_the_same_scene_gives_the_same_bytes_and_a_moved_camera_the_same_shapes() -> None:
     first, again = made([at([0, 0, 0], seed=1)]), made([at([0, 0, 0], seed=1)])
     assert first.data == again.data
