@@ -172,6 +172,21 @@ def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, 
     }
 
 
+def _begin(driver: Any, chromium: str, command: list[str], folder: Path, secret: str) -> None:
+    """Measure first pictures, each by a service and a browser of their own and then again, and keep them."""
+    sheet = Sheet("page-first", ["first picture", "drawing", "there", "drawn", "page's thread", "service"])
+    for is_drawn in (True, False):
+        with running(command, "/healthz", WIZEN_STORE=str(folder / "store")) as (server, port, _):
+            browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
+            for turn in ("service and browser just begun", "again", "once more"):
+                run = _first(browser, psutil.Process(server.pid), f"http://127.0.0.1:{port}/#token={secret}", is_drawn)
+                times = [f"{run[name] / 1000:.2f} s" for name in ("shown", "drawn")]
+                words = [turn, "in software" if is_drawn else "left out"]
+                sheet.add([*words, *times, f"{run['page_s']:.2f} s", f"{run['service_cpu_s']:.2f} s"], turn=turn, **run)
+            browser.close()
+    sheet.keep()
+
+
 def main() -> None:
     """Measure all rows, and keep them."""
     from playwright.sync_api import sync_playwright
@@ -201,21 +216,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         secret = fit_out(Path(folder) / "store")
         command = [sys.executable, "-m", "service.cli", "serve", "--port", "{port}"]
-        begun = Sheet("page-first", ["first picture", "drawing", "there", "drawn", "page's thread", "service"])
-        for is_drawn in (True, False):
-            with running(command, "/healthz", WIZEN_STORE=str(Path(folder) / "store")) as (server, port, _):
-                browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
-                for turn in ("service and browser just begun", "again", "once more"):
-                    run = _first(
-                        browser, psutil.Process(server.pid), f"http://127.0.0.1:{port}/#token={secret}", is_drawn
-                    )
-                    times = [f"{run[name] / 1000:.2f} s" for name in ("shown", "drawn")]
-                    words = [turn, "in software" if is_drawn else "left out"]
-                    begun.add(
-                        [*words, *times, f"{run['page_s']:.2f} s", f"{run['service_cpu_s']:.2f} s"], turn=turn, **run
-                    )
-                browser.close()
-        begun.keep()
+        _begin(driver, chromium, command, Path(folder), secret)
         if given.first:
             return
         with running(command, "/healthz", WIZEN_STORE=str(Path(folder) / "store")) as (server, port, _):
