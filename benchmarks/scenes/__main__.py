@@ -1,5 +1,9 @@
 """A scene of 1,000 fruits of 50 kinds beside 1,000 requests for them, in one run: python -m benchmarks.scenes.
 
+With --peer PYTHON, one that has xpublish below 0.5 and zarr, it stands beside xpublish too: a server of arrays, which
+is given each fruit's positions on the lattice that the scene gives it, looked up by us beforehand, as a chunk of
+float32 of its own. Its bytes are positions alone: no triangles, normals, colours or places.
+
 The server is `wizen serve` on the tables in the package; processor time is the server's own, wall time the client's.
 Every single request names the lattice that the scene gave that fruit. Then 10,000 items, an item out of the picture,
 and the memory that they take.
@@ -11,8 +15,10 @@ import argparse
 import json
 import struct
 import sys
+import tempfile
 import time
 import urllib.request
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +26,17 @@ import psutil
 
 from benchmarks.figures import Sheet
 from benchmarks.service.__main__ import running
+from solver.registry import surface
 from store import starter
+from store.lookup import ShapeTable
+
+#: xpublish over an archive of arrays v0, v1, ..., each of them one chunk.
+PEER = """
+import sys, numpy as np, xarray as xr, xpublish, uvicorn
+with np.load(sys.argv[2]) as found:
+    data = xr.Dataset({name: (f"point{i}", found[name]) for i, name in enumerate(found.files)})
+uvicorn.run(xpublish.Rest({"d": data}).app, host="127.0.0.1", port=int(sys.argv[1]), log_level="error")
+"""
 
 #: Kinds: te, gamma and stage within the table in the package.
 KINDS = [(0.03 + 0.01 * (i * 0.618 % 1), 10 + 40 * (i * 0.382 % 1), 0.1 + 0.2 * (i * 0.755 % 1)) for i in range(50)]
@@ -75,10 +91,41 @@ def one_by_one(port: int, process: psutil.Process, body: dict[str, Any], lattice
     return {"wall_s": wall, "processor_s": spent, "bytes": size, "memory": process.memory_info().rss}
 
 
+def beside(peer: str, body: dict[str, Any], lattices: list[int], rounds: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Have xpublish serve every fruit's positions; return what 1,000 requests took, and one for each distinct array."""
+    table = ShapeTable.open(starter.ROOT, "default", surfaces=surface)
+    asked, arrays, order = {}, {}, []
+    for item, n in zip(body["items"], lattices, strict=True):
+        said = (*item["parameters"].values(), item["stage"], n)
+        if said not in asked:
+            asked[said] = f"v{len(asked)}"
+            shape = table.at(item["parameters"], item["stage"], resolution=n)
+            arrays[asked[said]] = np.asarray(shape.position, np.float32).ravel()
+        order.append(asked[said])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "arrays.npz"
+        np.savez(file, **arrays)
+        with running([peer, "-c", PEER, "{port}", str(file)], "/datasets/d/zarr/v0/0") as (server, port, _):
+            process = psutil.Process(server.pid)
+            found = [[_arrays(port, process, names) for _ in range(rounds)] for names in (order, list(arrays))]
+    return _least(found[0]), _least(found[1])
+
+
+def _arrays(port: int, process: psutil.Process, names: list[str]) -> dict[str, Any]:
+    before, start, size = sum(process.cpu_times()[:2]), time.perf_counter(), 0
+    for name in names:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/datasets/d/zarr/{name}/0", timeout=60) as answer:
+            size += len(answer.read())
+    wall, spent = time.perf_counter() - start, sum(process.cpu_times()[:2]) - before
+    return {"wall_s": wall, "processor_s": spent, "bytes": size, "memory": process.memory_info().rss}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3, help="of which the least times are kept")
-    rounds = parser.parse_args().rounds
+    parser.add_argument("--peer", help="a Python that has xpublish")
+    given = parser.parse_args()
+    rounds = given.rounds
     sheet = Sheet("scenes", ["1,000 fruits of 50 kinds and more", "wall", "processor", "bytes", "memory of the server"])
     command = [sys.executable, "-m", "service.cli", "serve", "--port", "{port}"]
     settings = {
@@ -97,6 +144,10 @@ def main() -> None:
         best, single = _least(made), _least(alone)
         _row(sheet, "one scene", best, {k: best["report"][k] for k in ("meshes", "triangles", "shown", "left_out")})
         _row(sheet, "1,000 requests, each with the lattice that it has in the scene", single, {})
+        if given.peer:
+            each_of, once = beside(given.peer, thousand, lattices, min(rounds, 2))
+            _row(sheet, "xpublish: 1,000 requests for their positions, stored beforehand", each_of, {})
+            _row(sheet, "xpublish: a request for each distinct one of them", once, {})
         base = [ask(port, process, scene(1, 0), format="json") for _ in range(rounds + 2)]
         many = [ask(port, process, scene(1, 9999), format="json") for _ in range(rounds)]
         each = 1e6 * (_least(many)["processor_s"] - _least(base)["processor_s"]) / 9999

@@ -3,9 +3,10 @@
 Each row is driven as a hand would (a slider that never rests, a growth that plays, a brush) for some seconds, twice:
 drawn by SwiftShader on the processor, and with the draw calls left out, so that what remains is the page's own work
 and the service's. A graphics card draws what SwiftShader needs seconds for: the second figure is the bound that it
-leaves. Draw calls are counted in the browser's own WebGL functions, instanced ones apart. Page and service: processor
-seconds of the page's thread and of the server, over the updates; both together are the least time from one update to
-the next.
+leaves. First of all, how long the first picture takes from the address on, by a service that has just begun: until
+what is shown is there, and until a frame of it is drawn. Draw calls are counted in the browser's own WebGL functions,
+instanced ones apart. Page and service: processor seconds of the page's thread and of the server, over the updates;
+both together are the least time from one update to the next.
 """
 
 from __future__ import annotations
@@ -50,6 +51,15 @@ _COUNT = """() => {
     requestAnimationFrame(count);
   };
   requestAnimationFrame(count);
+}"""
+#: Notes when something is shown first, and when a frame that was begun after it is over, since the address was gone to.
+_FIRST = """() => {
+  const look = () => {
+    if (!document.getElementById("view")?.dataset.shown) return setTimeout(look, 5);
+    window.first = { shown: performance.now() };
+    requestAnimationFrame(() => setTimeout(() => (window.first.drawn = performance.now()), 0));
+  };
+  look();
 }"""
 #: Moves a slider to and fro for some milliseconds, and counts what is shown meanwhile.
 _DRIVE = """async ([selector, milliseconds, label]) => {
@@ -115,6 +125,22 @@ def _opened(browser: Browser, address: str, row: _Row, is_drawn: bool) -> Iterat
     page.close()
 
 
+def _first(browser: Browser, server: psutil.Process, address: str, is_drawn: bool) -> dict[str, Any]:
+    """Return how long the first picture takes, in a browser that keeps nothing."""
+    page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
+    page.add_init_script(f"window.drawn = {str(is_drawn).lower()}; ({_COUNT})(); ({_FIRST})()")
+    spent = sum(server.cpu_times()[:4])
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+    page.goto(f"{address}&s=0.2")
+    page.wait_for_function("() => window.first?.drawn", timeout=300_000)
+    first = page.evaluate("window.first")
+    busy = _metrics(session)["TaskDuration"]
+    spent = sum(server.cpu_times()[:4]) - spent
+    page.context.close()
+    return {"what": "first picture", "is_drawn": is_drawn, **first, "page_s": busy, "service_cpu_s": spent}
+
+
 def _metrics(session: Any) -> dict[str, float]:
     return {one["name"]: one["value"] for one in session.send("Performance.getMetrics")["metrics"]}
 
@@ -146,13 +172,30 @@ def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, 
     }
 
 
+def _begin(driver: Any, chromium: str, command: list[str], folder: Path, secret: str) -> None:
+    """Measure first pictures, each by a service and a browser of their own and then again, and keep them."""
+    sheet = Sheet("page-first", ["first picture", "drawing", "there", "drawn", "page's thread", "service"])
+    for is_drawn in (True, False):
+        with running(command, "/healthz", WIZEN_STORE=str(folder / "store")) as (server, port, _):
+            browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
+            for turn in ("service and browser just begun", "again", "once more"):
+                run = _first(browser, psutil.Process(server.pid), f"http://127.0.0.1:{port}/#token={secret}", is_drawn)
+                times = [f"{run[name] / 1000:.2f} s" for name in ("shown", "drawn")]
+                words = [turn, "in software" if is_drawn else "left out"]
+                sheet.add([*words, *times, f"{run['page_s']:.2f} s", f"{run['service_cpu_s']:.2f} s"], turn=turn, **run)
+            browser.close()
+    sheet.keep()
+
+
 def main() -> None:
     """Measure all rows, and keep them."""
     from playwright.sync_api import sync_playwright
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=8.0, help="for each row [s]")
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--first", action="store_true", help="the first picture alone")
+    given = parser.parse_args()
+    seconds = given.seconds
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:
         sys.exit("Chromium is needed: apt-get install chromium")
@@ -173,6 +216,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         secret = fit_out(Path(folder) / "store")
         command = [sys.executable, "-m", "service.cli", "serve", "--port", "{port}"]
+        _begin(driver, chromium, command, Path(folder), secret)
+        if given.first:
+            return
         with running(command, "/healthz", WIZEN_STORE=str(Path(folder) / "store")) as (server, port, _):
             browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
             for row in _ROWS:

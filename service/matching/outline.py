@@ -115,8 +115,7 @@ def of_surface(points: Array, unit: float | None) -> Signature:
     x = np.asarray(points, float)
     rows, extents = [], []
     for right, up in _sides():
-        flat = np.stack([x @ right, x @ up], axis=1)
-        r, area = _around(flat)
+        r, area = _around(x @ right, x @ up)
         extents.append(np.sqrt(area / np.pi))
         rows.append(_features(r / extents[-1]))
     values = np.array(rows)
@@ -137,13 +136,13 @@ def _signature(values: Floats, scatter: Floats, radius: float, unit: float | Non
     return Signature(np.r_[size, values], ("size", *parts), np.r_[0.01, scatter], radius)
 
 
-def _around(flat: Floats) -> tuple[Floats, float]:
-    """Return the farthest of points (v, 2) by direction (rays,) from the middle of the area that they cover, and it."""
-    middle = 0.5 * (flat.max(axis=0) + flat.min(axis=0))
+def _around(x: Floats, y: Floats) -> tuple[Floats, float]:
+    """Return the farthest of points (v) by direction (rays,) from the middle of the area that they cover, and it."""
+    middle = np.array([0.5 * (values.max() + values.min()) for values in (x, y)])
     for _ in range(3):
-        away = flat - middle
-        r = np.hypot(*away.T)
-        place = np.rint(np.arctan2(away[:, 1], away[:, 0]) * (_RAYS / (2 * np.pi))).astype(int) % _RAYS
+        across, along = x - middle[0], y - middle[1]
+        r = np.sqrt(across * across + along * along)  # no length here is near a number's ends, which hypot minds
+        place = np.rint(np.arctan2(along, across) * (_RAYS / (2 * np.pi))).astype(int) % _RAYS
         far = np.zeros(_RAYS)
         np.maximum.at(far, place, r)
         angles = np.arange(_RAYS) * 2 * np.pi / _RAYS

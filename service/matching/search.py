@@ -23,9 +23,13 @@ __all__ = ["Candidate", "Found", "Range", "search"]
 
 #: Followed downhill: the nearest shapes of this many tables, and so many more of the nearest table.
 _TABLES, _SECOND = 4, 7
-#: Shapes between the runs of the nearest table that are looked at too, and by how much of their range as many of them
+#: Shapes between the runs of the nearest tables that are looked at too, and by how much of their range as many of them
 #: are apart: distances have hollows there which no run lies in.
 _BETWEEN, _APART = 256, 0.1
+#: So many of them tell which of the tables is the nearest; their stages are around those of so many of its runs.
+_FIRST, _BEST = 64, 8
+#: So many tables at most, if their nearest run is no more than this many times as far as the nearest of all.
+_CONTENDERS, _LIKELY = 3, 2.0
 #: Found as near as this, no further start is followed: what is matched lies in the table itself.
 _EXACT = 0.08
 #: Tables whose nearest run is this many times as far as the nearest of all are not followed.
@@ -91,11 +95,16 @@ def search(target: Target, ranges: Sequence[Range], progress: Progress = lambda 
     if not rows:
         raise OutsideTable("no table holds what is to be compared.", "Name descriptors that tables have.")
     rows.sort(key=lambda row: row[0])
+    runs = len(rows)
+    contenders = _contenders(rows)
+    for one in contenders:
+        progress(0.5, f"between the runs of table {one.table.info.name}")
+        rows += _between(target, one, rows, 0, _FIRST)
+    rows.sort(key=lambda row: row[0])
     nearest = rows[0][1]
     progress(0.55, f"between the runs of table {nearest.table.info.name}")
-    scattered = _between(target, nearest, [row for row in rows if row[1] is nearest][:8])
-    looked += len(scattered)
-    rows = sorted([*rows, *scattered], key=lambda row: row[0])
+    rows = sorted(rows + _between(target, nearest, rows, _FIRST, _BETWEEN), key=lambda row: row[0])
+    looked += len(rows) - runs
     starts = _starts(rows, nearest)
     candidates: list[Candidate] = []
     for k, (_, one, point, stage) in enumerate(starts):
@@ -107,6 +116,17 @@ def search(target: Target, ranges: Sequence[Range], progress: Progress = lambda 
         looked += walk.looked
     candidates.sort(key=lambda found: found.distance)
     return Found(_distinct(candidates), looked)
+
+
+def _contenders(rows: Sequence[_Row]) -> list[Range]:
+    """Return the tables between whose runs something nearer may lie than any run is."""
+    found: list[Range] = []
+    for away, one, _, _ in rows:
+        if away > _LIKELY * rows[0][0] or len(found) == _CONTENDERS:
+            break
+        if one not in found:
+            found.append(one)
+    return found
 
 
 def _places(one: Range) -> list[tuple[dict[str, float], float]]:
@@ -145,15 +165,17 @@ def _distance(target: Look, found: Look) -> float:
     return float(np.sqrt(np.mean(((found.values - target.values) / _scatter(target, found)) ** 2)))
 
 
-def _between(target: Target, one: Range, best: Sequence[_Row]) -> list[_Row]:
-    """Return shapes all over a table at stages around those of its nearest runs, evenly spread."""
+def _between(target: Target, one: Range, rows: Sequence[_Row], first: int, last: int) -> list[_Row]:
+    """Return shapes all over a table at stages around those of its nearest runs, the first of `rows` of it: of evenly
+    spread ones those from the first to before the last.
+    """
     from scipy.stats import qmc
 
     walk = _Walk(target, one)
     if walk.dimension < 2:
         return []
-    shares = np.asarray(qmc.Sobol(walk.dimension, scramble=False).random(_BETWEEN))
-    stages = [row[3] for row in best]
+    shares = np.asarray(qmc.Sobol(walk.dimension, scramble=False).random(_BETWEEN))[first:last]
+    stages = [row[3] for row in rows if row[1] is one][:_BEST]
     low, high = one.stage
     knots = np.unique([low, *(s for s in (0.0, *one.table.stages) if low < s < high), high])
     step = float(np.diff(knots).max(initial=0.0))

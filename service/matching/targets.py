@@ -128,7 +128,7 @@ def _points(table: ShapeTable, point: Mapping[str, float], stage: float, n: int)
 
 
 #: Lattices on which candidates are looked up: the one with about as many points as the target, which smooths as much.
-_LATTICES = np.array([32, 48, 64, 96])
+_LATTICES = np.array([32, 48, 64, 80, 96, 112, 128])
 
 
 class _Mesh:
@@ -151,7 +151,7 @@ class _Mesh:
         return Look(self._seen[coarse].values, self._seen[coarse].scatter)
 
     def of(self, table: ShapeTable, point: Mapping[str, float], stage: float, coarse: bool) -> Look:
-        n = min(self._n, COARSE if coarse or table.resolution <= COARSE else FINE)
+        n = min(self._n, COARSE) if coarse else self._n
         known = None if self._unit is None else 1.0
         found = signature(_points(table, point, stage, n), closed_lattice(n), known, COARSE if coarse else FINE)
         return Look(found.values, found.scatter)

@@ -21,8 +21,8 @@ from .request import Scene
 
 __all__ = ["Made", "make"]
 
-#: How often a file that is larger than expected is made again with less in it.
-_AGAIN = 6
+#: Share of detail that is left, at most, where a file came out larger than expected and is made again.
+_LESS = 0.8
 
 
 class Made(NamedTuple):
@@ -74,19 +74,21 @@ def make(
     encoders: dict[str, Callable[..., bytes]] = {"glb": glb.encode, "usdc": usd.usdc, "usda": usd.usda}
     encoder = encoders.get(to)
     compress = compress and to == "glb" and glb.compressor() is not None
+    form = "packed" if compress else ("glb" if encoder is None else to)
     data, share = b"", 1.0
-    for _ in range(_AGAIN):
-        levels = detail.choose(scene.budget, kinds, visible.kind, pixels, compress, share)
+    while True:
+        levels = detail.choose(scene.budget, kinds, visible.kind, pixels, form, share)
         if encoder is None:
             break
         more = {"known": frozenset(scene.known)} if to == "glb" else {}
         data = encoder(kinds, visible, levels.n, held, scene.unit, compress, **more)
         if scene.budget.bytes is None or len(data) <= scene.budget.bytes:
             break
-        share = 0.8 * levels.share
-    else:
-        advice = f"Allow {len(data)}, or drop items."
-        raise OverBudget.of([Wrong("budget.bytes", f"{scene.budget.bytes} are too few for {len(data)}", advice)])
+        if (levels.n == detail.RUNGS[0]).all():
+            larger = len(data) / levels.bytes
+            raise OverBudget.of(detail.over(scene.budget, levels, kinds, visible.kind, pixels, form, larger))
+        # a lattice's bytes go with its square
+        share = min(_LESS, math.sqrt(scene.budget.bytes / len(data))) * levels.share
     lap("computed and written")
     told = report.Told(scene, kinds, rows, everything, found, shown, levels, rests, len(data), compress, times)
     return Made(data, report.document(told))

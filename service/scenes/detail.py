@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,14 +17,22 @@ from .errors import OverBudget
 from .kinds import RUNGS, Kind
 from .request import Budget
 
-__all__ = ["Levels", "choose", "expected"]
+__all__ = ["RUNGS", "Levels", "choose", "expected", "over"]
 
 #: By how much the lattices shrink from try to try, and how often before a budget is called too small.
 _LESS, _TRIES = 0.84, 28
-#: Bytes of a file: by vertex, by triangle of a lattice, by instance, by mesh and by node; compressed or not.
-_BYTES = {True: (9.5, 1.4, 22.0, 520.0, 560.0), False: (16.0, 6.0, 32.0, 430.0, 480.0)}
+#: Bytes of a file, measured: by vertex, by triangle of a lattice (which shapes share; USD's have their own, by vertex),
+#: by instance, by mesh and by node.
+_BYTES = {
+    "packed": (9.5, 1.4, 22.0, 520.0, 560.0),
+    "glb": (16.0, 6.0, 32.0, 430.0, 480.0),
+    "usdc": (36.2, 0.0, 32.0, 375.0, 0.0),
+    "usda": (152.0, 0.0, 51.0, 1880.0, 0.0),
+}
 #: A triangle of a mesh of its own, over one of a lattice: its neighbours are not where one expects them.
 _OWN = 2.0
+#: How many kinds are named when something is to be dropped.
+_NAMED = 4
 #: A look-up [ms]: of any lattice, and by squared colatitude; only said as an expectation.
 _MILLISECONDS = (1.4, 2.6e-4)
 
@@ -41,10 +50,10 @@ class Levels(NamedTuple):
     share: float
 
 
-def choose(
-    budget: Budget, kinds: Sequence[Kind], kind: Array, pixels: Floats, compress: bool, most: float = 1.0
-) -> Levels:
-    """Return the levels of seen instances; `most` is the share of the screen's wish to begin with.
+def choose(budget: Budget, kinds: Sequence[Kind], kind: Array, pixels: Floats, form: str, most: float = 1.0) -> Levels:
+    """Return the levels of seen instances in a file of a form: `packed` for a compressed GLB, else the format's name.
+
+    `most` is the share of the screen's wish to begin with.
 
     Raises:
         OverBudget: even the coarsest levels cost more; it says what to drop.
@@ -56,24 +65,24 @@ def choose(
     share, levels = most, None
     for _ in range(_TRIES):
         n = np.minimum(_rung(pixels, share), top)
-        levels = Levels(n, wanted, *expected(kinds, kind, n, compress), share)
+        levels = Levels(n, wanted, *expected(kinds, kind, n, form), share)
         if _fits(budget, levels):
             return levels
         if (n == RUNGS[0]).all():
             break
         share *= _LESS
     assert levels is not None
-    raise OverBudget.of(_over(budget, levels, kinds, kind, pixels, compress))
+    raise OverBudget.of(over(budget, levels, kinds, kind, pixels, form))
 
 
-def expected(kinds: Sequence[Kind], kind: Array, n: Array, compress: bool) -> tuple[int, float, float]:
+def expected(kinds: Sequence[Kind], kind: Array, n: Array, form: str) -> tuple[int, float, float]:
     """Return triangles drawn, bytes and milliseconds to expect of instances of kinds with levels.
 
     What has a mesh of its own costs no look-up, and as many bytes as that mesh has vertices and triangles.
     """
     if not len(n):
         return 0, 2000.0, 0.0
-    a_vertex, a_triangle, an_instance, a_mesh, a_node = _BYTES[compress]
+    a_vertex, a_triangle, an_instance, a_mesh, a_node = _BYTES[form]
     looked = np.array([one.topology is None for one in kinds])[kind]
     drawn, size = int((4 * n[looked].astype(np.int64) ** 2).sum()), 0.0
     if not looked.all():
@@ -104,28 +113,61 @@ def _fits(budget: Budget, levels: Levels) -> bool:
     return all(limit is None or cost <= limit for limit, cost in limits)
 
 
-def _over(
-    budget: Budget, least: Levels, kinds: Sequence[Kind], kind: Array, pixels: Floats, compress: bool
+def over(
+    budget: Budget,
+    least: Levels,
+    kinds: Sequence[Kind],
+    kind: Array,
+    pixels: Floats,
+    form: str,
+    larger: float = 1.0,
 ) -> list[Wrong]:
-    """Return which limits are too low, and how many of the smallest instances to drop for each."""
+    """Return which limits are too low, and which of the smallest instances to drop for each.
+
+    larger: how many times as many bytes came out as were expected.
+    """
     wrong = []
-    order = np.argsort(pixels)
-    costs = {"bytes": least.bytes, "triangles": least.triangles, "milliseconds": least.milliseconds}
-    for place, (name, cost) in enumerate(costs.items()):
+    costs = {"bytes": larger * least.bytes, "triangles": least.triangles, "milliseconds": least.milliseconds}
+    for name, cost in costs.items():
         limit = getattr(budget, name)
         if limit is None or cost <= limit:
             continue
-        for part in np.linspace(0, 1, 65)[1:-1]:
-            rest = order[int(part * len(order)) :]
-            found = expected(kinds, kind[rest], least.n[rest], compress)
-            if (found[1], found[0], found[2])[place] <= limit:
-                smallest = order[: int(part * len(order))]
+        advice = f"Allow {math.ceil(cost)}: dropping some is not enough."
+        for gone in _candidates(name, kind, pixels):
+            rest = np.ones(len(kind), bool)
+            rest[gone] = False
+            drawn, size, spent = expected(kinds, kind[rest], least.n[rest], form)
+            if {"bytes": larger * size, "triangles": drawn, "milliseconds": spent}[name] <= limit:
                 advice = (
-                    f"Drop the {len(smallest)} smallest of {len(order)} in sight (up to {pixels[smallest].max():.3g} "
-                    f"pixels across), or allow {math.ceil(cost)}."
+                    f"Drop the {len(gone)} smallest of {len(kind)} in sight (up to {pixels[gone].max():.3g} pixels "
+                    f"across: {_named(kinds, kind[gone])}), or allow {math.ceil(cost)}."
                 )
                 break
-        else:
-            advice = f"Allow {math.ceil(cost)}, or show fewer kinds."
         wrong.append(Wrong(f"budget.{name}", f"{limit:g} are too few: the coarsest shapes take {cost:.0f}", advice))
     return wrong
+
+
+def _candidates(name: str, kind: Array, pixels: Floats) -> Iterator[Array]:
+    """Return what may be dropped, less first: of triangles the smallest instances; of all else, which instances share,
+    all of the kinds whose largest is smallest.
+    """
+    if name == "triangles":
+        order = np.argsort(pixels, kind="stable")
+        ends = np.unique(np.linspace(0, len(order), 65)[1:-1].astype(int))
+        yield from (order[:end] for end in ends if end)
+        return
+    own, back = np.unique(kind, return_inverse=True)
+    largest = np.zeros(len(own))
+    np.maximum.at(largest, back, pixels)
+    rank = np.empty(len(own), int)
+    rank[np.argsort(largest, kind="stable")] = np.arange(len(own))
+    for end in np.unique(np.linspace(0, len(own), 65)[1:-1].astype(int)):
+        if end:
+            yield np.flatnonzero(rank[back] < end)
+
+
+def _named(kinds: Sequence[Kind], kind: Array) -> str:
+    """Return how many of what instances are, those that are most first."""
+    found = Counter(kinds[k].label for k in kind.tolist()).most_common()
+    words = [f"{count} of {label}" for label, count in found[:_NAMED]]
+    return ", ".join(words) + (f" and {len(found) - _NAMED} more kinds" if len(found) > _NAMED else "")

@@ -46,7 +46,9 @@ class Instances(NamedTuple):
         return Instances(*(values[which] for values in self))
 
 
-def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Instances, dict[str, resting.Rest]]:
+def place(
+    scene: Scene, kinds: Sequence[Kind], rows: Sequence[Sequence[int]]
+) -> tuple[Instances, dict[str, resting.Rest]]:
     """Return where all individuals are, and how the piles and bowls came to rest.
 
     Raises:
@@ -55,11 +57,13 @@ def place(scene: Scene, kinds: Sequence[Kind], rows: Sequence[int]) -> tuple[Ins
     """
     counts = np.array([item.instances for item in scene.items])
     item = np.repeat(np.arange(len(counts)), counts)
-    kind = np.asarray(rows)[item]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    own = np.array([len(row) for row in rows])
+    start = np.concatenate([[0], np.cumsum(own)[:-1]])
+    kind = np.array([k for row in rows for k in row])[(start[item] + (np.arange(len(item)) - first[item]) % own[item])]
     named = [one.size for one in scene.items]
     sizes = [
-        size if isinstance(size, float) else _size(size, kinds[row], scene.unit)
+        size if isinstance(size, float) else _size(size, kinds[row[0]], scene.unit)
         for size, row in zip(named, rows, strict=True)
     ]
     scale = np.repeat(sizes, counts).astype(float)

@@ -28,7 +28,7 @@ class Told(NamedTuple):
 
     scene: Scene
     kinds: Sequence[Kind]
-    rows: Sequence[int]
+    rows: Sequence[Sequence[int]]
     everything: Instances
     found: seen.View
     shown: Array
@@ -54,7 +54,7 @@ def document(told: Told) -> dict[str, Any]:
     first: set[tuple[int, int]] = set()
     least = min(spent.values(), default=0.0)
     # lists, since most items are one instance, of which arrays are slow to ask
-    one = _Ranks(told.shown.tolist(), told.found.why.tolist(), n.tolist(), wanted.tolist())
+    one = _Ranks(*(values.tolist() for values in (told.everything.kind, told.shown, told.found.why, n, wanted)))
     ranks, bounds = order.tolist(), ends.tolist()
     items = [
         _item(told, i, ranks[bounds[i] : bounds[i + 1]], one, spent, least, first) for i in range(len(told.scene.items))
@@ -93,8 +93,9 @@ def _by_lattice(kinds: Sequence[Kind]) -> dict[int, float]:
 
 
 class _Ranks(NamedTuple):
-    """By instance: whether it is shown, why not, its lattice, and the lattice that the screen asks for."""
+    """By instance: its kind, whether it is shown, why not, its lattice, and the lattice that the screen asks for."""
 
+    kind: list[int]
     shown: list[bool]
     why: list[int]
     n: list[int]
@@ -110,8 +111,7 @@ def _item(
     least: float,
     first: set[tuple[int, int]],
 ) -> dict[str, Any]:
-    one, k = told.scene.items[i], told.rows[i]
-    kind = told.kinds[k]
+    one, kind = told.scene.items[i], told.kinds[told.rows[i][0]]
     if len(rows) == 1 and not ranks.shown[rows[0]]:
         # most items of a large scene
         lacks = {} if kind.missing is None else {"missing": kind.missing.to_json()}
@@ -130,19 +130,20 @@ def _item(
         }
     shown = [row for row in rows if ranks.shown[row]]
     lattices = sorted(Counter(ranks.n[row] for row in shown).items())
-    computed = [size for size, _ in lattices if (k, size) not in first]
-    first |= {(k, size) for size in computed}
+    pairs = sorted({(ranks.n[row], ranks.kind[row]) for row in shown})
+    made = [(k, size) for size, k in pairs if (k, size) not in first]
+    first |= set(made)
     alone = sum(spent.get(size, least) * count for size, count in lattices) + least * (len(rows) - len(shown))
     alone = alone if kind.topology is None else 0.0  # what is stored is read, whoever asks
-    used = sum(1e3 * kind.spent.get(size, 0.0) for size in computed)
+    used = sum(1e3 * told.kinds[k].spent.get(size, 0.0) for k, size in made)
     left = Counter(ranks.why[row] for row in rows)
     said: dict[str, Any] = {
         "name": one.name or kind.label,
         **kind.source,
         "instances": len(rows),
         "shown": len(shown),
-        "computed": computed,
-        "shared": max(len(shown) - len(computed), 0),
+        "computed": [size for _, size in made],
+        "shared": max(len(shown) - len(made), 0),
         "reduced": sum(ranks.n[row] < ranks.wanted[row] for row in shown),
         "skipped": {text: left[code] for code, text in _WHY.items() if left[code]},
         "lattices": {str(size): count for size, count in lattices},
@@ -150,4 +151,18 @@ def _item(
     }
     if kind.missing is not None:
         said["missing"] = kind.missing.to_json()
-    return said | kind.trust([size for size, _ in lattices])
+    if kind.variants:
+        said["variants"] = [other.label for other in kind.variants]
+    if len(told.rows[i]) > 1:
+        said["shapes"] = len({k for _, k in pairs})
+    return said | _worst([told.kinds[k].trust([n for n, own in pairs if own == k]) for k in {k for _, k in pairs}])
+
+
+def _worst(said: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return what those shapes say of themselves that are least to be trusted."""
+
+    def doubt(one: dict[str, Any]) -> tuple[bool, bool, float]:
+        known = one.get("expected_error")
+        return one.get("converged") is False, known is None, max(map(abs, (known or {}).values()), default=0.0)
+
+    return max(said, key=doubt, default={})

@@ -125,6 +125,17 @@ class Item(_Strict):
     count: int = Field(1, ge=1, description="How many individuals")
     seed: int | None = Field(None, ge=0, le=2**32 - 1, description="Turns and mirrors the individuals; none: as stored")
     vary: float = Field(0.0, ge=0, le=0.5, description="Share by which sizes of individuals differ; needs a seed")
+    differ: float = Field(
+        0.0,
+        ge=0,
+        le=0.5,
+        description="Of tables: share by which stage and axes differ between individuals, never out of what the table "
+        "holds; needs a seed",
+    )
+    shapes: int = Field(6, ge=1, le=64, description="With differ: how many shapes the individuals share")
+    variants: tuple[float, ...] = Field(
+        (), max_length=16, description="usd: other stages, which the prototype's variant set `stage` offers"
+    )
     shade: str | None = Field(None, description="The skin, as the solver names it; the preset's, if not given")
     place: str | None = Field(None, description="The place that holds it")
     transforms: tuple[Transform, ...] = Field((), description="Where the individuals are, instead of a place")
@@ -144,8 +155,12 @@ class Item(_Strict):
             raise ValueError("transforms and place exclude each other: keep one of them")
         if self.transforms and self.count not in (1, len(self.transforms)):
             raise ValueError(f"count is {self.count}, and there are {len(self.transforms)} transforms: leave out count")
-        if self.vary and self.seed is None:
-            raise ValueError("vary needs a seed")
+        if (self.vary or self.differ) and self.seed is None:
+            raise ValueError(f"{'vary' if self.vary else 'differ'} needs a seed")
+        if self.variants and self.curve:
+            raise ValueError("variants and a curve exclude each other: keep one of them")
+        if not all(map(math.isfinite, self.variants)):
+            raise ValueError("variants are finite numbers")
         return self
 
     def _named(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any
@@ -79,6 +80,8 @@ def _runs(request: Request) -> Runs:
     return Runs(lambda: state.tables.store, ask)
 
 
+#: The tag of a mesh, as its extras say it, in quotes; that of a whole answer is longer.
+_MESH = re.compile('"[0-9a-f]{16}"')
 _SCHEMA = Scene.model_json_schema()
 _BODY = _inlined(_SCHEMA, _SCHEMA.get("$defs", {}))
 _TYPES = [media_type for name, (media_type, _) in FORMATS.items() if name != "json"]
@@ -110,7 +113,8 @@ def scenes(
     What is out of the picture, behind others or smaller than a pixel is left out, and kinds of which nothing is in
     sight are not computed. `format=json` is the report alone, without a file; a file brings the report's summary in
     the header `Wizen-Scene`. Items may be stages of stored runs; those that are not stored become jobs where the
-    request has a token with the scope run, and something plain stands in for them meanwhile.
+    request has a token with the scope run, and something plain stands in for them meanwhile. `If-None-Match` may name
+    meshes by their etags: these are not sent again; or the whole answer by its own: 304.
     """
     make = _maker()
     settings: Settings = request.app.state.settings
@@ -120,12 +124,17 @@ def scenes(
         hint = f"Did you mean {near[0]!r}? " if near else ""
         advice = f"{hint}Formats: {', '.join(FORMATS)}."
         raise InvalidQuery.of([Wrong("format", f"there is no format {format[:40]!r}", advice)])
-    made = make(parse(body), tables, settings.max_resolution, format, compress, _runs(request))
+    given = [tag.strip().removeprefix("W/") for tag in request.headers.get("if-none-match", "").split(",")]
+    scene = parse(body)
+    held = tuple(tag[1:-1] for tag in given if _MESH.fullmatch(tag))
+    if held:
+        scene = scene.model_copy(update={"known": scene.known + held})
+    made = make(scene, tables, settings.max_resolution, format, compress, _runs(request))
     if format == "json":
         return Response(orjson.dumps(made.report), media_type=FORMATS["json"][0])
     told = {name: value for name, value in made.report.items() if name not in ("items", "places", "generator")}
     etag = f'"{hashlib.sha256(made.data).hexdigest()[:32]}"'
     headers = {"Wizen-Scene": orjson.dumps(told).decode(), "ETag": etag}
-    if request.headers.get("if-none-match") == etag:
+    if etag in given:
         return Response(status_code=304, headers=headers)
     return Response(made.data, media_type=FORMATS[format][0], headers=headers)

@@ -1,6 +1,7 @@
 """A scene as USD: one prototype mesh for each distinct level of a shape, and a PointInstancer that places them.
 
 Mirror images are prototypes of their own: an instancer's scales mirror the points and not the winding.
+An item's variants are those of its prototypes: whoever opens the file chooses among them, without asking again.
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ from .moving import FPS
 from .placing import Instances
 
 __all__ = ["usda", "usdc"]
+
+#: Name of the variant set of a prototype that can be had at several stages.
+_VARIANTS = "stage"
 
 
 def _encode(
@@ -64,7 +68,9 @@ def _encode(
         for place, (k, size, mirrored) in enumerate(groups.T):
             kind = kinds[k]
             path = f"/scene/fruits/prototypes/shape{place}"
-            _prototype(stage, path, kind, int(size), bool(mirrored), _material(stage, materials, kind))
+            for one in (kind, *kind.variants):
+                _material(stage, materials, one)
+            _prototype(stage, path, kind, int(size), bool(mirrored), materials)
             instancer.GetPrototypesRel().AddTarget(Sdf.Path(path))
         instancer.CreateProtoIndicesAttr(Vt.IntArray.FromNumpy(number.ravel().astype(np.int32)))
         instancer.CreatePositionsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(seen.centre, np.float32)))
@@ -88,6 +94,29 @@ usdc, usda = partial(_encode, "usdc"), partial(_encode, "usda")
 def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, material: Any) -> None:
     from pxr import UsdGeom
 
+    prim = UsdGeom.Mesh.Define(stage, path).GetPrim()
+    prim.SetDisplayName(kind.label)
+    if not kind.variants:
+        _filled(stage, path, kind, n, mirrored, material[kind.prim])
+        return
+    # what stands outside of variants is stronger than they are: all of the mesh is in them
+    choice = prim.GetVariantSets().AddVariantSet(_VARIANTS)
+    for one in (*kind.variants, kind):
+        name = _word(one.label)
+        choice.AddVariant(name)
+        choice.SetVariantSelection(name)
+        with choice.GetVariantEditContext():
+            _filled(stage, path, one, min(n, one.finest), mirrored, material[one.prim])
+
+
+def _word(label: str) -> str:
+    """Return a label as the name of a variant: letters, digits, and underscores for all else."""
+    return "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in label)
+
+
+def _filled(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, material: Any) -> None:
+    from pxr import UsdGeom
+
     across = np.array([-1 if mirrored else 1, 1, 1], np.float32)
     surfaces = [(points * across, normal * across) for points, normal in kind.surfaces(n)]
     colours = kind.colours(n)
@@ -103,7 +132,6 @@ def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, materi
     paint.Set(_vectors(colours[0]))
     for (seconds, _), colour in zip(kind.curve if kind.fades else (), colours, strict=False):
         paint.Set(_vectors(colour), FPS * seconds)
-    stage.GetPrimAtPath(path).SetDisplayName(kind.label)
 
 
 def _vectors(values: Array) -> Any:

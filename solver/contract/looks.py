@@ -91,4 +91,5 @@ class Looks:
         """Return what a page wants to know, as JSON values."""
         named: dict[str, Mapping[str, Any]] = {"labels": self.labels, "shades": self.shades, "places": self.places}
         said = {key: {name: value._asdict() for name, value in values.items()} for key, values in named.items()}
-        return {"layers": list(self.layers), "advance": self.advance, **said}
+        known = {"opens": self.inside is not None, "grows": self.fur is not None}
+        return {"layers": list(self.layers), "advance": self.advance, **known, **said}

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -56,8 +56,9 @@ class Column(NamedTuple):
     attrs: Mapping[str, Any]
 
 
-def read(path: Path) -> dict[str, Column]:
-    """Read all of a generation but its spectra, without xarray, whose import takes longer than a service's start may.
+def read(path: Path, only: Collection[str] | None = None) -> dict[str, Column]:
+    """Read all of a generation but its spectra, without xarray, whose import takes longer than a service's start may;
+    of some names alone, what there is of them.
 
     Raises:
         CorruptTable: it cannot be read.
@@ -65,7 +66,8 @@ def read(path: Path) -> dict[str, Column]:
     """
     try:
         with h5py.File(path) as file:
-            return {name: _column(file[name]) for name in file if name != "spectrum" and file[name].ndim}
+            names = file if only is None else [name for name in only if name in file]
+            return {name: _column(file[name]) for name in names if name != "spectrum" and file[name].ndim}
     except NO_DAMAGE:
         raise
     except Exception as error:  # HDF5 reports damage as whatever it stumbles over
@@ -113,9 +115,11 @@ def judged(path: Path) -> Judged:
         CorruptTable: it cannot be read.
 
     """
-    opened = read(path)
-    found, likeness = left_out(opened), opened.get("neighbour_correlation")
-    return Judged(found[1] if found else None, tuple(likeness.values.tolist()) if likeness else None)
+    first = _left_out_names()[0]
+    opened = read(path, (first, "neighbour_correlation"))
+    found, likeness = opened.get(first), opened.get("neighbour_correlation")
+    method = str(found.attrs["method"]) if found else None
+    return Judged(method, tuple(likeness.values.tolist()) if likeness else None)
 
 
 def map_spectra(path: Path) -> Stored:
@@ -163,10 +167,14 @@ def left_out(opened: Mapping[str, Column]) -> tuple[Array, str] | None:
 
     None for a table that holds none: of one sample, or of no fruits.
     """
-    names = [f"left_out_{name}" for name in Measures._fields]
+    names = _left_out_names()
     if names[0] not in opened:
         return None
     return np.stack([opened[name].values for name in names], axis=-1), str(opened[names[0]].attrs["method"])
+
+
+def _left_out_names() -> list[str]:
+    return [f"left_out_{name}" for name in Measures._fields]
 
 
 def combined(small: xr.Dataset, of_spectra: str) -> str:

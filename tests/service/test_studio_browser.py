@@ -213,6 +213,51 @@ def test_a_wound_is_put_where_the_shape_is_clicked(browser: Browser, studio: str
     visit.page.close()
 
 
+def test_a_rotten_fruit_is_cut_open_where_one_likes(browser: Browser, studio: str) -> None:
+    """What is shown is what the service cuts: half of it, on the stage where it was, and so is what is taken away."""
+    visit = Visit(browser, viewport={"width": 1200, "height": 900}, bypass_csp=True)
+    page = visit.page
+    page.goto(at(studio, "room=decay&preset=apple&stages=0,2,4"))
+    visit.shown("shown.of == 3 && shown.stage == 4")
+    scrub = page.locator("#scrub")
+    scrub.focus()
+    page.keyboard.press("Home")
+    visit.shown("shown.stage == 0")
+    assert not page.locator("#cut-depth").is_visible()
+    choice = page.get_by_label("Cut open")
+    choice.focus()
+    with page.expect_response(lambda answer: "cut=" in answer.url and "stage=0" in answer.url) as cut:
+        choice.select_option("front")
+    assert parse_qs(urlsplit(cut.value.url).query)["cut"] == ["0,0,0,0,0,1"]
+    visit.shown("shown.stage == 0 && !shown.blended")
+    # the hand stays on what it holds, and the stage where it was
+    assert page.evaluate("document.activeElement.id") == "cut"
+    with page.expect_response(lambda answer: "cut=" in answer.url) as cut:
+        page.locator("#cut-depth").focus()
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("Tab")
+    assert parse_qs(urlsplit(cut.value.url).query)["cut"] == ["0,0,0.05,0,0,1"]
+    page.get_by_text("stages fetched").wait_for(state="hidden")
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download GLB").click()
+    taken = trimesh.load(io.BytesIO(download.value.path().read_bytes()), file_type="glb", force="mesh")
+    assert taken.vertices[:, 2].max() < 0.06 < 0.8 < -taken.vertices[:, 2].min()
+    with page.expect_response(lambda answer: "cut" not in answer.url and "threads=" in answer.url):
+        choice.select_option("")
+        page.get_by_label("Threads of mould").check()
+    page.get_by_text("stages fetched").wait_for(state="hidden")
+    page.add_script_tag(path=AXE)
+    assert page.evaluate("async () => (await axe.run()).violations.map(v => v.id)") == []
+    assert visit.complaints == []
+    page.close()
+    # where nothing is known of the inside nothing is offered
+    other = Visit(browser, viewport={"width": 1200, "height": 900})
+    other.page.goto(at(studio, "room=growth"))
+    other.shown()
+    assert other.page.get_by_label("Cut open").count() == 0
+    other.page.close()
+
+
 def test_a_frost_is_drawn_and_stops_the_rot(browser: Browser, studio: str) -> None:
     visit = Visit(browser, viewport={"width": 1200, "height": 900}, bypass_csp=True)
     page = visit.page

@@ -15,8 +15,10 @@ from solver.geometry.crossings import crossings
 from solver.lattice import closed_lattice
 from store import seal, starter, tables
 from store.families import stored
+from store.generations import generation
 from store.lookup import ShapeTable
 from store.store import Store
+from store.surfaces.measures import Measures
 from sweeps.planning.plan import Plan
 
 
@@ -27,6 +29,26 @@ def test_it_serves_shapes_at_once() -> None:
     radius = np.linalg.norm(shape.position, axis=-1)
     assert 0.7 < radius.min() < radius.max() < 1.04
     assert np.ptp(radius) > 0.1
+
+
+def test_what_tables_say_of_their_trust_is_read_without_all_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The list of all tables asks for it before a page shows anything."""
+    read: list[str] = []
+    real = generation._column
+    monkeypatch.setattr(generation, "_column", lambda variable: read.append(variable.name) or real(variable))
+    store = Store(starter.ROOT)
+    methods = set()
+    for folder in sorted((starter.ROOT / "tables").iterdir()):
+        path = tables.path_of(store, tables.info(store, folder.name))
+        read.clear()
+        judged = generation.judged(path)
+        assert set(read) <= {"/neighbour_correlation", f"/left_out_{Measures._fields[0]}"}
+        whole = generation.read(path)
+        found, likeness = generation.left_out(whole), whole.get("neighbour_correlation")
+        assert judged.method == (found[1] if found else None)
+        assert judged.neighbour_correlation == (tuple(likeness.values.tolist()) if likeness else None)
+        methods.add(judged.method)
+    assert methods - {None}
 
 
 def test_every_stage_of_it_was_free_of_crossings_and_inversion() -> None:

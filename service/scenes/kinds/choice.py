@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from solver import registry
 from solver.contract import InvalidInput, SolverError
@@ -23,11 +25,15 @@ from .shades import shade_of
 
 __all__ = ["distinct"]
 
+#: Lowest and highest.
+Range = tuple[float, float]
+
 
 def distinct(
     items: Sequence[Item], tables: LiveTables, highest: int, runs: Runs | None = None
-) -> tuple[list[Kind], list[int]]:
-    """Return the distinct kinds of a scene, and for each item which of them it is. No table is asked yet.
+) -> tuple[list[Kind], list[tuple[int, ...]]]:
+    """Return the distinct kinds of a scene, and for each item which of them its individuals are, in turns. No table is
+    asked yet.
 
     Runs are those of the tables' store, and nobody asks for those that it lacks, unless `runs` says so.
 
@@ -36,38 +42,58 @@ def distinct(
 
     """
     runs = runs or Runs(lambda: tables.store, lambda asked: (None, "Ask for it with POST /v1/jobs."))
-    numbers: dict[tuple[object, ...], int] = {}
+    numbers: dict[tuple[object, ...], tuple[int, ...]] = {}
     kinds: list[Kind] = []
-    rows: list[int] = []
+    rows: list[tuple[int, ...]] = []
     wrong: list[Wrong] = []
     for i, item in enumerate(items):
         values: object = tuple(sorted(item.parameters.items()))
         of_run = item.run, item.source, item.quality
-        key = (item.solver, item.preset, values, item.stage, item.curve, item.shade, of_run)
+        unlike = (item.differ, item.shapes, item.seed) if item.differ else None
+        key = (item.solver, item.preset, values, item.stage, item.curve, item.shade, of_run, unlike, item.variants)
         try:
             number = numbers.get(key)
         except TypeError:  # lists among the parameters; rare, where items are many
             key = (*key[:2], json.dumps(item.parameters, sort_keys=True), *key[3:])
             number = numbers.get(key)
         if number is None:
-            numbers[key] = number = len(kinds)
             try:
-                full = item
-                if item.solver is None and item.run is None:
-                    full = item.model_copy(update={"solver": _solver_of(item, tables)})
-                kinds.append(_of_run(full, runs) if _is_run(full, tables) else _of_table(full, tables, highest))
+                found = _kinds_of(item, tables, highest, runs)
             except (StoreError, SolverError, ServiceError) as error:
                 wrong += _complaints(error, f"items.{i}")
-            if wrong:
-                numbers[key] = -1
+                found = []
+            numbers[key] = number = tuple(range(len(kinds), len(kinds) + len(found)))
+            kinds += found
         if item.size == "real" and not wrong:
-            wrong += _measured(item, kinds[number], f"items.{i}.size")
+            wrong += _measured(item, [kinds[k] for k in number], f"items.{i}.size")
         rows.append(number)
         if len(wrong) > 20:
             break
     if wrong:
         raise InvalidScene.of(wrong)
     return kinds, rows
+
+
+def _kinds_of(item: Item, tables: LiveTables, highest: int, runs: Runs) -> list[Kind]:
+    """Return the kinds of an item: one, or as many as its individuals differ by; each with its variants."""
+    if item.solver is None and item.run is None:
+        item = item.model_copy(update={"solver": _solver_of(item, tables)})
+    if _is_run(item, tables):
+        if item.differ:
+            advice = "Leave it out, or name several runs."
+            raise InvalidQuery.of([Wrong("differ", "is of tables: a run is what it is", advice)])
+        found = _of_run(item, runs)
+        found.variants = tuple(_of_run(one, runs) for one in _variants(item))
+        return [found]
+    made: list[Kind] = [*_of_table(item, tables, highest)]
+    for one in _variants(item):
+        for kind, other in zip(made, _of_table(one, tables, highest), strict=True):
+            kind.variants += (other,)
+    return made
+
+
+def _variants(item: Item) -> list[Item]:
+    return [item.model_copy(update={"stage": stage, "variants": ()}) for stage in item.variants]
 
 
 def _complaints(error: StoreError | SolverError | ServiceError, name: str) -> list[Wrong]:
@@ -114,7 +140,7 @@ def _of_run(item: Item, runs: Runs) -> Kind:
     return placeholder(found, item.preset or found.solver.name)
 
 
-def _of_table(item: Item, tables: LiveTables, highest: int) -> Looked:
+def _of_table(item: Item, tables: LiveTables, highest: int) -> list[Looked]:
     solver = vocabulary.solver_named(item.solver or "")
     if item.quality is not None:
         advice = "Leave it out, or say source = 'run'."
@@ -137,7 +163,42 @@ def _of_table(item: Item, tables: LiveTables, highest: int) -> Looked:
     last = f"..{item.curve[-1][1]:g}" if item.curve else ""
     label = f"{item.preset or table.info.name} {symbol}={item.first:g}{last}"
     shade = shade_of(solver, item.shade, item.preset)
-    return Looked(solver, table, dict(query.point), query.stage, shade, label, item.curve)
+    first = Looked(solver, table, dict(query.point), query.stage, shade, label, item.curve)
+    return _differing(first, item, words.axes, words.stages) if item.differ else [first]
+
+
+def _differing(first: Looked, item: Item, axes: Mapping[str, Range], reach: Range) -> list[Looked]:
+    """Return shapes of points and stages about one: each moved by up to the item's share, and held within the table's
+    ranges. Points that no fruit can have move half as far, until they can.
+    """
+    random = np.random.default_rng([item.seed or 0, 7])
+    found = [first]
+    for _ in range(item.shapes - 1):
+        by = item.differ * random.uniform(-1, 1, len(axes) + 1)
+        while True:
+            point = {
+                name: first.point[name]
+                if name not in axes
+                else _within(first.point[name] * (1 + by[1 + list(axes).index(name)]), axes[name])
+                for name in first.point
+            }
+            try:
+                first.table.fresh(point)
+            except SolverError:
+                by[1:] *= 0.5 if np.abs(by[1:]).max() > 1e-3 else 0.0
+                continue
+            break
+        curve = tuple((at, _within(stage * (1 + by[0]), reach)) for at, stage in first.curve)
+        stage = curve[0][1] if curve else _within(first.stage * (1 + by[0]), reach)
+        found.append(Looked(first.solver, first.table, point, stage, first.shade, first.label, curve))
+    return found
+
+
+def _within(value: float, ends: Range) -> float:
+    """Return a value no farther out than the ends of a range, in four digits: equal shapes are to be equal."""
+    low, high = ends
+    rounded = float(f"{value:.4g}")
+    return rounded if low <= rounded <= high else min(max(value, low), high)
 
 
 def _numbers(item: Item) -> dict[str, float]:
@@ -157,12 +218,13 @@ def _numbers(item: Item) -> dict[str, float]:
     return {name: float(value) for name, value in item.parameters.items()}
 
 
-def _measured(item: Item, kind: Kind, name: str) -> list[Wrong]:
-    """Find how large a kind is in metres; return what is wrong where nobody knows."""
-    if isinstance(kind, Looked) and kind.metres is None:
-        params = kind.solver.parse(item.parameters, item.preset)
-        kind.metres = kind.solver.metres(params.model_dump(mode="json"))
-    if kind.metres is not None:
-        return []
+def _measured(item: Item, kinds: Sequence[Kind], name: str) -> list[Wrong]:
+    """Find how large an item's kinds are in metres; return what is wrong where nobody knows."""
     advice = "Say how many units of the scene its own unit is: size = 1.0."
-    return [Wrong(name, f"nobody knows how large {kind.label} is", advice)]
+    for kind in kinds:
+        if isinstance(kind, Looked) and kind.metres is None:
+            params = kind.solver.parse(item.parameters, item.preset)
+            kind.metres = kind.solver.metres(params.model_dump(mode="json"))
+        if kind.metres is None:
+            return [Wrong(name, f"nobody knows how large {kind.label} is", advice)]
+    return []

@@ -31,7 +31,8 @@ class Kind(ABC):
 
     Lengths are in the kind's own unit, r1 for fruits, about its own origin. `curve` are seconds and stages, the first
     of which is the stage; empty where nothing changes. `metres` is its unit's length, None where nobody knows.
-    `missing` says why something plain stands here in place of a run that is not stored. `spent` is the processor time
+    `missing` says why something plain stands here in place of a run that is not stored. `variants` are what may be
+    chosen in its place, where a format can hold them. `spent` is the processor time
     [s] of look-ups by level.
     """
 
@@ -39,6 +40,7 @@ class Kind(ABC):
     curve: Curve = ()
     metres: float | None = None
     missing: Missing | None = None
+    variants: tuple[Kind, ...] = ()
     spent: dict[int, float]
 
     @property

@@ -18,7 +18,7 @@ from store.shape import Shape
 
 from ...formats import mesh
 from ...limits import waited
-from ..meshes import Packed, Skin, pack, skin
+from ..meshes import Packed, Skin, pack, quantised, skin, weathered
 from .kind import COARSE, RUNGS, Curve, Kind
 
 __all__ = ["Looked"]
@@ -122,11 +122,12 @@ class Looked(Kind):
         return 1.08 * float(np.abs(self._fresh()).max())
 
     @property
-    def dryness(self) -> float:
-        """Share of the way from the fresh shape to the table's last stage."""
+    def dryness(self) -> tuple[float, ...]:
+        """Share of the way from the fresh shape to the table's last stage, at the stage and those on the curve."""
         low, high = self.table.reach
         last = high if abs(high) >= abs(low) else low
-        return min(abs(self.stage / last), 1.0) if last else 0.0
+        stages = (self.stage, *(stage for _, stage in self.curve[1:]))
+        return tuple(round(min(abs(stage / last), 1.0), 3) if last else 0.0 for stage in stages)
 
     @property
     def body(self) -> Body:
@@ -136,21 +137,39 @@ class Looked(Kind):
     @property
     def look(self) -> tuple[str, Hashable]:
         """The skin and how dry it is."""
-        return self.shade[0], round(self.dryness, 3)
+        return self.shade[0], self.dryness
 
     @property
     def prim(self) -> str:
         """The skin and how dry it is, as a word."""
-        return f"{self.shade[0]}{round(1000 * self.dryness)}"
+        return "_".join([self.shade[0], *(f"{1000 * share:.0f}" for share in self.dryness)])
 
     @cached_property
     def skin(self) -> Skin:
-        """The skin of a fruit that is so dry."""
-        return skin(self.shade[1], self.dryness)
+        """The skin of a fruit that is so dry; on a curve its brightest colours, which others are shares of."""
+        worn = self._worn
+        if not self.fades:
+            return worn[0]
+        base = np.max([one.base for one in worn], axis=0)
+        return worn[0]._replace(ridge=base, furrow=base)
+
+    @cached_property
+    def _worn(self) -> list[Skin]:
+        """The skins along the curve."""
+        return [skin(self.shade[1], share) for share in self.dryness]
 
     def packed(self, n: int) -> list[Packed]:
         """Return lattices as vertices; one scale suits them all."""
-        return [pack(one, self.skin, self.extent) for one in (self.shape(n), *self.later(n))]
+        shapes = (self.shape(n), *self.later(n))
+        if not self.fades:
+            return [pack(one, self.skin, self.extent) for one in shapes]
+        found = []
+        for one, worn in zip(shapes, self._worn, strict=True):
+            position, poles = mesh.surface(one)
+            lattice, ends = mesh.normals(position)
+            colour = weathered(position, lattice, worn) * worn.base / self.skin.base
+            found.append(quantised(mesh.vertices(position, poles), mesh.vertices(lattice, ends), colour, self.extent))
+        return found
 
     def surfaces(self, n: int) -> list[tuple[Array, Array]]:
         """Return the points and normals of lattices and their poles."""
@@ -161,14 +180,13 @@ class Looked(Kind):
         return found
 
     def colours(self, n: int) -> list[Floats]:
-        """Return colours of ridges and furrows, which stay what they are at the stage."""
-        rounded = pack(self.shape(n), self.skin).vertices["colour"][:, :3]
-        return [np.asarray(rounded / 255 * self.skin.base)]
+        """Return colours of ridges and furrows."""
+        return [np.asarray(one.vertices["colour"][:, :3] / 255 * self.skin.base) for one in self.packed(n)]
 
     @property
     def fades(self) -> bool:
-        """Not yet."""
-        return False
+        """Whether it has a curve: a skin wears as it dries."""
+        return len(self.curve) > 1
 
     def triangles(self, n: int) -> Array:
         """Return the triangles of the lattice."""

@@ -55,8 +55,9 @@ function tabs(offers: Offer[], current: string): void {
       el("a", { href: `#room=${room}`, title, ...(room === current ? { "aria-current": "page" } : {}) }, label),
     ),
   );
-  const chosen = byId("rooms").querySelector("[aria-current]");
-  chosen?.scrollIntoView({ block: "nearest", inline: "center" });
+  // not scrollIntoView: browsers go on from there with the next Tab, past the first rooms
+  const [strip, chosen] = [byId("rooms"), byId("rooms").querySelector<HTMLElement>("[aria-current]")];
+  if (chosen) strip.scrollLeft = chosen.offsetLeft - strip.offsetLeft - (strip.clientWidth - chosen.offsetWidth) / 2;
 }
 
 async function go(): Promise<void> {

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from PIL import Image, ImageDraw
 from scipy.spatial.transform import Rotation
 
 from service.matching import answer, outline, targets
+from service.matching.search import Range, search
 from service.matching.signature import COARSE, Unreadable, signature
 from service.shapes.live import LiveTables
 from solver.lattice import closed_lattice, directions, lattice
@@ -41,6 +43,51 @@ def obj(points: np.ndarray, triangles: np.ndarray) -> bytes:
 
 def matched(data: bytes, suffix: str, size: float | None, **known: float) -> Any:
     return answer.match(targets.read(data, suffix, size), TABLES, "default", known)
+
+
+@pytest.mark.parametrize("n", [64, 96, 112])
+def test_the_right_place_is_near_whatever_lattice_a_target_is_on(n: int) -> None:
+    """Half as many points again are another shape to a comparison that counts amplitudes of waves."""
+    asked = {"te": 0.037, "gamma": 11.7}
+    points = Rotation.random(random_state=3).apply(shape(n, asked=asked, stage=0.29)) * 7.5 + [3, -20, 100]
+    target = targets.read(obj(points, closed_lattice(n)), ".obj", 7.5)
+    seen, found = target.seen(False), target.of(TABLES.get("default"), asked, 0.29, False)
+    scatter = np.maximum(seen.scatter, found.scatter)
+    assert np.sqrt(np.mean(((seen.values - found.values) / scatter) ** 2)) < 0.15
+
+
+def test_a_table_is_looked_into_though_another_s_run_is_nearer() -> None:
+    """Two tables whose runs are as far: what lies between those of the second is not given up for the first."""
+
+    class Flat:
+        """A target of one number: .4 off everywhere in the one table; in the other nothing off at x = .3, between runs
+        that are 1.5 and .5 off, of which the way downhill leads nowhere."""
+
+        kind, parts, about, like = "numbers", ("number",), {}, ("flat",)
+
+        def seen(self, coarse: bool) -> targets.Look:
+            return targets.Look(np.zeros(1), np.ones(1))
+
+        def of(self, table: Any, point: Any, stage: float, coarse: bool) -> targets.Look:
+            away = 0.4 if table is near else min(5 * abs(point["x"] - 0.3), 1.5 - point["x"])
+            return targets.Look(np.array([away]), np.ones(1))
+
+    class Table:
+        resolution, reach, stages, size = 64, (0.1, 0.2), (0.1, 0.2), 2
+
+        def __init__(self, name: str) -> None:
+            self.info = SimpleNamespace(name=name, stages=(0.1, 0.2))
+
+        def sample(self, i: int) -> dict[str, float]:
+            return {"x": float(i), "y": float(i)}
+
+    near, far = Table("near"), Table("far")
+    free = {"x": (0.0, 1.0), "y": (0.0, 1.0)}
+    found = search(Flat(), [Range(cast(Any, one), free, {}, (0.1, 0.2)) for one in (near, far)])
+    best = found.candidates[0]
+    assert best.table is far
+    assert best.distance < 0.05
+    assert best.point["x"] == pytest.approx(0.3, abs=0.02)
 
 
 @pytest.mark.parametrize("n", [64, pytest.param(100, marks=pytest.mark.slow)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from service.scenes import seen
 from service.scenes.compose import make
+from service.scenes.errors import OverBudget
 from service.scenes.request import Camera, parse
 from service.shapes.live import LiveTables
 from solver.registry import surface
@@ -188,6 +190,50 @@ def test_what_is_wrong_is_said(client: httpx.Client, part: dict[str, Any], code:
     assert word in json.dumps(problem)
 
 
+@pytest.mark.parametrize("to", ["glb", "usdc", "usda"])
+def test_as_many_bytes_come_as_are_expected(to: str) -> None:
+    if to != "glb":
+        pytest.importorskip("pxr")
+    for z, most in ((-30, 1.3), (0, 1.1)):
+        items = [{**at([x / 2, 0, z], size=0.2), "stage": 0.2 + x / 1000} for x in range(-6, 7)]
+        told = made(items, to).report
+        assert 1 / most < told["bytes_expected"] / told["bytes"] < most
+
+
+@pytest.mark.parametrize(("to", "share"), [("glb", 0.4), ("usdc", 0.4)])
+def test_what_is_said_to_be_dropped_is_enough(to: str, share: float) -> None:
+    """Also where a file comes out larger than expected: what is said is said of the file that came out."""
+    if to == "usdc":
+        pytest.importorskip("pxr")
+    near = [at([float(x), 0, 0], size=0.3) for x in range(-2, 3)]
+    far = [{**at([x / 3, 1.5, -30], size=0.2), "preset": "jujube1", "stage": 0.2 + x / 1000} for x in range(-12, 13)]
+    items = [*near, *far]
+    whole = len(made(items, to, budget={"triangles": len(items) * 4 * 8**2}).data)
+    with pytest.raises(OverBudget) as caught:
+        made(items, to, budget={"bytes": int(share * whole)})
+    [wrong] = caught.value.wrong
+    found = re.search(r"Drop the (\d+) smallest of 30 in sight \(.* across: (.*)\), or allow", wrong.advice)
+    assert found is not None, wrong.advice
+    count = int(found[1])
+    assert 5 < count < 25
+    assert found[2].startswith("1 of jujube1 s=0.")
+    assert found[2].endswith(f" and {count - 4} more kinds")
+    # all of the near ones are one kind, and larger; of the far ones so many fewer do fit
+    left = [*near, *sorted(far, key=lambda item: abs(item["transforms"][0]["position"][0]))[: len(far) - count]]
+    assert len(made(left, to, budget={"bytes": int(share * whole)}).data) <= share * whole
+
+
+def test_what_kinds_share_is_saved_by_dropping_all_of_them() -> None:
+    """A hundred fewer of one shape save no bytes to speak of; a shape fewer does."""
+    many = at(*([float(x) / 5, float(y) / 5, -30] for x in range(-5, 5) for y in range(-5, 5)), size=0.1)
+    items = [at([0, 0, 0]), {**many, "preset": "jujube1"}]
+    with pytest.raises(OverBudget) as caught:
+        made(items, budget={"bytes": 9000}, cull=False)
+    [wrong] = caught.value.wrong
+    assert "Drop the 100 smallest of 101" in wrong.advice
+    assert "100 of jujube1 s=0.2)" in wrong.advice
+
+
 def test_a_million_items_are_refused_at_once(client: httpx.Client) -> None:
     items = [{**RAISIN, "count": 1_000_000, "place": "pile"}]
     answer = client.post("/v1/scenes", json={"camera": CAMERA, "items": items})
@@ -203,6 +249,19 @@ def test_over_http_as_file_and_as_numbers(client: httpx.Client) -> None:
     again = client.post("/v1/scenes", json=body, headers={"If-None-Match": file.headers["etag"]})
     assert again.status_code == 304
     checked(client.post("/v1/scenes?format=glbb", json=body), 422, "invalid-query")
+
+
+def test_meshes_that_the_asker_holds_are_named_in_a_header_too(client: httpx.Client) -> None:
+    body = {"camera": CAMERA, "items": [at([-1, 0, 0]), {**at([1, 0, 0]), "preset": "jujube1"}]}
+    first = client.post("/v1/scenes", json=body)
+    tags = [mesh["extras"]["etag"] for mesh in parsed(first.content)[0]["meshes"]]
+    moved = {**body, "camera": {**CAMERA, "position": [0.3, 0, 12]}}
+    held = client.post("/v1/scenes", json=moved, headers={"If-None-Match": f'"{tags[0]}", W/"{tags[1]}", "other"'})
+    said = [mesh["extras"] for mesh in parsed(held.content)[0]["meshes"]]
+    assert [(one["etag"], one.get("known")) for one in said] == [(tag, True) for tag in tags]
+    assert len(held.content) < 0.1 * len(first.content)
+    whole = client.post("/v1/scenes", json=body, headers={"If-None-Match": f'"other", {first.headers["etag"]}'})
+    assert whole.status_code == 304
 
 
 def test_the_same_scene_gives_the_same_bytes_and_a_moved_camera_the_same_shapes() -> None:

@@ -115,7 +115,7 @@ class Painter {
     this.busy = true;
     for (let next = this.queue.shift(); next && !this.signal.aborted; next = this.queue.shift()) {
       const job = this.waiting.get(next) as Job;
-      const film = new Film({ ...job, need: { ...job.need, stages: job.need.stages.slice(-1) } }, "auto");
+      const film = new Film({ ...job, need: { ...job.need, stages: job.need.stages.slice(-1) } });
       try {
         await film.load(0, () => film.show(film.stages[0]), this.signal);
         this.house.studio.portrait(film, next as HTMLCanvasElement);

@@ -8,8 +8,9 @@ import { Form } from "../parts/form";
 import { Player } from "../parts/play";
 import { needToken } from "../parts/token";
 import { curves } from "../parts/curves";
+import { Opening } from "../parts/opening";
 import { absolute, Problem } from "../service/http";
-import { ask, cancel, follow, isOf, job as findJob, numbers, result, stored, type Job, type Numbers } from "../service/jobs";
+import { ask, cancel, follow, isOf, job as findJob, nearest, numbers, result, stored, type Job, type Numbers } from "../service/jobs";
 import { solver as askSolver, type Solver, type Values } from "../service/solvers";
 import { Film } from "../view/film";
 
@@ -39,6 +40,7 @@ class Work {
   private readonly value = el("span", { class: "value" });
   private readonly play: HTMLButtonElement;
   private readonly kept = el("div");
+  private readonly opening: Opening;
   private preset: string;
   private quality = "preview";
   private colour = "auto";
@@ -48,6 +50,7 @@ class Work {
   private running: Job | undefined;
   private loading: AbortController | undefined;
   private map: HTMLImageElement | undefined;
+  private readonly legend = el("p", { class: "hint" });
   private closed = false;
   private own = "";
 
@@ -62,6 +65,7 @@ class Work {
     if (QUALITIES.includes(words.quality)) this.quality = words.quality;
     this.form = new Form(solver.params, this.important(), () => this.changed());
     this.actions = new Actions(() => this.take());
+    this.opening = new Opening(solver.looks, () => this.film && void this.look(this.film.job));
     this.play = button("", () => this.player.toggle(Number(this.scrub.value) / 1000), { class: "play" });
     this.player = new Player(
       (share) => this.show(this.at(share)),
@@ -160,8 +164,7 @@ class Work {
   private async adopt(listed: Job): Promise<void> {
     const found = listed.omitted.length ? await findJob(listed.id) : listed;
     if (this.closed) return;
-    const preset = Object.keys(this.solver.presets).find((name) => isOf(found, this.solver, name));
-    if (preset) this.preset = preset;
+    this.preset = nearest(found, this.solver);
     (byId("preset") as HTMLSelectElement).value = this.preset;
     this.stages.value = found.need.stages.join(", ");
     this.form.set(found.params);
@@ -222,9 +225,8 @@ class Work {
     if (this.closed) return;
     this.stopped();
     if (ended.state === "done") {
-      this.said.textContent = `Done in ${digits(ended.seconds ?? 0)} s.`;
       this.list(await stored(this.solver.name));
-      await this.look(ended);
+      await this.look(ended, `Done in ${digits(ended.seconds ?? 0)} s.`);
     } else {
       const { detail, advice } = ended.problem ?? { detail: "The job was stopped.", advice: "" };
       this.said.textContent = ended.state === "cancelled" ? "The job was stopped." : `${detail} ${advice}`;
@@ -258,28 +260,32 @@ class Work {
     this.actions.refresh();
   }
 
-  /** Fetch what a job computed and show its last stage. */
-  private async look(found: Job): Promise<void> {
+  /** Fetch what a job computed and show its last stage; `ended` is what stays said when all are there. */
+  private async look(found: Job, ended = ""): Promise<void> {
     this.loading?.abort();
     const loading = (this.loading = new AbortController());
-    const film = new Film(found, this.colour);
+    const film = new Film(found, { ...(this.colour === "auto" ? {} : { colour: this.colour }), ...this.opening.query });
     this.remember(found);
     try {
       const told = await numbers(found);
       const more = await curves(found, told, this.solver);
       if (loading.signal.aborted || this.closed) return;
+      // the same run in other colours, or cut open: stay where it was, and keep the hand on what it holds
+      const again = this.film?.job.id === found.id;
+      const stage = again ? this.at(Number(this.scrub.value) / 1000) : film.stages[film.stages.length - 1];
       this.film?.dispose();
       this.film = film;
       this.found = told;
       this.house.content();
-      this.results(found, told, more);
+      if (!again) this.results(found, told, more);
+      this.actions.refresh();
       this.house.stand(film);
       await film.load(
-        film.stages.length - 1,
+        film.nearest(stage),
         (there) => {
-          this.said.textContent = there < film.stages.length ? `${there} of ${film.stages.length} stages fetched` : "";
+          this.said.textContent = there < film.stages.length ? `${ended} ${there} of ${film.stages.length} stages fetched`.trim() : ended;
           this.house.studio.aim();
-          this.show(there === 1 ? film.stages[film.stages.length - 1] : this.at(Number(this.scrub.value) / 1000));
+          this.show(there === 1 ? stage : this.at(Number(this.scrub.value) / 1000));
         },
         loading.signal,
       );
@@ -309,12 +315,14 @@ class Work {
     house.studio.reshaped();
     house.say(`${this.title(film.job)}, ${where}`, `a run, ${film.job.need.quality}${blended ? ", blended between stages" : ""}`, this.verdict(index));
     house.canvas.dataset.shown = JSON.stringify({ stage: all[Math.max(index, 0)], blended, of: all.length });
-    if (this.map) this.map.src = this.mapOf(all[Math.max(index, 0)]);
+    if (!this.map) return;
+    this.map.src = this.mapOf(all[Math.max(index, 0)]);
+    this.legend.textContent = `${worded(this.layer())} over azimuth (across) and colatitude (down), dark 0 to bright 1.`;
   }
 
   private title(found: Job): string {
     const preset = Object.keys(this.solver.presets).find((name) => isOf(found, this.solver, name));
-    return preset ? worded(preset) : `${worded(this.preset)}, changed`;
+    return preset ? worded(preset) : `${worded(nearest(found, this.solver))}, changed`;
   }
 
   /** What the run says of the stage that is shown. */
@@ -348,7 +356,8 @@ class Work {
             }),
           ]
         : []),
-      ...(this.map ? [details("Map", false, el("p", { class: "hint" }, `${worded(this.layer())} over azimuth (across) and colatitude (down), dark 0 to bright 1.`), this.map)] : []),
+      this.opening.root,
+      ...(this.map ? [details("Map", false, this.legend, this.map)] : []),
       ...(names.length
         ? [
             details(
@@ -440,7 +449,7 @@ class Work {
     if (this.own) URL.revokeObjectURL(this.own);
     this.own = long ? URL.createObjectURL(new Blob([sent], { type: "application/json" })) : "";
     const asked = long ? [{ label: "Job as JSON", href: this.own, name: "job.json" }] : [];
-    const file = (label: string, format: string, primary = false) => ({ label, href: film ? result(film.job, { format }) : "", primary });
+    const file = (label: string, format: string, primary = false) => ({ label, href: film ? result(film.job, { format, ...(format === "netcdf" ? {} : film.more) }) : "", primary });
     return {
       files: [...(film ? [file("Download GLB", "glb", true), file("USD", "usdc"), file("netCDF", "netcdf")] : []), ...asked],
       commands: said

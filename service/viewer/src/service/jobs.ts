@@ -49,14 +49,22 @@ export async function stored(solver: string): Promise<Job[]> {
 }
 
 /** Whether a job ran a preset as it stands: all that the preset says, and the solver's defaults beside it. */
-export function isOf(found: Job, solver: Solver, preset: string): boolean {
+export const isOf = (found: Job, solver: Solver, preset: string): boolean => !found.omitted.length && changes(found, solver, preset) === 0;
+
+/** The preset that a job's parameters leave in the fewest places, of several the first. */
+export function nearest(found: Job, solver: Solver): string {
+  const by = new Map(Object.keys(solver.presets).map((name) => [name, changes(found, solver, name)]));
+  return [...by.keys()].reduce((best, name) => ((by.get(name) ?? 0) < (by.get(best) ?? 0) ? name : best));
+}
+
+/** In how many parameters a job is not as a preset; the seed does not count. */
+function changes(found: Job, solver: Solver, preset: string): number {
   const said = solver.presets[preset] ?? {};
-  if (found.omitted.length) return false;
-  return Object.entries(found.params).every(([name, value]) => {
-    if (name === "seed") return true;
+  return Object.entries(found.params).filter(([name, value]) => {
+    if (name === "seed") return false;
     const meant = name in said ? said[name] : solver.params.properties[name]?.default;
-    return meant === undefined || includes(value, meant);
-  });
+    return meant !== undefined && !includes(value, meant);
+  }).length;
 }
 
 /** Whether a value has all that is meant; what a preset leaves out of an object is its default. */

@@ -23,6 +23,7 @@ const parts = (of: Object3D): Mesh<BufferGeometry, Material>[] => {
   return found;
 };
 
+/** A job's stages; `more` is what each is asked for besides, as colours or a cut. */
 export class Film implements Subject {
   readonly object = new Group();
   readonly stages: number[];
@@ -35,7 +36,7 @@ export class Film implements Subject {
 
   constructor(
     readonly job: Job,
-    private readonly colour: string,
+    readonly more: Record<string, string> = {},
   ) {
     this.stages = [...job.need.stages].sort((a, b) => a - b);
     this.frames = this.stages.map(() => undefined);
@@ -43,11 +44,16 @@ export class Film implements Subject {
     this.object.add(this.inner);
   }
 
+  /** The number of the stage that is nearest. */
+  nearest(stage: number): number {
+    return this.stages.reduce((best, one, i) => (Math.abs(one - stage) < Math.abs(this.stages[best] - stage) ? i : best), 0);
+  }
+
   /** Fetch all stages, the one to be seen first; `told` after each. */
   async load(first: number, told: (there: number) => void, signal: AbortSignal): Promise<void> {
     const order = [first, ...this.stages.keys()].filter((i, at, all) => all.indexOf(i) === at);
     for (const [there, i] of order.entries()) {
-      const query = { stage: this.stages[i], format: "glb", ...(this.colour === "auto" ? {} : { colour: this.colour }) };
+      const query = { stage: this.stages[i], format: "glb", ...this.more };
       const data = await (await get(result(this.job, query), { signal })).arrayBuffer();
       if (signal.aborted) return;
       const frame = await meshes(data);
@@ -125,6 +131,8 @@ export class Film implements Subject {
     const [from, to] = [a.geometry, b.geometry];
     const count = from.getAttribute("position").count;
     if (count !== to.getAttribute("position").count || from.index?.count !== to.index?.count) return false;
+    // cut faces are meshed anew for every stage: as many triangles need not be the same
+    if (this.more.cut && !from.index?.array.every((vertex, i) => vertex === to.index?.array[i])) return false;
     let own = this.blend.children[0] as Mesh<BufferGeometry, Material> | undefined;
     if (!own || own.geometry.getAttribute("position").count !== count) {
       this.blend.clear();

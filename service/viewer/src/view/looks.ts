@@ -21,6 +21,9 @@ export interface Place {
 export interface Look {
   /** Fields that make its colours. */
   layers: string[];
+  /** Whether something is known of the inside, and whether threads grow on it. */
+  opens: boolean;
+  grows: boolean;
   labels: Record<string, { symbol: string; name: string }>;
   /** The word for going along the stage axis. */
   advance: string;
