@@ -193,9 +193,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     real = rods.k > 0
     k = params.contact_stiffness or _CONTACT * float(np.median(rods.k[real] / rods.rest[real]))
     edge = np.arange(len(real), dtype=np.int32).reshape(len(points), -1)
-    bonds = bonded(
-        params, points, s, at.grid, edge[:, int(at.ghosts[0]) :], at.rest.reshape(-1, 3), rods, grain, strong
-    )
+    bonds = bonded(params, points, s, edge[:, int(at.ghosts[0]) :], at.rest.reshape(-1, 3), rods, grain, strong)
     straight = at.straight.reshape(-1, 3)
     motion = _motion(at, rods, params)
     sawn(params, straight, rods, bonds)
