@@ -25,10 +25,10 @@ __all__ = ["FORCES", "READS", "bind", "bound", "gather", "parts"]
 
 _TINY = 1e-30
 #: Rows that a bond reads: its seat, the other edge's first end, this edge, p and q, the slope at the seat; and rows of
-#: its forces: on the seat, the edge, p, q and the slope.
+#: its forces: on the seat, the slopes, p, q and the edge.
 READS, FORCES = 18, 15
 #: Lanes that an edge's numbers are written to at once; rows have as many to spare.
-_WIDE = 8
+_WIDE = 4
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -39,7 +39,7 @@ def _spread(row: np.ndarray, value: float) -> None:
 
 @njit(cache=True, error_model="numpy")
 def gather(seats: np.ndarray, seat: np.ndarray, lane: np.ndarray, edge: np.ndarray, row: np.ndarray) -> None:
-    """Fill the rows (18, w + 8) of bonds: their seats' places, first ends, edges, p, q and slopes at the seats.
+    """Fill the rows (18, w + 4) of bonds: their seats' places, first ends, edges, p, q and slopes at the seats.
 
     seats (s, 8): places and slopes; seat (w,), lane (m + 1,): as in `Plan`; edge: rows of the part's edges.
     """
@@ -124,26 +124,16 @@ def _pull(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> No
 
 
 @njit(cache=True, error_model="numpy")
-def _lean(count: int, law: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces on the slopes at the seats [N m] to the rows 12 to 14."""
-    for n in range(count):
-        h = law[LONG, n]
-        force[12, n] = h * force[3, n]
-        force[13, n] = h * force[4, n]
-        force[14, n] = h * force[5, n]
-
-
-@njit(cache=True, error_model="numpy")
 def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces on p and q to the rows 6 to 11, and on the edge over those by t."""
+    """Write the forces on p and q to the rows 6 to 11, and on the edge to the rows 12 to 14."""
     for n in range(count):
         u = law[SHARE, n]
         a, b, a1, b1 = parts(u)
         fx, fy, fz = force[0, n], force[1, n], force[2, n]
         tx, ty, tz = force[3, n], force[4, n], force[5, n]
-        force[3, n] = tx - u * fx
-        force[4, n] = ty - u * fy
-        force[5, n] = tz - u * fz
+        force[12, n] = tx - u * fx
+        force[13, n] = ty - u * fy
+        force[14, n] = tz - u * fz
         force[6, n] = a1 * tx - a * fx
         force[7, n] = a1 * ty - a * fy
         force[8, n] = a1 * tz - a * fz
@@ -154,15 +144,14 @@ def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces (15, w) [N] of `count` bonds on their seats, and on edges, p and q; first ends bear the rest.
+    """Write the forces (15, w) [N] of `count` bonds on seats and mean slopes, p, q and edges; first ends bear the rest.
 
-    law (7, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In four loops: where
+    law (7, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In three loops: where
     more rows are written than six, LLVM gives up asking which overlap, and nothing is vectorised. For the same reason
     no two arguments may be slices with steps.
     """
     _reach(count, law, row)
     _pull(count, law, row, force)
-    _lean(count, law, force)
     _share(count, law, force)
 
 

@@ -14,8 +14,10 @@ __all__ = ["internal"]
 
 
 @njit(cache=True, error_model="numpy")
-def _gathered(pull: np.ndarray, seat: np.ndarray, lane: np.ndarray, force: np.ndarray, edge: np.ndarray) -> None:
-    """Add forces of bonds to those on their seats, pull (s, 8) [N], [N m], and to the rows of edges."""
+def _gathered(
+    pull: np.ndarray, seat: np.ndarray, lane: np.ndarray, rest: np.ndarray, force: np.ndarray, edge: np.ndarray
+) -> None:
+    """Add forces of bonds to those on their seats, pull (s, 8) [N], [N m], and to the rows of edges `rest` [m] long."""
     n = 0
     for q in range(len(lane) - 1):
         sx, sy, sz = 0.0, 0.0, 0.0
@@ -23,21 +25,22 @@ def _gathered(pull: np.ndarray, seat: np.ndarray, lane: np.ndarray, force: np.nd
         px, py, pz = 0.0, 0.0, 0.0
         qx, qy, qz = 0.0, 0.0, 0.0
         last = int(lane[q + 1])
+        h = rest[q]
         while n < last:
             i = seat[n]
             gx, gy, gz = force[0, n], force[1, n], force[2, n]
             pull[i, 0] += gx
             pull[i, 1] += gy
             pull[i, 2] += gz
-            pull[i, 3] += force[12, n]
-            pull[i, 4] += force[13, n]
-            pull[i, 5] += force[14, n]
+            pull[i, 3] += h * force[3, n]
+            pull[i, 4] += h * force[4, n]
+            pull[i, 5] += h * force[5, n]
             sx += gx
             sy += gy
             sz += gz
-            ex += force[3, n]
-            ey += force[4, n]
-            ez += force[5, n]
+            ex += force[12, n]
+            ey += force[13, n]
+            ez += force[14, n]
             px += force[6, n]
             py += force[7, n]
             pz += force[8, n]
@@ -91,6 +94,31 @@ def _unseat(u: float, rest: float, pull: np.ndarray, row: np.ndarray, q: int) ->
         row[11 + c, q] += u * f + t
         row[ON_CURVE + c, q] += a * f + a1 * t
         row[ON_CURVE + 3 + c, q] += b * f + b1 * t
+
+
+@njit(cache=True, error_model="numpy")
+def _seated(rest: np.ndarray, row: np.ndarray, out: np.ndarray) -> None:
+    """Do what `_seat` does in the middles of edges, out (m, 8): their number makes the loops worth it."""
+    a, b, a1, b1 = parts(0.5)
+    for q in range(len(out)):
+        h = 1.0 / rest[q]
+        for c in range(3):
+            e, p, z = row[20 + c, q], row[23 + c, q], row[26 + c, q]
+            out[q, c] = row[c, q] + 0.5 * e + a * p + b * z
+            out[q, 3 + c] = (e + a1 * p + b1 * z) * h
+
+
+@njit(cache=True, error_model="numpy")
+def _unseated(rest: np.ndarray, pull: np.ndarray, row: np.ndarray) -> None:
+    """Do what `_unseat` does for seats (m, 8) in the middles of edges."""
+    a, b, a1, b1 = parts(0.5)
+    for c in range(3):
+        for q in range(len(pull)):
+            f, t = pull[q, c], pull[q, 3 + c] / rest[q]
+            row[c, q] -= f
+            row[11 + c, q] += 0.5 * f + t
+            row[ON_CURVE + c, q] += a * f + a1 * t
+            row[ON_CURVE + 3 + c, q] += b * f + b1 * t
 
 
 @njit(cache=True, error_model="numpy")
@@ -157,8 +185,7 @@ def internal(
             found[p, 3] = strain(count, plan.edge[p], edge)
         if bonded:
             curve(count, plan.edge[p], edge)
-            for q in range(count):
-                _seat(0.5, plan.edge[p, REST, q], edge, q, seats[0, e + q])
+            _seated(plan.edge[p, REST], edge, seats[0, e:z])
         else:
             edge[0:3] = 0.0
             _add(f, plan.a[e:z], plan.b[e:z], edge)
@@ -178,14 +205,14 @@ def _joints(
         _seat(plan.at[s], plan.edge[p, REST, q], rows[p], q, seats[0, edges + s])
     seats[1] = 0.0
     wide = plan.seat.shape[1]
-    bond = np.empty((READS, wide + 8))
+    bond = np.empty((READS, wide + 4))
     force = np.empty((FORCES, wide))
     for p in range(len(plan.part) - 1):
         lane = plan.lane[plan.part[p] + p : plan.part[p + 1] + p + 1]
         bonds = int(lane[len(lane) - 1])
         gather(seats[0], plan.seat[p], lane, rows[p], bond)
         bind(bonds, plan.law[p], bond, force)
-        _gathered(seats[1], plan.seat[p], lane, force, rows[p])
+        _gathered(seats[1], plan.seat[p], lane, plan.edge[p, REST], force, rows[p])
         if look:
             bound(bonds, plan.law[p], bond, force)
             found[p, 2] = _sum(bonds, force[0])
@@ -200,7 +227,6 @@ def _joints(
     for p in range(len(plan.part) - 1):
         e = int(plan.part[p])
         z = int(plan.part[p + 1])
-        for q in range(z - e):
-            _unseat(0.5, plan.edge[p, REST, q], seats[1, e + q], rows[p], q)
+        _unseated(plan.edge[p, REST], seats[1, e:z], rows[p])
         uncurve(z - e, plan.edge[p], rows[p])
         _add(f, plan.a[e:z], plan.b[e:z], rows[p])

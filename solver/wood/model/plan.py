@@ -45,12 +45,12 @@ _EDGE = CURVE + 8
 #: length [m].
 SHARE, RATE, SPRING, SHEAR, COSINE, KEEP, LONG = range(7)
 _BOND = LONG + 1
-#: The fewest edges of a part, but for the last: 64 cost a tenth more, 256 as much.
-_PART = 128
+#: The fewest edges of a part, but for the last: of 2,000 rods 128 cost a tenth more; a call of the bonds' loops, .5 us.
+_PART = 256
 #: Numbers in a line of the cache: rows of parts begin on one.
 _LINE = 8
 #: Rows that the kernels keep of a part's edges, see `forces.rods`.
-ROWS = 41
+ROWS = 35
 
 
 class Plan(NamedTuple):
