@@ -10,7 +10,7 @@ from ..params import Body, WoodParams
 from .arrays import Bodies, Bonds, Rods
 from .cracks import widths
 from .curves import held
-from .grain import Field
+from .grain import Field, rayed, ringed
 from .outline import area, corners, sawn_through
 
 __all__ = ["bodied", "bonded", "longest_edge", "resolved", "stretched"]
@@ -185,11 +185,14 @@ def bonded(
     i, e, u, part = _closest(pairs, s, edge)
     at = np.full(len(i), 0.5)
     middle, length, cosine = _lying(rest, rods, i, at, e, u)
+    way = (held(rest, rods, i, at)[0] - held(rest, rods, e, u)[0])[:, 1:]
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
     volume = area(outline) * params.length * part / max(float(part.sum()), 1e-300)
     stiff = grain.factor(middle, params.grain.stiffness)
-    strength = strong.strength(middle, params.grain.strength)
+    # early wood comes apart as much more easily as it is softer; toughness goes with the square of this
+    early = ringed(params.grain, middle[:, 1:], length / 2) ** 0.5
+    strength = strong.strength(middle, params.grain.strength) * early * rayed(params.grain, middle[:, 1:], way)
     springs = _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff
     sheared = params.shear * volume * stiff
     torn, shorn = (g * crack * part * strength**2 for g in (params.toughness, params.toughness_sliding))
