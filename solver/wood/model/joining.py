@@ -122,7 +122,7 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
 def longest_edge(params: WoodParams, outline: np.ndarray) -> float:
     """Return the length [m] beyond which edges feel no crack's tip, however weak `resolved` may make the bonds.
 
-    Twice as long, a double cantilever beam bore 1.3 times what it should (docs/wood.md).
+    Twice as long, a double cantilever beam bore 1.6 times what it should (docs/wood.md).
     """
     way = np.linalg.norm(np.roll(outline, -1, 0) - outline, axis=1).sum()
     thick = 2 * area(outline) / float(way)
