@@ -107,7 +107,7 @@ def _slides(cut: float) -> tuple[np.ndarray, np.ndarray]:
 
 DCB = Trial("DCB", _DCB_HIGH, _DCB_LONG, (0.08, 1.0), 0.013, 0.6, _opened, (0, 1.0), _opens, 400.0)
 ENF = Trial(
-    "ENF", _ENF_HIGH, 2 * (_ENF_HALF + _ENF_OVER), (-0.1, 0.122), 0.0082, 0.8, _slid, (2, -1.0), _slides, 1600.0
+    "ENF", _ENF_HIGH, 2 * (_ENF_HALF + _ENF_OVER), (-0.1, 0.121), 0.0082, 0.8, _slid, (2, -1.0), _slides, 1600.0
 )
 
 
@@ -204,7 +204,7 @@ def main(meshes: list[str]) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     meshes = ["DCB:24:33:0", "ENF:24:35:0", "DCB:24:17:0", "DCB:24:33:1", "DCB:96:33:0", "ENF:24:69:0", "DCB:24:65:0"]
-    meshes += ["DCB:24:33:2", "ENF:24:35:1"]
+    meshes += ["DCB:24:33:2", "ENF:24:35:1", "ENF:24:35:2", "ENF:96:35:0", "ENF:24:137:0", "DCB:24:129:0"]
     parser.add_argument(
         "meshes", nargs="*", default=meshes, metavar="TEST:RODS:VERTICES:SEED", help="default: %(default)s"
     )

@@ -1,8 +1,7 @@
 """Whether cracks are of the material or of the mesh: python -m benchmarks.wood.objectivity; reads wood-fracture.
 
-What the crack grew by and the energy that this took, over the mean of the seeds on the first mesh. A saw cut ends
-between vertices, so that finer meshes begin with a shorter one; where the crack ends hangs on the way alone. So it is
-counted from where the first mesh's cut ends. What is off is counted from the nearest seed on. Nothing is run.
+What the crack grew by and the energy that this took, over the mean of the seeds on the first mesh. What is off is
+counted from the nearest seed on. Nothing is run. All meshes begin with the same cut, or they are not compared.
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ import numpy as np
 
 from benchmarks.figures import Sheet, load
 
-from .fracture import WIDE
-
 __all__ = ["beyond", "meshes"]
 
 _HEAD = ("test", "rods", "vertices", "area over the first mesh's", "energy over it", "seeds are off by",
          "area off beyond seeds", "within 10 %")  # fmt: skip
 _ALLOWED = 0.1
+#: Cuts [m] that are the same.
+_SAME = 1e-6
 
 
 def beyond(value: float, seeds: Sequence[float]) -> float:
@@ -29,10 +28,9 @@ def beyond(value: float, seeds: Sequence[float]) -> float:
     return float(max(min(seeds) - value, value - max(seeds), 0.0) / np.mean(seeds))
 
 
-def _past(run: Mapping[str, Any], cut: float) -> tuple[float, float]:
-    """Return the area [m2] that cracked past the cut's length [m], and the energy [J] that it took."""
-    area = run["area"] + WIDE * (run["cut"] - cut)
-    return area, area * run["by_area"]
+def _took(runs: Sequence[Mapping[str, Any]]) -> tuple[list[float], list[float]]:
+    """Return the areas [m2] that cracked and the energies [J] that this took."""
+    return [run["area"] for run in runs], [run["area"] * run["by_area"] for run in runs]
 
 
 def meshes(runs: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -44,10 +42,11 @@ def meshes(runs: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             if run["test"] == test:
                 grouped.setdefault((run["rods"], run["vertices"]), []).append(run)
         first = max(grouped.values(), key=len)
-        cut = first[0]["cut"]
-        areas, works = ([_past(run, cut)[n] for run in first] for n in (0, 1))
+        if np.ptp([run["cut"] for mine in grouped.values() for run in mine]) > _SAME:
+            raise ValueError(f"{test}: meshes begin with different cuts")
+        areas, works = _took(first)
         for (rods, vertices), own in grouped.items():
-            area, work = np.mean([_past(run, cut) for run in own], axis=0).tolist()
+            area, work = (float(np.mean(taken)) for taken in _took(own))
             found.append({
                 "test": test, "rods": rods, "vertices": vertices, "seeds": len(own), "first": own is first,
                 "area": area / float(np.mean(areas)), "energy": work / float(np.mean(works)),

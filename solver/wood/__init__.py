@@ -68,7 +68,7 @@ _NUMBERS = (
 
 SOLVER = Solver(
     name="wood",
-    version="7",
+    version="8",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),

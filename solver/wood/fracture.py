@@ -17,7 +17,7 @@ from numba import njit
 
 from .model.arrays import Bonds, Rods
 from .model.bundle import SAMPLES
-from .model.joining import sloped
+from .model.joining import stretched
 from .model.motion import Motion
 from .model.sawing import crossed
 from .model.state import Wood
@@ -27,6 +27,9 @@ __all__ = ["Breaks", "break_worst", "overstress", "sawed"]
 
 #: A break closer to a vertex than this, over the edge, is one at the vertex.
 _NEAR = 0.25
+_TINY = 1e-30
+#: A bond beside a break is laid anew no shorter than this, over its length before.
+_SHORTEST = 0.5
 
 
 class Breaks(NamedTuple):
@@ -142,8 +145,8 @@ def overstress(
 
 
 def _split(wood: Wood, h: int) -> Wood:
-    """Split the vertex of hinge h in two, one for each edge; mass, load and bonds by their shares."""
-    m, rods, bonds = wood.motion, wood.rods, wood.bonds
+    """Split the vertex of hinge h in two, one for each edge; mass and load by their shares, bonds stay on the edges."""
+    m, rods = wood.motion, wood.rods
     p, q = int(rods.before[h]), int(rods.after[h])
     i, new = int(rods.b[p]), len(m.x)
     lengths = np.where(rods.k[[p, q]] > 0, rods.rest[[p, q]], 0.0)
@@ -159,16 +162,9 @@ def _split(wood: Wood, h: int) -> Wood:
     }
     grown["mass"][i] *= 1 - part
     grown["load"][i] *= 1 - part
-    mine = np.flatnonzero((bonds.i == i) & (bonds.on > 0))
-    more = {name: getattr(bonds, name)[mine] for name in Bonds._fields}
-    more["i"] = np.full(len(mine), new, np.int32)
-    for name in ("k", "s", "opens", "slides", "torn", "shorn", "area"):
-        more[name] = more[name] * part
-        getattr(bonds, name)[mine] *= 1 - part
     return replace(
         wood,
         motion=Motion(*(grown.get(name, getattr(m, name)) for name in Motion._fields)),
-        bonds=Bonds(*(np.concatenate([getattr(bonds, name), more[name]]) for name in Bonds._fields)),
         parent=np.append(wood.parent, np.int32(i)),
     )
 
@@ -187,21 +183,22 @@ def _sever(wood: Wood, e: int, place: float) -> int:
         np.flatnonzero((rods.after == e) & (rods.whole == 1)),
         np.flatnonzero((rods.before == e) & (rods.whole == 1)),
     )
-    mine = np.flatnonzero((bonds.j == e) & (bonds.on > 0))
-    first = bonds.share[mine] < place
     dropped = 0
-    if len(ends[0]):
-        p = rods.before[ends[0][0]]
-        bonds.j[mine[first]] = p
-        bonds.share[mine[first]] = 1 + bonds.share[mine[first]] * rods.rest[e] / rods.rest[p]
-    else:
-        dropped += _left(bonds, mine[first])
-    if len(ends[1]):
-        q = rods.after[ends[1][0]]
-        bonds.j[mine[~first]] = q
-        bonds.share[mine[~first]] = (bonds.share[mine[~first]] - 1) * rods.rest[e] / rods.rest[q]
-    else:
-        dropped += _left(bonds, mine[~first])
+    for edge, share in ((bonds.i, bonds.at), (bonds.j, bonds.share)):
+        mine = np.flatnonzero((edge == e) & (bonds.on > 0))
+        first = share[mine] < place
+        if len(ends[0]):
+            p = rods.before[ends[0][0]]
+            edge[mine[first]] = p
+            share[mine[first]] = 1 + share[mine[first]] * rods.rest[e] / rods.rest[p]
+        else:
+            dropped += _left(bonds, mine[first])
+        if len(ends[1]):
+            q = rods.after[ends[1][0]]
+            edge[mine[~first]] = q
+            share[mine[~first]] = (share[mine[~first]] - 1) * rods.rest[e] / rods.rest[q]
+        else:
+            dropped += _left(bonds, mine[~first])
     rods.alive[e] = 0
     for found in ends:
         rods.whole[found] = 0
@@ -212,10 +209,11 @@ def _sever(wood: Wood, e: int, place: float) -> int:
 def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float) -> Breaks:
     """Break what rods are most overstressed, until they have released `allowed` [J]; the worst breaks in any case.
 
-    ratio (e,) and place (e,) as from `overstress`. Beside a break a rod's slope is one-sided: by this alone a bond
-    would be sheared, at a strong bend by many times what it bears. What bonds hold in shear stays what it was.
+    ratio (e,) and place (e,) as from `overstress`. Beside a break a rod's curve is one-sided: by this alone a bond
+    would be stretched and sheared, at a strong bend by many times what it bears, and what bonds hold would be made of
+    nothing. So they are as if laid on the curve that is left: stretch, shear and energy stay what they were.
     """
-    wood.bonds.cosine[:] -= sloped(wood.motion.x, wood.rods, wood.bonds)
+    length, slope = stretched(wood.motion.x, wood.rods, wood.bonds)
     edges = np.flatnonzero(ratio > 1)
     rods = wood.rods
     spent, broken, gone = 0.0, 0, 0
@@ -239,7 +237,12 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float
             # the vertex beyond is already split or a clamp's: cut as close to it as a stub allows
             gone += _sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
             broken += 1
-    wood.bonds.cosine[:] += sloped(wood.motion.x, rods, wood.bonds)
+    later, lean = stretched(wood.motion.x, rods, wood.bonds)
+    # no stiffer than the step bears
+    longer = np.maximum(later / np.maximum(length, _TINY), _SHORTEST)
+    wood.bonds.rest[:] *= longer
+    wood.bonds.k[:] /= longer
+    wood.bonds.cosine[:] += lean - slope
     return Breaks(wood, broken, gone)
 
 

@@ -26,7 +26,7 @@ class _Part(BaseModel):
 
 
 class Grain(_Part):
-    """How stiffness and strength vary over the section and along the rods: a smooth field from the run's seed."""
+    """How stiffness and strength vary: a smooth field from the run's seed, growth rings, and rays from the pith."""
 
     stiffness: float = Field(0.0, ge=0, le=0.5, description="Relative deviation of the stiffness [1]")
     strength: float = Field(
@@ -34,6 +34,16 @@ class Grain(_Part):
     )
     along: float = Field(0.02, gt=1e-5, le=10, description="Correlation length along the rods [m]")
     across: float = Field(0.003, gt=1e-6, le=1, description="Correlation length across them [m]")
+    rings: float = Field(0.0, ge=0, le=1, description="Width of growth rings; 0 lays none [m]")
+    late: float = Field(0.3, gt=0, lt=1, description="Late wood's share of a ring, its outer part [1]")
+    contrast: float = Field(3.0, ge=1, le=20, description="Stiffness of late wood over that of early wood [1]")
+    pith: Corner = Field((0.0, 0.0), description="Place y, z of the pith, where rings and rays begin [m]")
+    rays: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="How much less wood bears in cracks along rays than in those around the pith [1]",
+    )
 
 
 class Notch(_Part):

@@ -25,7 +25,7 @@ def pieces(wood: Wood, params: WoodParams) -> dict[str, Any]:
     m, rods, bonds = wood.motion, wood.rods, wood.bonds
     real, alive = rods.k > 0, (rods.alive == 1) & (rods.k > 0)
     on = (bonds.on == 1) & (bonds.damage < 1)
-    a = np.concatenate([rods.a[alive], bonds.i[on]])
+    a = np.concatenate([rods.a[alive], rods.a[bonds.i[on]]])
     b = np.concatenate([rods.b[alive], rods.a[bonds.j[on]]])
     count = len(m.x)
     label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), (count, count)), directed=False)[1]

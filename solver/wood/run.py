@@ -114,7 +114,7 @@ def _settled(params: WoodParams, vertices: int) -> tuple[WoodParams, dict[str, A
         wanted = math.ceil(params.length / most) + 1
         notes.append(
             f"edges of {1e3 * edge:.3g} mm are longer than the {1e3 * most:.3g} mm that feel a crack's tip: it splits "
-            f"at loads that are too high (by .3 at twice that), and all at once; {wanted} vertices on a rod are enough"
+            f"at loads that are too high (by .6 at twice that), and all at once; {wanted} vertices on a rod are enough"
         )
     return params, said | ({"note": "; ".join(notes)} if notes else {})
 

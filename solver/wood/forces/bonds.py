@@ -1,10 +1,12 @@
 """Forces of the bonds: a transverse spring and a shear term, both balanced.
 
-A bond joins a vertex x to the point c of a curve through another rod's vertices (`model.curves`). With d = x - c and t
-the mean of the curve's slope there and of that at the vertex, by arc length at rest: E = k/2 (|d|/rest - 1)^2 rest + S
-(t.d/|d| - C0)^2, both times 1 - damage, but for pressure. Sutherland 2012 has chords for curves, one rod's slope, and
-the cosine for t.d/|d|, which is the same but for the edge's stretch (Eqs. 3.11-3.23). Put right: Eq. 3.15 has a wrong
-sign, 3.17 squares the energy, and 3.19-3.23 hold c fixed, which loses momentum. Nothing is 0/0 at the rest angle.
+A bond joins its seat, the middle of an edge as laid, to a point of another rod, both on the curves through the rods'
+vertices (`model.curves`). With d from the one point to the other and t the mean of the curves' slopes there, by arc
+length at rest: E = k/2 (|d|/rest - 1)^2 rest + S (t.d/|d| - C0)^2, both times 1 - damage, but for pressure. At vertices
+instead, shear is seen by slopes over two edges: too little of it, and a crack ends half an edge before its halves bend.
+Sutherland 2012 has vertices, chords for curves, one rod's slope, and the cosine for t.d/|d|, which is the same but for
+the edge's stretch (Eqs. 3.11-3.23). Put right: Eq. 3.15 has a wrong sign, 3.17 squares the energy, and 3.19-3.23 hold c
+fixed, which loses momentum. Nothing is 0/0 at the rest angle.
 
 The bonds of a part are rows of numbers, one lane a bond: what they read is copied to rows, the forces are computed from
 rows to rows, which is vectorised, and the rows are added up. What did not help: one loop with gathers in it (it is not
@@ -19,14 +21,14 @@ from numba import njit
 
 from ..model.plan import COSINE, KEEP, LONG, RATE, SHARE, SHEAR, SPRING
 
-__all__ = ["FORCES", "READS", "bind", "bound", "gather"]
+__all__ = ["FORCES", "READS", "bind", "bound", "gather", "parts"]
 
 _TINY = 1e-30
-#: Rows that a bond reads: its vertex, its edge's first end, the edge, p and q, the slope at the vertex; and rows of its
-#: forces: on the vertex, the edge, p, q and the slope.
+#: Rows that a bond reads: its seat, the other edge's first end, this edge, p and q, the slope at the seat; and rows of
+#: its forces: on the seat, the slopes, p, q and the edge.
 READS, FORCES = 18, 15
 #: Lanes that an edge's numbers are written to at once; rows have as many to spare.
-_WIDE = 8
+_WIDE = 4
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -36,23 +38,19 @@ def _spread(row: np.ndarray, value: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def gather(
-    x: np.ndarray, lean: np.ndarray, vertex: np.ndarray, lane: np.ndarray, edge: np.ndarray, row: np.ndarray
-) -> None:
-    """Fill the rows (18, w + 8) of bonds: their vertices' places, first ends, edges, p, q and slopes at the vertices.
+def gather(seats: np.ndarray, seat: np.ndarray, lane: np.ndarray, edge: np.ndarray, row: np.ndarray) -> None:
+    """Fill the rows (18, w + 4) of bonds: their seats' places, first ends, edges, p, q and slopes at the seats.
 
-    lean (v, 3): slopes at vertices; vertex (w,), lane (m + 1,): as in `Plan`; edge: rows of the part's edges.
+    seats (s, 8): places and slopes; seat (w,), lane (m + 1,): as in `Plan`; edge: rows of the part's edges.
     """
     for n in range(lane[-1]):
-        i = vertex[n]
-        row[0, n] = x[i, 0]
-        row[1, n] = x[i, 1]
-        row[2, n] = x[i, 2]
-    for n in range(lane[-1]):
-        i = vertex[n]
-        row[15, n] = lean[i, 0]
-        row[16, n] = lean[i, 1]
-        row[17, n] = lean[i, 2]
+        i = seat[n]
+        row[0, n] = seats[i, 0]
+        row[1, n] = seats[i, 1]
+        row[2, n] = seats[i, 2]
+        row[15, n] = seats[i, 3]
+        row[16, n] = seats[i, 4]
+        row[17, n] = seats[i, 5]
     _over(lane, edge, 0, row[3], row[4], row[5])
     _over(lane, edge, 20, row[6], row[7], row[8])
     _over(lane, edge, 23, row[9], row[10], row[11])
@@ -72,7 +70,7 @@ def _over(lane: np.ndarray, edge: np.ndarray, first: int, x: np.ndarray, y: np.n
 
 
 @njit(cache=True, error_model="numpy")
-def _parts(u: float) -> tuple[float, float, float, float]:
+def parts(u: float) -> tuple[float, float, float, float]:
     """Return the parts of p and q in the curve's place at u, and in its slope."""
     v = min(max(u, 0.0), 1.0)
     w = 1.0 - v
@@ -85,7 +83,7 @@ def _reach(count: int, law: np.ndarray, row: np.ndarray) -> None:
     """Overwrite the rows 0 to 5 of bonds by d and t."""
     for n in range(count):
         u = law[SHARE, n]
-        a, b, a1, b1 = _parts(u)
+        a, b, a1, b1 = parts(u)
         ex, ey, ez = row[6, n], row[7, n], row[8, n]
         px, py, pz = row[9, n], row[10, n], row[11, n]
         qx, qy, qz = row[12, n], row[13, n], row[14, n]
@@ -126,26 +124,16 @@ def _pull(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> No
 
 
 @njit(cache=True, error_model="numpy")
-def _lean(count: int, law: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces on the slopes at the vertices [N m] to the rows 12 to 14."""
-    for n in range(count):
-        h = law[LONG, n]
-        force[12, n] = h * force[3, n]
-        force[13, n] = h * force[4, n]
-        force[14, n] = h * force[5, n]
-
-
-@njit(cache=True, error_model="numpy")
 def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces on p and q to the rows 6 to 11, and on the edge over those by t."""
+    """Write the forces on p and q to the rows 6 to 11, and on the edge to the rows 12 to 14."""
     for n in range(count):
         u = law[SHARE, n]
-        a, b, a1, b1 = _parts(u)
+        a, b, a1, b1 = parts(u)
         fx, fy, fz = force[0, n], force[1, n], force[2, n]
         tx, ty, tz = force[3, n], force[4, n], force[5, n]
-        force[3, n] = tx - u * fx
-        force[4, n] = ty - u * fy
-        force[5, n] = tz - u * fz
+        force[12, n] = tx - u * fx
+        force[13, n] = ty - u * fy
+        force[14, n] = tz - u * fz
         force[6, n] = a1 * tx - a * fx
         force[7, n] = a1 * ty - a * fy
         force[8, n] = a1 * tz - a * fz
@@ -156,15 +144,14 @@ def _share(count: int, law: np.ndarray, force: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def bind(count: int, law: np.ndarray, row: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces (15, w) [N] of `count` bonds on their vertices, and on edges, p and q; first ends bear the rest.
+    """Write the forces (15, w) [N] of `count` bonds on seats and mean slopes, p, q and edges; first ends bear the rest.
 
-    law (7, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In four loops: where
+    law (7, w): as in `Plan`; row: as `gather` leaves it; d and t are left in its rows 0 to 5. In three loops: where
     more rows are written than six, LLVM gives up asking which overlap, and nothing is vectorised. For the same reason
     no two arguments may be slices with steps.
     """
     _reach(count, law, row)
     _pull(count, law, row, force)
-    _lean(count, law, force)
     _share(count, law, force)
 
 

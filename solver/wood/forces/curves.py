@@ -15,8 +15,6 @@ __all__ = ["ON_CURVE", "curve", "uncurve"]
 
 #: Rows of a part's edges, see `rods.ROWS`: tangent, inverse length, force on the edge; the edge, p, q, forces on them.
 _T, _INVERSE, _FORCE, _E, _P, _Q, ON_CURVE = 6, 10, 11, 20, 23, 26, 29
-#: Forces on the edges before and behind by their neighbours' curves.
-_BEFORE, _BEHIND = 35, 38
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -50,27 +48,20 @@ def curve(count: int, law: np.ndarray, row: np.ndarray) -> None:
             row[_Q + c, n] = q - law[CURVE + 7, n] * p
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _hand(first: int, last: int, side: int, made: int, on: int, to: int, law: np.ndarray, row: np.ndarray) -> None:
-    """Hand the forces in three rows from `on` to their edges, and write those on the neighbours to rows from `to`."""
-    for n in range(first, last):
-        m = n + side
-        ex, ey, ez = row[_E, n], row[_E + 1, n], row[_E + 2, n]
-        gx, gy, gz = row[_T, m], row[_T + 1, m], row[_T + 2, m]
-        fx, fy, fz = row[on, n], row[on + 1, n], row[on + 2, n]
-        beside = law[made, n]
-        own = law[made + 1, n]
-        pull = law[made + 2, n] * (gx * fx + gy * fy + gz * fz)
-        along = law[made + 2, n] * (gx * ex + gy * ey + gz * ez)
-        row[_FORCE, n] += own * fx + pull * gx
-        row[_FORCE + 1, n] += own * fy + pull * gy
-        row[_FORCE + 2, n] += own * fz + pull * gz
-        # a clamp's direction g: (g.e) f + (g.f) e, but for what lies along g
-        less = 2.0 * pull * along
-        turn = row[_INVERSE, m]
-        row[to, n] = beside * fx + turn * (along * fx + pull * ex - less * gx)
-        row[to + 1, n] = beside * fy + turn * (along * fy + pull * ey - less * gy)
-        row[to + 2, n] = beside * fz + turn * (along * fz + pull * ez - less * gz)
+@njit(cache=True, error_model="numpy")
+def _clamped(n: int, m: int, along: float, on: int, row: np.ndarray) -> None:
+    """Add what pulls on p or q of edge n, in three rows from `on`, by the direction g of its clamp's ghost edge m."""
+    part, pull = 0.0, 0.0
+    for c in range(3):
+        part += along * row[_T + c, m] * row[_E + c, n]
+        pull += along * row[_T + c, m] * row[on + c, n]
+    for c in range(3):
+        g = row[_T + c, m]
+        row[_FORCE + c, n] += pull * g
+        # (g.e) f + (g.f) e, but for what lies along g
+        row[_FORCE + c, m] += row[_INVERSE, m] * (
+            part * row[on + c, n] + pull * row[_E + c, n] - 2.0 * pull * part / along * g
+        )
 
 
 @njit(cache=True, error_model="numpy")
@@ -82,10 +73,17 @@ def uncurve(count: int, law: np.ndarray, row: np.ndarray) -> None:
             q = row[ON_CURVE + 3 + c, n]
             row[ON_CURVE + c, n] = p - law[CURVE + 7, n] * q
             row[ON_CURVE + 3 + c, n] = q - law[CURVE + 3, n] * p
-    _hand(1, count, -1, CURVE, ON_CURVE, _BEFORE, law, row)
-    _hand(0, count - 1, 1, CURVE + 4, ON_CURVE + 3, _BEHIND, law, row)
     for c in range(3):
+        for n in range(count):
+            row[_FORCE + c, n] += (
+                law[CURVE + 1, n] * row[ON_CURVE + c, n] + law[CURVE + 5, n] * row[ON_CURVE + 3 + c, n]
+            )
         for n in range(1, count):
-            row[_FORCE + c, n - 1] += row[_BEFORE + c, n]
+            row[_FORCE + c, n - 1] += law[CURVE, n] * row[ON_CURVE + c, n]
         for n in range(count - 1):
-            row[_FORCE + c, n + 1] += row[_BEHIND + c, n]
+            row[_FORCE + c, n + 1] += law[CURVE + 4, n] * row[ON_CURVE + 3 + c, n]
+    for n in range(count):
+        if law[CURVE + 2, n] != 0.0:
+            _clamped(n, n - 1, law[CURVE + 2, n], ON_CURVE, row)
+        if law[CURVE + 6, n] != 0.0:
+            _clamped(n, n + 1, law[CURVE + 6, n], ON_CURVE + 3, row)

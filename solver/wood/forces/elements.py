@@ -26,7 +26,7 @@ class Elements(NamedTuple):
     h: np.ndarray  # (n, 6, 6) second derivatives by the two vectors [N/m]
     weight: np.ndarray  # (n, 2, w) what each vertex counts in each vector
     along: np.ndarray  # (n, 2, w) what each vertex counts in each vector along `clamp`
-    clamp: np.ndarray  # (n, 3) a unit vector
+    clamp: np.ndarray  # (n, 2, 3) unit vectors, of the first half of the vertices and of the second
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,17 +133,19 @@ def _bonds(d: np.ndarray, t: np.ndarray, rest: np.ndarray, bonds: Bonds, h: np.n
 def edges(x: np.ndarray, rods: Rods, vertex: np.ndarray) -> Elements:
     """Return edges and then hinges at x (v, 3), of three vertices (n, 3) each; an edge has the last one twice."""
     count = len(rods.a) + len(rods.before)
-    out = Elements(np.zeros((count, 6, 6)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3)), np.zeros((count, 3)))
+    out = Elements(np.zeros((count, 6, 6)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3)))
     _rods(x, rods, vertex, out.h, out.weight)
     return out
 
 
 def joints(x: np.ndarray, rods: Rods, bonds: Bonds, vertex: np.ndarray, made: Elements) -> Elements:
-    """Return the bonds at x (v, 3), of vertices (b, 9), in the frame of `made`, whose h is not read."""
+    """Return the bonds at x (v, 3), of vertices (b, 8), in the frame of `made`, whose h is not read."""
     y = x[vertex]
     both = np.einsum("bpw,bwc->bpc", made.weight, y)
-    reach = np.einsum("bpw,bwc,bc->bp", made.along, y, made.clamp)
-    both += reach[:, :, None] * made.clamp[:, None, :]
+    wide = vertex.shape[1] // 2
+    for n, mine in enumerate((slice(wide), slice(wide, None))):
+        reach = np.einsum("bpw,bwc,bc->bp", made.along[:, :, mine], y[:, mine], made.clamp[:, n])
+        both += reach[:, :, None] * made.clamp[:, n, None]
     h = np.zeros((len(bonds.i), 6, 6))
     _bonds(both[:, 0], both[:, 1], 2 * rods.rest[bonds.j], bonds, h)
     return made._replace(h=h)
@@ -154,10 +156,11 @@ def spread(parts: Elements, place: np.ndarray, out: np.ndarray) -> None:
     """Add the elements to the blocks out (nnz, 3, 3) at `place` (n, w, w); -1 where a vertex is held."""
     wide = parts.weight.shape[2]
     for n in range(len(parts.h)):
-        g = parts.clamp[n]
         h = parts.h[n]
         for k in range(wide):
+            g = parts.clamp[n, 2 * k // wide]
             for m in range(wide):
+                e = parts.clamp[n, 2 * m // wide]
                 at = place[n, k, m]
                 if at < 0:
                     continue
@@ -171,18 +174,18 @@ def spread(parts: Elements, place: np.ndarray, out: np.ndarray) -> None:
                                     out[at, r, c] += w * z * h[3 * p + r, 3 * q + c]
                         if a == 0.0 and b == 0.0:
                             continue
-                        # (w + a g g) H (z + b g g) less w z H
+                        # (w + a g g) H (z + b e e) less w z H
                         whole = 0.0
                         for r in range(3):
                             for c in range(3):
-                                whole += g[r] * h[3 * p + r, 3 * q + c] * g[c]
+                                whole += g[r] * h[3 * p + r, 3 * q + c] * e[c]
                         for r in range(3):
                             for c in range(3):
                                 left = 0.0
                                 right = 0.0
                                 for s in range(3):
                                     left += g[s] * h[3 * p + s, 3 * q + c]
-                                    right += h[3 * p + r, 3 * q + s] * g[s]
+                                    right += h[3 * p + r, 3 * q + s] * e[s]
                                 out[at, r, c] += (
-                                    a * z * g[r] * left + w * b * right * g[c] + a * b * whole * g[r] * g[c]
+                                    a * z * g[r] * left + w * b * right * e[c] + a * b * whole * g[r] * e[c]
                                 )

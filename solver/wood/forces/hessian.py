@@ -7,54 +7,60 @@ import scipy.sparse as sp
 
 from ..model.arrays import Bonds, Rods
 from ..model.curves import slopes, weights
-from ..model.slopes import parabolas
 from .elements import Elements, edges, joints, spread
 
 __all__ = ["Stiffness"]
 
 
-def _frame(x: np.ndarray, rods: Rods, bonds: Bonds) -> tuple[np.ndarray, Elements]:
-    """Return the vertices (b, 9) of each bond and what they count; h is empty.
+def _ends(rods: Rods, edge: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return four vertices (b, 4) about each edge, and what they count in place and slope [1/m] at its share.
 
-    They are its own, four about its edge, and the ends of two edges that make up the slope at its own.
+    What counts are (b, 2, 4), place and slope: as they stand, and along the clamp's direction; then the edge (b,) that
+    has this direction, whatever where nothing does.
     """
-    count, j = len(rods.a), bonds.j
-    beside = np.full((2, count), -1)
+    beside = np.full((2, len(rods.a)), -1)
     whole = rods.whole == 1
     beside[0, rods.after[whole]] = rods.before[whole]
     beside[1, rods.before[whole]] = rods.after[whole]
-    before, behind = (np.where(n[j] < 0, j, n[j]) for n in beside)
-    lean, factor = (n[bonds.i] for n in parabolas(rods, len(x)))
-    ends = [rods.a[lean[:, 0]], rods.b[lean[:, 0]], rods.a[lean[:, 1]], rods.b[lean[:, 1]]]
-    vertex = np.column_stack([bonds.i, rods.a[before], rods.a[j], rods.b[j], rods.b[behind], *ends])
-    made = slopes(rods)[:, j]
+    before, behind = (np.where(n[edge] < 0, edge, n[edge]) for n in beside)
+    vertex = np.column_stack([rods.a[before], rods.a[edge], rods.b[edge], rods.b[behind]])
+    made = slopes(rods)[:, edge]
     # p and q by the edges before, of and behind the bond, and by the edge along the clamp's direction
-    zero = np.zeros(len(j))
+    zero = np.zeros(len(edge))
     p, q = np.stack([made[0], made[1], zero]), np.stack([zero, made[5], made[4]])
     p, q = p - made[3] * q, q - made[7] * p
     along = np.stack([made[2] - made[3] * made[6], made[6] - made[7] * made[2]])
-    place, slope = weights(bonds.share)
-    parts = np.zeros((2, 3, len(j)))
-    parts[0] = -place[0] * p - place[1] * q
-    parts[0, 1] -= bonds.share
-    parts[1] = slope[0] * p + slope[1] * q
-    parts[1, 1] += 1
-    weight, reach = np.zeros((len(j), 2, 9)), np.zeros((len(j), 2, 9))
+    place, slope = weights(share)
+    parts = np.zeros((2, 3, len(edge)))
+    parts[0] = place[0] * p + place[1] * q
+    parts[0, 1] += share
+    parts[1] = (slope[0] * p + slope[1] * q) / rods.rest[edge]
+    parts[1, 1] += 1 / rods.rest[edge]
+    weight, reach = np.zeros((len(edge), 2, 4)), np.zeros((len(edge), 2, 4))
     for n in range(3):
-        weight[:, :, 1 + n] -= parts[:, n].T
-        weight[:, :, 2 + n] += parts[:, n].T
-    for n in range(2):
-        # the curve's slope is times the edge's length
-        weight[:, 1, 5 + 2 * n] = -factor[:, n] * rods.rest[j]
-        weight[:, 1, 6 + 2 * n] = factor[:, n] * rods.rest[j]
-    weight[:, 0, 0] += 1
-    weight[:, 0, 2] -= 1
-    for n, part in enumerate((-(place * along).sum(0), (slope * along).sum(0))):
-        reach[:, n, 2], reach[:, n, 3] = -part, part
+        weight[:, :, n] -= parts[:, n].T
+        weight[:, :, n + 1] += parts[:, n].T
+    weight[:, 0, 1] += 1
+    for n, part in enumerate(((place * along).sum(0), (slope * along).sum(0) / rods.rest[edge])):
+        reach[:, n, 1], reach[:, n, 2] = -part, part
+    return vertex, weight, reach, np.where(made[2] != 0, before, behind)
+
+
+def _frame(x: np.ndarray, rods: Rods, bonds: Bonds) -> tuple[np.ndarray, Elements]:
+    """Return the vertices (b, 8) of each bond, four about each edge, and what they count; h is empty."""
+    first, one, along, clamp = _ends(rods, bonds.i, bonds.at)
+    second, other, more, beside = _ends(rods, bonds.j, bonds.share)
+    # a bond is from the second to the first; slopes are times the length of the second one's edge
+    sign = np.column_stack([np.full(len(bonds.j), -1.0), rods.rest[bonds.j]])[:, :, None]
+    same = np.column_stack([np.ones(len(bonds.j)), rods.rest[bonds.j]])[:, :, None]
     e = x[rods.b] - x[rods.a]
     t = e / np.linalg.norm(e, axis=1)[:, None]
-    clamp = t[np.where(made[2] != 0, before, behind)]
-    return vertex, Elements(np.zeros((0, 6, 6)), weight, reach, clamp)
+    return np.column_stack([first, second]), Elements(
+        np.zeros((0, 6, 6)),
+        np.concatenate([same * one, sign * other], 2),
+        np.concatenate([same * along, sign * more], 2),
+        np.stack([t[clamp], t[beside]], 1),
+    )
 
 
 class Stiffness:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..model.plan import Plan
-from .bonds import FORCES, READS, bind, bound, gather
+from ..model.plan import REST, Plan
+from .bonds import FORCES, READS, bind, bound, gather, parts
 from .curves import ON_CURVE, curve, uncurve
-from .rods import ROWS, bend, bending, place, strain, stretch, stretching
+from .rods import bend, bending, place, strain, stretch, stretching
 
 __all__ = ["internal"]
 
 
 @njit(cache=True, error_model="numpy")
 def _gathered(
-    f: np.ndarray, lean: np.ndarray, vertex: np.ndarray, lane: np.ndarray, force: np.ndarray, edge: np.ndarray
+    pull: np.ndarray, seat: np.ndarray, lane: np.ndarray, rest: np.ndarray, force: np.ndarray, edge: np.ndarray
 ) -> None:
-    """Add forces of bonds to their vertices in f (v, 3) [N], slopes in lean (v, 3) [N m], and the rows of edges."""
+    """Add forces of bonds to those on their seats, pull (s, 8) [N], [N m], and to the rows of edges `rest` [m] long."""
     n = 0
     for q in range(len(lane) - 1):
         sx, sy, sz = 0.0, 0.0, 0.0
@@ -25,21 +25,22 @@ def _gathered(
         px, py, pz = 0.0, 0.0, 0.0
         qx, qy, qz = 0.0, 0.0, 0.0
         last = int(lane[q + 1])
+        h = rest[q]
         while n < last:
-            i = vertex[n]
+            i = seat[n]
             gx, gy, gz = force[0, n], force[1, n], force[2, n]
-            f[i, 0] += gx
-            f[i, 1] += gy
-            f[i, 2] += gz
-            lean[i, 0] += force[12, n]
-            lean[i, 1] += force[13, n]
-            lean[i, 2] += force[14, n]
+            pull[i, 0] += gx
+            pull[i, 1] += gy
+            pull[i, 2] += gz
+            pull[i, 3] += h * force[3, n]
+            pull[i, 4] += h * force[4, n]
+            pull[i, 5] += h * force[5, n]
             sx += gx
             sy += gy
             sz += gz
-            ex += force[3, n]
-            ey += force[4, n]
-            ez += force[5, n]
+            ex += force[12, n]
+            ey += force[13, n]
+            ez += force[14, n]
             px += force[6, n]
             py += force[7, n]
             pz += force[8, n]
@@ -74,28 +75,58 @@ def _add(f: np.ndarray, a: np.ndarray, b: np.ndarray, edge: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _slopes(x: np.ndarray, plan: Plan, lean: np.ndarray) -> None:
-    """Fill lean[0] with slopes, and lean[1] with nothing."""
-    for i in range(len(x)):
-        e = plan.leans[i, 0]
-        g = plan.leans[i, 1]
-        p = plan.factor[i, 0]
-        q = plan.factor[i, 1]
-        for c in range(3):
-            lean[0, i, c] = p * (x[plan.b[e], c] - x[plan.a[e], c]) + q * (x[plan.b[g], c] - x[plan.a[g], c])
-            lean[1, i, c] = 0.0
+def _seat(u: float, rest: float, row: np.ndarray, q: int, out: np.ndarray) -> None:
+    """Write place [m] and slope at the share u of an edge, column q of its part's rows, to out (8,)."""
+    a, b, a1, b1 = parts(u)
+    for c in range(3):
+        e, p, z = row[20 + c, q], row[23 + c, q], row[26 + c, q]
+        out[c] = row[c, q] + u * e + a * p + b * z
+        out[3 + c] = (e + a1 * p + b1 * z) / rest
 
 
 @njit(cache=True, error_model="numpy")
-def _unslope(f: np.ndarray, plan: Plan, lean: np.ndarray) -> None:
-    """Add what pulls on slopes, lean[1] [N m], to the vertices f (v, 3) [N] that make them up."""
-    for i in range(len(f)):
-        for n in range(2):
-            e = plan.leans[i, n]
-            for c in range(3):
-                pull = plan.factor[i, n] * lean[1, i, c]
-                f[plan.b[e], c] += pull
-                f[plan.a[e], c] -= pull
+def _unseat(u: float, rest: float, pull: np.ndarray, row: np.ndarray, q: int) -> None:
+    """Add what pulls on such a seat (8,) to the forces in the edge's rows."""
+    a, b, a1, b1 = parts(u)
+    for c in range(3):
+        f, t = pull[c], pull[3 + c] / rest
+        row[c, q] -= f
+        row[11 + c, q] += u * f + t
+        row[ON_CURVE + c, q] += a * f + a1 * t
+        row[ON_CURVE + 3 + c, q] += b * f + b1 * t
+
+
+@njit(cache=True, error_model="numpy")
+def _seated(rest: np.ndarray, row: np.ndarray, out: np.ndarray) -> None:
+    """Do what `_seat` does in the middles of edges, out (m, 8): their number makes the loops worth it."""
+    a, b, a1, b1 = parts(0.5)
+    for q in range(len(out)):
+        h = 1.0 / rest[q]
+        for c in range(3):
+            e, p, z = row[20 + c, q], row[23 + c, q], row[26 + c, q]
+            out[q, c] = row[c, q] + 0.5 * e + a * p + b * z
+            out[q, 3 + c] = (e + a1 * p + b1 * z) * h
+
+
+@njit(cache=True, error_model="numpy")
+def _unseated(rest: np.ndarray, pull: np.ndarray, row: np.ndarray) -> None:
+    """Do what `_unseat` does for seats (m, 8) in the middles of edges."""
+    a, b, a1, b1 = parts(0.5)
+    for c in range(3):
+        for q in range(len(pull)):
+            f, t = pull[q, c], pull[q, 3 + c] / rest[q]
+            row[c, q] -= f
+            row[11 + c, q] += 0.5 * f + t
+            row[ON_CURVE + c, q] += a * f + a1 * t
+            row[ON_CURVE + 3 + c, q] += b * f + b1 * t
+
+
+@njit(cache=True, error_model="numpy")
+def _part_of(plan: Plan, e: int) -> int:
+    p = 0
+    while plan.part[p + 1] <= e:
+        p += 1
+    return p
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc"})
@@ -111,10 +142,9 @@ def _sum(count: int, row: np.ndarray) -> float:
 def internal(
     x: np.ndarray,
     f: np.ndarray,
-    lean: np.ndarray,
+    seats: np.ndarray,
+    rows: np.ndarray,
     plan: Plan,
-    first: int,
-    last: int,
     turning: bool,
     look: bool,
     t: np.ndarray,
@@ -122,29 +152,22 @@ def internal(
     each: np.ndarray,
     found: np.ndarray,
 ) -> None:
-    """Add the forces of the parts from `first` to `last` to f (v, 3) [N]; fill tangents t (e, 3) and 1/|e| (e,).
+    """Add the forces of all parts to f (v, 3) [N]; fill tangents t (e, 3) and 1/|e| (e,), `rows` and `seats`.
 
     With `turning`, bending is left to `twist.turn`. With `look`, each part's energies [J] of stretching, bending and
     bonds and its bound of `rods.strain` are written (p, 4), and what each bond would have by opening and by shear if it
     were whole, each (2, b) [J].
     """
-    wide = plan.vertex.shape[1]
     bonded = False
-    for p in range(first, last):
+    for p in range(len(plan.part) - 1):
         # a part's last lane is the end of its bonds
         bonded = bonded or plan.lane[plan.part[p + 1] + p] > 0
-    if bonded:
-        _slopes(x, plan, lean)
-    edge = np.empty((ROWS, plan.edge.shape[2]))
-    bond = np.empty((READS, wide + 8))
-    force = np.empty((FORCES, wide))
-    for p in range(first, last):
+    for p in range(len(plan.part) - 1):
         e = int(plan.part[p])
         z = int(plan.part[p + 1])
-        a = plan.a[e:z]
-        b = plan.b[e:z]
+        edge = rows[p]
         count = z - e
-        place(x, a, b, edge)
+        place(x, plan.a[e:z], plan.b[e:z], edge)
         stretch(count, plan.edge[p], edge)
         own = t[e:z]
         other = inverse[e:z]
@@ -160,18 +183,36 @@ def internal(
             found[p, 1] = 0.0 if turning else bending(count, plan.edge[p], edge)
             found[p, 2] = 0.0
             found[p, 3] = strain(count, plan.edge[p], edge)
-        lane = plan.lane[e + p : z + p + 1]
-        bonds = int(lane[count])
-        if bonds == 0:
+        if bonded:
+            curve(count, plan.edge[p], edge)
+            _seated(plan.edge[p, REST], edge, seats[0, e:z])
+        else:
             edge[0:3] = 0.0
-            _add(f, a, b, edge)
-            continue
-        curve(count, plan.edge[p], edge)
-        gather(x, lean[0], plan.vertex[p], lane, edge, bond)
+            _add(f, plan.a[e:z], plan.b[e:z], edge)
+    if bonded:
+        _joints(f, seats, rows, plan, look, each, found)
+
+
+@njit(cache=True, error_model="numpy")
+def _joints(
+    f: np.ndarray, seats: np.ndarray, rows: np.ndarray, plan: Plan, look: bool, each: np.ndarray, found: np.ndarray
+) -> None:
+    """Add the forces of bonds to those in `rows`, and all to f; the rest as in `internal`."""
+    edges = len(plan.a)
+    for s in range(len(plan.stub)):
+        p = _part_of(plan, plan.stub[s])
+        q = plan.stub[s] - plan.part[p]
+        _seat(plan.at[s], plan.edge[p, REST, q], rows[p], q, seats[0, edges + s])
+    seats[1] = 0.0
+    wide = plan.seat.shape[1]
+    bond = np.empty((READS, wide + 4))
+    force = np.empty((FORCES, wide))
+    for p in range(len(plan.part) - 1):
+        lane = plan.lane[plan.part[p] + p : plan.part[p + 1] + p + 1]
+        bonds = int(lane[len(lane) - 1])
+        gather(seats[0], plan.seat[p], lane, rows[p], bond)
         bind(bonds, plan.law[p], bond, force)
-        _gathered(f, lean[1], plan.vertex[p], lane, force, edge)
-        uncurve(count, plan.edge[p], edge)
-        _add(f, a, b, edge)
+        _gathered(seats[1], plan.seat[p], lane, plan.edge[p, REST], force, rows[p])
         if look:
             bound(bonds, plan.law[p], bond, force)
             found[p, 2] = _sum(bonds, force[0])
@@ -179,5 +220,13 @@ def internal(
             for n in range(bonds):
                 each[0, origin[n]] = force[1, n]
                 each[1, origin[n]] = force[2, n]
-    if bonded:
-        _unslope(f, plan, lean)
+    for s in range(len(plan.stub)):
+        p = _part_of(plan, plan.stub[s])
+        q = plan.stub[s] - plan.part[p]
+        _unseat(plan.at[s], plan.edge[p, REST, q], seats[1, edges + s], rows[p], q)
+    for p in range(len(plan.part) - 1):
+        e = int(plan.part[p])
+        z = int(plan.part[p + 1])
+        _unseated(plan.edge[p, REST], seats[1, e:z], rows[p])
+        uncurve(z - e, plan.edge[p], rows[p])
+        _add(f, plan.a[e:z], plan.b[e:z], rows[p])

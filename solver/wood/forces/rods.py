@@ -17,12 +17,11 @@ from numba import njit
 
 from ..model.plan import BOW, RADIUS, REST, STIFF, TENSION, WEAK
 
-__all__ = ["ROWS", "bend", "bending", "place", "strain", "stretch", "stretching"]
+__all__ = ["bend", "bending", "place", "strain", "stretch", "stretching"]
 
-#: Rows of a part's edges: 0 first end, 3 second end [m], 6 tangent, 9 length [m], 10 its inverse, 11 -dE/de [N], 14 and
-#: 17 its parts by the hinges behind and before the edge [N], 20 the edge, 23 and 26 p and q of its curve [m]; from 29
-#: on forces on these, and what `curves.uncurve` hands on [N].
-ROWS = 41
+# Rows of a part's edges (`plan.ROWS`): 0 first end, 3 second end [m], 6 tangent, 9 length [m], 10 its inverse, 11
+# -dE/de [N], 14 and 17 its parts by the hinges behind and before the edge [N], 20 the edge, 23 and 26 p and q of its
+# curve [m]; 29 and 32 forces on these [N].
 #: Keeps an edge of no length, and a hinge folded flat, finite.
 _TINY = 1e-30
 _FLAT = 1e-9

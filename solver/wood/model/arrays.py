@@ -31,11 +31,12 @@ class Rods(NamedTuple):
 
 
 class Bonds(NamedTuple):
-    """Bonds (b,) from a vertex to a point of the curve through another rod's vertices (`curves`)."""
+    """Bonds (b,) between points of the curves through two rods' vertices (`curves`): the middle of an edge as laid."""
 
-    i: np.ndarray  # (b,) int32 vertex
-    j: np.ndarray  # (b,) int32 edge
-    share: np.ndarray  # (b,) where on the edge, 0 to 1; beyond it on a stub that the edge carries
+    i: np.ndarray  # (b,) int32 edge of the one rod
+    at: np.ndarray  # (b,) where on it, 1/2 as laid; not so on a stub that the edge carries, beyond 0 to 1
+    j: np.ndarray  # (b,) int32 edge of the other
+    share: np.ndarray  # (b,) where on it, 0 to 1; beyond on a stub
     rest: np.ndarray  # (b,) rest distance [m]
     k: np.ndarray  # (b,) transverse stiffness [N]: energy k s^2 rest / 2
     s: np.ndarray  # (b,) shear stiffness S of Eq. 3.12 [J]

@@ -10,7 +10,7 @@ from ...contract import Context
 from ..params import WoodParams
 from .arrays import Rods, Turns
 from .axis import along, curved, started
-from .grain import Field
+from .grain import Field, ringed
 from .gripping import courses, pins_of
 from .joining import bodied, bonded
 from .motion import Motion
@@ -88,7 +88,7 @@ def _rods(at: _Layout, grain: Field, params: WoodParams) -> Rods:
     length = np.linalg.norm(flat[b] - flat[a], axis=1)
     section = np.repeat(at.area, count - 1)
     middle = (at.straight[:, 1:] + at.straight[:, :-1]) / 2
-    stiff = grain.factor(middle, params.grain.stiffness).ravel()
+    stiff = (grain.factor(middle, params.grain.stiffness) * _rings(at, params)[:, None]).ravel()
     solid = np.where(real, length, 0.0)
     before, after = edge[:, :-1].ravel(), edge[:, 1:].ravel()
     return Rods(
@@ -113,8 +113,16 @@ def _hinges(at: _Layout) -> np.ndarray:
 
 def _stiff(at: _Layout, grain: Field, params: WoodParams) -> np.ndarray:
     """Return the grain's factor (h,) of the stiffness of hinges."""
-    found: np.ndarray = grain.factor(at.straight[:, 1:-1], params.grain.stiffness).ravel()
+    factor = grain.factor(at.straight[:, 1:-1], params.grain.stiffness)
+    found: np.ndarray = (factor * _rings(at, params)[:, None]).ravel()
     return found
+
+
+def _rings(at: _Layout, params: WoodParams) -> np.ndarray:
+    """Return the growth rings' factor (k,) of the stiffness of rods; the bundle keeps what it has in tension."""
+    found = ringed(params.grain, at.straight[:, 0, 1:], np.sqrt(at.area / np.pi))
+    kept: np.ndarray = found * at.area.sum() / (found @ at.area)
+    return kept
 
 
 def _motion(at: _Layout, rods: Rods, params: WoodParams) -> Motion:
@@ -193,9 +201,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     real = rods.k > 0
     k = params.contact_stiffness or _CONTACT * float(np.median(rods.k[real] / rods.rest[real]))
     edge = np.arange(len(real), dtype=np.int32).reshape(len(points), -1)
-    bonds = bonded(
-        params, points, s, at.grid, edge[:, int(at.ghosts[0]) :], at.rest.reshape(-1, 3), rods, grain, strong
-    )
+    bonds = bonded(params, points, s, edge[:, int(at.ghosts[0]) :], at.rest.reshape(-1, 3), rods, grain, strong)
     straight = at.straight.reshape(-1, 3)
     motion = _motion(at, rods, params)
     sawn(params, straight, rods, bonds)

@@ -60,7 +60,7 @@ def fragments(rods: Rods, bonds: Bonds, held: np.ndarray, mass: np.ndarray, scal
     for b in range(len(bonds.i)):
         # what is broken but in the way pushes: with its real mass alone, a chip could not bear that at long steps
         if bonds.on[b] > 0:
-            _join(up, bonds.i[b], rods.a[bonds.j[b]])
+            _join(up, rods.a[bonds.i[b]], rods.a[bonds.j[b]])
     number = 0
     name = np.full(count, -1, np.int32)
     for i in range(count):

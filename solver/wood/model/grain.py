@@ -1,4 +1,4 @@
-"""Grain: stiffness and strength that vary over the section and along the rods, by a seeded smooth random field."""
+"""Grain: stiffness and strength that vary, by a seeded smooth random field, by growth rings and by rays."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import gamma, log_ndtr
 
-__all__ = ["Field", "weibull_modulus"]
+from ..parts import Grain
+
+__all__ = ["Field", "rayed", "ringed", "weibull_modulus"]
 
 _WAVES = 64
 #: A deviation that is none.
@@ -49,6 +51,41 @@ class Field:
         m = weibull_modulus(variation)
         found: np.ndarray = (-log_ndtr(-self(points))) ** (1 / m) / gamma(1 + 1 / m)
         return found
+
+
+def ringed(grain: Grain, points: np.ndarray, wide: np.ndarray | float) -> np.ndarray:
+    """Return the stiffness (n,) of wood at points (n, 2) [m] of the section over the mean: late wood has more.
+
+    It is the mean over `wide` [m] to both sides of the distance to the pith: rods that are wider than a ring do not see
+    it. A ring ends with its late wood.
+    """
+    if grain.rings == 0:
+        return np.ones(len(points))
+    away = np.linalg.norm(points - np.array(grain.pith), axis=1) / grain.rings
+    half = np.maximum(np.asarray(wide) / grain.rings, 1e-9)
+
+    def before(x: np.ndarray) -> np.ndarray:
+        # late wood between the pith and x rings from it; before the pith there is none
+        whole = np.floor(np.maximum(x, 0.0))
+        found: np.ndarray = grain.late * whole + np.maximum(np.maximum(x, 0.0) - whole - (1 - grain.late), 0.0)
+        return found
+
+    low, high = np.maximum(away - half, 0.0), away + half
+    late = (before(high) - before(low)) / (high - low)
+    found: np.ndarray = (1 + (grain.contrast - 1) * late) / (1 + (grain.contrast - 1) * grain.late)
+    return found
+
+
+def rayed(grain: Grain, points: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Return what bonds at points (n, 2) [m] of the section bear over others, as `way` (n, 2) they join rods.
+
+    A crack along a ray parts what is joined around the pith. It bears 1 - `rays` of one that follows a ring.
+    """
+    out = points - np.array(grain.pith)
+    size = np.linalg.norm(out, axis=1) * np.linalg.norm(way, axis=1)
+    around = (out[:, 0] * way[:, 1] - out[:, 1] * way[:, 0]) / np.maximum(size, 1e-300)
+    found: np.ndarray = 1 - grain.rays * around**2
+    return found
 
 
 @lru_cache

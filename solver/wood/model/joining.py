@@ -10,19 +10,18 @@ from ..params import Body, WoodParams
 from .arrays import Bodies, Bonds, Rods
 from .cracks import widths
 from .curves import held
-from .grain import Field
+from .grain import Field, rayed, ringed
 from .outline import area, corners, sawn_through
-from .slopes import leaning
 
-__all__ = ["bodied", "bonded", "longest_edge", "resolved", "sloped"]
+__all__ = ["bodied", "bonded", "longest_edge", "resolved", "stretched"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
 _NET = 3.0
 #: Modulus [Pa] that stands for none.
 _NONE = 1e-9
-#: Edges on the length over which wood gives way ahead of a crack.
-_ZONE = 5.5
+#: Edges on the length over which wood gives way ahead of a crack that opens, and ahead of one that slides.
+_ZONE = 4.0, 5.5
 #: The least share of its strength that a coarse bundle keeps.
 _LEAST = 0.25
 #: Strain and slope at which a bond must have given way, however coarse rods are.
@@ -80,30 +79,27 @@ def bodied(params: WoodParams, k: float, ease: float, rest: np.ndarray) -> Bodie
     )
 
 
-def _lying(x: np.ndarray, rods: Rods, i: np.ndarray, j: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the middles (b, 3) [m], lengths (b,) [m] and slopes along themselves (b,) of bonds from vertices to edges.
+def _lying(
+    x: np.ndarray, rods: Rods, i: np.ndarray, at: np.ndarray, j: np.ndarray, share: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Return the middles (b, 3) [m], lengths (b,) [m] and slopes along themselves (b,) of bonds between edges.
 
-    x (v, 3) [m]; the slope is the mean of both rods', i (b,) vertices, j (b,) edges, share (b,) of these.
+    x (v, 3) [m]; i (b,) edges, at (b,) where on them; j and share likewise. The slope is the mean of both rods'.
     """
-    on_curve, slope = held(x, rods, j, share)
-    d = x[i] - on_curve
+    one, slope = held(x, rods, i, at)
+    other, more = held(x, rods, j, share)
+    d = one - other
     length = np.linalg.norm(d, axis=1)
-    slope = (slope + leaning(x, rods)[i]) / 2
-    return x[i] - d / 2, length, (slope * d).sum(1) / np.maximum(length, 1e-300)
+    return (one + other) / 2, length, (0.5 * (slope + more) * d).sum(1) / np.maximum(length, 1e-300)
 
 
-def sloped(x: np.ndarray, rods: Rods, bonds: Bonds) -> np.ndarray:
-    """Return the slope (b,) along each bond, of the mean of the rods that it joins, vertices at x (v, 3) [m]."""
-    return _lying(x, rods, bonds.i, bonds.j, bonds.share)[2]
+def stretched(x: np.ndarray, rods: Rods, bonds: Bonds) -> tuple[np.ndarray, np.ndarray]:
+    """Return the length (b,) [m] of each bond, and the slope (b,) along it of the mean of the rods that it joins.
 
-
-def _along(s: np.ndarray) -> np.ndarray:
-    """Return the length (k, n) that each vertex stands for, at places s (k, n) along: a bond has its vertex's wood."""
-    gap = np.diff(s, axis=1)
-    own = np.zeros_like(s)
-    own[:, :-1] += gap / 2
-    own[:, 1:] += gap / 2
-    return own
+    x (v, 3) [m]: vertices.
+    """
+    _, length, slope = _lying(x, rods, bonds.i, bonds.at, bonds.j, bonds.share)
+    return length, slope
 
 
 def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[float, float]:
@@ -116,9 +112,9 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
     what the crack costs (Turon et al. 2007); but never so low that bundles without a crack fall apart.
     """
     way = np.linalg.norm(np.roll(outline, -1, 0) - outline, axis=1).sum()
-    thick, zone = 2 * area(outline) / float(way), _ZONE * edge
-    opens = (params.stiffness * params.toughness * thick**3) ** 0.5 / zone**2
-    slides = (params.stiffness * params.toughness_sliding * thick) ** 0.5 / zone
+    thick = 2 * area(outline) / float(way)
+    opens = (params.stiffness * params.toughness * thick**3) ** 0.5 / (_ZONE[0] * edge) ** 2
+    slides = (params.stiffness * params.toughness_sliding * thick) ** 0.5 / (_ZONE[1] * edge)
     own = (params.cleavage, params.shear_strength)
     return min(own[0], max(opens, _LEAST * own[0])), min(own[1], max(slides, _LEAST * own[1]))
 
@@ -126,13 +122,13 @@ def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[floa
 def longest_edge(params: WoodParams, outline: np.ndarray) -> float:
     """Return the length [m] beyond which edges feel no crack's tip, however weak `resolved` may make the bonds.
 
-    Twice as long, a double cantilever beam bore 1.3 times what it should (docs/wood.md).
+    Twice as long, a double cantilever beam bore 1.6 times what it should (docs/wood.md).
     """
     way = np.linalg.norm(np.roll(outline, -1, 0) - outline, axis=1).sum()
     thick = 2 * area(outline) / float(way)
     opens = ((params.stiffness * params.toughness * thick**3) ** 0.5 / (_LEAST * params.cleavage)) ** 0.5
     slides = (params.stiffness * params.toughness_sliding * thick) ** 0.5 / (_LEAST * params.shear_strength)
-    return float(min(opens, slides)) / _ZONE
+    return float(min(opens / _ZONE[0], slides / _ZONE[1]))
 
 
 def _begins(own: np.ndarray, resolved_: np.ndarray, cost: np.ndarray, holds: np.ndarray) -> np.ndarray:
@@ -145,36 +141,37 @@ def _begins(own: np.ndarray, resolved_: np.ndarray, cost: np.ndarray, holds: np.
     return found
 
 
-def _closest(pairs: np.ndarray, s: np.ndarray, grid: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return vertices (b,) of each rod of a pair (m, 2), the edges (b,) of the other one that they are closest to, and
-    how far along those (b,).
+def _closest(pairs: np.ndarray, s: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the edges (b,) of the first rod of each pair (m, 2), the edges (b,) of the second one that their middles
+    are closest to, how far along those (b,), and how long (b,) [m] the first ones are.
     """
-    vertex, on, share = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)]
-    for p, q in np.concatenate([pairs, pairs[:, ::-1]]):
+    one, on, share, long = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)], [np.zeros(0)], [np.zeros(0)]
+    for p, q in pairs:
         # rods are parallel at rest: the closest point lies at the same place along
-        j = np.clip(np.searchsorted(s[q], s[p]) - 1, 0, s.shape[1] - 2)
-        vertex.append(grid[p])
+        middle = (s[p][1:] + s[p][:-1]) / 2
+        j = np.clip(np.searchsorted(s[q], middle) - 1, 0, s.shape[1] - 2)
+        one.append(edge[p][: len(middle)])
         on.append(edge[q][j])
-        share.append(np.clip((s[p] - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
-    return np.concatenate(vertex), np.concatenate(on), np.concatenate(share)
+        share.append(np.clip((middle - s[q][j]) / (s[q][j + 1] - s[q][j]), 0, 1))
+        long.append(np.diff(s[p]))
+    return np.concatenate(one), np.concatenate(on), np.concatenate(share), np.concatenate(long)
 
 
 def bonded(
     params: WoodParams,
     points: np.ndarray,
     s: np.ndarray,
-    grid: np.ndarray,
     edge: np.ndarray,
     rest: np.ndarray,
     rods: Rods,
     grain: Field,
     strong: Field,
 ) -> Bonds:
-    """Bond every vertex to the closest point of each rod within reach.
+    """Bond the middles of edges to the closest points of rods within reach, each pair of rods once.
 
     A bond along the stress begins to give way at the strain of the strength, in tension and in shear.
 
-    points (k, 2) in the section, s (k, n) places along, grid (k, n) vertex numbers, edge (k, n - 1) edge numbers,
+    points (k, 2) in the section, s (k, n) places along, edge (k, n - 1) edge numbers,
     rest (v, 3) places at rest.
     """
     outline = corners(params)
@@ -182,17 +179,21 @@ def bonded(
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T)] if len(pairs) else np.zeros((0, 2), int)
     n = s.shape[1]
-    # each pair is bonded from both sides: half of its crack each
-    crack = np.repeat(np.tile(widths(points, pairs, outline, sawn_through(params)) / 2, 2), n)
-    i, e, u = _closest(pairs, s, grid, edge)
-    middle, length, cosine = _lying(rest, rods, i, e, u)
+    crack = np.repeat(widths(points, pairs, outline, sawn_through(params)), n - 1)
+    # by turns from the one rod and from the other
+    pairs[1::2] = pairs[1::2, ::-1]
+    i, e, u, part = _closest(pairs, s, edge)
+    at = np.full(len(i), 0.5)
+    middle, length, cosine = _lying(rest, rods, i, at, e, u)
+    way = (held(rest, rods, i, at)[0] - held(rest, rods, e, u)[0])[:, 1:]
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    part = _along(s).ravel()[np.searchsorted(grid.ravel(), i)]
     volume = area(outline) * params.length * part / max(float(part.sum()), 1e-300)
     stiff = grain.factor(middle, params.grain.stiffness)
-    strength = strong.strength(middle, params.grain.strength)
-    stretched = _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff
+    # early wood comes apart as much more easily as it is softer; toughness goes with the square of this
+    early = ringed(params.grain, middle[:, 1:], length / 2) ** 0.5
+    strength = strong.strength(middle, params.grain.strength) * early * rayed(params.grain, middle[:, 1:], way)
+    springs = _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff
     sheared = params.shear * volume * stiff
     torn, shorn = (g * crack * part * strength**2 for g in (params.toughness, params.toughness_sliding))
     per_opening = _NET / 2 / max(params.transverse, _NONE) * volume * strength**2
@@ -200,13 +201,14 @@ def bonded(
     cleavage, shear_strength = resolved(params, params.length / (n - 1), outline)
     return Bonds(
         i.astype(np.int32),
+        at,
         e.astype(np.int32),
         u,
         length,
-        stretched,
+        springs,
         sheared,
         cosine,
-        _begins(per_opening * params.cleavage**2, per_opening * cleavage**2, torn, 0.5 * stretched * length),
+        _begins(per_opening * params.cleavage**2, per_opening * cleavage**2, torn, 0.5 * springs * length),
         _begins(per_shear * params.shear_strength**2, per_shear * shear_strength**2, shorn, sheared),
         torn,
         shorn,

@@ -35,7 +35,8 @@ class Scratch(NamedTuple):
     """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3); pairs of edges."""
 
     f: np.ndarray
-    lean: np.ndarray  # (2, v, 3) slopes at vertices, and forces on them [N m]
+    seats: np.ndarray  # (2, s, 8) place [m] and slope of every seat of the plan; force [N] and what pulls on it [N m]
+    rows: np.ndarray  # of the plan's parts (p, rows, m), see `rods.ROWS`
     t: np.ndarray
     inverse: np.ndarray
     torque: np.ndarray

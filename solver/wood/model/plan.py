@@ -14,7 +14,6 @@ from numba import njit
 
 from .arrays import Bonds, Rods
 from .curves import slopes
-from .slopes import parabolas
 
 __all__ = [
     "BOW",
@@ -25,6 +24,7 @@ __all__ = [
     "RADIUS",
     "RATE",
     "REST",
+    "ROWS",
     "SHARE",
     "SHEAR",
     "SPRING",
@@ -45,10 +45,12 @@ _EDGE = CURVE + 8
 #: length [m].
 SHARE, RATE, SPRING, SHEAR, COSINE, KEEP, LONG = range(7)
 _BOND = LONG + 1
-#: The fewest edges of a part, but for the last: 64 cost a tenth more, 256 as much.
-_PART = 128
+#: The fewest edges of a part, but for the last: of 2,000 rods 128 cost a tenth more; a call of the bonds' loops, .5 us.
+_PART = 256
 #: Numbers in a line of the cache: rows of parts begin on one.
 _LINE = 8
+#: Rows that the kernels keep of a part's edges, see `forces.rods`.
+ROWS = 35
 
 
 class Plan(NamedTuple):
@@ -59,11 +61,11 @@ class Plan(NamedTuple):
     b: np.ndarray  # (e,) uint32 second vertex
     edge: np.ndarray  # (p, 14, m) what an edge is made of, in the rows above
     lane: np.ndarray  # (e + p,) uint32 first lane of an edge's bonds; a part has one entry more, its end
-    vertex: np.ndarray  # (p, w) uint32 vertex of a bond
+    seat: np.ndarray  # (p, w) uint32 seat of a bond
     law: np.ndarray  # (p, 7, w) what a bond is made of, in the rows above
     origin: np.ndarray  # (p, w) uint32 the bond's number
-    leans: np.ndarray  # (v, 2) int32 edges that make up the slope at each vertex
-    factor: np.ndarray  # (v, 2) and how much of each [1/m]
+    stub: np.ndarray  # (s,) uint32 edges of the seats that follow those in the middles of edges
+    at: np.ndarray  # (s,) and where on them
 
 
 @njit(cache=True, error_model="numpy")
@@ -118,8 +120,8 @@ def _edges(rods: Rods, strength: np.ndarray, part: np.ndarray, first: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
-def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray, count: int) -> Plan:
-    """Return the plan of what is whole of `count` vertices; strength (e, samples): strain that each place bears."""
+def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray) -> Plan:
+    """Return the plan of what is whole; strength (e, samples): strain that each place bears."""
     edges = len(rods.a)
     part = _parts(rods)
     parts = len(part) - 1
@@ -135,7 +137,9 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray, count: int) -> Plan
     for p in range(parts):
         wide = max(wide, first[part[p + 1]] - first[part[p]])
     wide = (wide + _LINE - 1) // _LINE * _LINE
-    vertex = np.zeros((parts, wide), np.uint32)
+    seat = np.zeros((parts, wide), np.uint32)
+    moved = np.flatnonzero((bonds.on > 0) & (bonds.at != 0.5))
+    stubs = 0
     origin = np.zeros((parts, wide), np.uint32)
     law = np.zeros((parts, _BOND, wide))
     free = first[:edges].copy()
@@ -146,7 +150,10 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray, count: int) -> Plan
         p = own[j]
         m = free[j] - first[part[p]]
         free[j] += 1
-        vertex[p, m] = bonds.i[n]
+        seat[p, m] = bonds.i[n]
+        if bonds.at[n] != 0.5:
+            seat[p, m] = edges + stubs
+            stubs += 1
         origin[p, m] = n
         law[p, SHARE, m] = bonds.share[n]
         law[p, RATE, m] = 1.0 / bonds.rest[n]
@@ -155,16 +162,15 @@ def plan_for(rods: Rods, bonds: Bonds, strength: np.ndarray, count: int) -> Plan
         law[p, COSINE, m] = 2.0 * bonds.cosine[n] * rods.rest[j]
         law[p, LONG, m] = rods.rest[j]
         law[p, KEEP, m] = 1.0 - bonds.damage[n]
-    leans, factor = parabolas(rods, count)
     return Plan(
         part.astype(np.uint32),
         rods.a.astype(np.uint32),
         rods.b.astype(np.uint32),
         edge,
         lane,
-        vertex,
+        seat,
         law,
         origin,
-        leans,
-        factor,
+        bonds.i[moved].astype(np.uint32),
+        bonds.at[moved],
     )

@@ -30,9 +30,10 @@ def sawn(params: WoodParams, rest: np.ndarray, rods: Rods, bonds: Bonds) -> None
     """Break the bonds that cuts go through; rest (v, 3) places at rest [m]."""
     if not len(bonds.i) or not params.cuts:
         return
-    on = held(rest, rods, bonds.j, bonds.share)[0]
+    first = held(rest, rods, bonds.i, bonds.at)[0]
+    second = held(rest, rods, bonds.j, bonds.share)[0]
     for cut in params.cuts:
-        through = _through(rest[bonds.i], on, cut)
+        through = _through(first, second, cut)
         bonds.damage[through] = 1.0
         bonds.parted[through] = 1.0
         bonds.on[through] = 2

@@ -11,7 +11,7 @@ from .arrays import Bodies, Bonds, Pins, Rods, Rubbing, Turns
 from .fragments import fragments
 from .gripping import Course
 from .motion import Motion, Scratch
-from .plan import plan_for
+from .plan import ROWS, plan_for
 
 __all__ = ["State", "Wood", "copied", "scratch_for"]
 
@@ -51,13 +51,14 @@ class Wood:
 
 def scratch_for(wood: Wood) -> Scratch:
     """Return work arrays that fit, and the plan of what is whole."""
-    plan = plan_for(wood.rods, wood.bonds, wood.strength, len(wood.motion.x))
+    plan = plan_for(wood.rods, wood.bonds, wood.strength)
     held = wood.motion.held.copy()
     held[wood.pins.vertex] = 1
     v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
     return Scratch(
         np.zeros((v, 3)),
-        np.zeros((2, v, 3)),
+        np.zeros((2, e + len(plan.stub), 8)),
+        np.zeros((len(plan.part) - 1, ROWS, plan.edge.shape[2])),
         wood.motion.old.copy(),
         1.0 / wood.rods.rest,
         np.zeros(e),

@@ -64,10 +64,9 @@ def _fill(
     internal(
         motion.x,
         f,
-        scratch.lean,
+        scratch.seats,
+        scratch.rows,
         plan,
-        0,
-        len(plan.part) - 1,
         turning,
         look,
         scratch.t,

@@ -60,6 +60,9 @@ def steady(
                 found = found and not apart(p, d, bodies.box[r, c] + near)
             if found:
                 touching[parts.of[a]] += 1.0
+                # the feet of a cut edge's stubs may be of two fragments
+                if parts.of[b] != parts.of[a]:
+                    touching[parts.of[b]] += 1.0
     for q in range(len(pair)):
         n = parts.of[rods.a[pair[q, 0]]]
         m = parts.of[rods.a[pair[q, 1]]]

@@ -77,12 +77,9 @@ def bonded(wood: Wood, span: Spans, pairs: Pairs) -> np.ndarray:
 
     Cells may meet whose rods stand too far apart for bonds: they hold while both hold to a third.
     """
-    rods, per = len(wood.grid), len(wood.rods.a) // len(wood.grid)
-    vertex = wood.bonds.i
-    while (wood.parent[vertex] != vertex).any():
-        vertex = wood.parent[vertex]
-    holder, column = vertex // (per + 1), vertex % (per + 1)
-    places = np.column_stack([span.start.reshape(rods, per), span.end.reshape(rods, per)[:, -1]])
+    rods = len(wood.grid)
+    holder = wood.rod[wood.bonds.i]
+    place = span.start[wood.bonds.i] + wood.bonds.at * (span.end - span.start)[wood.bonds.i]
     other = wood.rod[wood.bonds.j]
     key = np.minimum(holder, other) * rods + np.maximum(holder, other)
     known = pairs.p * rods + pairs.q
@@ -91,7 +88,7 @@ def bonded(wood: Wood, span: Spans, pairs: Pairs) -> np.ndarray:
     number = np.clip(np.searchsorted(known, key), 0, len(known) - 1)
     mine = np.flatnonzero(known[number] == key)
     gap = 4 * span.length
-    value = number[mine] * gap + places[holder[mine], column[mine]]
+    value = number[mine] * gap + place[mine]
     # of bonds at the same place, one that holds comes first
     order = np.lexsort((wood.bonds.on[mine] != 1, value))
     value, on = value[order], wood.bonds.on[mine][order] == 1

@@ -53,32 +53,21 @@ def curves(wood: Wood, x: np.ndarray) -> dict[int, tuple[np.ndarray, ...]]:
 def bond_energies(wood: Wood, x: np.ndarray) -> np.ndarray:
     """Return the energy (b,) [J] of each bond with vertices at x (v, 3), which may be complex."""
     b, at = wood.bonds, curves(wood, x)
-    lean = {}
-    for e, (_, _, _, m0, m1) in at.items():
-        if wood.rods.k[e] > 0 and wood.rods.alive[e]:
-            lean |= {int(wood.rods.a[e]): m0, int(wood.rods.b[e]): m1}
-    for chain in pieces(wood):
-        # one edge alone has no parabola
-        real = [e for e in chain if wood.rods.k[e] > 0 and wood.rods.alive[e]]
-        if len(real) == 1:
-            way = (at[real[0]][2] - at[real[0]][1]) / at[real[0]][0]
-            lean |= {int(wood.rods.a[real[0]]): way, int(wood.rods.b[real[0]]): way}
-        # at a clamp the slope is its own
-        for e in chain if len(chain) > 1 else []:
-            if wood.rods.k[e] == 0:
-                lean[int(wood.rods.b[e] if e == chain[0] else wood.rods.a[e])] = at[e][3]
-    out = np.zeros(len(b.i), x.dtype)
-    for n in np.flatnonzero(b.on):
-        h, y0, y1, m0, m1 = at[int(b.j[n])]
-        u = float(b.share[n])
+
+    def point(edge: int, u: float) -> tuple[np.ndarray, np.ndarray]:
+        h, y0, y1, m0, m1 = at[edge]
         v = min(max(u, 0.0), 1.0)
         place = (1 + 2 * v) * (1 - v) ** 2 * y0 + v * v * (3 - 2 * v) * y1
         place = place + h * v * (1 - v) ** 2 * m0 - h * v * v * (1 - v) * m1
         slope = 6 * v * (1 - v) * (y1 - y0) / h + (1 - v) * (1 - 3 * v) * m0 + v * (3 * v - 2) * m1
-        place = place + (u - v) * h * slope
-        d = x[b.i[n]] - place
+        return place + (u - v) * h * slope, slope
+
+    out = np.zeros(len(b.i), x.dtype)
+    for n in np.flatnonzero(b.on):
+        (one, m0), (other, m1) = point(int(b.i[n]), float(b.at[n])), point(int(b.j[n]), float(b.share[n]))
+        d = one - other
         apart = _length(d)
-        shear = (d * (slope + lean.get(int(b.i[n]), 0))).sum() / 2 / apart - b.cosine[n]
+        shear = (d * (m0 + m1)).sum() / 2 / apart - b.cosine[n]
         keep = 1 - b.damage[n]
         straight = 0.5 * b.k[n] * (apart / b.rest[n] - 1) ** 2 * b.rest[n]
         out[n] = straight * (keep if apart.real > b.rest[n] else 1) + keep * b.s[n] * shear**2

@@ -82,7 +82,7 @@ def test_a_straight_crack_costs_its_area_whatever_the_rods(values, rods):
     for angle in np.linspace(0, np.pi, 9)[:-1]:
         n = np.array([np.cos(angle), np.sin(angle)])
         for off in (-0.0031, 0.0007, 0.0029):
-            one, other = (m.x[i][:, 1:] @ n - off for i in (b.i, wood.rods.a[b.j]))
+            one, other = (m.x[i][:, 1:] @ n - off for i in (wood.rods.a[b.i], wood.rods.a[b.j]))
             crack = b.area[(one < 0) != (other < 0)].sum()
             found.append(crack / (chords(corners(params), n[None], np.array([off]))[0] * params.length))
     assert np.mean(found) == pytest.approx(1, abs=0.05)
@@ -119,8 +119,8 @@ def test_a_saw_cut_along_the_grain_breaks_the_bonds_that_it_passes():
     params = SOLVER.parse({"rods": 24, "vertices": 16, "cuts": [cut], "clamp": "none", **PLANK})
     wood = lay(params, 16)
     b, x = wood.bonds, wood.motion.x
-    apart = (x[b.i, 2] > 0) != (x[wood.rods.a[b.j], 2] > 0)
-    assert np.array_equal(b.on == 2, apart & (x[b.i, 0] <= 0.06))
+    apart = (x[wood.rods.a[b.i], 2] > 0) != (x[wood.rods.a[b.j], 2] > 0)
+    assert np.array_equal(b.on == 2, apart & (x[[wood.rods.a[b.i], wood.rods.b[b.i]], 0].mean(0) <= 0.06))
     assert np.array_equal(b.damage == 1, b.on == 2)
     assert 0.02 * len(b.i) < (b.on == 2).sum() < 0.2 * len(b.i)
     assert wood.rods.alive.all()
@@ -155,7 +155,7 @@ def test_a_plank_sawn_along_has_halves_of_the_beam_s_stiffness_and_a_crack_of_it
         second = a @ (z - a @ z / a.sum()) ** 2 + (a**2).sum() / (4 * np.pi)
         assert second == pytest.approx(0.01 * 0.01**3 / 12, rel=0.06)
     b, x = wood.bonds, wood.motion.x
-    apart = (x[b.i, 2] > 0) != (x[wood.rods.a[b.j], 2] > 0)
+    apart = (x[wood.rods.a[b.i], 2] > 0) != (x[wood.rods.a[b.j], 2] > 0)
     assert b.area[apart].sum() == pytest.approx(0.01 * params.length, rel=1e-9)
 
 
@@ -171,7 +171,7 @@ def test_strength_of_coarse_rods_is_what_their_edges_resolve():
     thick = 2 * 2e-4 / 0.06
     assert resolved(params, 1e-3, outline) == (4e6, 8e6)
     opens, slides = resolved(params, 0.005, outline)
-    assert (10e9 * 250 * thick**3 / opens**2) ** 0.25 == pytest.approx(5.5 * 0.005)
+    assert (10e9 * 250 * thick**3 / opens**2) ** 0.25 == pytest.approx(4 * 0.005)
     assert (10e9 * 700 * thick / slides**2) ** 0.5 == pytest.approx(5.5 * 0.005)
     assert resolved(params, 0.1, outline) == (1e6, 2e6)
 

@@ -19,7 +19,7 @@ def test_fragments_are_the_components_of_a_graph_of_edges_and_bonds():
     r.alive[:] = chance.uniform(size=len(r.alive)) < 0.6
     b.on[:] = chance.uniform(size=len(b.on)) < 0.1
     edge, bond = (r.alive == 1) & (r.k > 0), b.on == 1
-    i, j = np.append(r.a[edge], b.i[bond]), np.append(r.b[edge], r.a[b.j[bond]])
+    i, j = np.append(r.a[edge], r.a[b.i[bond]]), np.append(r.b[edge], r.a[b.j[bond]])
     count, label = connected_components(coo_array((np.ones(len(i)), (i, j)), shape=(len(m.mass),) * 2), directed=False)
     found = fragments(r, b, m.held, m.mass, 4.0, 0.0)
     assert 5 < count < 60

@@ -85,15 +85,18 @@ def test_forces_are_those_of_plain_numpy(values):
 
 def test_a_plan_lists_every_whole_bond_once_and_by_its_edge():
     wood = broken(rods=40)
-    plan, b = plan_for(wood.rods, wood.bonds, wood.strength, len(wood.motion.x)), wood.bonds
+    plan, b = plan_for(wood.rods, wood.bonds, wood.strength), wood.bonds
     found = []
     for p in range(len(plan.part) - 1):
         lanes = plan.lane[plan.part[p] + p : plan.part[p + 1] + p + 1].astype(int)
         number = plan.origin[p, : lanes[-1]]
         np.testing.assert_array_equal(b.j[number], np.repeat(np.arange(*plan.part[p : p + 2]), np.diff(lanes)))
-        np.testing.assert_array_equal(b.i[number], plan.vertex[p, : lanes[-1]])
+        seat = plan.seat[p, : lanes[-1]]
+        np.testing.assert_array_equal(b.i[number], np.append(np.arange(len(plan.a)), plan.stub)[seat])
+        np.testing.assert_array_equal(b.at[number], np.append(np.full(len(plan.a), 0.5), plan.at)[seat])
         found.append(number)
     assert len(found) > 3
+    assert len(plan.stub) > 3
     np.testing.assert_array_equal(np.sort(np.concatenate(found)), np.flatnonzero(b.on))
 
 
@@ -158,15 +161,16 @@ def test_the_bound_of_strain_is_above_what_it_bounds_and_near(seed):
 
 
 @pytest.mark.parametrize("reach", [0.0, 1.6], ids=["loose", "bonded"])
-def test_slopes_are_computed_where_something_is_bonded(reach):
-    """Of several parts none has bonds, or all: without, the slopes' array stays what it was."""
+def test_seats_are_computed_where_something_is_bonded(reach):
+    """Of several parts none has bonds, or all: without, the seats' array stays what it was."""
     wood = lay(SOLVER.parse({"rods": 30, "vertices": 20, "reach": reach}), 20)
     state = begin(wood)
     assert len(state.scratch.plan.part) > 3
-    state.scratch.lean[:] = np.nan
+    state.scratch.seats[:, :, :6] = np.nan
     books, impulse = state.books, state.impulse
     assert march(
         wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, wood.pins, state.scratch, False, 0.0, 1e-9, 1, 0.0,
         books, impulse,
     )  # fmt: skip
-    assert np.isnan(state.scratch.lean).all() == (reach == 0.0)
+    assert np.isnan(state.scratch.seats[:, :, :6]).all() == (reach == 0.0)
+    assert np.isfinite(wood.motion.x).all()
