@@ -75,7 +75,9 @@ def refine(asked: _Asked) -> None:
     if asked.dry_run:
         refining.check(read, tables.info(opened, asked.name))
         state = refining.read(opened, asked.name, measure)
-        _show_proposals(list(itertools.islice(refining.propose(read, state), asked.count)), state, asked)
+        _show_proposals(
+            list(itertools.islice(refining.propose(read, state), max(asked.count, _LOOKED_AT))), state, asked
+        )
         return
     done: list[Round] = []
     with executors.choose(asked.workers, asked.dask, asked.scheduler) as pool:
@@ -101,6 +103,10 @@ def refine(asked: _Asked) -> None:
         raise typer.Exit(130)
     if failed:
         raise typer.Exit(1)
+
+
+#: Proposals that a dry run looks at, at least: the first lines of a grid may be too long for what was asked for.
+_LOOKED_AT = 16
 
 
 def _show_rounds(console: Any, done: list[Round], asked: _Asked, failed: int, stopped: bool) -> None:
@@ -134,6 +140,11 @@ def _show_proposals(found: list[Any], state: Any, asked: _Asked) -> None:
 
     def show(console: Any) -> None:
         console.print(f"table {state.table.name}: {measure} left out {state.mean:.4g}", markup=False)
+        if not kept:
+            fewest = min((len(p.points) for p in found), default=0)
+            advice = f"a grid grows by whole lines: give at least --count {fewest}" if fewest else "no fruit is missing"
+            console.print(f"nothing fits into --count {asked.count} ({advice})", markup=False)
+            return
         grid(
             console,
             ["runs", "at", f"{measure} around"],

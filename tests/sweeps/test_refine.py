@@ -151,6 +151,8 @@ def test_plan_and_table_must_fit(site: None, tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert sum(len(proposal["points"]) for proposal in json.loads(done.stdout)["proposals"]) <= 8
     assert tables.info(store).samples == 8
+    done = CliRunner().invoke(app, [*words[:-1], "--dry-run", "--count", "1"])
+    assert "nothing fits into --count 1 (a grid grows by whole lines: give at least --count 2)" in done.output
     done = CliRunner().invoke(app, [*words, "--count", "2"])
     assert json.loads(done.stdout)["added"] == 2
     assert len(store.ledger.jobs("done", refine.name_of(plan).replace("plan", "grid"))) == 2
