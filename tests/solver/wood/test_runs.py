@@ -75,6 +75,8 @@ def test_breaks_keep_mass_and_momentum_and_hand_bonds_over():
     wood.motion.v[:] = np.random.default_rng(0).normal(size=wood.motion.v.shape)
     mass, momentum = wood.motion.mass.sum(), wood.motion.mass @ wood.motion.v
     stiffness = wood.bonds.s.sum()
+    x, r, b = wood.motion.x, wood.rods, wood.bonds
+    before = held(x, r, b.i, b.at)[0].copy(), held(x, r, b.j, b.share)[0].copy()
     ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
     ratio[[4, 15, 30]], place[[4, 15, 30]] = 1.5, [0.0, 0.5, 1.0]
     broken = break_worst(wood, ratio, place, np.inf)
@@ -86,7 +88,10 @@ def test_breaks_keep_mass_and_momentum_and_hand_bonds_over():
     assert now.bonds.s.sum() == pytest.approx(stiffness, rel=1e-14)
     # bonds pull at the places where they pulled
     x, r, b = now.motion.x, now.rods, now.bonds
-    d = held(x, r, b.i, b.at)[0] - held(x, r, b.j, b.share)[0]
+    ends = held(x, r, b.i, b.at)[0], held(x, r, b.j, b.share)[0]
+    for found, expected in zip(ends, before, strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    d = ends[0] - ends[1]
     assert np.linalg.norm(d, axis=1) == pytest.approx(b.rest, rel=1e-9)
     assert r.alive[b.j].all()
     assert r.alive[b.i].all()
