@@ -85,7 +85,7 @@ def test_who_leaves_stops_what_he_asked_for(monkeypatch: Any) -> None:
         # what is imported first, or a busy machine, may take longer than the asker waits
         for _ in range(20):
             with contextlib.suppress(httpx.ReadTimeout):
-                client.post(URL, json=bowl(40, 4), timeout=0.3)
+                client.post(URL, json=bowl(400, 4), timeout=0.3)
             if made:
                 break
         client.close()
