@@ -36,7 +36,7 @@ from numba import njit
 
 from ...arrays import Ints32, Singles
 from .data import ACTIVE, BINS, HITS, INLINE, LIVE, OPTIONS, PAIRS, READS, Contact, Single
-from .distance import edge_edge, node_triangle
+from .distance import edge_edge, gone, node_triangle
 
 __all__ = ["measure", "prepare", "push_apart", "resolve"]
 
@@ -78,16 +78,6 @@ def prepare(contact: Contact, x: Singles, v: Singles) -> int:
 
 
 @njit(**INLINE)
-def _gone(before: Singles, searched: Singles, i: int, j: int) -> Single:
-    """Square of how far nodes i and j have moved, one as the other sees it, since the last search."""
-    x = (before[i, 0] - searched[i, 0]) - (before[j, 0] - searched[j, 0])
-    y = (before[i, 1] - searched[i, 1]) - (before[j, 1] - searched[j, 1])
-    z = (before[i, 2] - searched[i, 2]) - (before[j, 2] - searched[j, 2])
-    square: Single = x * x + y * y + z * z
-    return square
-
-
-@njit(**INLINE)
 def measure(
     before: Singles, searched: Singles, pairs: Ints32, apart: Singles, values: Singles, weights: Singles,
     limits: Singles, slack: Single, clearance: Single, i: int,
@@ -102,11 +92,11 @@ def measure(
     enough = max(limits[i] + slack, clearance)
     spare = (apart[i] - enough) * SURE
     if spare > 0:
-        gone = max(_gone(before, searched, a, c), _gone(before, searched, a, d))
-        gone = max(gone, _gone(before, searched, a if pairs[i, 4] == 0 else b, b if pairs[i, 4] == 0 else d))
+        come = max(gone(before, searched, a, c), gone(before, searched, a, d))
+        come = max(come, gone(before, searched, a if pairs[i, 4] == 0 else b, b if pairs[i, 4] == 0 else d))
         if pairs[i, 4] != 0:
-            gone = max(gone, _gone(before, searched, b, c))
-        if gone < spare * spare:
+            come = max(come, gone(before, searched, b, c))
+        if come < spare * spare:
             values[i, 7], weights[i] = enough, np.float32(0)
             return
     out, weight = values[i], np.float32(1)

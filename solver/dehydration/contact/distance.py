@@ -1,4 +1,4 @@
-"""How far a node is from a triangle and an edge from an edge, and which points are nearest.
+"""How far a node is from a triangle and an edge from an edge, which points are nearest, and how far two nodes came.
 
 Squared distances to a triangle are continuously differentiable, so forces along them are continuous. Those between
 edges are so but where both are parallel, and there, and where the nearest point is an end, the pair counts for nothing:
@@ -14,7 +14,7 @@ from ...arrays import Singles
 from ...geometry.closest import of_products
 from .data import INLINE, Single
 
-__all__ = ["edge_edge", "node_triangle"]
+__all__ = ["edge_edge", "gone", "node_triangle"]
 
 PARALLEL, FLAT = np.float32(2e-3), np.float32(1e-4)
 """Squared sines between two edges below which their pair begins to fade out (2.6 degrees) and counts for nothing.
@@ -85,3 +85,13 @@ def edge_edge(x: Singles, a: int, b: int, c: int, d: int, out: Singles) -> Singl
     nx, ny, nz = qx + s * ux - t * vx, qy + s * uy - t * vy, qz + s * uz - t * vz
     out[7] = np.sqrt(nx * nx + ny * ny + nz * nz)
     return ZERO
+
+
+@njit(**INLINE)
+def gone(now: Singles, then: Singles, i: int, j: int) -> Single:
+    """Return the square of how far nodes i and j (rows) have moved, one as the other sees it."""
+    x = (now[i, 0] - then[i, 0]) - (now[j, 0] - then[j, 0])
+    y = (now[i, 1] - then[i, 1]) - (now[j, 1] - then[j, 1])
+    z = (now[i, 2] - then[i, 2]) - (now[j, 2] - then[j, 2])
+    square: Single = x * x + y * y + z * z
+    return square

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ...arrays import Ints32, Singles
+from ...arrays import Ints32
 from .data import INLINE, OPTIONS, Contact, Single
-from .distance import edge_edge, node_triangle
+from .distance import edge_edge, gone, node_triangle
 
 __all__ = ["share_a_node", "trust"]
 
@@ -23,16 +23,6 @@ MORE = 16
 """Distances are measured anew when one in so many triangles has come into doubt since they were."""
 
 
-@njit(**INLINE)
-def _gone(x: Singles, looked: Singles, i: int, j: int) -> Single:
-    """Square of how far nodes i and j have moved against each other."""
-    a = (x[i, 0] - looked[i, 0]) - (x[j, 0] - looked[j, 0])
-    b = (x[i, 1] - looked[i, 1]) - (x[j, 1] - looked[j, 1])
-    c = (x[i, 2] - looked[i, 2]) - (x[j, 2] - looked[j, 2])
-    square: Single = a * a + b * b + c * c
-    return square
-
-
 @njit(**OPTIONS)
 def _judge(contact: Contact, reach: Single) -> int:
     """Fill `sure` at positions `searched`, and return how many triangles are not."""
@@ -40,7 +30,7 @@ def _judge(contact: Contact, reach: Single) -> int:
     bent, least, sure = contact.bent, contact.least, contact.sure
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        most = max(_gone(x, looked, a, b), _gone(x, looked, b, c), _gone(x, looked, c, a))
+        most = max(gone(x, looked, a, b), gone(x, looked, b, c), gone(x, looked, c, a))
         bent[t, 0] = np.sqrt(most)
         bent[t, 1] = np.float32(0)
     for i in range(around.shape[0]):
