@@ -32,7 +32,7 @@ def test_a_secret_is_not_kept_and_its_file_is_private(tmp_path: Path) -> None:
     tokens = Tokens(tmp_path)
     token, secret = tokens.create("studio", ["run"])
     assert secret not in tokens.path.read_text()
-    assert secret.rpartition("_")[2] not in tokens.path.read_text()
+    assert secret.removeprefix(f"wizen_{token.id}_") not in tokens.path.read_text()
     assert stat.S_IMODE(tokens.path.stat().st_mode) == 0o600
     assert Tokens(tmp_path).find(secret) == token
     changed = secret[:-1] + ("A" if secret[-1] != "A" else "B")
