@@ -1,10 +1,11 @@
 """How often the page changes what it shows, in a browser that draws in software: python -m benchmarks.scenes.page.
 
-Each row is driven as a hand would (a slider that never rests, a growth that plays, a brush) for some seconds, twice:
-drawn by SwiftShader on the processor, and with the draw calls left out, so that what remains is the page's own work
-and the service's. A graphics card draws what SwiftShader needs seconds for: the second figure is the bound that it
-leaves. First of all, how long the first picture takes from the address on, by a service that has just begun: until
-what is shown is there, and until a frame of it is drawn. Draw calls are counted in the browser's own WebGL functions,
+Each row is driven as a hand would (a slider that never rests, a growth that plays, a brush) for some seconds, thrice:
+drawn by SwiftShader on the processor, in the plain look that the page takes on there and in the full one, and with the
+draw calls left out, so that what remains is the page's own work and the service's. A graphics card draws what
+SwiftShader needs seconds for: the last figure is the bound that it leaves. First of all, how long the first picture
+takes from the address on, by a service that has just begun: until what is shown is there, and until a frame of it is
+drawn. Draw calls are counted in the browser's own WebGL functions,
 instanced ones apart. Page and service: processor seconds of the page's thread and of the server, over the updates;
 both together are the least time from one update to the next.
 """
@@ -99,6 +100,12 @@ class _Row(NamedTuple):
     press: str = ""
 
 
+#: Words of a table -> whether draw calls are made, and the look.
+_DRAWING = {
+    "in software, plain look": (True, "plain"),
+    "in software, full look": (True, "full"),
+    "left out": (False, "full"),
+}
 _DAB = "Dab in the middle"
 _ROWS = (
     _Row("dry: one fruit, s moves", "s=0.2", "#axis-s"),
@@ -108,10 +115,16 @@ _ROWS = (
 )
 
 
+def _prepared(drawing: str) -> str:
+    """Return the script that chooses the look before the page does, and counts what it draws."""
+    is_drawn, look = _DRAWING[drawing]
+    return f"sessionStorage.setItem('wizen-look', '{look}'); window.drawn = {str(is_drawn).lower()}; ({_COUNT})()"
+
+
 @contextmanager
-def _opened(browser: Browser, address: str, row: _Row, is_drawn: bool) -> Iterator[Page]:
+def _opened(browser: Browser, address: str, row: _Row, drawing: str) -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 1280, "height": 800})
-    page.add_init_script(f"window.drawn = {str(is_drawn).lower()}; ({_COUNT})()")
+    page.add_init_script(_prepared(drawing))
     page.goto(address)
     if row.quality:
         page.locator("#quality").select_option(row.quality)
@@ -125,10 +138,10 @@ def _opened(browser: Browser, address: str, row: _Row, is_drawn: bool) -> Iterat
     page.close()
 
 
-def _first(browser: Browser, server: psutil.Process, address: str, is_drawn: bool) -> dict[str, Any]:
+def _first(browser: Browser, server: psutil.Process, address: str, drawing: str) -> dict[str, Any]:
     """Return how long the first picture takes, in a browser that keeps nothing."""
     page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
-    page.add_init_script(f"window.drawn = {str(is_drawn).lower()}; ({_COUNT})(); ({_FIRST})()")
+    page.add_init_script(f"{_prepared(drawing)}; ({_FIRST})()")
     spent = sum(server.cpu_times()[:4])
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable", {"timeDomain": "threadTicks"})
@@ -138,16 +151,16 @@ def _first(browser: Browser, server: psutil.Process, address: str, is_drawn: boo
     busy = _metrics(session)["TaskDuration"]
     spent = sum(server.cpu_times()[:4]) - spent
     page.context.close()
-    return {"what": "first picture", "is_drawn": is_drawn, **first, "page_s": busy, "service_cpu_s": spent}
+    return {"what": "first picture", "drawing": drawing, **first, "page_s": busy, "service_cpu_s": spent}
 
 
 def _metrics(session: Any) -> dict[str, float]:
     return {one["name"]: one["value"] for one in session.send("Performance.getMetrics")["metrics"]}
 
 
-def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, is_drawn: bool, seconds: float) -> Any:
+def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, drawing: str, seconds: float) -> Any:
     """Return what was shown a second, and what one change took of the page's thread and of the service."""
-    with _opened(browser, f"{address}&{row.words}", row, is_drawn) as page:
+    with _opened(browser, f"{address}&{row.words}", row, drawing) as page:
         page.evaluate(_DRIVE, [row.slider, 1500, row.press])  # what is compiled and opened once
         session = page.context.new_cdp_session(page)
         session.send("Performance.enable", {"timeDomain": "threadTicks"})
@@ -159,7 +172,7 @@ def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, 
     served = 1000 * spent / count
     return {
         "what": row.name,
-        "drawn": is_drawn,
+        "drawing": drawing,
         "updates_s": seen["shown"] / seen["seconds"],
         "frames_s": seen["renders"] / seen["seconds"],
         "page_ms": task,
@@ -175,14 +188,15 @@ def _measure(browser: Browser, server: psutil.Process, address: str, row: _Row, 
 def _begin(driver: Any, chromium: str, command: list[str], folder: Path, secret: str) -> None:
     """Measure first pictures, each by a service and a browser of their own and then again, and keep them."""
     sheet = Sheet("page-first", ["first picture", "drawing", "there", "drawn", "page's thread", "service"])
-    for is_drawn in (True, False):
+    for drawing in _DRAWING:
         with running(command, "/healthz", WIZEN_STORE=str(folder / "store")) as (server, port, _):
             browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
             for turn in ("service and browser just begun", "again", "once more"):
-                run = _first(browser, psutil.Process(server.pid), f"http://127.0.0.1:{port}/#token={secret}", is_drawn)
+                run = _first(browser, psutil.Process(server.pid), f"http://127.0.0.1:{port}/#token={secret}", drawing)
                 times = [f"{run[name] / 1000:.2f} s" for name in ("shown", "drawn")]
-                words = [turn, "in software" if is_drawn else "left out"]
-                sheet.add([*words, *times, f"{run['page_s']:.2f} s", f"{run['service_cpu_s']:.2f} s"], turn=turn, **run)
+                sheet.add(
+                    [turn, drawing, *times, f"{run['page_s']:.2f} s", f"{run['service_cpu_s']:.2f} s"], turn=turn, **run
+                )
             browser.close()
     sheet.keep()
 
@@ -222,14 +236,14 @@ def main() -> None:
         with running(command, "/healthz", WIZEN_STORE=str(Path(folder) / "store")) as (server, port, _):
             browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
             for row in _ROWS:
-                for is_drawn in (True, False):
+                for drawing in _DRAWING:
                     address = f"http://127.0.0.1:{port}/#token={secret}"
-                    run = _measure(browser, psutil.Process(server.pid), address, row, is_drawn, seconds)
+                    run = _measure(browser, psutil.Process(server.pid), address, row, drawing, seconds)
                     calls = run["calls_frame"] + run["instanced_frame"]
                     cells = [
                         row.name,
-                        "in software" if is_drawn else "left out",
-                        f"{run['frames_s']:.1f}" if is_drawn else "",
+                        drawing,
+                        f"{run['frames_s']:.1f}" if _DRAWING[drawing][0] else "",
                         f"{run['updates_s']:.1f}",
                         f"{run['page_ms']:.1f} ms",
                         f"{run['service_cpu_ms']:.1f} ms",

@@ -2,6 +2,7 @@
 
 import { button, byId, el } from "./parts/dom";
 import { Problem } from "./service/http";
+import type { Look } from "./view/means";
 import { Studio, type Subject } from "./view/studio";
 
 export type Words = Record<string, string>;
@@ -38,8 +39,23 @@ export class House {
 
   /** The studio, built when a room first draws. */
   get studio(): Studio {
-    this.made ??= new Studio(this.canvas);
+    if (!this.made) {
+      this.made = new Studio(this.canvas);
+      if (this.made.byProcessor) this.offerLook(this.made);
+    }
     return this.made;
+  }
+
+  /** Where no graphics card draws, beauty or speed is for the user to choose. */
+  private offerLook(studio: Studio): void {
+    const title = "No graphics card draws here. Soft light, shadows and pores take seconds for each picture; without them it follows your hand";
+    const choice = button("Full look", () => choose(studio.look === "full" ? "plain" : "full"), { title });
+    const choose = (look: Look): void => {
+      studio.look = look;
+      choice.setAttribute("aria-pressed", String(look === "full"));
+    };
+    choose(studio.look);
+    this.tools.prepend(choice);
   }
 
   stand(subject: Subject | undefined): void {

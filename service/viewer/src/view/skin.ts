@@ -34,6 +34,9 @@ export class SkinMaterial extends MeshPhysicalMaterial {
     uPores: { value: 0.045 },
   };
 
+  private coat = 0;
+  private isPlain = false;
+
   constructor() {
     super({ metalness: 0, clearcoatRoughness: 0.4, specularIntensity: 0.7, ior: 1.42 });
     this.onBeforeCompile = (shader) => {
@@ -48,7 +51,11 @@ export class SkinMaterial extends MeshPhysicalMaterial {
           `#include <color_fragment>
           float ridge = smoothstep(-1.1, 0.8, vRelief / uScale);
           float open = smoothstep(-2.2, 0.15, vRelief / uScale);
-          vec4 mottle = noised(vRest * 5.0 + 3.0), fine = noised(vRest * 23.0);
+          #ifdef PLAIN
+            vec4 mottle = vec4(0.0), fine = vec4(0.0);
+          #else
+            vec4 mottle = noised(vRest * 5.0 + 3.0), fine = noised(vRest * 23.0);
+          #endif
           diffuseColor.rgb = mix(uFurrow, uRidge, ridge) * (1.0 + 0.13 * mottle.x + 0.07 * fine.x);
           float dust = uBloomAmount * smoothstep(-0.3, 0.9, ridge + 0.35 * mottle.x + 0.25 * fine.x);
           diffuseColor.rgb = mix(diffuseColor.rgb, uBloom, 0.3 * dust);`,
@@ -60,13 +67,15 @@ export class SkinMaterial extends MeshPhysicalMaterial {
         .replace(
           "#include <normal_fragment_maps>",
           `#include <normal_fragment_maps>
+          #ifndef PLAIN
           {
             // pores fade out with the distance, before they are smaller than a pixel (by derivatives, triangles would show)
             vec3 pore = noised(vRest * 38.0).yzw + 0.6 * noised(vRest * 83.0).yzw;
             float fade = 1.0 - smoothstep(5.0, 13.0, vViewPosition.z);
             vec3 slope = mat3(viewMatrix) * pore;
             normal = normalize(normal - fade * uPores * (slope - dot(slope, normal) * normal));
-          }`,
+          }
+          #endif`,
         )
         .replace(
           "#include <aomap_fragment>",
@@ -76,6 +85,16 @@ export class SkinMaterial extends MeshPhysicalMaterial {
           reflectedLight.directSpecular *= mix(0.5, 1.0, open);`,
         );
     };
+  }
+
+  /** Without pores, mottles and coat, which cost most where the processor draws. */
+  set plain(plain: boolean) {
+    if (plain === this.isPlain) return;
+    this.isPlain = plain;
+    const { PLAIN: _, ...others } = this.defines ?? {};
+    this.defines = plain ? { ...others, PLAIN: "" } : others;
+    this.clearcoat = plain ? 0 : this.coat;
+    this.needsUpdate = true;
   }
 
   /** Take on a skin at a dryness of 0 to 1; `scale` [r1] is the relief at which ridge and furrow part. */
@@ -89,6 +108,7 @@ export class SkinMaterial extends MeshPhysicalMaterial {
     this.own.uBloomAmount.value = skin.bloom_amount;
     this.own.uScale.value = scale;
     this.roughness = skin.roughness[0] + (skin.roughness[1] - skin.roughness[0]) * dryness;
-    this.clearcoat = skin.coat * (1 - 0.5 * dryness);
+    this.coat = skin.coat * (1 - 0.5 * dryness);
+    this.clearcoat = this.isPlain ? 0 : this.coat;
   }
 }

@@ -9,7 +9,6 @@ import {
   Color,
   DirectionalLight,
   HemisphereLight,
-  type Light,
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
@@ -26,6 +25,8 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { SkinMaterial } from "./skin";
+import { drawsByProcessor, type Look, prefer, preferred } from "./means";
 
 export const HOME = new Spherical(6.3, 1.24, 0.55);
 const FOV = 25;
@@ -50,8 +51,13 @@ export class Studio {
   private readonly camera = new PerspectiveCamera(FOV, 1, 0.5, 40);
   private readonly controls: OrbitControls;
   private readonly target = TARGET.clone();
+  private readonly lamps = lights();
+  /** No graphics card draws. */
+  readonly byProcessor = drawsByProcessor();
+  private chosen: Look = preferred(this.byProcessor);
   private subject: Subject | undefined;
   private pinned: Object3D | undefined;
+  private boxes: Scene["environment"] | undefined;
   private scheduled = false;
   private last = 0;
   /** Told of a click on the shape: the ray's first hit in the coordinates of the subject's object. */
@@ -60,16 +66,17 @@ export class Studio {
   stroke: { dab(at: Vector3): void; end(): void } | undefined;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    // where the processor draws, four samples a pixel would be four times the work
+    const antialias = !this.byProcessor;
+    this.renderer = new WebGLRenderer({ canvas, antialias, alpha: true, powerPreference: "high-performance" });
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.08;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false; // the lights stand still: only a new shape casts another shadow
-    this.scene.environment = softBoxes(this.renderer);
     this.scene.environmentIntensity = 0.62;
-    this.scene.add(...lights(), table());
+    this.scene.add(...Object.values(this.lamps), table());
+    this.dress();
 
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enablePan = false;
@@ -88,11 +95,41 @@ export class Studio {
     this.resize();
   }
 
+  /** Soft boxes, shadows and pores, or what can be drawn at the rate of a hand without a graphics card. */
+  get look(): Look {
+    return this.chosen;
+  }
+
+  set look(look: Look) {
+    prefer(look);
+    this.chosen = look;
+    this.dress();
+    this.resize();
+    this.reshaped();
+  }
+
+  private dress(): void {
+    const plain = this.chosen === "plain";
+    const { key, bounce, fill } = this.lamps;
+    if (!plain) this.boxes ??= softBoxes(this.renderer);
+    this.scene.environment = plain ? null : (this.boxes ?? null);
+    key.castShadow = !plain;
+    // what the boxes would give comes from all around
+    bounce.intensity = plain ? 1.7 : 0.75;
+    fill.visible = plain;
+    this.renderer.setPixelRatio(plain ? 1 : this.byProcessor ? 1.5 : Math.min(devicePixelRatio, 2));
+    for (const object of [this.subject?.object, this.pinned]) if (object) simplify(object, plain);
+    this.canvas.dataset.look = this.chosen;
+  }
+
   /** Put something on the table in place of what stood there; nothing clears it. */
   stand(subject: Subject | undefined): void {
     if (this.subject) this.scene.remove(this.subject.object);
     this.subject = subject;
-    if (subject) this.scene.add(subject.object);
+    if (subject) {
+      simplify(subject.object, this.chosen === "plain");
+      this.scene.add(subject.object);
+    }
     this.resize();
     this.aim();
     this.reshaped();
@@ -102,7 +139,10 @@ export class Studio {
   pin(keep: boolean): void {
     if (this.pinned) this.scene.remove(this.pinned);
     this.pinned = keep ? this.subject?.frozen() : undefined;
-    if (this.pinned) this.scene.add(this.pinned);
+    if (this.pinned) {
+      simplify(this.pinned, this.chosen === "plain");
+      this.scene.add(this.pinned);
+    }
     this.resize();
     this.reshaped();
   }
@@ -149,6 +189,7 @@ export class Studio {
     const [shown, kept] = [this.subject, this.pinned];
     const ratio = this.renderer.getPixelRatio();
     for (const one of [shown?.object, kept]) if (one) one.visible = false;
+    simplify(subject.object, this.chosen === "plain");
     this.scene.add(subject.object);
     const camera = new PerspectiveCamera(FOV, width / height, 0.5, 40);
     const middle = new Vector3(0, 0.48 * subject.height, 0);
@@ -303,7 +344,15 @@ function listenToClicks(canvas: HTMLCanvasElement, clicked: (x: number, y: numbe
   });
 }
 
-function lights(): Light[] {
+/** Leave out of materials what costs most where the processor draws, or take it in again. */
+function simplify(object: Object3D, plain: boolean): void {
+  object.traverse((one) => {
+    if (!(one instanceof Mesh)) return;
+    for (const material of [one.material].flat()) if (material instanceof SkinMaterial) material.plain = plain;
+  });
+}
+
+function lights(): { key: DirectionalLight; rim: DirectionalLight; bounce: HemisphereLight; fill: DirectionalLight } {
   const key = new DirectionalLight("#ffe6cb", 3.1);
   key.position.set(-3.2, 3.9, 2.2);
   key.castShadow = true;
@@ -318,7 +367,10 @@ function lights(): Light[] {
   rim.position.set(3.6, 2.2, -3.2);
   // what the table throws back: without it the underside is a hole
   const bounce = new HemisphereLight("#8f9bb0", "#c09a84", 0.75);
-  return [key, rim, bounce];
+  // stands for the soft boxes where there are none
+  const fill = new DirectionalLight("#fff4e8", 0.9);
+  fill.position.set(1.5, 3, 5);
+  return { key, rim, bounce, fill };
 }
 
 /** A round table top that fades into the background. */

@@ -1,0 +1,28 @@
+// What the browser draws with, and so how much of the studio it can afford.
+
+/** Names of what draws on the processor; a frame with soft boxes, shadows and pores takes such seconds. */
+const BY_PROCESSOR = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+const CHOICE = "wizen-look";
+
+export type Look = "full" | "plain";
+
+/** Whether the browser draws without a graphics card. */
+export function drawsByProcessor(): boolean {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  if (!probe) return false;
+  const named = probe.getExtension("WEBGL_debug_renderer_info");
+  const name = String(probe.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : probe.RENDERER));
+  probe.getExtension("WEBGL_lose_context")?.loseContext();
+  return BY_PROCESSOR.test(name);
+}
+
+/** The look that was chosen here before, or the one that this browser can draw at the rate of a hand. */
+export function preferred(byProcessor: boolean): Look {
+  const chosen = sessionStorage.getItem(CHOICE);
+  if (chosen === "full" || chosen === "plain") return chosen;
+  return byProcessor ? "plain" : "full";
+}
+
+export function prefer(look: Look): void {
+  sessionStorage.setItem(CHOICE, look);
+}
