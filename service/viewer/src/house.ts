@@ -2,7 +2,7 @@
 
 import { button, byId, el } from "./parts/dom";
 import { Problem } from "./service/http";
-import type { Look } from "./view/means";
+import { prefer } from "./view/means";
 import { Studio, type Subject } from "./view/studio";
 
 export type Words = Record<string, string>;
@@ -49,12 +49,13 @@ export class House {
   /** Where no graphics card draws, beauty or speed is for the user to choose. */
   private offerLook(studio: Studio): void {
     const title = "No graphics card draws here. Soft light, shadows and pores take seconds for each picture; without them it follows your hand";
-    const choice = button("Full look", () => choose(studio.look === "full" ? "plain" : "full"), { title });
-    const choose = (look: Look): void => {
-      studio.look = look;
-      choice.setAttribute("aria-pressed", String(look === "full"));
-    };
-    choose(studio.look);
+    const choice = button("Full look", () => {
+      studio.look = studio.look === "full" ? "plain" : "full";
+      prefer(studio.look);
+      pressed();
+    }, { title });
+    const pressed = (): void => choice.setAttribute("aria-pressed", String(studio.look === "full"));
+    pressed();
     this.tools.prepend(choice);
   }
 

@@ -23,6 +23,7 @@ export function preferred(byProcessor: boolean): Look {
   return byProcessor ? "plain" : "full";
 }
 
+/** Keep a choice for as long as the tab is open. */
 export function prefer(look: Look): void {
   sessionStorage.setItem(CHOICE, look);
 }

@@ -26,7 +26,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { SkinMaterial } from "./skin";
-import { drawsByProcessor, type Look, prefer, preferred } from "./means";
+import { drawsByProcessor, type Look, preferred } from "./means";
 
 export const HOME = new Spherical(6.3, 1.24, 0.55);
 const FOV = 25;
@@ -101,7 +101,6 @@ export class Studio {
   }
 
   set look(look: Look) {
-    prefer(look);
     this.chosen = look;
     this.dress();
     this.resize();
