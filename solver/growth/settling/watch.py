@@ -18,7 +18,7 @@ from ...geometry.crossings import crossings
 from ..state import State
 from .energy import vertex_areas
 from .minimise import longest
-from .touching import lengths_of, near_in, touches
+from .touching import lengths_of, near_in
 
 __all__ = ["Watch"]
 
@@ -86,7 +86,10 @@ class Watch:
         if size > _FURTHEST * end.length:
             if (yield from _through(end, way, looks)):
                 return False
-            return not touches(end, self._distance, vertex_areas(end))
+            # what is near along the sheet outlives a long way, too: that takes longer to find than all the rest
+            along = self._along_now(end)
+            yield
+            return not self._touches(along, self._searched(along, end, 0.0), end)
         along = self._along_now(end)
         yield
         far = self._far_now(along, end, size)
@@ -135,9 +138,12 @@ class Watch:
         if known and longest(end.x - known.x) + size <= known.room:
             return known
         room = min(max(_ROOM * end.length, _AHEAD * size), _FURTHEST * end.length)
-        there = end.x, end.mesh, along.surely, self._distance, _SURE * room, 0.0, end.length
-        known = self._far = _Far(end.x, room, shell.search(*there, only="far"))
+        known = self._far = self._searched(along, end, room)
         return known
+
+    def _searched(self, along: _Along, end: State, room: float) -> _Far:
+        there = end.x, end.mesh, along.surely, self._distance, _SURE * room, 0.0, end.length
+        return _Far(end.x, room, shell.search(*there, only="far"))
 
     def _touches(self, along: _Along, far: _Far, state: State) -> bool:
         """Return what `touches` does: it is asked where the sheet is bent, and where something far is within reach."""
