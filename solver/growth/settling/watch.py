@@ -18,7 +18,7 @@ from ...geometry.crossings import crossings
 from ..state import State
 from .energy import vertex_areas
 from .minimise import longest
-from .touching import lengths_of, near_in
+from .touching import lengths_of, near_in, touches
 
 __all__ = ["Watch"]
 
@@ -86,10 +86,11 @@ class Watch:
         if size > _FURTHEST * end.length:
             if (yield from _through(end, way, looks)):
                 return False
-            # what is near along the sheet outlives a long way, too: that takes longer to find than all the rest
-            along = self._along_now(end)
-            yield
-            return not self._touches(along, self._searched(along, end, 0.0), end)
+            known = self._along_still(lengths_of(end))
+            if known is None:
+                return not touches(end, self._distance, vertex_areas(end))
+            # what is near along the sheet outlives a long way, and takes longer to find than all the rest
+            return not self._touches(known, self._searched(known, end, 0.0), end)
         along = self._along_now(end)
         yield
         far = self._far_now(along, end, size)
@@ -108,13 +109,20 @@ class Watch:
 
     def _along_now(self, state: State) -> _Along:
         """Return what is near along a state's sheet; ways, and the longest that count, change by no more than edges."""
-        lengths, known = lengths_of(state), self._along
-        if known is None or (np.abs(lengths - known.lengths) > _DRIFT * known.lengths).any():
+        lengths = lengths_of(state)
+        known = self._along_still(lengths)
+        if known is None:
             more = _SURE * (1 + _DRIFT) / (1 - _DRIFT)
             near = near_in(state, self._distance, vertex_areas(state), more)
             known = self._along = _Along(lengths, near, near.within(1 / more**2))
             self._close = self._far = None
         return known
+
+    def _along_still(self, lengths: Floats) -> _Along | None:
+        """Return what was near along the sheet where it is still, with edges of such lengths (e,)."""
+        known = self._along
+        changed = known is None or (np.abs(lengths - known.lengths) > _DRIFT * known.lengths).any()
+        return None if changed else known
 
     def _close_now(self, along: _Along, end: State, way: Floats) -> _Close | None:
         """Return what may cross on a way (n, 3) and is near each other along the sheet; None where it is long."""
