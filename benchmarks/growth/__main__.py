@@ -25,7 +25,8 @@ from solver.growth.params import GrowthParams
 from solver.growth.settling.energy import elastic
 from solver.growth.tooling.tools import HotSpot
 
-_CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+#: Shape and tool of what is timed.
+CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "leaf rim 3 %": (
         {"shape": "disc", "thickness": 0.02, "curved": False},
         {
@@ -155,11 +156,11 @@ def main() -> None:
         if given.slices:
             slices(given.vertices or [5000, 10_000])
             return
-        for values, tool in _CASES.values():  # compile
+        for values, tool in CASES.values():  # compile
             measure(values, tool, 100, "quasi_newton")
         sheet = Sheet("growth-ways", ("case", *given.ways), "growth")
         for vertices in given.vertices or [2600, 10_000]:
-            for name, (values, tool) in _CASES.items():
+            for name, (values, tool) in CASES.items():
                 found = {way: measure(values, tool, vertices, way) for way in given.ways}
                 sheet.add((f"{name}, {vertices}", *map(_said, found.values())), case=name, vertices=vertices, **found)
         sheet.keep()

@@ -17,6 +17,8 @@ __all__ = ["factor"]
 
 #: Multiplications of one piece of a factorisation: some milliseconds.
 _PIECE = 5_000_000
+#: Columns of a panel: with a front's whole width they stay in the second cache.
+_PANEL = 32
 #: Pivots below are taken for 1 [mu].
 _FLOOR = 1e-8
 
@@ -30,7 +32,8 @@ def factor(fronts: Fronts, indptr: Ints, indices: Ints, data: Floats) -> Generat
     """
     total = fronts.starts[-1]
     values = np.empty(total[1], np.float32)
-    complements = np.empty(total[2])
+    kept, room = _room(fronts.starts[:, 2])
+    complements = np.empty(room)
     place = np.full(len(indptr) - 1, -1)
     size, own = np.diff(fronts.starts[:, 0]), fronts.own
     # sum over the eliminated columns of what is left, squared
@@ -39,7 +42,7 @@ def factor(fronts: Fronts, indptr: Ints, indices: Ints, data: Floats) -> Generat
     while at < len(own):
         done = work[at - 1] if at else 0.0
         end = max(at + 1, int(np.searchsorted(work, done + _PIECE)))
-        good = _eliminate(at, end, fronts, indptr, indices, data, place, complements, values)
+        good = _eliminate(at, end, fronts, indptr, indices, data, place, complements, kept, values)
         if not good:
             raise np.linalg.LinAlgError("the tangent is not finite")
         at = end
@@ -47,14 +50,57 @@ def factor(fronts: Fronts, indptr: Ints, indices: Ints, data: Floats) -> Generat
     return values
 
 
+def _room(starts: Ints) -> tuple[Ints, int]:
+    """Return where the complement of each front is kept, and how much room all take; starts (f + 1,): end to end.
+
+    A complement is asked for by the next level alone, so that a level takes the place of the one before the last.
+    """
+    count = len(starts) - 1
+    # levels halve: the last front is the root
+    begin = count - (1 << np.arange(count.bit_length(), 0, -1)) + 1
+    level = np.searchsorted(begin, np.arange(count), side="right") - 1
+    sizes = np.diff(np.append(starts[begin], starts[-1]))
+    even, odd = int(sizes[::2].max(initial=0)), int(sizes[1::2].max(initial=0))
+    return starts[:-1] - starts[begin][level] + even * (level % 2), even + odd
+
+
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+def _pivots(w: Floats, first: int, last: int, end: int) -> bool:
+    """Eliminate columns first to last - 1 of a front from rows up to end - 1; returns whether pivots are numbers."""
+    for c in range(first, last):
+        if np.isnan(w[c, c]):
+            return False
+        # the matrices are semidefinite: what is below is rounding, of slivers mostly
+        if w[c, c] < _FLOOR:
+            w[c, c:] = 0.0
+            w[c, c] = 1.0
+        column = w[c, c:]
+        column /= np.sqrt(w[c, c])
+        for e in range(c + 1, end):
+            a, row, tail = w[c, e], w[e, e:], w[c, e:]
+            for r in range(len(row)):
+                row[r] -= a * tail[r]
+    return True
+
+
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+def _take_four(w: Floats, p: int, e: int) -> None:
+    """Take columns p to p + 3 of a front out of its row e."""
+    row, w0, w1, w2, w3 = w[e, e:], w[p, e:], w[p + 1, e:], w[p + 2, e:], w[p + 3, e:]
+    a0, a1, a2, a3 = w0[0], w1[0], w2[0], w3[0]
+    for r in range(len(row)):
+        row[r] -= a0 * w0[r] + a1 * w1[r] + a2 * w2[r] + a3 * w3[r]
+
+
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _eliminate(
     first: int, last: int, fronts: Fronts, indptr: Ints, indices: Ints, data: Floats,
-    place: Ints, complements: Floats, values: Singles,
+    place: Ints, complements: Floats, kept: Ints, values: Singles,
 ) -> bool:  # fmt: skip
     """Eliminate fronts first to last - 1; returns whether all pivots were finite. place (n,): -1 on entry and exit.
 
-    Fronts are symmetric; row c of w holds column c from the diagonal on.
+    kept (f,): where the complement of each front begins. Fronts are symmetric; row c of w holds column c from the
+    diagonal on.
     """
     nodes, starts, own, children = fronts
     for f in range(first, last):
@@ -76,7 +122,7 @@ def _eliminate(
                 continue
             lead = starts[child, 0] + own[child]
             wide = starts[child + 1, 0] - lead
-            at = starts[child, 2]
+            at = kept[child]
             for c in range(wide):
                 column = place[nodes[lead + c]]
                 for r in range(c, wide):
@@ -84,34 +130,27 @@ def _eliminate(
                     w[min(row, column), max(row, column)] += complements[at + c * wide + r]
         for r in range(size):
             place[nodes[begin + r]] = -1
-        # four columns at a time, so that the rest of the front is read and written a fourth as often
-        for p in range(0, pivots, 4):
-            q = min(p + 4, pivots)
-            near = q if q - p == 4 else size
-            for c in range(p, q):
-                if np.isnan(w[c, c]):
+        # four columns at a time, so that the rest of the front is read and written a fourth as often, and the rest
+        # row by row for a panel of them, which stays in the cache: every entry is taken from in the same order
+        fours = pivots - pivots % 4
+        for panel in range(0, fours, _PANEL):
+            end = min(panel + _PANEL, fours)
+            for p in range(panel, end, 4):
+                if not _pivots(w, p, p + 4, p + 4):
                     return False
-                # the matrices are semidefinite: what is below is rounding, of slivers mostly
-                if w[c, c] < _FLOOR:
-                    w[c, c:] = 0.0
-                    w[c, c] = 1.0
-                column = w[c, c:]
-                column /= np.sqrt(w[c, c])
-                for e in range(c + 1, near):
-                    a, row, tail = w[c, e], w[e, e:], w[c, e:]
-                    for r in range(len(row)):
-                        row[r] -= a * tail[r]
-            for e in range(near, size):
-                row, w0, w1, w2, w3 = w[e, e:], w[p, e:], w[p + 1, e:], w[p + 2, e:], w[p + 3, e:]
-                a0, a1, a2, a3 = w0[0], w1[0], w2[0], w3[0]
-                for r in range(len(row)):
-                    row[r] -= a0 * w0[r] + a1 * w1[r] + a2 * w2[r] + a3 * w3[r]
+                for e in range(p + 4, end):
+                    _take_four(w, p, e)
+            for e in range(end, size):
+                for p in range(panel, end, 4):
+                    _take_four(w, p, e)
+        if not _pivots(w, fours, pivots, size):
+            return False
         at = starts[f, 1]
         for c in range(pivots):
             for r in range(c, size):
                 values[at] = w[c, r]
                 at += 1
-        at = starts[f, 2]
+        at = kept[f]
         wide = size - pivots
         for c in range(wide):
             for r in range(c, wide):

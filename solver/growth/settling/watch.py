@@ -86,7 +86,11 @@ class Watch:
         if size > _FURTHEST * end.length:
             if (yield from _through(end, way, looks)):
                 return False
-            return not touches(end, self._distance, vertex_areas(end))
+            known = self._along_still(lengths_of(end))
+            if known is None:
+                return not touches(end, self._distance, vertex_areas(end))
+            # what is near along the sheet outlives a long way, and takes longer to find than all the rest
+            return not self._touches(known, self._searched(known, end, 0.0), end)
         along = self._along_now(end)
         yield
         far = self._far_now(along, end, size)
@@ -105,13 +109,20 @@ class Watch:
 
     def _along_now(self, state: State) -> _Along:
         """Return what is near along a state's sheet; ways, and the longest that count, change by no more than edges."""
-        lengths, known = lengths_of(state), self._along
-        if known is None or (np.abs(lengths - known.lengths) > _DRIFT * known.lengths).any():
+        lengths = lengths_of(state)
+        known = self._along_still(lengths)
+        if known is None:
             more = _SURE * (1 + _DRIFT) / (1 - _DRIFT)
             near = near_in(state, self._distance, vertex_areas(state), more)
             known = self._along = _Along(lengths, near, near.within(1 / more**2))
             self._close = self._far = None
         return known
+
+    def _along_still(self, lengths: Floats) -> _Along | None:
+        """Return what was near along the sheet where it is still, with edges of such lengths (e,)."""
+        known = self._along
+        changed = known is None or (np.abs(lengths - known.lengths) > _DRIFT * known.lengths).any()
+        return None if changed else known
 
     def _close_now(self, along: _Along, end: State, way: Floats) -> _Close | None:
         """Return what may cross on a way (n, 3) and is near each other along the sheet; None where it is long."""
@@ -135,9 +146,12 @@ class Watch:
         if known and longest(end.x - known.x) + size <= known.room:
             return known
         room = min(max(_ROOM * end.length, _AHEAD * size), _FURTHEST * end.length)
-        there = end.x, end.mesh, along.surely, self._distance, _SURE * room, 0.0, end.length
-        known = self._far = _Far(end.x, room, shell.search(*there, only="far"))
+        known = self._far = self._searched(along, end, room)
         return known
+
+    def _searched(self, along: _Along, end: State, room: float) -> _Far:
+        there = end.x, end.mesh, along.surely, self._distance, _SURE * room, 0.0, end.length
+        return _Far(end.x, room, shell.search(*there, only="far"))
 
     def _touches(self, along: _Along, far: _Far, state: State) -> bool:
         """Return what `touches` does: it is asked where the sheet is bent, and where something far is within reach."""

@@ -101,7 +101,7 @@ def _ways(indptr: Ints, indices: Ints, lengths: Floats, limit: float, rows: Bool
     """Return the shortest ways along edges up to a limit, from some vertices, in CSR: a queue until nothing gains."""
     n = len(indptr) - 1
     start = np.zeros(n + 1, np.int64)
-    room = 64 * n
+    room, gone, left = 1 << 14, 0, int(rows.sum())
     other, way = np.empty(room, np.int64), np.empty(room)
     found = np.full(n, np.inf)
     queue, waits, seen = np.empty(n, np.int64), np.zeros(n, np.bool_), np.empty(n, np.int64)
@@ -130,8 +130,10 @@ def _ways(indptr: Ints, indices: Ints, lengths: Floats, limit: float, rows: Bool
                         waits[j] = True
                         queue[(first + waiting) % n] = j
                         waiting += 1
+        gone += 1
         if count + known > room:
-            room = 2 * room + known
+            # what has been found so far tells of the rest: new pages of memory cost more than the ways in them
+            room = known + max(room + room // 2, (count + known) // gone * left * 9 // 8)
             more, further = np.empty(room, np.int64), np.empty(room)
             more[:count], further[:count] = other[:count], way[:count]
             other, way = more, further
@@ -142,7 +144,7 @@ def _ways(indptr: Ints, indices: Ints, lengths: Floats, limit: float, rows: Bool
                 count += 1
             found[j] = np.inf
         start[v + 1] = count
-    return start, other[:count].copy(), way[:count].copy()
+    return start, other[:count], way[:count]
 
 
 @njit(cache=True, error_model="numpy")

@@ -89,6 +89,22 @@ def test_what_is_remembered_tells_what_looks_all_over_tell(shape, pace, distance
     assert pace > 0.01 or len(looks) < steps / 3
 
 
+@pytest.mark.parametrize(("shape", "distance"), [(rolled, DISTANCE), (folded, DISTANCE), (folded, 1e-4)])
+def test_a_long_way_after_short_ones_is_told_from_what_they_found(shape, distance, monkeypatch):
+    """It is looked for anew only where nothing is known, and the answer is that of a look all over."""
+    flat, anew = strip(), []
+    monkeypatch.setattr(module, "touches", lambda *a: anew.append(1) or touches(*a))
+    told = []
+    for long in np.arange(0.2, 3.0, 0.1):
+        watch, begin, first = Watch(distance), replace(flat, x=shape(flat.x, 4.6)), replace(flat, x=shape(flat.x, 4.61))
+        assert done(watch.apart(begin.x, first))
+        end = replace(flat, x=shape(flat.x, 4.61 + long))
+        told.append(done(watch.apart(first.x, end)))
+        assert told[-1] == told_all_over(first.x, end, distance), long
+    assert not anew
+    assert set(told) == {True, False}
+
+
 def test_a_stiff_part_that_sinks_into_another_in_one_step_is_seen():
     """No edge changes, and nothing is within the distance before the step or after it."""
     flat, watch, distance = strip(), Watch(1e-4), 1e-4
