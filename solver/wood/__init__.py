@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..contract import Context, Cost, Extent, Need, Solver, StageAxis
+from .accuracy import expected_error
 from .looks import LOOKS
 from .params import Body, Grain, Notch, Waypoint, WoodParams
 from .presets import PRESETS, STAGES
@@ -81,6 +82,7 @@ SOLVER = Solver(
     preset_stages=STAGES,
     run=_run,
     cost=_cost,
+    error=expected_error,
     looks=LOOKS,
     extent=_extent,
 )

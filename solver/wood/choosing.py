@@ -143,7 +143,8 @@ def _missed(params: WoodParams, omega: float, time: float, scaling: float) -> fl
 def _at_rest(params: WoodParams) -> bool:
     """Return whether only dead loads act, on what the static mode can hold."""
     moves = params.bodies or params.grips or any(params.pull) or params.bend
-    knows = params.twist or params.curvature or params.rod_contact or params.clamp == "none"
+    turned = params.twist or params.curvature or params.grain.deviates
+    knows = turned or params.rod_contact or params.clamp == "none"
     return not (moves or knows) and (any(params.tip_load) or params.gravity != 0)
 
 

@@ -23,7 +23,7 @@ from .model.sawing import crossed
 from .model.state import Wood
 from .params import WoodParams
 
-__all__ = ["Breaks", "break_worst", "overstress", "sawed"]
+__all__ = ["Breaks", "break_worst", "overstress", "sawed", "sever"]
 
 #: A break closer to a vertex than this, over the edge, is one at the vertex.
 _NEAR = 0.25
@@ -176,7 +176,7 @@ def _left(bonds: Bonds, mine: np.ndarray) -> int:
     return whole
 
 
-def _sever(wood: Wood, e: int, place: float) -> int:
+def sever(wood: Wood, e: int, place: float) -> int:
     """Cut edge e at `place`; its bonds go to the neighbours that carry the stubs. Return how many bonds had none."""
     rods, bonds = wood.rods, wood.bonds
     ends = (
@@ -231,11 +231,11 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float
             rods = wood.rods
             broken += 1
         elif _NEAR <= place[e] <= 1 - _NEAR:
-            gone += _sever(wood, e, float(place[e]))
+            gone += sever(wood, e, float(place[e]))
             broken += 1
         else:
             # the vertex beyond is already split or a clamp's: cut as close to it as a stub allows
-            gone += _sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
+            gone += sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
             broken += 1
     later, lean = stretched(wood.motion.x, rods, wood.bonds)
     # no stiffer than the step bears

@@ -10,9 +10,12 @@ from pydantic import Field, field_validator, model_validator
 
 from ..contract import Params
 from .outlines import check_outline, polygon_area
-from .parts import Body, Corner, Cut, Grain, Grip, GripPoint, Newtons, Notch, Rate, Waypoint
+from .parts import Body, Corner, Cut, Grain, Grip, GripPoint, Knot, Newtons, Notch, Rate, Waypoint
 
-__all__ = ["Body", "Cut", "Grain", "Grip", "GripPoint", "Notch", "Waypoint", "WoodParams"]
+__all__ = ["Body", "Cut", "Grain", "Grip", "GripPoint", "Knot", "Notch", "Waypoint", "WoodParams"]
+
+#: The steepest slope of spiral grain: 27 degrees; rods stand for fibres along the bundle.
+_STEEPEST = 0.5
 
 
 class WoodParams(Params):
@@ -237,8 +240,15 @@ class WoodParams(Params):
             raise ValueError("the axis is curved more sharply than the bundle is thick: take a smaller curvature")
         if abs(self.curvature) * self.length > 6.28:
             raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
-        if self.mode == "static" and (self.twist or self.curvature):
-            raise ValueError("twist and curved axes need the explicit mode: set mode explicit")
+        if self.mode == "static" and (self.twist or self.curvature or self.grain.deviates):
+            raise ValueError("twist, curved axes, spiral grain and knots need the explicit mode: set mode explicit")
+        if any(not 0 <= k.at[0] <= self.length for k in self.grain.knots):
+            raise ValueError("a knot lies beyond an end: its x is between 0 and the length")
+        away = math.hypot(*self.grain.pith) + self.wide
+        if abs(self.grain.spiral) * away > _STEEPEST:
+            raise ValueError(
+                f"the grain is steeper than {_STEEPEST:g} at the rim: take a smaller spiral, or a pith that is nearer"
+            )
         if self.mode == "auto" and self.mass_scaling > 1:
             raise ValueError("auto chooses the masses itself: leave mass_scaling out, or set mode explicit")
         if self.mode == "static" and self.mass_scaling > 1:

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-__all__ = ["Body", "Corner", "Cut", "Grain", "Grip", "GripPoint", "Newtons", "Notch", "Rate", "Vector", "Waypoint"]
+__all__ = [
+    "Body",
+    "Corner",
+    "Cut",
+    "Grain",
+    "Grip",
+    "GripPoint",
+    "Knot",
+    "Newtons",
+    "Notch",
+    "Rate",
+    "Vector",
+    "Waypoint",
+]
 
 Metres = Annotated[float, Field(ge=-10, le=10)]
 Vector = tuple[Metres, Metres, Metres]
@@ -25,8 +39,19 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+class Knot(_Part):
+    """A dead branch's knot: a cone from the pith, round which fibres pass; it bears nothing itself."""
+
+    at: Vector = Field(description="Place of its axis in the unloaded straight bundle at which its radius is given [m]")
+    radius: float = Field(gt=1e-5, le=1, description="Radius there; nearer to the pith it is narrower [m]")
+    elongation: float = Field(1.5, ge=1, le=4, description="How much longer along the fibres than wide it is [1]")
+
+
 class Grain(_Part):
-    """How stiffness and strength vary: a smooth field from the run's seed, growth rings, and rays from the pith."""
+    """How stiffness and strength vary: a smooth field from the run's seed, growth rings, and rays from the pith.
+
+    And where fibres go: along the bundle, but for spiral grain and knots.
+    """
 
     stiffness: float = Field(0.0, ge=0, le=0.5, description="Relative deviation of the stiffness [1]")
     strength: float = Field(
@@ -44,6 +69,26 @@ class Grain(_Part):
         lt=1,
         description="How much less wood bears in cracks along rays than in those around the pith [1]",
     )
+    spiral: float = Field(
+        0.0,
+        ge=-200,
+        le=200,
+        description="Turn of the fibres about the pith along the bundle; at the distance d from it their slope is this "
+        "times d. What does not lie round the pith is sawn out of such wood [radian/m]",
+    )
+    knots: tuple[Knot, ...] = Field((), max_length=32, description="Knots, round which fibres pass")
+
+    @property
+    def deviates(self) -> bool:
+        """Whether fibres do not run straight along the bundle."""
+        return self.spiral != 0 or bool(self.knots)
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        for knot in self.knots:
+            if knot.radius > 0.5 * math.hypot(knot.at[1] - self.pith[0], knot.at[2] - self.pith[1]):
+                raise ValueError("a knot is wider than half its distance from the pith: take a smaller radius")
+        return self
 
 
 class Notch(_Part):

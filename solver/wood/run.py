@@ -15,6 +15,7 @@ from ..contract import Context, InvalidInput, Need, SolverError
 from ..meshes import Frame, changing
 from .choosing import decide
 from .contact.listing import law
+from .fibres.hewing import hewn
 from .fracture import sawed
 from .loads import READ, SUMS, measured
 from .model.bundle import lay
@@ -54,12 +55,12 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     begun = time.perf_counter()
     params, said = _settled(params, settings.vertices)
     context.report(0.0, said.get("note", "laying the bundle"))
-    wood = lay(params, settings.vertices)
+    wood = hewn(lay(params, settings.vertices), params)
     attrs: dict[str, Any] = {
         "path": params.mode,
         "mass_scaling": params.mass_scaling,
         **said,
-        "rods": len(wood.grid),
+        "rods": len(np.unique(wood.rod[wood.rods.k > 0])),
         "vertices": settings.vertices,
         "bonds": len(wood.bonds.i),
         "metres_per_unit": 1.0,
@@ -126,6 +127,8 @@ def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: 
     moving, elastic, lost, work, _ = reached.energy
     ends = wood.grid[:, -1]
     weight = wood.rods.radius[np.searchsorted(wood.rod, np.arange(len(wood.grid)))] ** 2
+    # fibres may run out of the wood before its end
+    weight = np.where(np.isin(ends, laid.rods.b[laid.rods.k > 0]), weight, 0.0)
     found: dict[str, Any] = {
         "kinetic_energy": moving,
         "elastic_energy": elastic,

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contract import Context
+from ..fibres.paths import crowded, placed
+from ..fibres.timber import hews, timber
 from ..params import WoodParams
 from .arrays import Rods, Turns
 from .axis import along, curved, started
@@ -14,7 +16,8 @@ from .grain import Field, ringed
 from .gripping import courses, pins_of
 from .joining import bodied, bonded
 from .motion import Motion
-from .outline import stand
+from .outline import area as outlined
+from .outline import corners, inside, stand
 from .sawing import sawn
 from .state import Wood
 
@@ -32,11 +35,13 @@ class _Layout(NamedTuple):
     """Where all vertices are: k rods of n, ghosts among them, numbered rod after rod."""
 
     area: np.ndarray  # (k,) [m2]
-    straight: np.ndarray  # (k, n, 3) of the straight bundle [m]
+    fibre: np.ndarray  # (k, n, 3) by the names of fibres, which `fibres` explains [m]
+    straight: np.ndarray  # (k, n, 3) of the straight bundle: `fibre`, but where grain deviates [m]
     rest: np.ndarray  # (k, n, 3) of the unloaded one [m]
     number: np.ndarray  # (k, n) int32
     grid: np.ndarray  # (k, vertices) int32 without ghosts
     ghosts: tuple[bool, bool]  # before the first vertex, behind the last
+    section: np.ndarray  # (k, n - 1) [m2] of the edges, across them
 
     @property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
@@ -74,10 +79,31 @@ def _layout(points: np.ndarray, area: np.ndarray, s: np.ndarray, params: WoodPar
     if ghosts[1]:
         row = np.column_stack([row, 2 * row[:, -1] - row[:, -2]])
     rods, count = row.shape
-    straight = np.concatenate([row[:, :, None], np.repeat(points[:, None, :], count, 1)], -1)
+    fibre = np.concatenate([row[:, :, None], np.repeat(points[:, None, :], count, 1)], -1)
+    straight, section = fibre, np.repeat(area[:, None], count - 1, 1)
+    if params.grain.deviates:
+        straight = placed(fibre, params)
+        edge, middle = straight[:, 1:] - straight[:, :-1], (fibre[:, 1:] + fibre[:, :-1]) / 2
+        # what is cut by a section stands oblique in it, and is squeezed where fibres crowd round a knot
+        section *= crowded(middle, params) * edge[..., 0] / np.linalg.norm(edge, axis=-1)
+        section *= _filled(straight, area, params)
     number = np.arange(rods * count, dtype=np.int32).reshape(rods, count)
     grid = number[:, int(ghosts[0]) : count - int(ghosts[1])]
-    return _Layout(area, straight, curved(straight, params.curvature), number, grid, ghosts)
+    return _Layout(area, fibre, straight, curved(straight, params.curvature), number, grid, ghosts, section)
+
+
+def _filled(straight: np.ndarray, area: np.ndarray, params: WoodParams) -> float:
+    """Return by what sections are to be multiplied so that rods fill what is hewn: a rod is inside or not, as a whole.
+
+    straight (k, n, 3) [m], area (k,) [m2].
+    """
+    if not hews(params):
+        return 1.0
+    outline, ends = corners(params), np.clip(straight[..., 0], 0, params.length)
+    middle = (straight[:, 1:, 1:] + straight[:, :-1, 1:]) / 2
+    within = inside(outline, middle.reshape(-1, 2)).reshape(middle.shape[:2])
+    filled = float((area[:, None] * np.diff(ends, axis=1) * within).sum())
+    return outlined(outline) * params.length / filled if filled > 0 else 1.0
 
 
 def _rods(at: _Layout, grain: Field, params: WoodParams) -> Rods:
@@ -86,8 +112,8 @@ def _rods(at: _Layout, grain: Field, params: WoodParams) -> Rods:
     (a, b), real, flat = at.edges, at.real, at.rest.reshape(-1, 3)
     edge = np.arange(len(a), dtype=np.int32).reshape(rods, count - 1)
     length = np.linalg.norm(flat[b] - flat[a], axis=1)
-    section = np.repeat(at.area, count - 1)
-    middle = (at.straight[:, 1:] + at.straight[:, :-1]) / 2
+    section = at.section.ravel()
+    middle = (at.fibre[:, 1:] + at.fibre[:, :-1]) / 2
     stiff = (grain.factor(middle, params.grain.stiffness) * _rings(at, params)[:, None]).ravel()
     solid = np.where(real, length, 0.0)
     before, after = edge[:, :-1].ravel(), edge[:, 1:].ravel()
@@ -108,19 +134,20 @@ def _rods(at: _Layout, grain: Field, params: WoodParams) -> Rods:
 
 def _hinges(at: _Layout) -> np.ndarray:
     """Return the area (h,) [m2] of the rod of each hinge."""
-    return np.repeat(at.area, at.number.shape[1] - 2)
+    found: np.ndarray = ((at.section[:, 1:] + at.section[:, :-1]) / 2).ravel()
+    return found
 
 
 def _stiff(at: _Layout, grain: Field, params: WoodParams) -> np.ndarray:
     """Return the grain's factor (h,) of the stiffness of hinges."""
-    factor = grain.factor(at.straight[:, 1:-1], params.grain.stiffness)
+    factor = grain.factor(at.fibre[:, 1:-1], params.grain.stiffness)
     found: np.ndarray = (factor * _rings(at, params)[:, None]).ravel()
     return found
 
 
 def _rings(at: _Layout, params: WoodParams) -> np.ndarray:
     """Return the growth rings' factor (k,) of the stiffness of rods; the bundle keeps what it has in tension."""
-    found = ringed(params.grain, at.straight[:, 0, 1:], np.sqrt(at.area / np.pi))
+    found = ringed(params.grain, at.fibre[:, 0, 1:], np.sqrt(at.area / np.pi))
     kept: np.ndarray = found * at.area.sum() / (found @ at.area)
     return kept
 
@@ -130,7 +157,7 @@ def _motion(at: _Layout, rods: Rods, params: WoodParams) -> Motion:
     k, count = at.number.shape
     a, b = rods.a, rods.b
     solid = np.where(rods.k > 0, rods.rest, 0.0)
-    tributary = np.repeat(at.area, count - 1) * solid * params.density / 2
+    tributary = at.section.ravel() * solid * params.density / 2
     mass = np.zeros(k * count)
     np.add.at(mass, a, tributary)
     np.add.at(mass, b, tributary)
@@ -152,22 +179,48 @@ def _motion(at: _Layout, rods: Rods, params: WoodParams) -> Motion:
         np.where(mass > 0, params.mass_scaling * mass, 1.0),
         held.ravel(),
         loads,
-        np.tile([0.0, 1.0, 0.0], (len(a), 1)),
-        (x[b] - x[a]) / np.linalg.norm(x[b] - x[a], axis=1)[:, None],
+        *_frames(at, rods, x, params),
         np.zeros(len(a)),
         np.zeros(len(a)),
         np.zeros(len(rods.before)),
     )
 
 
-def _turns(at: _Layout, rods: Rods, grain: Field, params: WoodParams) -> Turns:
-    """Return what twist and curved rest shapes need besides."""
+def _frames(at: _Layout, rods: Rods, x: np.ndarray, params: WoodParams) -> tuple[np.ndarray, np.ndarray]:
+    """Return the directors (e, 3) and the tangents (e, 3) that they belong to; x (v, 3): places at time 0 [m].
+
+    Along a fibre that deviates they are carried from edge to edge without spin, so that at rest nothing is twisted.
+    """
+    if not params.grain.deviates:
+        way = x[rods.b] - x[rods.a]
+        return np.tile([0.0, 1.0, 0.0], (len(rods.a), 1)), way / np.linalg.norm(way, axis=1)[:, None]
+    way = at.rest[:, 1:] - at.rest[:, :-1]
+    t = way / np.linalg.norm(way, axis=-1, keepdims=True)
+    d = np.zeros(t.shape)
+    own = np.array([0.0, 1.0, 0.0]) - t[:, 0, 1:2] * t[:, 0]
+    for n in range(t.shape[1]):
+        if n:
+            u, w = t[:, n - 1], t[:, n]
+            axis = np.cross(u, w)
+            less = (axis * own).sum(1, keepdims=True) / (1 + (u * w).sum(1, keepdims=True))
+            own = (u * w).sum(1, keepdims=True) * own + np.cross(axis, own) + less * axis
+        own = own - (own * t[:, n]).sum(1, keepdims=True) * t[:, n]
+        own = own / np.linalg.norm(own, axis=1, keepdims=True)
+        d[:, n] = own
+    # `started` bends from here: the first step carries them there, as any motion does
+    return d.reshape(-1, 3), t.reshape(-1, 3)
+
+
+def _turns(at: _Layout, rods: Rods, d: np.ndarray, grain: Field, params: WoodParams) -> Turns:
+    """Return what twist and curved rest shapes need besides; d (e, 3): directors at rest."""
     flat, solid = at.rest.reshape(-1, 3), np.where(rods.k > 0, rods.rest, 0.0)
     tangent = (flat[rods.b] - flat[rods.a]) / rods.rest[:, None]
     u, w = tangent[rods.before], tangent[rods.after]
     binormal = 2 * np.cross(u, w) / (1 + (u * w).sum(1))[:, None]
-    kappa = np.column_stack([(np.cross(u + w, [0.0, 1.0, 0.0]) * binormal).sum(1) / 2, -binormal[:, 1]])
-    section = np.repeat(at.area, at.number.shape[1] - 1)
+    first = d[rods.before] + d[rods.after]
+    second = np.cross(u, d[rods.before]) + np.cross(w, d[rods.after])
+    kappa = np.column_stack([(second * binormal).sum(1), -(first * binormal).sum(1)]) / 2
+    section = at.section.ravel()
     return Turns(
         params.shear * _hinges(at) ** 2 / (2 * np.pi) * _stiff(at, grain, params),
         kappa,
@@ -178,8 +231,8 @@ def _turns(at: _Layout, rods: Rods, grain: Field, params: WoodParams) -> Turns:
 
 def _strengths(at: _Layout, strong: Field, params: WoodParams) -> np.ndarray:
     """Return the strain (e, samples) that each place of each edge bears; ghosts bear any."""
-    along_ = SAMPLES[:, None] * (at.straight[:, 1:] - at.straight[:, :-1])[:, :, None]
-    places = at.straight[:, :-1, None] + along_
+    along_ = SAMPLES[:, None] * (at.fibre[:, 1:] - at.fibre[:, :-1])[:, :, None]
+    places = at.fibre[:, :-1, None] + along_
     found: np.ndarray = _strength(places, strong, params).reshape(len(at.real), -1)
     return np.where(at.real[:, None], found, np.inf)
 
@@ -192,7 +245,8 @@ def lay(params: WoodParams, vertices: int) -> Wood:
 
     """
     generator = Context.generator(params.seed)
-    points, area, _ = stand(params, generator)
+    log = timber(params)
+    points, area, _ = stand(log, generator)
     s = along(len(points), vertices, params, generator)
     grain = Field(params.grain.along, params.grain.across, generator)
     strong = Field(params.grain.along, params.grain.across, generator)
@@ -201,7 +255,10 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     real = rods.k > 0
     k = params.contact_stiffness or _CONTACT * float(np.median(rods.k[real] / rods.rest[real]))
     edge = np.arange(len(real), dtype=np.int32).reshape(len(points), -1)
-    bonds = bonded(params, points, s, edge[:, int(at.ghosts[0]) :], at.rest.reshape(-1, 3), rods, grain, strong)
+    # where straight grain is laid, the middles' closest points are at the same places along
+    inner = slice(int(at.ghosts[0]), at.number.shape[1] - int(at.ghosts[1]))
+    course = at.straight[:, inner] if params.grain.deviates else None
+    bonds = bonded(params, log, points, s, course, edge[:, inner.start :], at.rest.reshape(-1, 3), rods, grain, strong)
     straight = at.straight.reshape(-1, 3)
     motion = _motion(at, rods, params)
     sawn(params, straight, rods, bonds)
@@ -209,10 +266,10 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         motion,
         rods,
         bonds,
-        _turns(at, rods, grain, params),
+        _turns(at, rods, motion.d, grain, params),
         bodied(params, k, _EASE * float(np.median(rods.radius)), rods.rest),
         pins_of(params, grips := courses(params, straight, motion.x, motion.held == 0)),
-        params.twist or params.curvature != 0,
+        params.twist or params.curvature != 0 or params.grain.deviates,
         _strengths(at, strong, params),
         np.repeat(np.arange(len(points), dtype=np.int32), at.number.shape[1] - 1),
         at.grid,

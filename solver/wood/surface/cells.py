@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
 from ...contract import Context
+from ..fibres.timber import timber
 from ..model.outline import corners, stand
 from ..params import WoodParams
 
@@ -44,10 +45,11 @@ class Section(NamedTuple):
 
 def section(params: WoodParams) -> Section:
     """Return the cells of the rods that `bundle.lay` lays: the same draws, in the same order."""
-    points = stand(params, Context.generator(params.seed)).points
-    if params.outline:
-        return divided(points, params.wide, corners(params))
-    return divided(points, params.wide)
+    log = timber(params)
+    points = stand(log, Context.generator(params.seed)).points
+    if log.outline:
+        return divided(points, log.wide, corners(log))
+    return divided(points, log.wide)
 
 
 def divided(points: np.ndarray, radius: float, outline: np.ndarray | None = None) -> Section:

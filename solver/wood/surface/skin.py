@@ -32,7 +32,7 @@ class Skin:
 
     def __init__(self, wood: Wood, params: WoodParams) -> None:
         self.section = section(params)
-        self._span = spans(wood, params.length)
+        self._span = spans(wood, params.length, params.grain.deviates)
         self._pairs = meeting(self.section)
         # a child of the run's seed: the bundle's own draws stay what they are without a mesh
         generator = Context.generator(params.seed).spawn(1)[0]

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from solver import meshes
 from solver.contract import Need
 from solver.wood import SOLVER
-from solver.wood.fracture import _sever, _split
+from solver.wood.fracture import _split, sever
 from solver.wood.model.bundle import lay
 from solver.wood.model.section import areas
 from solver.wood.surface.align import aligned, bonded, corners, meeting
@@ -119,7 +119,7 @@ def test_corners_meet_where_the_thesis_iterations_end():
 def test_a_broken_rod_is_two_closed_parts(inside):
     params, wood, skin = laid(rods=1, clamp="none")
     if inside:
-        _sever(wood, 4, 0.4)
+        sever(wood, 4, 0.4)
         place = float((wood.motion.x[4] + 0.4 * (wood.motion.x[5] - wood.motion.x[4]))[0])
         far = wood.motion.x[:, 0] > place
     else:

@@ -1,0 +1,135 @@
+"""Hewing: of wood whose fibres run out of the bundle, what lies outside is taken away, and rods end where they run out.
+
+What is left of an edge that the surface passes is a stub, which the edge beside it carries, as beside a break. Edges
+outside count as ghosts: they have no stiffness, and their vertices rest. So rods keep their numbers of vertices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..fracture import sever
+from ..model.gripping import courses, pins_of
+from ..model.joining import stretched
+from ..model.outline import corners, inside
+from ..model.state import Wood
+from ..params import WoodParams
+from .timber import hews
+
+__all__ = ["hewn"]
+
+#: Halvings by which the place where a rod runs out is found.
+_HALVINGS = 40
+#: Rods of no more vertices, or of fewer bonds, are chips; rounds in which what hung on chips goes with them.
+_VERTICES, _BONDS, _ROUNDS = 2, 6, 8
+
+
+def _passes(outline: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return where (n,) on the way from a (n, 2), inside, to b (n, 2), outside, the outline is passed."""
+    low, high = np.zeros(len(a)), np.ones(len(a))
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        within = inside(outline, a + middle[:, None] * (b - a))
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    return low
+
+
+def _kept(wood: Wood, outline: np.ndarray) -> np.ndarray:
+    """Return which vertices (v,) are left: those within, but for chips that next to nothing holds, which would dangle.
+
+    Ghosts count with the rods that they clamp.
+    """
+    rods, bonds = wood.rods, wood.bonds
+    within = inside(outline, wood.straight[:, 1:]).reshape(len(wood.grid), -1)
+    for _ in range(_ROUNDS):
+        starts = within & ~np.column_stack([np.zeros(len(within), bool), within[:, :-1]])
+        run = np.cumsum(starts.ravel()).reshape(within.shape) * within
+        of, kept = run.ravel(), within.ravel()
+        size = np.bincount(of)
+        whole = kept[rods.a] & kept[rods.b]
+        joined = whole[bonds.i] & whole[bonds.j] & (bonds.on > 0)
+        held = np.bincount(of[rods.a[bonds.i[joined]]], minlength=len(size))
+        held += np.bincount(of[rods.a[bonds.j[joined]]], minlength=len(size))
+        few = (size <= _VERTICES) | (held < (_BONDS if len(bonds.i) else 0))
+        if not (few[of] & kept).any():
+            break
+        within &= ~few[run]
+    found: np.ndarray = within.ravel()
+    return found
+
+
+def hewn(wood: Wood, params: WoodParams) -> Wood:
+    """Return the bundle as laid without what lies outside of its outline; chips are taken away."""
+    if not hews(params):
+        return wood
+    rods, bonds = wood.rods, wood.bonds
+    outline, section = corners(params), wood.straight[:, 1:]
+    within = _kept(wood, outline)
+    a, b = within[rods.a], within[rods.b]
+    before, slope = stretched(wood.motion.x, rods, bonds)
+    out = np.flatnonzero(~a & ~b)
+    rods.alive[out] = 0
+    rods.whole[np.isin(rods.before, out) | np.isin(rods.after, out)] = 0
+    cut = np.where(a & b, 2.0, np.nan)
+    leaves = np.flatnonzero((a != b) & (rods.k > 0))
+    ends = np.where(a[leaves], rods.a[leaves], rods.b[leaves]), np.where(a[leaves], rods.b[leaves], rods.a[leaves])
+    way = _passes(outline, section[ends[0]], section[ends[1]])
+    cut[leaves] = np.where(a[leaves], way, 1 - way)
+    for edge, share in ((bonds.i, bonds.at), (bonds.j, bonds.share)):
+        # what sits beyond the surface goes with it
+        bonds.on[~np.where(a[edge], share < cut[edge], share > cut[edge])] = 0
+    for e in leaves.tolist():
+        sever(wood, e, float(cut[e]))
+    rods.k[rods.alive == 0] = 0.0
+    bonds.on[(rods.alive[bonds.i] == 0) | (rods.alive[bonds.j] == 0)] = 0
+    _laid_again(wood, before, slope)
+    left = np.where(rods.alive == 1, np.where(rods.k > 0, 1.0, 0.0), 0.0)
+    left[leaves] = way
+    return _weighed(wood, params, left, a)
+
+
+def _laid_again(wood: Wood, before: np.ndarray, slope: np.ndarray) -> None:
+    """Lay bonds on the curves that are left, as beside a break, so that they are at rest."""
+    bonds = wood.bonds
+    later, lean = stretched(wood.motion.x, wood.rods, bonds)
+    on = bonds.on > 0
+    longer = np.where(on, later / np.maximum(before, 1e-300), 1.0)
+    bonds.rest[:] *= longer
+    bonds.k[:] /= longer
+    bonds.cosine[:] += np.where(on, lean - slope, 0.0)
+
+
+def _weighed(wood: Wood, params: WoodParams, left: np.ndarray, first: np.ndarray) -> Wood:
+    """Return the bundle with masses, loads and grips of what is left (e,) of every edge.
+
+    first (e,): whether an edge's first vertex is inside; of an edge that is cut, the end inside carries the stub.
+    """
+    rods, m = wood.rods, wood.motion
+    count = len(m.x)
+    whole = rods.alive == 1
+    there = np.zeros(count, bool)
+    there[rods.a[whole]] = there[rods.b[whole]] = True
+    heavy = np.pi * rods.radius**2 * rods.rest * left * params.density
+    mass = np.bincount(rods.a, np.where(whole, heavy / 2, np.where(first, heavy, 0.0)), count)
+    mass += np.bincount(rods.b, np.where(whole, heavy / 2, np.where(first, 0.0, heavy)), count)
+    mass[~there] = 0.0
+    held = np.where(there, m.held, np.uint8(1)).astype(np.uint8)
+    ends = wood.grid[:, -1]
+    share = np.where(
+        there[ends], rods.radius[np.searchsorted(wood.rod, np.arange(len(ends)), side="right") - 1] ** 2, 0
+    )
+    load = np.zeros((count, 3))
+    if any(params.tip_load):
+        load[ends] = share[:, None] / share.sum() * np.array(params.tip_load)
+    load[:, 2] -= mass * params.gravity
+    load[held == 1] = 0.0
+    grips = courses(params, wood.straight, m.x, held == 0)
+    motion = m._replace(
+        v=np.where(there[:, None], m.v, 0.0),
+        mass=np.where(mass > 0, params.mass_scaling * mass, 1.0),
+        held=held,
+        load=load,
+    )
+    return replace(wood, motion=motion, grips=grips, pins=pins_of(params, grips))
