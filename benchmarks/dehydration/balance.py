@@ -43,7 +43,7 @@ _LATTICE = 64
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--families", nargs="+", default=["default", "stone-radius"])
+    parser.add_argument("--families", nargs="+", default=["default", "stone-radius", "prolate", "plum2"])
     parser.add_argument("--stages", nargs="+", type=float, default=[0.1, 0.2, 0.3])
     parser.add_argument("--points", type=int, default=3, help="of each family")
     asked = parser.parse_args()

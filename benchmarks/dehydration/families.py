@@ -3,7 +3,8 @@
     python -m benchmarks.dehydration.families --store maps
 
 Of each table in the package, from the runs in the store that it was made of: how many stages meet their residual, the
-worst one, crossing triangles of finite elements and lattices, the least J; and of its file bytes and loss. A table
+worst one, crossing triangles of finite elements and lattices, the least J; and of its file how far a point of a sample
+was moved to even out what crossed on the lattice, bytes and loss. A table
 whose runs the store does not hold keeps what is in the record of it, if it is that very file (by its digest).
 """
 
@@ -25,7 +26,7 @@ from store.store import Store
 
 _HEAD = (
     *("family", "samples", "quality", "part solved", "stages met", "worst residual"),
-    *("crossing pairs", "least J", "MB", "loss [r1]"),
+    *("crossing pairs", "least J", "evened [r1]", "MB", "loss [r1]"),
 )
 
 
@@ -56,15 +57,18 @@ def _add(sheet: Sheet, name: str, info: TableInfo, package: Store, found: list[M
     path = tables.path_of(package, info)
     with xr.open_dataset(path, engine="h5netcdf", group="/") as stored:
         loss = float(stored["spectrum"].attrs.get("max_loss", 0.0)) if "spectrum" in stored else 0.0
+        evened = float(stored["lattice_evened"].max())
     met, asked = sum(row["met"] for row in found), sum(row["stages"] for row in found)
     residual, least = max(row["residual"] for row in found), min(row["least_jacobian"] for row in found)
     pairs, size = sum(row["pairs"] for row in found), path.stat().st_size / 1e6
     part = {"": "whole", "xz": "quarter", "xyz": "eighth"}[str(info.fixed.get("mirrors", ""))]
     quality = str(dict(info.need)["quality"])
     settled = f"{met} of {asked}", f"{residual:.1e}"
+    shape = pairs, f"{least:.2f}", f"{evened:.3f}"
     sheet.add(
-        (name, len(found), quality, part, *settled, pairs, f"{least:.2f}", f"{size:.1f}", f"{loss:.0e}"),
+        (name, len(found), quality, part, *settled, *shape, f"{size:.1f}", f"{loss:.0e}"),
         family=name, digest=info.digest, quality=quality, part=part, runs=found, bytes=path.stat().st_size, loss=loss,
+        evened=evened,
     )  # fmt: skip
 
 

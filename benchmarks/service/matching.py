@@ -28,7 +28,12 @@ from store import starter
 HEAD = ["shapes", "r1 is known", "asked", "gamma within 10 %", "te within 10 %", "s within .01", "all three"]
 HEAD += ["median error of gamma, te, s", "unique", "distance, median and most"]
 #: Other families: table, axes and their ranges; the stage from 0.05 to 0.3.
-FAMILIES = {"stone-radius": ("rs1", "te"), "prolate": ("r4", "te"), "sphere-02": ("gamma",), "raisin": ()}
+FAMILIES = {
+    "stone-radius": ("rs1", "te"),
+    "prolate": ("r4", "te"),
+    "sphere-02": ("gamma",),
+    "raisin": ("te", "gamma"),
+}
 
 
 class Case(NamedTuple):

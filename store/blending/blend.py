@@ -14,6 +14,7 @@ from solver.arrays import Array
 from ..surfaces import harmonics, window
 from ..surfaces.packed import Stored
 from ..surfaces.window import Patch
+from . import methods
 from .methods import Method, bands, envelope, poles
 from .methods.cells import Cells
 from .methods.thin import Mixture, Thin, outer
@@ -72,9 +73,10 @@ class Blender:
         self, query: Array | None, near: Weighted, stages: Sequence[int], method: Method, without: int | None = None
     ) -> Mixture:
         """Return what each sample near a point counts at stored stages; `without` one, as if it were not there."""
-        if method.weighting != "thin" or query is None or self._samples is None:
+        if method.weighting not in methods.SPLINED or query is None or self._samples is None:
             return outer(near, len(stages))
-        return self._thin.mix(near, self._samples.scale(query), stages, without)
+        lean = method.weighting == "lean"
+        return self._thin.mix(near, self._samples.scale(query), stages, without, lean)
 
     def __call__(
         self, query: Array | None, mixed: Mixture, stages: Mapping[int, float], method: Method, band: int | None = None
@@ -99,8 +101,9 @@ class Blender:
             whole = targets.gains(known.scale(query), mixed.samples, mixed.weights, dict(stages), mean)
             # where patterns agree their mean has the bands it should have, and a fit to all of the table knows less
             gains = whole**lossy
-            factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
-            poles.multiply(waves, factor, targets.highest)
+            if lossy > 0:  # else all gains are 1, and a sixth of the time is for nothing
+                factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
+                poles.multiply(waves, factor, targets.highest)
             total = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
         if "env" not in method.corrections:
             return Blend(waves)

@@ -83,9 +83,9 @@ def _dot(a: Array, b: Array) -> float:
 _NOTHING = 1e-9
 #: Share of errors that the expected one covers.
 COVERED = 0.9
-#: The default of older tables, which hold its errors. They stand for the present one's: those of runs held out lie
+#: Defaults of older tables, which hold their errors. They stand for the present one's: those of runs held out lie
 #: within what they foretell (record dehydration-calibration); slopes far outside of the samples may not.
-_FORMER = "linear+LL+env"
+_FORMER = ("linear+LL+env", "thin+LL+env")
 
 
 def foretold(found: Array, method: str, samples: Samples) -> tuple[Array, Array]:
@@ -116,7 +116,7 @@ class Trust:
 
     def knows(self, method: str) -> bool:
         """Return whether the table knows what errors of that method to expect."""
-        return method == self.method or (method == DEFAULT and self.method == _FORMER)
+        return method == self.method or (method == DEFAULT and self.method in _FORMER)
 
     def expect(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
         """Return what errors of each measure hardly exceed: nothing at a sample, most of them a whole spacing away."""

@@ -14,6 +14,8 @@ from solver.fruit import azimuths, colatitudes, directions, lattice
 from store.shape import Shape
 
 HALF_AXES = np.array([1.0, 1.4, 0.7])
+#: Where the raisin of Table 1 lies in its family.
+RAISIN_AT = {"te": 0.01, "gamma": 10.0}
 ABOUT = About("dehydration", "main", {"gamma": 10.0}, "s", {"te": "r1"})
 
 

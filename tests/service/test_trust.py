@@ -70,7 +70,7 @@ def test_a_method_is_the_lookups(client: httpx.Client, built: Path, method: str)
 
 def test_a_method_is_one_however_it_is_spelt(client: httpx.Client) -> None:
     address = f"{SHAPE}?te=0.03&gamma=7&s=0.25&resolution=16&format=glb"
-    spelt = ["", "&method=thin%2BLL%2Benv", "&method=thin+LL+env", "&method=thin%2Benv%2BLL"]
+    spelt = ["", "&method=lean%2BLL%2Benv", "&method=lean+LL+env", "&method=lean%2Benv%2BLL"]
     tags = [client.get(address + method).headers["etag"] for method in spelt]
     assert len(set(tags)) == 1
     other = client.get(f"{address}&method=idw", headers={"If-None-Match": tags[0]})

@@ -1,5 +1,5 @@
-"""The weights of `thin` written out plainly, by code that shares nothing with the look-up: SciPy's thin-plate splines,
-and correlations of patterns on their lattice.
+"""The weights of `thin` and `lean` written out plainly, by code that shares nothing with the look-up: SciPy's
+thin-plate splines and root of an equation, and correlations of patterns on their lattice.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 from scipy.fft import dct
 from scipy.interpolate import RBFInterpolator
+from scipy.optimize import brentq
 
 from ._wrinkled import N, own
 from .conftest import GAMMA, TE
@@ -53,9 +54,17 @@ def agreement(i: int, j: int, shared: float) -> float:
     return float(3 * x**2 - 2 * x**3)
 
 
-def mixture(te: float, gamma: float, shared: float) -> tuple[np.ndarray, float]:
+def leant(weights: np.ndarray, alike: float) -> np.ndarray:
+    """Return weights that are multiplied and lowered, all by the same, until those above zero sum to 1."""
+    steep = weights * (5 - 4 * alike)
+    found: np.ndarray = np.maximum(steep - brentq(lambda off: np.maximum(steep - off, 0).sum() - 1, -1, 5), 0)
+    return found
+
+
+def mixture(te: float, gamma: float, shared: float, lean: bool = False) -> tuple[np.ndarray, float]:
     """Return the weights (9,) of the nodes, and the part that the spline has in them."""
     plain, thin = bilinear(te, gamma), spline(te, gamma)
     assert np.abs(thin).sum() < 2  # all nodes take part, and nothing fades
     part = sum(w * agreement(*node, shared) for w, node in zip(plain, NODES, strict=True) if w)
-    return (1 - part) * plain + part * thin, float(part)
+    rest = leant(plain, part) if lean else plain
+    return (1 - part) * rest + part * thin, float(part)

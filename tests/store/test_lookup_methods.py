@@ -26,7 +26,10 @@ from store.surfaces.measures import Measures
 from ._wrinkled import N, grid, pattern, wrinkled
 from .conftest import GAMMA, STAGES, TE, fill
 
-CORRECTED = ("linear+LL", "linear+env", "linear+LL+env", "thin+LL+env", "idw+LL+env", "scattered+LL+env")
+CORRECTED = (
+    *("linear+LL", "linear+env", "linear+LL+env", "idw+LL+env", "scattered+LL+env"),
+    *("thin+LL+env", "lean+LL+env"),
+)
 
 
 def found(table: ShapeTable, te: float, gamma: float, stage: float, method: str, n: int = N) -> np.ndarray:

@@ -25,12 +25,12 @@ def plain(table: ShapeTable, n: int, shared: float) -> tuple[np.ndarray, np.ndar
     """Return positions (n, 2n, 3) and poles (2, 3) of the default method."""
     samples, stored, blender = table._samples, table._spectra, table._blender
     assert samples is not None
-    stages, (own, part) = table._bracket(STAGE), mixture(QUERY["te"], QUERY["gamma"], shared)
+    stages, (own, part) = table._bracket(STAGE), mixture(QUERY["te"], QUERY["gamma"], shared, lean=True)
     places = {tuple(table.sample(i).values()): i for i in range(len(NODES))}
     numbered = [(places[TE[i], GAMMA[j]], w) for (i, j), w in zip(NODES, own, strict=True) if w]
     taken, weights = np.array([i for i, _ in numbered]), np.array([w for _, w in numbered])
     terms = [(i, j, w * t) for i, w in numbered for j, t in stages.items()]
-    assert len(terms) == (18 if shared else 8)  # all nodes or four corners, at two stages
+    assert len(terms) == (18 if shared else 4)  # all nodes, or the nearer corners that are left, at two stages
     full = sum(w * complex_view(stored[i, j]).astype(complex) for i, j, w in terms)
     assert isinstance(full, np.ndarray)
     targets = bands.Targets(blender.power, samples)

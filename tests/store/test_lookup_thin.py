@@ -1,4 +1,4 @@
-"""The weighting `thin` against thin-plate splines and correlations of other code."""
+"""The weightings `thin` and `lean` against thin-plate splines and correlations of other code."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from solver.fruit import directions, lattice
+from store.blending.methods.lean import leaning
 from store.blending.methods.thin import Thin
 from store.blending.methods.weights import Samples
 from store.errors import OutsideTable
 from store.lookup import ShapeTable
 
-from ._thin import NODES, agreement, mixture
+from ._thin import NODES, agreement, bilinear, leant, mixture
 from ._wrinkled import N, own
 from .conftest import GAMMA, TE
 
@@ -31,15 +32,16 @@ def test_the_tables_patterns_are_between_alike_and_not() -> None:
     assert max(agreement(*node, 0.0) for node in NODES) == 0
 
 
+@pytest.mark.parametrize("method", ["thin", "lean"])
 @pytest.mark.parametrize(("te", "gamma"), POINTS)
-def test_splines_count_as_far_as_neighbours_agree(alike: ShapeTable, te: float, gamma: float) -> None:
-    weights, part = mixture(te, gamma, SHARED)
+def test_splines_count_as_far_as_neighbours_agree(alike: ShapeTable, te: float, gamma: float, method: str) -> None:
+    weights, part = mixture(te, gamma, SHARED, method == "lean")
     assert 0.05 < part < 0.95
     radial = sum(w * own(i, j, SHARED) for w, (i, j) in zip(weights, NODES, strict=True))
     exact = 0.17 * (radial - 0.5)[..., None] * directions(*lattice(N))
-    np.testing.assert_allclose(found(alike, te, gamma, 0.17), exact, atol=5e-7)
+    np.testing.assert_allclose(found(alike, te, gamma, 0.17, method), exact, atol=5e-7)
     assert np.abs(found(alike, te, gamma, 0.17, "linear") - exact).max() > 1e-4
-    said = alike.at({"te": te, "gamma": gamma}, 0.17, fields=(), method="thin").weights
+    said = alike.at({"te": te, "gamma": gamma}, 0.17, fields=(), method=method).weights
     assert sum(said.values()) == pytest.approx(1)
     assert sorted(said.values()) == pytest.approx(sorted(weights), abs=1e-7)  # stored in single precision
 
@@ -51,7 +53,38 @@ def test_patterns_that_are_unlike_are_left_to_linear_weights(rough: ShapeTable, 
         np.testing.assert_array_equal(both[0], both[1])
 
 
-@pytest.mark.parametrize("method", ["thin", "thin+LL+env"])
+@pytest.mark.parametrize(("te", "gamma"), POINTS)
+def test_patterns_that_are_unlike_lean_to_the_nearest(rough: ShapeTable, te: float, gamma: float) -> None:
+    plain, weights = bilinear(te, gamma), leant(bilinear(te, gamma), 0.0)
+    assert (weights > 0).sum() < (plain > 0).sum()
+    radial = sum(w * own(i, j) for w, (i, j) in zip(weights, NODES, strict=True))
+    exact = 0.17 * (radial - 0.5)[..., None] * directions(*lattice(N))
+    np.testing.assert_allclose(found(rough, te, gamma, 0.17, "lean"), exact, atol=5e-7)
+
+
+def test_a_sample_in_reach_is_all_there_is(rough: ShapeTable) -> None:
+    te, gamma = TE[1] * 1.04, GAMMA[1] * 1.04
+    near, at = (found(rough, *place, 0.2, "lean") for place in ((te, gamma), (TE[1], GAMMA[1])))
+    np.testing.assert_allclose(near, at, atol=1e-7)
+
+
+def test_weights_that_lean_change_no_faster_than_they_may(rough: ShapeTable) -> None:
+    """From sample to sample across a cell, five times as fast as linear ones at most, and they do where they change."""
+    samples = Samples(np.array([(te, gamma) for te in TE for gamma in GAMMA]))
+    steps = np.linspace(0, 1, 401)
+    rows = []
+    for part in steps:
+        near = samples.weigh("lean", samples.unscale(np.array([0.3, part])), 6, 2.0)
+        weights = leaning(near.weights, np.array([0.0, 1.0]))
+        np.testing.assert_allclose(weights[:, 1], near.weights, atol=1e-12)
+        rows.append([np.bincount(near.samples, w, 9) for w in (weights[:, 0], near.weights)])
+    fastest = [float(np.linalg.norm(np.diff(row, axis=0), axis=1).max()) for row in np.moveaxis(np.array(rows), 1, 0)]
+    assert 3 < fastest[0] / fastest[1] < 5 + 1e-9
+    assert np.array(rows)[:, 0].min() >= 0
+    np.testing.assert_allclose(np.array(rows).sum(axis=-1), 1)
+
+
+@pytest.mark.parametrize("method", ["thin", "thin+LL+env", "lean", "lean+LL+env"])
 def test_no_jumps_where_splines_count(alike: ShapeTable, method: str) -> None:
     at_node, between = (TE[1], GAMMA[1], 0.2), (0.036, 14.0, 0.2)
     for te, gamma, stage in (at_node, (TE[1], 14.0, 0.15), between, (0.036, GAMMA[1], 1e-5)):

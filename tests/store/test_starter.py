@@ -108,7 +108,8 @@ def test_its_files_are_whole_and_small() -> None:
     store = Store.open(starter.ROOT)
     paths = [tables.path_of(store, tables.info(store, name)) for name in store.table_names()]
     assert all(seal.is_whole(path) for path in paths)
-    assert sum(path.stat().st_size for path in paths) < 40e6
+    # what the package may take: spectra of 52 panels and of six fruits, each a grid of te by gamma
+    assert sum(path.stat().st_size for path in paths) < 80e6
 
 
 @pytest.mark.parametrize("given", [None, "nowhere"])

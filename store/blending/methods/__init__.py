@@ -1,8 +1,8 @@
 """Methods of look-up: a weighting of samples, then corrections of what their weighted mean has lost.
 
 A method is named by its parts, 'linear+LL+env': the weighting first, then the corrections in the order in which they
-act. Weightings: `idw` (the paper's Eq. 13-14), `nearest`, `linear`, `scattered`, `thin`. Corrections: `LL` (power by
-degree) and `env` (local amplitude).
+act. Weightings: `idw` (the paper's Eq. 13-14), `nearest`, `linear`, `scattered`, `thin`, `lean`. Corrections: `LL`
+(power by degree) and `env` (local amplitude).
 """
 
 from __future__ import annotations
@@ -13,18 +13,23 @@ from typing import NamedTuple
 
 from ...errors import OutsideTable
 
-__all__ = ["CORRECTIONS", "DEFAULT", "NAMED", "WEIGHTINGS", "Method", "parse"]
+__all__ = ["CORRECTIONS", "DEFAULT", "NAMED", "SPLINED", "WEIGHTINGS", "Method", "parse"]
 
-WEIGHTINGS = ("idw", "nearest", "linear", "scattered", "thin")
+WEIGHTINGS = ("idw", "nearest", "linear", "scattered", "thin", "lean")
+#: Those that pass splines through samples that share their pattern.
+SPLINED = ("thin", "lean")
 CORRECTIONS = ("LL", "env")
 
-#: What a query gets that names no method. Four held-out fruits between the starter table's twelve (one pattern, record
-#: dehydration-held-out): bands and slopes are half as far off as with `linear` where neighbours share their pattern, to
-#: s = 0.1 or 0.15, and no farther past it; and it is continuous, as `idw` and `nearest` are not.
-DEFAULT = "thin+LL+env"
+#: What a query gets that names no method: splines where neighbours share their pattern, to s = 0.1 or 0.15, which are
+#: half as far off as linear weights there; past it the nearest sample's pattern, from which the solver moves away least
+#: (records dehydration-held-out and -score); and it is continuous, as `idw` and `nearest` are not.
+DEFAULT = "lean+LL+env"
 
 #: The methods that are scored against each other; others can be composed from the same parts.
-NAMED = ("nearest", "idw", "idw+LL", "idw+LL+env", "linear", "linear+LL", "linear+LL+env", "thin", DEFAULT)
+NAMED = (
+    *("nearest", "idw", "idw+LL", "idw+LL+env", "linear", "linear+LL", "linear+LL+env"),
+    *("thin", "thin+LL+env", "lean", DEFAULT),
+)
 
 
 class Method(NamedTuple):

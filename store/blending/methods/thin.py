@@ -21,6 +21,7 @@ from solver.arrays import Array
 from ...surfaces import harmonics
 from ...surfaces.packed import Stored
 from ..neighbours import Weighted
+from .lean import leaning
 from .weights import Samples
 
 __all__ = ["Mixture", "Thin", "outer"]
@@ -62,22 +63,29 @@ class Thin:
         self._spline = lru_cache(maxsize=256)(self._spline_of)
         self._share = lru_cache(maxsize=4096)(self._share_of)
 
-    def mix(self, near: Weighted, point: Array, stages: Sequence[int], without: int | None = None) -> Mixture:
+    def mix(
+        self, near: Weighted, point: Array, stages: Sequence[int], without: int | None = None, lean: bool = False
+    ) -> Mixture:
         """Return `linear` weights `near` of a point (axes,) among `Samples.points`, mixed with the splines' as far as
-        these count; `without` one sample, as if it were not there.
+        these count; `without` one sample, as if it were not there. To `lean` is to lean to the nearest in the rest.
         """
         if len(near.samples) == 1:  # a spline passes through it
             share = np.array([self._share(int(near.samples[0]), j) for j in stages])
             return Mixture(near.samples, np.ones((1, len(stages))), 1 - share)
         shares: dict[_Spline, Array] = {}
+        alike = np.zeros(len(stages))
         for i, weight in zip(near.samples.tolist(), near.weights.tolist(), strict=True):
             spline = self._spline(i, without)
+            share = weight * np.array([self._share(i, j) for j in stages])
+            alike += share
             if spline is not None:
-                share = weight * np.array([self._share(i, j) for j in stages])
                 shares[spline] = shares.get(spline, 0.0) + share
+        # weights of samples that are alike stay as they are
+        leans = lean and float(alike.min(initial=1.0)) < 1
+        rest = leaning(near.weights, alike) if leans else outer(near, len(stages)).weights
         found = [(spline, share) for spline, share in shares.items() if share.any()]
         if not found:
-            return outer(near, len(stages))
+            return Mixture(near.samples, rest, np.ones(len(stages)))
         taken = sorted({*near.samples.tolist(), *(i for spline, _ in found for i in spline.samples)})
         place = {i: k for k, i in enumerate(taken)}
         weights, left = np.zeros((len(taken), len(stages))), np.ones(len(stages))
@@ -87,7 +95,7 @@ class Thin:
             counts = share * _ramp(float(np.abs(own).sum()), _WILD, _CALM)
             weights[[place[i] for i in spline.samples]] += np.multiply.outer(own, counts)
             left -= counts
-        weights[[place[i] for i in near.samples.tolist()]] += np.multiply.outer(near.weights, left)
+        weights[[place[i] for i in near.samples.tolist()]] += rest * left
         return Mixture(np.array(taken), weights, lossy)
 
     def _spline_of(self, i: int, without: int | None) -> _Spline | None:

@@ -2,7 +2,7 @@
 takes all.
 
 `idw` is the paper's: inverse distance in parameters scaled to 0..1 (Eq. 13-14), among the nearest m; it jumps where
-the set of the nearest changes, and so does `nearest`. `linear`, `scattered` and `thin` are continuous everywhere.
+the set of the nearest changes, and so does `nearest`. The others are continuous everywhere.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from ..neighbours import SAME, Neighbours, Weighted
 
 __all__ = ["Samples"]
 
-#: Weightings that are `linear` on grids; what `thin` makes of it is in `thin`.
-_LINEAR = ("linear", "thin")
+#: Weightings that are `linear` on grids; what the others make of it is in `thin` and `lean`.
+_LINEAR = ("linear", "thin", "lean")
 
 
 class Samples:

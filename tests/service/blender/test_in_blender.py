@@ -27,6 +27,7 @@ from store.store import Store
 from store.tokens import Tokens
 
 from .._asking import ROOT
+from .._shapes import RAISIN_AT
 from ..test_clients import run
 
 pytestmark = pytest.mark.slow
@@ -106,7 +107,7 @@ def test_families_are_browsed_and_nothing_waits(seen: dict[str, Any]) -> None:
 
 def test_an_inserted_raisin_is_the_tables_and_as_large_as_raisins(seen: dict[str, Any]) -> None:
     raisin = seen["raisin"]
-    truth = table("raisin", {}, raisin["s"], 48)
+    truth = table("raisin", RAISIN_AT, raisin["s"], 48)
     assert np.abs(np.array(raisin["positions"]).reshape(-1, 3) - truth).max() < 1e-5
     assert max(raisin["metres"]) == pytest.approx(0.0085 * np.ptp(truth, axis=0).max(), rel=1e-4)
     assert 0.012 < max(raisin["metres"]) < 0.018

@@ -23,6 +23,7 @@ from store import starter
 from store.lookup import ShapeTable
 
 from .._asking import ROOT
+from .._shapes import RAISIN_AT
 
 HERE = ROOT / "service" / "blender"
 
@@ -70,10 +71,10 @@ def test_points_are_the_tables_shape_turned_upright(parts: Any, tmp_path: Path) 
         service = parts["client"].Service("http://nowhere")
         service.ask = lambda path, data=None, method=None: http.get(path).raise_for_status().content
         assert {one["name"] for one in service.maps()} >= {"default", "raisin"}
-        found = service.shape("dehydration", "raisin", {"s": 0.2}, 32)
+        found = service.shape("dehydration", "raisin", {**RAISIN_AT, "s": 0.2}, 32)
     from solver.registry import surface
 
-    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at({}, 0.2, resolution=32)
+    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at(RAISIN_AT, 0.2, resolution=32)
     truth = mesh.vertices(*mesh.surface(shape))
     assert np.abs(np.array(found.positions).reshape(-1, 3) - truth).max() < 1e-6
     up = np.array(parts["lattice"].upright(found.positions)).reshape(-1, 3)

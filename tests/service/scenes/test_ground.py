@@ -22,6 +22,7 @@ from store import starter
 from store.lookup import ShapeTable
 
 from .._gltf import parsed
+from .._shapes import RAISIN_AT
 from ._reading import instances, placed
 from .test_scenes import made
 
@@ -71,7 +72,7 @@ def test_things_stand_on_a_hill_along_its_normals_apart() -> None:
     middles, ups = poses(scene.data)
     assert len(middles) == 60
     found = instances(scene.data)
-    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at({}, 0.2, resolution=128)
+    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at(RAISIN_AT, 0.2, resolution=128)
     assert shape.position is not None
     whole = np.concatenate([shape.position.reshape(-1, 3), shape.poles])
     moved = HILL.copy().apply_translation([1, 2, 3])

@@ -19,6 +19,7 @@ from store import starter
 from store.lookup import ShapeTable
 
 from .._gltf import parsed
+from .._shapes import RAISIN_AT
 from ._reading import array, instances
 from .test_scenes import CAMERA, TABLES, complaints
 
@@ -110,7 +111,7 @@ def test_a_prototype_can_be_had_at_other_stages(tmp_path: Path) -> None:
         mesh = UsdGeom.Mesh(prim)
         points = np.array(mesh.GetPointsAttr().Get())
         n = int(np.sqrt((len(points) - 2) / 2))
-        position = table.at({}, s, resolution=n).position
+        position = table.at(RAISIN_AT, s, resolution=n).position
         assert position is not None
         assert np.abs(np.abs(points[: 2 * n * n]) - np.abs(position.reshape(-1, 3))).max() < 1e-5
         assert len(mesh.GetDisplayColorAttr().Get()) == len(points)

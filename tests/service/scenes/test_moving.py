@@ -17,6 +17,7 @@ from store import starter
 from store.lookup import ShapeTable
 
 from .._gltf import parsed
+from .._shapes import RAISIN_AT
 from ._reading import array, instances, placed
 from .test_scenes import CAMERA, complaints
 
@@ -30,7 +31,7 @@ def made(items: list[dict[str, Any]], to: str = "glb", compress: bool = False, *
 
 
 def own(stage: float, n: int) -> np.ndarray:
-    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at({}, stage, resolution=n)
+    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at(RAISIN_AT, stage, resolution=n)
     assert shape.position is not None
     assert shape.poles is not None
     return np.concatenate([shape.position.reshape(-1, 3), shape.poles])

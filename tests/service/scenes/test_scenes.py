@@ -25,6 +25,7 @@ from store.lookup import ShapeTable
 from .. import _materialx
 from .._asking import checked
 from .._gltf import parsed
+from .._shapes import RAISIN_AT
 from ..conftest import client_of
 from ._reading import instances
 
@@ -47,8 +48,8 @@ def client() -> Any:
         yield client
 
 
-def own(name: str, n: int) -> np.ndarray:
-    shape = ShapeTable.open(starter.ROOT, name, surfaces=surface).at({}, 0.2, resolution=n)
+def own(n: int) -> np.ndarray:
+    shape = ShapeTable.open(starter.ROOT, "raisin", surfaces=surface).at(RAISIN_AT, 0.2, resolution=n)
     assert shape.position is not None
     assert shape.poles is not None
     return np.concatenate([shape.position.reshape(-1, 3), shape.poles])
@@ -63,7 +64,7 @@ def test_instances_are_the_tables_shape_where_they_should_be(compress: bool) -> 
     scene = made([item], compress=compress, unit=0.01)
     [(_, world, triangles, mirrored)] = instances(scene.data)
     n = scene.report["detail"]["lattices"][0]
-    points = own("raisin", n) * 1.2
+    points = own(n) * 1.2
     c, s = math.cos(1.0), math.sin(1.0)
     points = points @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T + [1, 2, -3]
     assert not mirrored
