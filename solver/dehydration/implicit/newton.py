@@ -95,7 +95,7 @@ def masked(pattern: Pattern, data: Floats, free: Bools) -> Floats:
     rows = np.repeat(np.arange(len(free)), np.diff(pattern.indptr))
     result = data.copy()
     # few nodes have held components: only their blocks are touched
-    held: Bools = ~free.all(axis=1)
+    held = ~np.all(free, axis=1, keepdims=True)[:, 0]
     there = np.flatnonzero(held[rows] | held[pattern.indices])
     result[there] *= free[rows[there], :, None] & free[pattern.indices[there], None, :]
     diagonal = there[rows[there] == pattern.indices[there]]
