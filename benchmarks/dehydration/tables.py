@@ -38,6 +38,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-onset-full": _full,
         "dehydration-buckled whole": _whole,
         "dehydration-buckled eighths": _eighths,
+        "dehydration-buckled merging": _merging,
         "dehydration-scaling": _scaling,
         "dehydration-speed": _speed,
         "dehydration-skips": _skips,
@@ -177,6 +178,25 @@ def _whole(record: Row) -> str:
         )  # fmt: skip
     head = ("quality, seed", "elements", "steps", "CPU s to each stage", "roughness [r1]", "against fine's mean")
     return markdown((*head, "residual", "not converged at s =", "least J", "deepest [te]"), lines)
+
+
+def _merging(record: Row) -> str:
+    """How many buckles there are at each stage, and in how many runs they are fewer at the end than at the start."""
+    rows = [row for mirrors in ("", "xyz") for row in _measured(record, mirrors) if "failed" not in row]
+    lines = []
+    for te, gamma, mirrors, quality in dict.fromkeys((*kind(row), row["quality"]) for row in rows):
+        runs = [row["buckle_count"] for row in rows if (*kind(row), row["quality"]) == (te, gamma, mirrors, quality)]
+        change = [run[-1] / run[0] - 1 for run in runs]
+        counts = [f"{statistics.mean(at):.3g}" for at in zip(*runs, strict=True)]
+        spread = f" +- {50 * (max(change) - min(change)):.0f}" if len(change) > 1 else ""
+        lines.append(
+            [
+                f"{te:g}", f"{gamma:g}", "eighth" if mirrors else "whole", f"{quality}, {len(runs)}", *counts,
+                f"{100 * statistics.mean(change):+.0f}{spread} %", f"{sum(c < 0 for c in change)} of {len(runs)}",
+            ]
+        )  # fmt: skip
+    stages = [f"s = {s:g}" for s in STAGES]
+    return markdown(("te", "gamma", "part", "quality, seeds", *stages, "first to last", "fewer in"), lines)
 
 
 def _eighths(record: Row) -> str:

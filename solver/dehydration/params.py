@@ -128,10 +128,6 @@ class DehydrationParams(Fruit):
                 raise ValueError(f"{field} differs across a mirror plane: leave {', '.join(across)} out of mirrors")
         if self.mirrors and self.light_map is not None:
             raise ValueError("a light map may differ across a mirror plane: leave out mirrors")
-        if self.mirrors and self.imperfection_kind == "mode":
-            raise ValueError(
-                "a buckling mode need not have the mirrors' symmetry: leave out mirrors, or start from waves"
-            )
         return self
 
     @model_validator(mode="after")

@@ -9,7 +9,10 @@ import pytest
 from scipy.sparse import bsr_array
 
 from solver.contract import Cancelled, Context, InvalidInput, NotConverged
+from solver.dehydration import SOLVER
 from solver.dehydration.implicit import (
+    BaseState,
+    Equilibrium,
     Patch,
     base_state,
     build_model,
@@ -176,3 +179,24 @@ def test_a_patch_follows_the_whole_it_is_cut_from():
     disturbed[inside] += 0.3 * model.free * np.sin(40 * mesh.positions[inside])
     with pytest.raises(NotConverged, match="near a guess"):
         equilibrium(model, 0.05, guess=dataclasses.replace(start, deformed=disturbed), alone=True)
+
+
+def test_a_thin_skin_is_carried_to_a_patch_as_thick_as_it_was():
+    """By share of depth: faces of the coarse mesh miss the fruit by as much as its skin is thick."""
+    thin = SOLVER.parse({"r8": 0.38}, "wolfberry")
+    assert isinstance(thin, DehydrationParams)
+    core, foot = np.array([0.0, 0.5, 0.8, 0.95, 1.0]), 0.95
+    coarse = build_quadratic_mesh(thin, 8, core, "quarter", 2, foot=foot)
+    fine = build_quadratic_mesh(thin, 60, core, "quarter", 2, Patch(np.array([0.071, 0.783, 0.198]), 0.1), foot)
+    assert coarse.foot == fine.foot == foot
+
+    def swollen(mesh):
+        """Return nodes whose skin has become a tenth thicker, along its columns."""
+        columns = mesh.positions.reshape(-1, mesh.levels, 3).copy()
+        columns[:, -4:] += 0.1 * (columns[:, -4:] - columns[:, -5:-4])
+        return columns.reshape(-1, 3)
+
+    state = Equilibrium(0.0, swollen(coarse), np.zeros((len(coarse.connectivity), PRESSURE.shape[1])))
+    found = carried(BaseState(thin, build_model(thin, coarse, 100.0), state), build_model(thin, fine, 100.0)).deformed
+    missed = np.linalg.norm(found - swollen(fine), axis=1).max()
+    assert missed < 0.01 * 0.1 * thin.exocarp_thickness

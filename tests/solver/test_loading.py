@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from solver.contract import Context, InvalidGeometry, InvalidInput, Need
+from solver.contract import Context, InvalidGeometry, InvalidInput, Need, NotConverged
+from solver.dehydration.bifurcation import mirrored
 from solver.dehydration.fresh.closed_form import sphere_radius
 from solver.dehydration.fresh.imperfection import bumps, heights
 from solver.dehydration.fresh.loading import Loading
 from solver.dehydration.fresh.mesh import cubed_sphere, layer_fractions
+from solver.dehydration.implicit.buckling import Crossing
 from solver.dehydration.kernel import (
     internal_force,
     march,
@@ -239,6 +241,28 @@ def test_the_mode_of_a_sphere_is_bumpy_and_at_most_one(stone):
     found = heights(parse(imperfection_kind="mode", stone=(stone, stone)), cubed_sphere(12).directions, Context())
     assert np.abs(found).max() == pytest.approx(1.0, abs=0.02)
     assert np.abs(found).mean() > 0.05
+
+
+def test_a_mode_between_mirrors_is_its_own_image():
+    """The first mode of this skin is odd about one plane; the one 1.2 % later is even about all."""
+    rays = cubed_sphere(12).directions
+    images = [rays * np.where(np.arange(3) == axis, -1, 1) for axis in range(3)]
+    params = parse(imperfection_kind="mode", mirrors="xyz", te=0.12)
+    own, *others = heights(params, np.concatenate([rays, *images]), Context()).reshape(4, -1)
+    assert np.abs(own).max() > 0.5
+    for other in others:
+        np.testing.assert_allclose(other, own, atol=1e-6)
+
+
+def test_no_mode_with_the_mirrors_symmetry(monkeypatch):
+    monkeypatch.setattr(mirrored, "crossings", lambda *_, **__: (SimpleNamespace(mesh=mesh), found))
+    mesh, found = SimpleNamespace(planes=(0, 1, 2)), [Crossing(0.1, np.zeros((1, 3)), (-1, 1, 1))]
+    params = parse(imperfection_kind="mode", mirrors="xyz")
+    with pytest.raises(NotConverged, match="symmetry"):
+        heights(params, np.eye(3), Context())
+    found.clear()
+    with pytest.raises(InvalidInput, match="no buckling mode"):
+        heights(params, np.eye(3), Context())
 
 
 def test_modes_are_for_homogeneous_drying():

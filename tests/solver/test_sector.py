@@ -139,7 +139,6 @@ def test_a_buckled_part_is_the_symmetric_whole(monkeypatch):
     [
         ({"mirrors": "y", "radii": [1, 0.9, 0.8, 0.8, 0.8, 0.85, 1, 0.8]}, "ends of the fruit"),
         ({"mirrors": "xz", "wetness": [0, 0, 0.2]}, "leave z out"),
-        ({"mirrors": "x", "imperfection_kind": "mode"}, "start from waves"),
     ],
 )
 def test_what_is_not_symmetric_is_refused(values, word):

@@ -23,7 +23,8 @@ LOWEST, HIGHEST = 5.0, 130.0
 def heights(params: DehydrationParams, directions: Floats, context: Context, highest: float = HIGHEST) -> Floats:
     """Return the heights (n,) of `params.imperfection_kind` at unit `directions` (n, 3), magnitude about one at most.
 
-    "waves": see `bumps`. "mode": the first buckling mode (Liu et al. 2014, Eq. 11), as it is; no seed enters.
+    "waves": see `bumps`. "mode": the first buckling mode (Liu et al. 2014, Eq. 11), as it is, or the first that has the
+    mirrors' symmetry; no seed enters.
 
     Raises:
         InvalidInput: the mode was asked for and the fruit does not buckle, or its drying is not homogeneous.
@@ -38,7 +39,9 @@ def heights(params: DehydrationParams, directions: Floats, context: Context, hig
             "buckling modes are known for homogeneous, isotropic drying only.",
             advice='Leave out wetness, anisotropy and light, or set imperfection_kind to "waves".',
         )
-    from ..bifurcation import onset  # an eigenproblem: nothing that waves should pay for
+    # eigenproblems: nothing that waves should pay for
+    from ..bifurcation import onset
+    from ..bifurcation.mirrored import mirrored_mode
 
     def stop() -> bool:
         try:
@@ -48,7 +51,10 @@ def heights(params: DehydrationParams, directions: Floats, context: Context, hig
         return False
 
     # its progress is not the run's
-    found = onset(params, quality="preview", context=Context(cancelled=stop))
+    quiet = Context(cancelled=stop)
+    if params.mirrors:
+        return mirrored_mode(params, context=quiet)(directions)
+    found = onset(params, quality="preview", context=quiet)
     if found.mode is None:
         raise InvalidInput(
             f"there is no buckling mode to start from: {found.reason or 'the smooth shape stays stable'}.",

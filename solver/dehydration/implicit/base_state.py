@@ -13,7 +13,7 @@ from ...contract import Context, NotConverged
 from ...fem import HEX27
 from ..params import DehydrationParams
 from .hexahedron import POINTS, PRESSURE, pressure_functions
-from .location import fold, interpolate, locate
+from .location import fold, interpolate, locate, nominal
 from .mesh import QuadraticMesh, Symmetry, build_quadratic_mesh, graded_layers, natural_symmetry
 from .newton import Equilibrium, Loading, Model, build_model, equilibrium
 
@@ -105,7 +105,7 @@ def carried(coarse: BaseState, model: Model, elsewhere: Equilibrium | None = Non
     for axis in model.mesh.planes:
         held[:, axis] |= fresh[:, axis] == 0
     moved = np.where(held, fresh, moved)
-    element, local = locate(coarse.params, coarse.mesh, fold(coarse.mesh, gauss)[0])
+    element, local = nominal(coarse.params, coarse.mesh, fold(coarse.mesh, gauss)[0])
     at_points = np.einsum("pr,pr->p", pressure_functions(local), coarse.pressure[element]).reshape(-1, len(POINTS))
     pressure = at_points @ np.linalg.pinv(PRESSURE).T
     if elsewhere is not None:

@@ -11,7 +11,7 @@ from ..params import DehydrationParams
 from .mesh import QuadraticMesh
 from .upright import parametric, slanted
 
-__all__ = ["fold", "interpolate", "locate"]
+__all__ = ["fold", "interpolate", "locate", "nominal"]
 
 
 _NUDGE = 1e-9
@@ -54,14 +54,24 @@ def _first_guess(params: DehydrationParams, mesh: QuadraticMesh, points: Floats)
     return stack * mesh.layers + layer, local
 
 
+def nominal(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tuple[Ints, Floats]:
+    """Return element (k,) and local coordinates (k, 3) of fresh points (k, 3) by direction and share of depth.
+
+    What is carried from mesh to mesh goes by these. A coarse mesh's polynomial faces miss the fruit's surface by as
+    much as a thin skin is thick (wolfberry): at their place in space, points of the skin lie in the flesh, and the
+    skin between two of them comes out a quarter too thick or too thin. The element is negative beyond a patch.
+    """
+    straight = points if mesh.foot is None else slanted(params, points, mesh.foot)
+    return _first_guess(params, mesh, straight)
+
+
 def locate(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tuple[Ints, Floats]:
     """Return element (k,) and local coordinates (k, 3) of fresh points (k, 3) inside the mesh's part (see `fold`).
 
     The element is that of the point's column and depth; local coordinates then solve X(xi) = point, and may reach a
     little beyond +-1 where the polynomial faces miss the fruit's surface. The element is negative beyond a patch.
     """
-    straight = points if mesh.foot is None else slanted(params, points, mesh.foot)
-    element, local = _first_guess(params, mesh, straight)
+    element, local = nominal(params, mesh, points)
     inside = np.flatnonzero(element >= 0)
     corners, target, at = mesh.positions[mesh.connectivity[element[inside]]], points[inside], local[inside]
     for _ in range(4):
@@ -73,8 +83,11 @@ def locate(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tu
 
 
 def interpolate(params: DehydrationParams, mesh: QuadraticMesh, nodal: Floats, points: Floats) -> Floats:
-    """Return a field of nodal values (nn, 3) at fresh points (k, 3) of the mesh's part, 0 beyond a patch."""
-    element, local = locate(params, mesh, points)
+    """Return a field of nodal values (nn, 3) at fresh points (k, 3) of the mesh's part, 0 beyond a patch.
+
+    At the same share of depth: a thin skin's nodes must not come out in another layer (see `nominal`).
+    """
+    element, local = nominal(params, mesh, points)
     found, inside = np.zeros_like(points), np.flatnonzero(element >= 0)
     shape = HEX27.shape(local[inside])[:, None]
     found[inside] = np.matmul(shape, nodal[mesh.connectivity[element[inside]]])[:, 0]

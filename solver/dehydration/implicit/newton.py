@@ -93,10 +93,14 @@ class Model:
 def masked(pattern: Pattern, data: Floats, free: Bools) -> Floats:
     """Return the matrix with rows and columns of held components replaced by those of the identity."""
     rows = np.repeat(np.arange(len(free)), np.diff(pattern.indptr))
-    result = data * free[rows][:, :, None] * free[pattern.indices][:, None, :]
-    diagonal = np.flatnonzero(rows == pattern.indices)
+    result = data.copy()
+    # few nodes have held components: only their blocks are touched
+    held = ~np.all(free, axis=1, keepdims=True)[:, 0]
+    there = np.flatnonzero(held[rows] | held[pattern.indices])
+    result[there] *= free[rows[there], :, None] & free[pattern.indices[there], None, :]
+    diagonal = there[rows[there] == pattern.indices[there]]
     for i in range(3):
-        result[diagonal, i, i] += ~free[:, i]
+        result[diagonal, i, i] += ~free[rows[diagonal], i]
     return result
 
 
