@@ -64,7 +64,7 @@ _BYTES = 1000
 def choose(params: DecayParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
     cells, tolerance = _MESHES[quality]
-    layers, *rest = _BODIES[quality]
+    layers, balance, smooth, skin = _BODIES[quality]
     if params.heap is not None:
         cells, layers = _HEAPS[quality]
     return Settings(
@@ -72,7 +72,9 @@ def choose(params: DecayParams, quality: Quality) -> Settings:
         tolerance,
         _LONGEST / max(_clock(params), 0.1),
         layers,
-        *rest,
+        balance,
+        smooth,
+        skin,
         len(params.mesh.points) if params.mesh else 0,
     )
 

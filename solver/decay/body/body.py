@@ -26,7 +26,7 @@ from .obstacles import Obstacles
 from .pressure import pressed
 from .springs import knit, swung
 
-__all__ = ["CONTACT", "DENSITY", "TETHER", "Body"]
+__all__ = ["CONTACT", "DENSITY", "Body"]
 
 
 #: Density of fresh fruit [kg/m^3].
@@ -34,7 +34,7 @@ DENSITY = 1000.0
 #: Stiffness of the floor per area, over the fresh modulus and an edge: it gives way by a thousandth of r1.
 CONTACT = 30.0
 #: Stiffness per volume of the springs that keep the core from sliding, over the fresh modulus.
-TETHER = 0.1
+_TETHER = 0.1
 #: Neighbours farther from the fresh skin than this are never met; one may stand so deep in it [r1].
 _REACH, _DEEP = 1.0, 0.3
 #: Radius of a ball that stands for a plane [r1].
@@ -129,7 +129,7 @@ class Body:
         contact[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(areas / 3, 3), len(solid.skin))
         contact *= CONTACT * fresh / float(np.cbrt(solid.volume.mean()))
         volume = np.bincount(solid.tets.ravel(), shared, count)
-        tether = np.where(self._filling.core, TETHER * fresh * volume, 0.0)
+        tether = np.where(self._filling.core, _TETHER * fresh * volume, 0.0)
         # a fruit that lies on another one does not reach the floor
         floor = self.obstacles.floor
         heights = None if floor is None else floor - self._filling.hanging

@@ -200,7 +200,7 @@ class System:
         return params.transpiration + more * self.surface.mean(self.broken(rot))
 
     def caught(self, day: float, ray: Floats, radius: float) -> None:
-        """Let rot, and the mould if there is one, land on a day at a unit direction, as of a fruit that touches there."""
+        """Let rot, and the mould if there is one, land on a day at a unit direction: a fruit that touches there."""
         if self._due is not None:
             # what was next may not be any more
             self._waiting.add(*self._due)

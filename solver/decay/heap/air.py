@@ -15,10 +15,9 @@ from ...arrays import Floats
 
 __all__ = ["Between", "between"]
 
-#: Diffusivity of water vapour in air at 20 degC and at 0 degC's ratio [m^2/s]: see docs/decay.md.
-_DIFFUSIVITY = 2.42e-5
-#: Gas constant [J/(mol K)] and molar weight of water [g/mol].
-_GAS, _MOLAR = 8.314, 18.015
+#: Diffusivity of water vapour in air [m^2/s], and its gas constant [J/(kg K)]; sources in docs/decay.md.
+_DIFFUSIVITY = 2.545e-5
+_VAPOUR = 461.53
 
 
 class Between(NamedTuple):
@@ -29,18 +28,24 @@ class Between(NamedTuple):
 
 
 def between(
-    centres: Floats, own: Floats, conductances: Floats, celsius: float, wet: float, dry: float, full: float, still: float
+    centres: Floats,
+    own: Floats,
+    conductances: Floats,
+    celsius: float,
+    pressures: tuple[float, float, float],
+    still: float,
 ) -> Between:
     """Return the air about fruits with centres (b, 3) [m], radii `own` (b) [m], conductances (b) [g/(s Pa)].
 
-    wet, dry: vapour pressures at the skins and in the room, full: of saturated air [Pa].
+    pressures: of vapour at the skins, in the room, and in saturated air [Pa]. still: share that no wind takes away.
     """
+    wet, dry, full = pressures
     count = len(centres)
     if wet <= dry or still == 0:
         return Between(np.ones(count), np.zeros(count))
     far = np.linalg.norm(centres[:, None] - centres[None], axis=2)
     far = np.maximum(far, np.maximum(own[:, None], own[None]))
-    raised = still * _GAS * (celsius + 273.15) / (_MOLAR * 4 * np.pi * _DIFFUSIVITY * far)
+    raised = 1e-3 * still * _VAPOUR * (celsius + 273.15) / (4 * np.pi * _DIFFUSIVITY * far)
     np.fill_diagonal(raised, 0.0)
     lost = np.linalg.solve(np.eye(count) + conductances[:, None] * raised, conductances * (wet - dry))
     # where others are so much wetter that vapour would go into a fruit, no dew falls

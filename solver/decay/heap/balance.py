@@ -19,7 +19,7 @@ from ...contract import NotConverged
 from ...linalg.krylov import times
 from ..body.equilibrium import Rest
 from ..body.material import Blocks, energy, forces, hessian
-from .linear import Ranks, coarse, solved
+from .linear import Ahead, Ranks, coarse, solved
 from .lying import Ground
 from .touching import Pairs, planes
 
@@ -262,7 +262,8 @@ def _direction(
 
 
 def _way_out(d: Floats, found: Met) -> Floats:
-    return np.einsum("nk,nk->n", found.out, d)
+    out: Floats = np.einsum("nk,nk->n", found.out, d)
+    return out
 
 
 def _pressed(y: Floats, x: Floats, found: Met, loads: Loaded) -> float:
@@ -294,7 +295,7 @@ class _System:
         lean: _Linear,
         touching: Bools,
     ) -> None:
-        self._a, self._pattern, self._bodies = a, pattern, loads.bodies
+        self._a, self._pattern = a, pattern
         way = loads.pairs.way[lean.pair] * lean.side[:, None]
         stiff = loads.contact[lean.point]
         ground = np.where(touching, loads.contact, 0.0)
@@ -303,7 +304,7 @@ class _System:
         a[pattern.diagonal] = blocks
         # linear contacts: a plane goes where its own points push it alike
         count = len(loads.pairs.way)
-        total = np.bincount(lean.pair, stiff, count)
+        total: Floats = np.bincount(lean.pair, stiff, count).astype(float)
         heights = np.einsum("mk,mk->m", x[lean.point], loads.pairs.way[lean.pair])
         place = np.bincount(lean.pair, stiff * heights, count) / np.maximum(total, 1e-300)
         deep = lean.side * (heights - place[lean.pair])
@@ -312,22 +313,22 @@ class _System:
         self.right = (ground * below)[:, None] * found.out
         np.subtract.at(self.right, lean.point, (stiff * deep)[:, None] * way)
         self._ranks = Ranks(lean.point, lean.pair, stiff, loads.pairs.way[lean.pair], total)
-        self._inverse, self._touched = np.linalg.inv(blocks), blocks - own
+        self._touched = blocks - own
         per = x.reshape(loads.bodies, -1, 3)
-        self._about = (per - per.mean(axis=1, keepdims=True)).reshape(-1, 3)
+        about: Floats = (per - per.mean(axis=1, keepdims=True)).reshape(-1, 3)
         springs = ground[:, None, None] * found.out[:, :, None] * found.out[:, None, :]
         springs[:, 0, 0] += loads.tether
         springs[:, 2, 2] += loads.tether
         springs[:, 1, 1] += loads.weight / _FALL
-        square = coarse(springs, self._about, loads.bodies, *self._ranks, loads.pairs.body)
+        square = coarse(springs, about, loads.bodies, *self._ranks, loads.pairs.body)
         square[np.diag_indices(len(square))] *= 1 + 1e-9
-        self._rigid = np.linalg.inv(square)
+        inverse, rigid = (np.asarray(np.linalg.inv(m), np.float64) for m in (blocks, square))
+        self._ahead = Ahead(inverse, rigid, about, loads.bodies)
 
     def solve(self, b: Floats, start: Floats, tolerance: float) -> tuple[Floats, bool]:
         """Return x (n, 3) with A x = b from a start, and whether A curved upwards in all directions met."""
         rows = self._pattern.indptr, self._pattern.indices, self._a
-        ahead = self._inverse, self._rigid, self._about, self._bodies
-        return solved(*rows, self._ranks, *ahead, b, start, tolerance, _ITERATIONS)
+        return solved(*rows, self._ranks, self._ahead, b, start, tolerance, _ITERATIONS)
 
     def without(self, p: Floats) -> Floats:
         """Return A p (n, 3) without the contacts in it."""

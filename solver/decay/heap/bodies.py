@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Floats
-from ..body.body import CONTACT, DENSITY, TETHER, Body
-from ..body.equilibrium import Rest, rested
+from ..body.body import CONTACT, DENSITY, Body
+from ..body.equilibrium import rested
 from ..body.flesh import Booked, Softened
 from ..body.material import blocks
 from ..params import DecayParams
@@ -28,17 +28,25 @@ __all__ = ["Bodies", "Shaped", "apart", "overlap", "stiff"]
 
 #: Gap at which two fruits touch [r1]; rounds in which surfaces are laid apart.
 TOUCHING, _ROUNDS = 0.05, 24
+#: Share of its weight that friction bears sideways before a fruit slides. A choice, as of solver.resting.
+_FRICTION = 0.5
+#: Springs that bear it until then: the weight at so many to the r1. They give way by 0.02 r1 before they slide.
+_HOLD = 25.0
 #: How far beyond a plane a point is laid [r1]: more than single precision takes away.
 _CLEAR = 2e-6
 
 
 class Shaped(NamedTuple):
-    """A heap's stage: surfaces (b, v, 3), what was solved for them if anything, and each fruit's weight and length."""
+    """A heap's stage: surfaces (b, v, 3), what was solved for them if anything, and each fruit's weight and length.
+
+    anchor (b, 3): where springs hold each fruit's core, sideways.
+    """
 
     points: Floats
     found: Settled | None
     booked: Sequence[Booked]
     even: Floats
+    anchor: Floats | None = None
 
 
 class Bodies:
@@ -67,8 +75,10 @@ class Bodies:
         self._contact = np.concatenate([areas * s**2 for s in lying.size]) * CONTACT * fresh / edge
         shared = np.repeat(self._volume / 4, 4)
         points = np.bincount(tets.ravel(), shared, size * count)
-        self._tether = np.where(np.tile(self._body.core, count), TETHER * fresh * points, 0.0)
         self._pressure = DENSITY * params.flesh.gravity * self._body.radius
+        core = np.where(np.tile(self._body.core, count), points, 0.0).reshape(count, -1)
+        whole = self._pressure * points.reshape(count, -1).sum(axis=1)
+        self._tether = (_HOLD * whole[:, None] * core / core.sum(axis=1, keepdims=True)).ravel()
 
     def state(self, water: float, rot: Floats) -> Softened:
         """Return the flesh of a fruit that lost a share of its weight as water, with rot (v) on its surface."""
@@ -93,22 +103,46 @@ class Bodies:
         per = last.reshape(count, -1, 3)
         middle = per.mean(axis=1, keepdims=True)
         start = (middle + ratio[:, None, None] * (per - middle)).reshape(-1, 3)
-        found = settled(start, rest, self._loads(states, start, rest), self._pattern, self._tolerance, watch)
-        return Shaped(self.surfaces(found.points), found, [state.booked for state in states], even)
+        anchor = None if before is None else before.anchor
+        loads = self._loads(states, start, anchor)
+        found = settled(start, rest, loads, self._pattern, self._tolerance, watch)
+        booked = [state.booked for state in states]
+        return Shaped(self.surfaces(found.points), found, booked, even, self._slid(found.points, loads, anchor))
 
-    def _loads(self, states: Sequence[Softened], start: Floats, rest: Rest) -> Loaded:
+    def _cores(self, points: Floats) -> Floats:
+        """Return the middles (b, 3) of what the springs hold."""
+        count = len(self._lying.size)
+        tether = self._tether.reshape(count, -1, 1)
+        found: Floats = (points.reshape(count, -1, 3) * tether).sum(axis=1) / tether.sum(axis=1)
+        return found
+
+    def _slid(self, points: Floats, loads: Loaded, anchor: Floats | None) -> Floats:
+        """Return where the cores are held next: where they were, or nearer, where friction bears no more."""
+        cores = self._cores(points)
+        if anchor is None:
+            return cores
+        count = len(cores)
+        most = _FRICTION * loads.weight.reshape(count, -1).sum(axis=1) / self._tether.reshape(count, -1).sum(axis=1)
+        away = cores - anchor
+        far = np.linalg.norm(away[:, ::2], axis=1)
+        return cores - away * np.minimum(1.0, most / np.maximum(far, 1e-300))[:, None]
+
+    def _loads(self, states: Sequence[Softened], start: Floats, anchor: Floats | None) -> Loaded:
         mass = np.concatenate([state.mass for state in states])
         shared = np.repeat(self._volume / 4, 4)
-        weight = np.bincount(self._tets.ravel(), shared * np.repeat(mass, 4), len(start))
+        weight: Floats = np.bincount(self._tets.ravel(), shared * np.repeat(mass, 4), len(start)).astype(float)
         skin, count = self._body.solid.skin, len(states)
         pairs = paired(start.reshape(count, -1, 3)[:, skin])
-        return Loaded(
-            self._pressure * weight, self._contact, self._tether, start, skin, count, pairs, self._lying.ground
-        )
+        held = start
+        if anchor is not None:
+            # what is held is where the fruit stands, and not how it shrinks or turns
+            held = start + np.repeat(anchor - self._cores(start), len(start) // count, axis=0)
+        ground = self._lying.ground
+        return Loaded(self._pressure * weight, self._contact, self._tether, held, skin, count, pairs, ground)
 
     def surfaces(self, points: Floats) -> Floats:
         """Return the surfaces (b, v, 3) of bodies with points (b * p, 3), as smooth as the fruit is, laid apart."""
-        lying, solid = self._lying, self._body.solid
+        lying = self._lying
         count = len(lying.size)
         found = np.empty((count, len(self._surface.points), 3))
         for b, own in enumerate(points.reshape(count, -1, 3)):
@@ -118,11 +152,6 @@ class Bodies:
             there = (1 + even) * self._surface.points + self._onto @ left
             found[b] = lying.size[b] * there @ lying.turn[b].T + middle
         return apart(found, lying)
-
-    @property
-    def least_fresh(self) -> float:
-        """Least edge of the fresh bodies [r1]."""
-        return float(np.cbrt(self._body.solid.volume.min()))
 
 
 def stiff(lying: Lying, surface: Surface) -> Floats:

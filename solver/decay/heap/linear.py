@@ -15,17 +15,26 @@ from numba import njit
 from ...arrays import Floats, Ints
 from ...linalg.krylov import times
 
-__all__ = ["Ranks", "applied", "coarse", "solved"]
+__all__ = ["Ahead", "Ranks", "applied", "coarse", "solved"]
 
 
 class Ranks(NamedTuple):
-    """Points (m) that lean on planes, of which pair (m), their stiffness (m) and ways (m, 3); stiffness of pairs (c)."""
+    """Points (m) that lean on planes, of which pair (m), their stiffness (m) and ways (m, 3); sums by pair (c)."""
 
     point: Ints
     pair: Ints
     stiff: Floats
     way: Floats
     total: Floats
+
+
+class Ahead(NamedTuple):
+    """What preconditions: inverses of blocks (n, 3, 3) and of the coarse matrix (6 b, 6 b), arms (n, 3), bodies."""
+
+    inverse: Floats
+    rigid: Floats
+    about: Floats
+    bodies: int
 
 
 @njit(cache=True)
@@ -146,10 +155,7 @@ def solved(
     indices: Ints,
     a: Floats,
     ranks: Ranks,
-    inverse: Floats,
-    rigid: Floats,
-    about: Floats,
-    bodies: int,
+    ahead: Ahead,
     b: Floats,
     start: Floats,
     tolerance: float,
@@ -157,13 +163,12 @@ def solved(
 ) -> tuple[Floats, bool]:
     """Return x (n, 3) with A x = b from a start, and whether A curved upwards in all directions met.
 
-    |b - A x| <= tolerance |b| in the preconditioner's norm, or after `most` iterations. inverse: of the points' blocks
-    (n, 3, 3); rigid: of the coarse matrix (6 b, 6 b).
+    |b - A x| <= tolerance |b| in the preconditioner's norm, or after `most` iterations.
     """
     x, z = start.copy(), np.empty_like(b)
-    first = _prepared(inverse, rigid, about, bodies, b, z)
+    first = _prepared(*ahead, b, z)
     r = b - applied(indptr, indices, a, ranks, x)
-    rz = _prepared(inverse, rigid, about, bodies, r, z)
+    rz = _prepared(*ahead, r, z)
     p = z.copy()
     for _ in range(most):
         if rz <= tolerance**2 * first or rz == 0:
@@ -174,6 +179,6 @@ def solved(
             return x, False
         x += rz / curve * p
         r -= rz / curve * ap
-        before, rz = rz, _prepared(inverse, rigid, about, bodies, r, z)
+        before, rz = rz, _prepared(*ahead, r, z)
         p = z + rz / before * p
     return x, True

@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Floats
-from ...contract import Context, InvalidInput, Need, SolverError
+from ...contract import Context, InvalidInput, Need
+from ..body.flesh import Booked
 from ..climate import warmth
 from ..environment import ACTIVITY, air, saturation
 from ..fields.stepping import Reached, march
 from ..fields.system import System, laid
-from ..body.flesh import Booked
 from ..names import BODY, MOULD
 from ..params import DecayParams, Wound
 from ..settings import Settings, moved
 from ..surfaces.surface import Surface, extent
 from .air import between
 from .bodies import TOUCHING, Bodies, Shaped, overlap, stiff
-from .infection import ROTTEN, Exposure
+from .infection import Exposure
 from .lying import Lying, lie, separate
 from .touching import Pairs, paired
 
@@ -33,6 +33,8 @@ __all__ = ["HeapRun"]
 
 #: Radius of the place where two fruits touch, and of what grows there first [r1].
 _PATCH = 0.15
+#: Gap that what is rotten still bridges, with threads and juice [r1]: rot sinks in where it starts. A choice.
+_BRIDGED = 0.15
 #: Map value from which a place counts as rotten or mouldy.
 _SEEN = 0.1
 
@@ -61,7 +63,9 @@ class HeapRun:
         start = stiff(self._lying, self._surface)
         self._shaped = Shaped(start, None, (), np.ones(len(start)))
         self._bodies = Bodies(params, self._lying, self._surface, settings) if moved(params, wanted) else None
-        self.systems = [System(self._fruit(b, start), settings.cells, self._with_mould, self._surface) for b in range(len(start))]
+        self.systems = [
+            System(self._fruit(b, start), settings.cells, self._with_mould, self._surface) for b in range(len(start))
+        ]
         self._exposure = Exposure(params)
         self._damp: Floats = np.zeros(len(start))
         own = extent(self._single)
@@ -113,7 +117,9 @@ class HeapRun:
         looks = {k * step for k in range(int(last / step + 1e-9) + 1)}
         days = tuple(sorted(looks | set(self._need.stages)))
         quiet = Context(cancelled=lambda: _asks(context))
-        paths = [march(system, days, self._settings.tolerance, self._settings.longest, quiet) for system in self.systems]
+        paths = [
+            march(system, days, self._settings.tolerance, self._settings.longest, quiet) for system in self.systems
+        ]
         seen = 0.0
         for day in days:
             context.check_cancelled()
@@ -146,7 +152,7 @@ class HeapRun:
         days = since * (float(warmth(params.rot, celsius)) if params.climate == "cardinal" else 1.0)
         rots = [system.rot.share(at.state.rot) for at, system in zip(reached, self.systems, strict=True)]
         for pair, way, gap in self._contacts(points):
-            if gap > TOUCHING:
+            if gap > _BRIDGED:
                 continue
             rays = [self._ray(pair[0], way), self._ray(pair[1], -way)]
             seen = [float(rots[b][self.systems[b].near(ray, _PATCH)].max()) for b, ray in zip(pair, rays, strict=True)]
@@ -160,9 +166,7 @@ class HeapRun:
             self._lying.size * self._r1,
             1e-6 * self._area * skins,
             float(celsius),
-            ACTIVITY * full,
-            float(humidity) / 100 * full,
-            full,
+            (ACTIVITY * full, float(humidity) / 100 * full, full),
             self._heap.still,
         )
         self._damp = found.damp

@@ -40,7 +40,9 @@ def paired(skins: Floats) -> Pairs:
 
 
 @njit(cache=True)
-def planes(ahead: Floats, behind: Floats, stiff: Floats, first: Ints, second: Ints, place: Floats, push: Floats) -> None:
+def planes(
+    ahead: Floats, behind: Floats, stiff: Floats, first: Ints, second: Ints, place: Floats, push: Floats
+) -> None:
     """Write where along their ways planes are pushed alike from both sides (c), and how hard (c).
 
     ahead (c, s): heights along the way of the first bodies' points, behind (c, s): of the second ones'; stiff (b, s):
