@@ -63,6 +63,9 @@ def test_weight_is_closed_and_shapes_are_at_rest(run):
 def test_the_upper_fruit_comes_down_as_those_below_shrink(run):
     tops = [surfaces(run, stage)[2].mean(axis=0)[1] for stage in range(run.sizes["stage"])]
     assert tops[0] > tops[1] > tops[2]
+    # and do not roll apart below it
+    aside = [surfaces(run, stage)[0].mean(axis=0)[0] for stage in range(run.sizes["stage"])]
+    assert max(aside) - min(aside) < 0.05
 
 
 def test_rot_goes_over_where_fruits_touch_and_not_without_infection(run):
