@@ -14,10 +14,9 @@ def loaded(path: str, ages: int) -> list[tuple[int, list[Any]]]:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if path.endswith(".glb"):
         bpy.ops.import_scene.gltf(filepath=path)
-        shapes = [o for o in bpy.data.objects if o.type == "MESH"]
-        # one node an age, named by it
-        shapes.sort(key=lambda o: float(o.name.split()[-1]) if o.name.split()[-1].replace(".", "").isdigit() else 0.0)
-        return [(1, [shape]) for shape in shapes[:ages]]
+        # the nodes of the ages take turns along the clip, each by its scale: all are shown, one is large
+        last = max((action.frame_range[1] for action in bpy.data.actions), default=1.0)
+        return [(round(last * (k + 0.5) / ages), list(bpy.data.objects)) for k in range(ages)]
     bpy.ops.wm.usd_import(filepath=path)
     scene = bpy.context.scene
     first, last = scene.frame_start, scene.frame_end
@@ -46,7 +45,7 @@ def lit(low: Any, high: Any) -> None:
     bpy.context.object.data.materials.append(table)
     scene.world = bpy.data.worlds.new("room")
     scene.world.use_nodes = True
-    scene.world.node_tree.nodes["Background"].inputs[1].default_value = 0.6
+    scene.world.node_tree.nodes["Background"].inputs[1].default_value = 0.7
     for name, data, way in (
         ("window", bpy.data.lights.new("window", "AREA"), (-1.2, -1.0, 1.4)),
         ("camera", bpy.data.cameras.new("camera"), (0.0, -2.0, 0.75)),
@@ -56,9 +55,9 @@ def lit(low: Any, high: Any) -> None:
         body.location = middle + size * Vector(way)
         body.rotation_euler = (middle - body.location).to_track_quat("-Z", "Y").to_euler()
         if name == "camera":
-            data.lens, data.clip_start, data.clip_end, scene.camera = 60, 0.01 * size, 100 * size, body
+            data.lens, data.clip_start, data.clip_end, scene.camera = 105, 0.01 * size, 100 * size, body
         else:
-            data.energy, data.size = 35 * size * size, size
+            data.energy, data.size = 65 * size * size, size
 
 
 def main(path: str, stem: str, ages: str, pixels: str, samples: str) -> None:
@@ -73,6 +72,8 @@ def main(path: str, stem: str, ages: str, pixels: str, samples: str) -> None:
     scene.view_settings.view_transform = "Standard"
     everyone = {one for _, objects in shown for one in objects}
     for k, (frame, objects) in enumerate(shown):
+        if path.endswith(".glb") and k + 1 < len(shown):
+            continue  # one is enough to see that it says the same
         scene.frame_set(frame)
         for one in everyone:
             one.hide_render = one not in objects

@@ -125,7 +125,8 @@ class Bodies:
         most = _FRICTION * loads.weight.reshape(count, -1).sum(axis=1) / self._tether.reshape(count, -1).sum(axis=1)
         away = cores - anchor
         far = np.linalg.norm(away[:, ::2], axis=1)
-        return cores - away * np.minimum(1.0, most / np.maximum(far, 1e-300))[:, None]
+        held: Floats = cores - away * np.minimum(1.0, most / np.maximum(far, 1e-300))[:, None]
+        return held
 
     def _loads(self, states: Sequence[Softened], start: Floats, anchor: Floats | None) -> Loaded:
         mass = np.concatenate([state.mass for state in states])
