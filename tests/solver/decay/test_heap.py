@@ -72,6 +72,7 @@ def test_rot_goes_over_where_fruits_touch_and_not_without_infection(run):
     rotten = run["fruit_rotten"].values
     assert (rotten[0] == 0).all()
     assert (rotten[-1][[0, 2]] > 0).all()
+    assert rotten[1][1] == 0  # it touches what is sound until then
     none = SOLVER.solve(heap({"infection": 0.0}, body="none"), Need(stages=(8.0,), quality="preview"))
     assert none["fruit_rotten"].values[0, 0] > 0
     assert (none["fruit_rotten"].values[0, 1:] == 0).all()
