@@ -126,6 +126,11 @@ register(
     juice_lost=Quantity("1", "juice that leaked from collapsed rot, over the fresh weight", "j"),
     respired=Quantity("1", "flesh that rot turned to carbon dioxide, over the fresh weight", "c"),
     density=Quantity("1", "weight over volume of the surface, over that of the fresh fruit", "rho"),
+    fruit=Quantity("1", "number of the fruit that a vertex is of, from 0", "-"),
+    fruit_rotten=Quantity("1", "share of each fruit's surface with rot of at least 0.1", "A_r"),
+    fruit_mass=Quantity("1", "weight of each fruit, over its fresh weight", "m"),
+    fruit_damp=Quantity("percent", "what the other fruits add to the humidity about each one", "dH"),
+    overlap=Quantity("1", "how deep one fruit of a heap is in another, in floor or bowl at most, in r1", "o"),
     water_lost=Quantity("1", "water evaporated from skin, wounds and rot, over the fresh weight", "w"),
 )
 

@@ -49,10 +49,13 @@ def flesh_activity(params: DecayParams, water: float) -> float:
     return float(1 / (1 + (1 / ACTIVITY - 1) * fresh / left))
 
 
-def surface_activity(params: DecayParams, day: float, flesh: float, broken: Floats) -> Floats:
-    """Return the water activity at the surface (v) where a share of the skin is broken (v), 0 to 1."""
+def surface_activity(params: DecayParams, day: float, flesh: float, broken: Floats, damp: float = 0.0) -> Floats:
+    """Return the water activity at the surface (v) where a share of the skin is broken (v), 0 to 1.
+
+    damp: what other fruits add to the humidity [percent].
+    """
     skin = params.transpiration + (opened(params) - params.transpiration) * broken
-    humidity = float(air(params, day)[1]) / 100
+    humidity = (float(air(params, day)[1]) + damp) / 100
     return np.asarray((skin * flesh + _STILL_AIR * humidity) / (skin + _STILL_AIR))
 
 

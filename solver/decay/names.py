@@ -28,12 +28,12 @@ VECTORS = ("position", "displacement")
 def completed(params: DecayParams, need: Need) -> Need:
     """Return the need with the places that its fields belong to.
 
-    An imported mesh comes along with what lives on its vertices. Who asks for all that a run keeps by default, of a
-    fruit with a body, gets where the surface is too: the shape could not be shown or exported without. Who names
-    fewer fields gets those.
+    An imported mesh, or the fruits of a heap as one, comes along with what lives on its vertices. Who asks for all
+    that a run keeps by default, of a fruit with a body, gets where the surface is too: the shape could not be shown or
+    exported without. Who names fewer fields gets those.
     """
     wanted = set(need.fields)
-    if params.mesh is not None and wanted & {*FIELDS}:
+    if (params.mesh is not None or params.heap is not None) and wanted & {*FIELDS}:
         wanted = wanted - {"position"} | {"mesh_position", "triangle"}
     elif not params.keeps_shape and wanted >= {*DEFAULT} and wanted.isdisjoint({*VECTORS, "mesh_position"}):
         wanted |= {"position"}

@@ -12,6 +12,7 @@ from ..fruit import Fruit
 from ..painted import Painted
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
+from .heap.given import Heap
 from .hyphae import FURS, Hyphae
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
@@ -181,6 +182,11 @@ class DecayParams(Fruit):
         description="A triangle mesh in place of the fruit's surface, closed or open; fields are those of its vertices",
         json_schema_extra={"units": "r1"},
     )
+    heap: Heap | None = Field(
+        None,
+        description="Many such fruits in one run, that lie on each other and infect each other; without, one alone",
+        json_schema_extra={"units": "1"},
+    )
     pressure: tuple[Pressure, ...] = Field(
         (),
         max_length=64,
@@ -244,6 +250,18 @@ class DecayParams(Fruit):
             raise ValueError("the table of dried fruits knows no imported mesh: take body=quasi-static, not table")
         if self.mesh is not None and self.seeds == "contacts":
             raise ValueError("an imported mesh has neither stem nor floor: take seeds=wounds")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_the_heap(self) -> Self:
+        if self.heap is None:
+            return self
+        if self.mesh is not None or self.neighbours:
+            raise ValueError("the fruits of a heap are each other's neighbours: leave mesh and neighbours out")
+        if self.skin is not None or self.body not in ("none", "quasi-static"):
+            raise ValueError("the fruits of a heap have body=none or quasi-static, and no skin that wrinkles")
+        if self.pressure or self.pressure_map is not None or self.march is not None:
+            raise ValueError("a heap takes no pressure, and heap.step is its march")
         return self
 
     @field_validator("weather")

@@ -16,7 +16,7 @@ from .fields.stepping import Reached, march
 from .fields.system import System
 from .names import FIELDS, MOULD, VECTORS, completed
 from .params import DecayParams
-from .settings import choose, nodes, stepped
+from .settings import Settings, choose, nodes, stepped
 from .surfaces.shape import Shape
 from .surfaces.surface import sampler
 from .told import note
@@ -40,6 +40,8 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     """
     need = completed(params, need)
     settings = choose(params, need.quality)
+    if params.heap is not None:
+        return _heap(params, need, settings, context)
     begun = time.perf_counter()
     wanted = set(need.fields)
     attrs: dict[str, Any] = {"vertices": settings.vertices, "vapour_pressure_deficit": float(deficit(params))}
@@ -86,6 +88,27 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             error.last_stage = rows[-1]["stage"]
         raise
     return _dataset(rows, need, attrs, shape, note(params, rows))
+
+
+def _heap(params: DecayParams, need: Need, settings: Settings, context: Context) -> xr.Dataset:
+    """Return the stages of many fruits as those of one mesh."""
+    from .heap.run import HeapRun
+
+    context.report(0.0, "laying the fruits")
+    heap = HeapRun(params, need, settings)
+    attrs: dict[str, Any] = {"vertices": settings.vertices * len(heap.systems), "path": "heap"}
+    attrs["vapour_pressure_deficit"] = float(deficit(params))
+    rows: list[dict[str, Any]] = []
+    try:
+        for row in heap.rows(context):
+            rows.append(row)
+    except SolverError as error:
+        if rows:
+            error.partial = _stacked(rows, need, attrs, heap.kept)
+            error.last_stage = rows[-1]["stage"]
+        raise
+    said = note(params, rows)
+    return _stacked(rows, need, {**attrs, **({"note": said} if said else {})}, heap.kept)
 
 
 def _finish(
@@ -148,10 +171,17 @@ def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shap
         data["triangle"] = (("face", "corner"), shape.triangles)
         data |= shape.textured
         attrs = {**attrs, **shape.materials}
+    return _stacked(rows, need, attrs, data)
+
+
+def _stacked(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], data: dict[str, Any]) -> xr.Dataset:
+    """Return rows as variables along the stages, beside `data`."""
     for name in rows[0]:
         values = np.array([row[name] for row in rows])
         if name == "mesh_position":
             data[name] = (("stage", "vertex", "component"), values)
+        elif name.startswith("fruit_"):
+            data[name] = (("stage", "fruit_number"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
         elif name in FIELDS and values.ndim == 2:
@@ -162,6 +192,7 @@ def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shap
             data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
     coords: dict[str, Any] = {"stage": np.array([row["stage"] for row in rows])}
     if any(name in FIELDS and data[name][1].ndim > 2 for name in data):
+        assert need.resolution is not None  # settled
         down, along = window(need.resolution, need.region)
         coords["colatitude"] = colatitudes(need.resolution)[down]
         coords["azimuth"] = azimuths(need.resolution)[along]

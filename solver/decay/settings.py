@@ -45,12 +45,16 @@ _BODIES: dict[Quality, tuple[int, float, float, int]] = {
     "default": (8, 1e-4, 1e-3, 32),
     "fine": (16, 1e-5, 1e-4, 32),
 }
+#: Cells and shells of each fruit of a heap, which is seen from farther away than one alone.
+_HEAPS: dict[Quality, tuple[int, int]] = {"preview": (16, 4), "default": (32, 6), "fine": (64, 8)}
 #: Longest step, in units of the quicker organism's own time.
 _LONGEST = 4.0
 #: Measured on one busy core: seconds per step and vertex with both organisms, and a typical step in model time.
 _SECONDS, _STEP = 4e-7, 0.2
 #: Seconds per settled body and tetrahedron.
 _BODY_SECONDS = 2e-5
+#: The same of a heap, whose bodies start from where they lay.
+_HEAP_SECONDS = 1e-5
 #: Seconds per wrinkled skin and vertex.
 _SKIN_SECONDS = 4e-4
 #: Working memory per vertex, mesh and states of both organisms.
@@ -60,11 +64,17 @@ _BYTES = 1000
 def choose(params: DecayParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
     cells, tolerance = _MESHES[quality]
+    layers, balance, smooth, skin = _BODIES[quality]
+    if params.heap is not None:
+        cells, layers = _HEAPS[quality]
     return Settings(
         cells,
         tolerance,
         _LONGEST / max(_clock(params), 0.1),
-        *_BODIES[quality],
+        layers,
+        balance,
+        smooth,
+        skin,
         len(params.mesh.points) if params.mesh else 0,
     )
 
@@ -105,7 +115,22 @@ def expected_cost(params: DecayParams, need: Need) -> Cost:
         count = len(need.stages) + len(nodes(params, need))
         seconds += count * 20 * settings.layers**3 * _BODY_SECONDS
         seconds += count * 10 * settings.skin**2 * _SKIN_SECONDS * (params.skin is not None)
+    if params.heap is not None:
+        return _heaped(params, need, settings, steps)
     return Cost(seconds, len(need.stages) * (values * width + 200) + settings.vertices * _BYTES)
+
+
+def _heaped(params: DecayParams, need: Need, settings: Settings, steps: float) -> Cost:
+    """Return what a heap is expected to take: its fruits' fields, and at each look its bodies."""
+    assert params.heap is not None
+    fruits, wanted = params.heap.count, set(need.fields)
+    points = fruits * settings.vertices
+    looks = len(need.stages) + need.stages[-1] / params.heap.step
+    seconds = 2.0 + steps * points * _SECONDS
+    seconds += looks * fruits * 20 * settings.layers**3 * _HEAP_SECONDS * moved(params, wanted)
+    width = 8 if need.dtype == "float64" else 4
+    values = sum(3 if f == "mesh_position" else 1 for f in (*FIELDS, "mesh_position") if f in wanted) * points
+    return Cost(seconds, len(need.stages) * (values * width + 200) + points * _BYTES)
 
 
 def _clock(params: DecayParams) -> float:

@@ -26,13 +26,13 @@ from .obstacles import Obstacles
 from .pressure import pressed
 from .springs import knit, swung
 
-__all__ = ["Body"]
+__all__ = ["CONTACT", "DENSITY", "Body"]
 
 
 #: Density of fresh fruit [kg/m^3].
-_DENSITY = 1000.0
+DENSITY = 1000.0
 #: Stiffness of the floor per area, over the fresh modulus and an edge: it gives way by a thousandth of r1.
-_FLOOR = 30.0
+CONTACT = 30.0
 #: Stiffness per volume of the springs that keep the core from sliding, over the fresh modulus.
 _TETHER = 0.1
 #: Neighbours farther from the fresh skin than this are never met; one may stand so deep in it [r1].
@@ -43,6 +43,8 @@ _PLANE = 1e4
 
 class Body:
     """Tetrahedra of one fruit under a surface of so many `cells`; tolerance: of the out-of-balance force.
+
+    radius: r1 [m]. core (p): which points springs keep from sliding.
 
     Raises:
         InvalidInput: a neighbour stands in the fruit.
@@ -59,7 +61,8 @@ class Body:
         self._pattern = blocks(self.solid.tets, len(self.solid.points))
         r1 = reference_radius(params, self._filling.extent)
         self._balls = _balls(params, self._filling)
-        self._pressure, self._inertia = _DENSITY * params.flesh.gravity * r1, _DENSITY * r1**2
+        self._pressure, self._inertia = DENSITY * params.flesh.gravity * r1, DENSITY * r1**2
+        self.radius, self.core = r1, self._filling.core
 
     def state(self, water: float, rot: Floats | None) -> Softened:
         """Return the flesh after a share of the weight has gone as water; rot: on the surface's vertices (v)."""
@@ -124,7 +127,7 @@ class Body:
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
         contact = zero.copy()
         contact[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(areas / 3, 3), len(solid.skin))
-        contact *= _FLOOR * fresh / float(np.cbrt(solid.volume.mean()))
+        contact *= CONTACT * fresh / float(np.cbrt(solid.volume.mean()))
         volume = np.bincount(solid.tets.ravel(), shared, count)
         tether = np.where(self._filling.core, _TETHER * fresh * volume, 0.0)
         # a fruit that lies on another one does not reach the floor
@@ -154,8 +157,12 @@ class Body:
 
         Facets would take the even part as shrinking chords; taken apart, a fruit that shrinks evenly stays exact.
         """
+        return self.parted_of(balance.points)
+
+    def parted_of(self, points: Floats) -> tuple[float, Floats]:
+        """Return the same of points (p, 3) of the body, in its own frame."""
         skin = self.solid.skin
-        fresh, moved = self.solid.points[skin], (balance.points - self.solid.points)[skin]
+        fresh, moved = self.solid.points[skin], (points - self.solid.points)[skin]
         about = fresh - fresh.mean(axis=0)
         even = float(np.sum(about * moved) / np.sum(about * about))
         return even, moved - even * fresh

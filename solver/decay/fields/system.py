@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ...contract import Context
 from ...fruit import directions
 from ...painted import painted
@@ -64,8 +64,12 @@ def laid(params: DecayParams, cells: int) -> Surface:
 class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it.
 
-    surface: the fruit's own of so many cells, where it has been laid already.
+    surface: the fruit's own of so many cells, where it has been laid already. dries, damp: what other fruits near by
+    do to its air: evaporation over that of a fruit alone, and what they add to its humidity [percent].
     """
+
+    dries = 1.0
+    damp = 0.0
 
     def __init__(self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None) -> None:
         self._params = params
@@ -170,7 +174,7 @@ class System:
         ground = (self.rot.share(state.rot) + self.rot.share(rot)) / 2
         pace = None
         if self._cardinal:
-            out = surface_activity(params, middle, flesh, (broken[0] + broken[1]) / 2)
+            out = surface_activity(params, middle, flesh, (broken[0] + broken[1]) / 2, self.damp)
             pace = np.asarray(moisture(params.mould, flesh + params.mould.exposed * (out - flesh)))
         rates = self._rates(params.mould, middle, self.mould.rates)
         return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water)
@@ -186,7 +190,29 @@ class System:
         """Return the water lost by the end, with a share (v) of the skin broken meanwhile."""
         params = self._params
         skin = params.transpiration + (opened(params) - params.transpiration) * self.surface.mean(broken)
-        return min(before + skin * evaporated(params, self._extent, start, end), params.water_content / 100)
+        lost = skin * evaporated(params, self._extent, start, end) * self.dries
+        return min(before + lost, params.water_content / 100)
+
+    def conductance(self, rot: State) -> float:
+        """Return the mean conductance of the whole skin, rotten places and wounds among it [g/(m2 s MPa)]."""
+        params = self._params
+        more = opened(params) - params.transpiration
+        return params.transpiration + more * self.surface.mean(self.broken(rot))
+
+    def caught(self, day: float, ray: Floats, radius: float) -> None:
+        """Let rot, and the mould if there is one, land on a day at a unit direction: a fruit that touches there."""
+        if self._due is not None:
+            # what was next may not be any more
+            self._waiting.add(*self._due)
+            self._due = None
+        for rots in (True, False) if self.mould is not None else (True,):
+            starts = self._waits[rots].day(day) if self._cardinal else day
+            self._waiting.add(starts, Seed(rots, ray, self._place(ray), radius))
+
+    def near(self, ray: Floats, radius: float) -> Ints:
+        """Return the vertices within a distance on the unit sphere of a direction, the nearest one among them."""
+        found = self._tree.query_ball_point(ray, radius)
+        return np.array(sorted({*found, int(self._tree.query(ray)[1])}))
 
     def distance(self, a: Both, b: Both) -> float:
         """Return the largest relative L2 difference of density u + v between two states, of rot and of mould."""

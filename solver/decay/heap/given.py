@@ -1,0 +1,62 @@
+"""What a user says of a heap of fruits."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+__all__ = ["Heap"]
+
+
+class Heap(BaseModel):
+    """Fruits of one kind that lie on each other; each is the fruit of the parameters, a little larger or smaller."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    fruits: int = Field(20, ge=1, le=60, description="How many there are [1]")
+    bowl: float = Field(
+        4.0, ge=0, le=20, description="Radius of the opening of the bowl that they lie in; 0: on a floor [r1]"
+    )
+    spread: float = Field(0.06, ge=0, le=0.3, description="How far sizes depart from the parameters' at most [1]")
+    places: tuple[tuple[float, float, float], ...] = Field(
+        (),
+        max_length=60,
+        description="Centres, where they are to lie from the start, upright; without, they are poured. The floor, or "
+        "the bowl's foot, is at y = 0 [r1]",
+    )
+    infected: tuple[int, ...] = Field(
+        (0,), max_length=60, description="Numbers from 0 of the fruits that have the wounds; the others are sound [1]"
+    )
+    infection: float = Field(
+        1.0,
+        ge=0,
+        le=50,
+        description="Infections in a day through a contact that is rotten on one side, at the best temperature; a "
+        "choice [1/day]",
+    )
+    still: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="How much of the vapour that a fruit gives off reaches the others: 1 in still air, 0 where a wind "
+        "takes it away; a choice [1]",
+    )
+    step: float = Field(
+        0.25, ge=0.02, le=10, description="Days between looks at what touches what, and at the air between [day]"
+    )
+
+    @model_validator(mode="after")
+    def _there(self) -> Self:
+        count = len(self.places) or self.fruits
+        for number in self.infected:
+            if not 0 <= number < count:
+                raise ValueError(f"infected names fruit {number}: they are numbered 0 to {count - 1}")
+        if self.bowl and self.bowl < 1.5:
+            raise ValueError("a bowl that holds a fruit opens 1.5 r1 wide at least; 0 is a floor")
+        return self
+
+    @property
+    def count(self) -> int:
+        """How many fruits there are."""
+        return len(self.places) or self.fruits
