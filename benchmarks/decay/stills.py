@@ -25,7 +25,7 @@ AGES = {
     "pear": (0, 8, 14, 22),
     "tomato": (0, 1, 2, 5),
 }
-_PIXELS, _SAMPLES = 160, 12
+_PIXELS, _SAMPLES, _SHOWN = 160, 12, 132
 #: Wounds that the camera sees.
 _WOUNDS = 'wounds=[{"colatitude":60,"azimuth":70},{"colatitude":110,"azimuth":140}]'
 
@@ -73,7 +73,7 @@ def main(out: str, python: str, folder: str = "stills", *presets: str) -> None:
         ages = len(AGES[preset])
         pictures = [*rendered(usd, ages, python, where), *rendered(glb, ages, python, where)]
         rows.append(np.hstack([np.asarray(Image.open(path).convert("RGB")) for path in pictures]))
-    Image.fromarray(np.vstack(rows)).quantize(256).save(out, optimize=True)
+    Image.fromarray(np.vstack(rows)).resize((5 * _SHOWN, len(rows) * _SHOWN)).save(out, optimize=True)
 
 
 if __name__ == "__main__":
