@@ -37,12 +37,8 @@ def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     for item in error.errors():
         where = ".".join(str(p) for p in item["loc"])
         if item["type"] == "extra_forbidden":
-            within = list(fields) if len(item["loc"]) == 1 else _within(fields, item["loc"])
-            near = difflib.get_close_matches(str(item["loc"][-1]), within, n=1)
-            strange |= not near and len(item["loc"]) == 1
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            if within and not near and len(item["loc"]) > 1:
-                hint = f"; known there: {', '.join(within)}"
+            hint = _hint(fields, item["loc"])
+            strange |= not hint and len(item["loc"]) == 1
             parts.append(f"unknown name {SHORT.repr(where)}{hint}")
         else:
             message = item["msg"].removeprefix("Value error, ")
@@ -52,6 +48,20 @@ def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     if strange:
         parts.append(f"known: {', '.join(sorted(fields))}")
     return "; ".join(parts)
+
+
+def _hint(fields: Mapping[str, Any], place: tuple[int | str, ...]) -> str:
+    """Return what was probably meant by a name that does not exist, or what there is where it stands."""
+    name, alone = str(place[-1]), len(place) == 1
+    group, _, inner = name.partition(".")
+    if alone and inner and (there := _within(fields, (group, inner))):
+        # errors name what is in a group so, but nothing can be set so
+        return f"; {group} is one value, an object of {', '.join(there)}"
+    within = list(fields) if alone else _within(fields, place)
+    near = difflib.get_close_matches(name, within, n=1)
+    if near:
+        return f"; did you mean {near[0]!r}?"
+    return f"; known there: {', '.join(within)}" if within and not alone else ""
 
 
 def _within(fields: Mapping[str, Any], place: tuple[int | str, ...]) -> list[str]:
