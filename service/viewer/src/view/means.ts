@@ -1,6 +1,6 @@
 // What the browser draws with, and so how much of the studio it can afford.
 
-/** Names of what draws on the processor; a frame with soft boxes, shadows and pores takes such seconds. */
+/** Names of what draws on the processor, which takes seconds for a frame with soft boxes, shadows and pores. */
 const BY_PROCESSOR = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 const CHOICE = "wizen-look";
 
@@ -18,12 +18,21 @@ export function drawsByProcessor(): boolean {
 
 /** The look that was chosen here before, or the one that this browser can draw at the rate of a hand. */
 export function preferred(byProcessor: boolean): Look {
-  const chosen = sessionStorage.getItem(CHOICE);
+  const chosen = kept()?.getItem(CHOICE);
   if (chosen === "full" || chosen === "plain") return chosen;
   return byProcessor ? "plain" : "full";
 }
 
 /** Keep a choice for as long as the tab is open. */
 export function prefer(look: Look): void {
-  sessionStorage.setItem(CHOICE, look);
+  kept()?.setItem(CHOICE, look);
+}
+
+/** What lasts as long as the tab; nothing where the browser forbids it, in a frame of another page, say. */
+function kept(): Storage | undefined {
+  try {
+    return sessionStorage;
+  } catch {
+    return undefined;
+  }
 }

@@ -25,8 +25,8 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { SkinMaterial } from "./skin";
 import { drawsByProcessor, type Look, preferred } from "./means";
+import { SkinMaterial } from "./skin";
 
 export const HOME = new Spherical(6.3, 1.24, 0.55);
 const FOV = 25;
