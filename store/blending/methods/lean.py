@@ -15,9 +15,9 @@ from solver.arrays import Array
 
 __all__ = ["leaning"]
 
-#: By how much faster than linear ones weights change where samples have nothing in common, less 1. Chosen by how far
-#: the solver moves what is looked up on the family prolate: half as much is .17 of the roughness at s = .2 and .26 at
-#: .3, this .15 and .21, and linear weights .20 and .30. The runs held out of the default family had no part in it.
+#: By how much faster than linear ones weights change where samples have nothing in common, less 1. Chosen on the family
+#: prolate, by how far the solver moves what is looked up (record dehydration-score): half as much moved it farther. The
+#: runs held out of the default family had no part in it.
 _STEEPER = 4.0
 
 
