@@ -46,6 +46,7 @@ from .shapes.turns import Turns
 from .stopping import at_signals
 from .telemetry import Metrics, Telemetry, record
 from .views.addresses import Rooted
+from .warming import warm
 
 __all__ = ["create_app"]
 
@@ -63,6 +64,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Door]]:
             runner.start()
         try:
             memory.keep("service")
+            if app.state.is_warmed:
+                warm(app.state)
             yield {DOOR: app.state.door}
         finally:
             await app.state.sessions.close_all()
@@ -70,11 +73,12 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Door]]:
                 await anyio.to_thread.run_sync(runner.stop)
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
+def create_app(settings: Settings | None = None, is_warmed: bool = False) -> FastAPI:
     """Return the service over one store; without settings, those of the environment.
 
     The store and its tables are opened by the first request that needs them, so the service may start before they
-    exist and says what is missing until they do.
+    exist and says what is missing until they do. One that `is_warmed` opens the first of them on its own, once it
+    listens.
     """
     memory.settle()
     settings = settings or Settings()
@@ -87,7 +91,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redoc_url=None,
         generate_unique_id_function=operation_id,
     )
-    app.state.settings = settings
+    app.state.settings, app.state.is_warmed = settings, is_warmed
     app.state.compiling = Compiling()
     app.state.tables = LiveTables(settings.store, settings.reload_interval, app.state.compiling)
     app.state.answers = Answers(settings.cache_bytes)
@@ -158,6 +162,6 @@ def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
 def __getattr__(name: str) -> Any:
     # made when first asked for: importing this module must not read the environment
     if name == "app":
-        globals()["app"] = made = create_app()
+        globals()["app"] = made = create_app(is_warmed=True)
         return made
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -115,7 +115,7 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
 
     options = _protocols(settings)
     if settings.workers == 1:
-        made = create_app(settings)
+        made = create_app(settings, is_warmed=True)
         with listener, _compiling(made.state.compiling):
             uvicorn.Server(uvicorn.Config(made, **options)).run(sockets=[listener])
         return

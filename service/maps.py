@@ -20,7 +20,7 @@ from .shapes.answers import matches
 from .shapes.live import LiveTables
 from .views.addresses import link
 
-__all__ = ["router"]
+__all__ = ["listed", "router"]
 
 #: Other pictures of the same tables have other addresses and tags: browsers keep them for a day.
 _DRAWN = "-2"
@@ -34,7 +34,16 @@ def maps(request: Request) -> dict[str, Any]:
     """List the families of shapes that can be asked for: axes with the values that were run, stages with how many runs
     converged and how far they are off, quality, version, how they were made, the presets that they hold.
     """
-    live: LiveTables = request.app.state.tables
+    return {"maps": listed(request.app.state.tables)}
+
+
+def listed(live: LiveTables) -> list[dict[str, Any]]:
+    """Return what each table covers as JSON values, with links; a damaged one has a `complaint` instead.
+
+    Raises:
+        MissingStore: there is no store.
+
+    """
     found: list[dict[str, Any]] = []
     for name in live.names():
         try:
@@ -52,7 +61,7 @@ def maps(request: Request) -> dict[str, Any]:
         if info.plan:
             links["plan"] = link(f"/v1/maps/{name}/plan.toml")
         found.append({**said, "portrait": {**point, solver.stages.symbol: stage}, "links": links})
-    return {"maps": found}
+    return found
 
 
 @router.get(

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from typing import Any
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,12 +36,8 @@ def covered(store: Store, families: Families, info: TableInfo, solver: Solver) -
         CorruptTable, FileNotFoundError: its generation cannot be read.
 
     """
-    opened = generation.read(path_of(store, info))
-    units, values = solver.axis_units(), stored.values(store, info)
-    converged = opened["converged"].values if "converged" in opened else None
-    judged = generation.left_out(opened)
-    off = None if judged is None else np.median(np.abs(judged[0][..., 0] - 1), axis=0)
-    likeness = opened.get("neighbour_correlation")
+    path = path_of(store, info)
+    kept, units, values = _kept(path), solver.axis_units(), stored.values(store, info)
     return {
         "name": info.name,
         "solver": info.solver,
@@ -48,7 +46,7 @@ def covered(store: Store, families: Families, info: TableInfo, solver: Solver) -
         "quality": info.need.get("quality"),
         "samples": info.samples,
         "resolution": info.resolution,
-        "bytes": path_of(store, info).stat().st_size,
+        "bytes": path.stat().st_size,
         "axes": {
             name: {"lowest": low, "highest": high, "values": values[name], "units": units.get(name, "1")}
             for name, (low, high) in info.axes.items()
@@ -59,16 +57,40 @@ def covered(store: Store, families: Families, info: TableInfo, solver: Solver) -
         "stages": [
             {
                 "stage": stage,
-                "converged": None if converged is None else int(converged[:, j].astype(bool).sum()),
-                "roughness_error": None if off is None else round(float(off[j]), 4),
-                "neighbour_correlation": None if likeness is None else round(float(likeness.values[j]), 4),
+                "converged": None if kept.converged is None else kept.converged[j],
+                "roughness_error": None if kept.off is None else round(kept.off[j], 4),
+                "neighbour_correlation": None if kept.likeness is None else round(kept.likeness[j], 4),
             }
             for j, stage in enumerate(info.stages)
         ],
-        "method": None if judged is None else judged[1],
+        "method": kept.method,
         "presets": families.presets_of(info),
         "has_plan": bool(info.plan),
     }
+
+
+class _Kept(NamedTuple):
+    """What a generation holds by stage: samples that converged, median error of the roughness, likeness of neighbours;
+    and the method that the error is of.
+    """
+
+    converged: list[int] | None
+    off: list[float] | None
+    likeness: list[float] | None
+    method: str | None
+
+
+@lru_cache(maxsize=256)
+def _kept(path: Path) -> _Kept:
+    # a generation's file never changes, and opening all its columns takes longer than a shape
+    opened = generation.read(path)
+    judged, likeness = generation.left_out(opened), opened.get("neighbour_correlation")
+    return _Kept(
+        opened["converged"].values.astype(bool).sum(axis=0).tolist() if "converged" in opened else None,
+        None if judged is None else np.median(np.abs(judged[0][..., 0] - 1), axis=0).tolist(),
+        None if likeness is None else likeness.values.tolist(),
+        None if judged is None else judged[1],
+    )
 
 
 def portrait(store: Store, families: Families, info: TableInfo) -> tuple[dict[str, float], float]:

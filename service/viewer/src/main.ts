@@ -65,6 +65,8 @@ async function go(): Promise<void> {
   takeToken();
   try {
     const words = fromHash();
+    // most visitors come for a shape of a table: its room is fetched while the service is asked what there is
+    if (!words.room) void import("./rooms/table").catch(() => undefined);
     const [every, all] = await Promise.all([solvers(), tables()]);
     // what can be seen at once goes before what has to be computed
     const entries = [...every].sort((a, b) => Number(hasTables(b, all)) - Number(hasTables(a, all)));

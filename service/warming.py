@@ -1,0 +1,60 @@
+"""What the first questions need is loaded once the service answers: whoever opens the page does not wait for it.
+
+Descriptions of solvers, what the tables cover, the first table and the code that looks a folded shape up: some 1.5 s of
+a processor, which the first visitor waited for. It is done aside, in a thread, a moment after the service has begun to
+listen: what it is asked at once comes before that.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from starlette.datastructures import State
+
+from solver import registry
+from store.errors import StoreError
+
+from .errors import ServiceError
+from .shapes.live import LiveTables
+from .telemetry import LOGGER
+
+__all__ = ["warm"]
+
+#: Pause before it begins: health checks and scripts ask as soon as the port is open [s].
+_PAUSE = 0.2
+#: Tables that the page prefers to begin with.
+_FIRST = ("default", "sphere")
+
+
+def warm(state: State) -> threading.Thread:
+    """Begin to load what an application's first questions need; return the thread that does it.
+
+    A store that is missing or damaged is left to those who ask: they are told what is wrong with it.
+    """
+    thread = threading.Thread(target=_load, args=(state,), name="warming", daemon=True)
+    thread.start()
+    return thread
+
+
+def _load(state: State) -> None:
+    time.sleep(_PAUSE)
+    for name in registry.names():
+        registry.get(name)
+    try:
+        _open_first(state)
+    except (StoreError, ServiceError, OSError) as error:
+        LOGGER.info("nothing to load before the first question: %s", error)
+
+
+def _open_first(state: State) -> None:
+    """Look up one shape of the table that the page begins with, and what all of them cover."""
+    from . import maps  # what it draws with is not needed to start
+
+    tables: LiveTables = state.tables
+    names = tables.names()
+    for name in [name for name in _FIRST if name in names][:1] or names[:1]:
+        table = tables.get(name)
+        middle = {axis: (low + high) / 2 for axis, (low, high) in table.info.axes.items()}
+        table.at(middle, max(table.info.stages, key=abs), resolution=64)
+    maps.listed(tables)
