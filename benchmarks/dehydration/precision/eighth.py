@@ -5,6 +5,9 @@
 PYTHON is an interpreter with felupe and pypardiso (benchmarks/peers/felupe_eighth.py: its elements, its Newton's
 method, kappa = 1000 mu). Twice: from the fresh shape on its own, and from our settled states, which it moves to its own
 equilibria nearby. A thick skin, te = 0.1 and gamma = 10, whose buckles do not touch (record dehydration-eighth).
+
+Record dehydration-newton: what Newton's method takes there, in FElupe and at the least: its iterations times one
+factor of our own of a matrix that couples what its tangent does, assembly and line searches left out.
 """
 
 from __future__ import annotations
@@ -15,13 +18,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from benchmarks.figures import ROOT, Sheet
-from solver.arrays import Floats
+from solver.arrays import Floats, Ints
 from solver.contract import Context, Quality
 from solver.dehydration import SOLVER, path
 from solver.dehydration.kernel import positions
 from solver.dehydration.settings import choose
+from solver.linalg.multifrontal import analyse, factorise
 
 from .record import answer
 
@@ -35,6 +40,12 @@ _HEAD = (
 )
 
 
+_NEWTON = (
+    *("quality", "nodes", "steps", "Newton iterations", "FElupe, CPU", "one factor of ours", "as many", "the march"),
+    "at least so many times the march",
+)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--peer", required=True, help="a Python that imports felupe")
@@ -42,14 +53,16 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="radii of the eighth at the last stage, side by side")
     asked = parser.parse_args()
     sheet = Sheet("dehydration-eighth", _HEAD, "dehydration")
+    newton = Sheet("dehydration-newton", _NEWTON, "dehydration")
     for quality in asked.quality:
-        shown = _compare(sheet, quality, asked.peer)
+        shown = _compare(sheet, newton, quality, asked.peer)
     if asked.picture:
         _draw(asked.picture, *shown)
     sheet.keep(fruit=_FRUIT)
+    newton.keep(fruit=_FRUIT)
 
 
-def _compare(sheet: Sheet, quality: Quality, peer: str) -> tuple[Floats, dict[str, Floats]]:
+def _compare(sheet: Sheet, newton: Sheet, quality: Quality, peer: str) -> tuple[Floats, dict[str, Floats]]:
     """Add the rows of one quality; return the skin's fresh nodes and everybody's last ones."""
     import tempfile
 
@@ -81,8 +94,36 @@ def _compare(sheet: Sheet, quality: Quality, peer: str) -> tuple[Floats, dict[st
             columns = {of: [stage[of] for stage in told["stages"]] for of in ("energy", "least")}
             columns["energy"] = [8 * value for value in columns["energy"]]
             _rows(sheet, quality, f"{name} {told['version']}", nodes, ours[:, skin], columns, told["cpu"])
+            if not more:
+                least = told["newton"] * (one := _factor_seconds(fresh, mesh.connectivity))
+                newton.add(
+                    (quality, len(fresh), told["steps"], told["newton"], f"{told['cpu']:.0f} s", f"{one:.2f} s",
+                     f"{least:.0f} s", f"{cpu:.1f} s", f"{least / cpu:.0f}"),
+                    quality=quality, nodes=len(fresh), steps=told["steps"], newton=told["newton"],
+                    peer_cpu=told["cpu"], factor_cpu=one, march_cpu=cpu,
+                )  # fmt: skip
             last[name] = nodes[-1]
     return fresh[skin], last
+
+
+def _factor_seconds(nodes: Floats, elements: Ints) -> float:
+    """Return the processor seconds, the least of three, that our factor takes of a matrix that couples the nodes of
+    each trilinear element: numbers only, the order of elimination is found before.
+    """
+    pairs = sparse.coo_array(
+        (np.ones(elements.size * 8), (np.repeat(elements, 8, axis=1).ravel(), np.tile(elements, (1, 8)).ravel())),
+        shape=(len(nodes), len(nodes)),
+    ).tocsr()
+    # as many as the neighbours and one on the diagonal, minus one beside it: definite
+    rows = np.repeat(np.arange(len(nodes)), np.diff(pairs.indptr))
+    scalars = np.where(rows == pairs.indices, np.diff(pairs.indptr)[rows] + 1.0, -1.0)
+    order = analyse(elements, nodes[elements].mean(axis=1), pairs.indptr, pairs.indices)
+    seconds = []
+    for _ in range(3):
+        begin = time.process_time()
+        factorise(order, scalars[:, None, None] * np.eye(3), definite=True)
+        seconds.append(time.process_time() - begin)
+    return min(seconds)
 
 
 def _ours(road: path.Path) -> tuple[Floats, list[float]]:
