@@ -260,13 +260,24 @@ def parse(values: Any) -> Scene:
         return Scene.model_validate(values)
     except ValidationError as error:
         wrong = []
-        for item in error.errors(include_url=False)[:50]:
+        for item in _causes(error)[:50]:
             name = ".".join(str(part) for part in item["loc"]) or "scene"
             detail = str(item["msg"]).removeprefix("Value error, ")
             given = item.get("input")
             shown = f" (got {given!r})" if isinstance(given, str | int | float) else ""
             wrong.append(Wrong(name, f"{detail}{shown}"[:400], _advice(item["type"])))
         raise InvalidScene.of(wrong) from None
+
+
+def _causes(error: ValidationError) -> list[Any]:
+    """Return what is wrong, without lists that are too short only because an entry of theirs is wrong."""
+    found = error.errors(include_url=False)
+    places = [item["loc"] for item in found]
+
+    def is_followed(loc: tuple[int | str, ...]) -> bool:
+        return any(len(place) > len(loc) and place[: len(loc)] == loc for place in places)
+
+    return [item for item in found if item["type"] != "too_short" or not is_followed(item["loc"])]
 
 
 def _check_count(items: Any) -> None:

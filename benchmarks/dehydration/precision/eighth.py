@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,8 @@ def _compare(sheet: Sheet, newton: Sheet, quality: Quality, peer: str) -> tuple[
     import tempfile
 
     params = SOLVER.parse(_FRUIT)
+    # compiled outside of the clock
+    _ours(path.Path(params, choose(params, quality, _STAGES[-1]), Context()), _STAGES[:1])
     road = path.Path(params, choose(params, quality, _STAGES[-1]), Context())
     mesh = road.motion.sector.mesh
     skin = mesh.surface_nodes
@@ -126,7 +129,7 @@ def _factor_seconds(nodes: Floats, elements: Ints) -> float:
     return min(seconds)
 
 
-def _ours(road: path.Path) -> tuple[Floats, list[float]]:
+def _ours(road: path.Path, stages: Sequence[float] = _STAGES) -> tuple[Floats, list[float]]:
     """Return all nodes (stages, n, 3) of our settled states, and their energies."""
     kept: list[Floats] = []
     settle = path.settle
@@ -139,7 +142,7 @@ def _ours(road: path.Path) -> tuple[Floats, list[float]]:
     path.settle = watched  # type: ignore[attr-defined]
     try:
         # a rung below is settled as well: the last one is the stage's
-        found = [(road.stage(s, _STAGES[-1]), len(kept)) for s in _STAGES]
+        found = [(road.stage(s, _STAGES[-1]), len(kept)) for s in stages]
     finally:
         path.settle = settle  # type: ignore[attr-defined]
     return np.array([kept[count - 1] for _, count in found]), [state.energy for state, _ in found]

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from service.scenes import seen
 from service.scenes.compose import make
-from service.scenes.errors import OverBudget
+from service.scenes.errors import InvalidScene, OverBudget
 from service.scenes.request import Camera, parse
 from service.shapes.live import LiveTables
 from solver.registry import surface
@@ -189,6 +189,14 @@ def test_what_is_wrong_is_said(client: httpx.Client, part: dict[str, Any], code:
         return
     problem = checked(answer, 422, code)
     assert word in json.dumps(problem)
+
+
+def test_a_list_is_not_too_short_for_an_entry_that_is_wrong() -> None:
+    with pytest.raises(InvalidScene) as caught:
+        parse({"camera": CAMERA, "items": [{**RAISIN, "transforms": [{"position": [math.nan, 0, 0]}]}]})
+    assert [wrong.name for wrong in caught.value.wrong] == ["items.0.transforms.0.position.0"]
+    with pytest.raises(InvalidScene, match="at least 1 item"):
+        parse({"camera": CAMERA, "items": []})
 
 
 @pytest.mark.parametrize("to", ["glb", "usdc", "usda"])
