@@ -9,6 +9,7 @@ from typing import Any
 
 from benchmarks.figures import Row, markdown
 
+from . import order
 from .precision.buckled import STAGES, kind, summary
 from .precision.spheres import SHIPPED, ratios
 
@@ -42,6 +43,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-scaling": _scaling,
         "dehydration-speed": _speed,
         "dehydration-skips": _skips,
+        "dehydration-meshes": order.table,
     }
     return makers[f"{record['name']} {part}".strip()](record)
 
