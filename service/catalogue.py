@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any
 
 from fastapi import APIRouter, Path, Request
@@ -13,9 +14,11 @@ from store.blending import methods
 from store.errors import CorruptTable
 from store.tables import TableInfo
 
-from . import page, problems, vocabulary
+from . import page, portraits, problems, vocabulary
+from .errors import UnknownPreset
 from .formats import FORMATS
 from .sequences import EXPORTS
+from .shapes.answers import matches
 from .shapes.live import LiveTables
 from .views.addresses import link
 from .views.catalogue import Health, Index, SolverList, SolverPage, TableList, TablePage
@@ -26,6 +29,8 @@ __all__ = ["open_router", "router"]
 open_router, router = APIRouter(tags=["catalogue"]), APIRouter(tags=["catalogue"])
 
 Json = dict[str, Any]
+
+_PNG = problems.files(["image/png"])
 
 
 @open_router.get(
@@ -133,6 +138,32 @@ def solver(name: str = Path(description="Name of a solver; GET /v1/solvers lists
     return _solver(vocabulary.solver_named(name))
 
 
+@router.get(
+    "/v1/solvers/{name}/presets/{preset}/portrait.png",
+    summary="A picture of a preset",
+    response_class=Response,
+    responses={200: {"content": _PNG}, 304: {"description": "It has not changed"}, **problems.responses(404)},
+)
+def portrait(
+    request: Request,
+    name: str = Path(description="Name of a solver; GET /v1/solvers lists them"),
+    preset: str = Path(description="Name of a preset; the solver's page says which have a picture"),
+) -> Response:
+    """Return the picture that comes with wizen of what a preset makes; the solver's page says of which stage it is."""
+    known = vocabulary.solver_named(name)
+    data = portraits.png(known.name, preset)
+    if data is None:
+        raise UnknownPreset(
+            f"there is no picture of {known.name}'s {preset[:40]!r}.",
+            advice=f"Those of {', '.join(portraits.said(known.name)) or 'no preset'} are there.",
+        )
+    tag = f'"{hashlib.sha256(data).hexdigest()[:32]}"'
+    headers = {"ETag": tag, "Cache-Control": "public, max-age=86400"}
+    if matches(request.headers.get("if-none-match", ""), tag):
+        return Response(status_code=304, headers=headers)
+    return Response(data, headers=headers, media_type="image/png")
+
+
 def _solver(solver: Solver) -> Json:
     return {
         "name": solver.name,
@@ -145,6 +176,11 @@ def _solver(solver: Solver) -> Json:
         "default_fields": list(solver.default_fields),
         "presets": solver.presets,
         "preset_stages": solver.preset_stages,
+        "portraits": {
+            preset: {"href": link(f"/v1/solvers/{solver.name}/presets/{preset}/portrait.png"), **what}
+            for preset, what in portraits.said(solver.name).items()
+            if preset in solver.presets
+        },
         "sizes": solver.sizes,
         "looks": solver.looks.to_json(),
         "qualities": {

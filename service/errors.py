@@ -29,6 +29,7 @@ __all__ = [
     "Uncertain",
     "UncertainBatch",
     "UnfitFormat",
+    "UnknownPreset",
     "UnknownSession",
     "UnknownSolver",
     "Wrong",
@@ -130,6 +131,12 @@ class UnknownSolver(ServiceError):
     """No solver of that name."""
 
     code = "unknown-solver"
+
+
+class UnknownPreset(ServiceError):
+    """No preset of that name, or none with a picture."""
+
+    code = "unknown-preset"
 
 
 class QueryTooLong(ServiceError):

@@ -81,6 +81,7 @@ STATUS: Mapping[type[Exception], int] = {
     errors.BatchTooLarge: 413,
     errors.NotAcceptable: 406,
     errors.Unavailable: 501,
+    errors.UnknownPreset: 404,
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,

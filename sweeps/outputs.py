@@ -25,7 +25,7 @@ from .formats import Encoder, Made, added
 if TYPE_CHECKING:
     from .pictures.sheet import Panel
 
-__all__ = ["check_suffix", "fields_for", "of_result", "save", "suffixes", "triangles"]
+__all__ = ["check_suffix", "fields_for", "of_result", "panels", "save", "suffixes", "triangles"]
 
 #: Pictures of meshes leave out what is farther from the middle than this, over the radius that they show.
 _BEYOND = 1.6
@@ -58,25 +58,30 @@ def _png(made: Made) -> bytes:
         from .pictures import section
 
         return section.picture(made.run, section.plane(made.cut), title=made.title, symbol=made.stage_symbol)
+    from .pictures.sheet import sheet
+
+    stages = [shape.stage for shape in made.shapes] if made.shapes or made.run is None else made.run["stage"].values
+    labels = [f"{made.stage_symbol} = {float(stage):g}" for stage in stages]
+    return sheet([panels(made)], title=made.title, column_labels=labels, pixels=360)
+
+
+def panels(made: Made) -> list[Panel]:
+    """Return what is to be written as panels of a picture, one for each stage, in the colours of a run."""
     from .pictures import colours, standing
-    from .pictures.sheet import Panel, sheet
+    from .pictures.sheet import Panel
 
     if made.run is not None and "mesh_position" in made.run and "position" not in made.run:
-        panels = triangles(made.run)
-        labels = [f"{made.stage_symbol} = {float(stage):g}" for stage in made.run["stage"]]
-        return sheet([panels], title=made.title, column_labels=labels, pixels=360)
+        return triangles(made.run)
     skins = [None if made.run is None else colours.of_run(made.run, i) for i in range(len(made.shapes))]
     places = [(shape.position, shape.poles) for shape in made.shapes]
     fur = [None] * len(skins) if made.run is None else standing.on_lattices(made.run, places)
-    panels = [
+    return [
         Panel(shape.position, shape.poles)
         if skin is None
         else Panel(shape.position, shape.poles, colour=skin.colour, roughness=skin.roughness, more=more)
         for shape, skin, more in zip(made.shapes, skins, fur, strict=True)
         if shape.position is not None
     ]
-    labels = [f"{made.stage_symbol} = {shape.stage:g}" for shape in made.shapes]
-    return sheet([panels], title=made.title, column_labels=labels, pixels=360)
 
 
 def triangles(run: xr.Dataset) -> list[Panel]:

@@ -159,6 +159,15 @@ class SessionPage(BaseModel):
     fields: list[str] = Field(description="What may be shown beside the shape")
 
 
+class Portrait(BaseModel):
+    """A picture of a preset that comes with wizen."""
+
+    href: str = Field(description="PNG")
+    version: str = Field(description="Version of the solver that it was drawn of")
+    quality: str
+    stage: float
+
+
 class SolverPage(BaseModel):
     """A solver: what it takes and what it gives."""
 
@@ -172,6 +181,7 @@ class SolverPage(BaseModel):
     default_fields: list[str]
     presets: dict[str, dict[str, Any]]
     preset_stages: dict[str, list[float]]
+    portraits: dict[str, Portrait] = Field(description="Pictures by preset, of those that have one")
     sizes: dict[str, float] = Field(description="Length of r1 by preset [m]; none where any size is right")
     looks: dict[str, Any] = Field(description="Colours by field, and labels and places for a page")
     qualities: dict[str, Quality]

@@ -57,6 +57,7 @@ EXPECTED: dict[type[Exception], int] = {
     errors.OutsideRanges: 422,
     errors.Uncertain: 422,
     errors.NotAcceptable: 406,
+    errors.UnknownPreset: 404,
     errors.UnknownSolver: 404,
     errors.QueryTooLong: 414,
     errors.BodyTooLarge: 413,

@@ -1,4 +1,4 @@
-// The room of all presets: pictures of tables, of stored runs, and an empty frame where nothing is stored.
+// The room of all presets: pictures of tables, of stored runs, and where nothing is stored those that come with wizen.
 
 import type { House, Room } from "../house";
 import { counted, el, worded } from "../parts/dom";
@@ -58,24 +58,34 @@ function card(entry: Entry, solver: Solver, preset: string, family: Family | und
     if (job) words.set("job", job.id);
   }
   const { symbol, units } = solver.stages;
+  const at = (stage: number): string => `${symbol} = ${stage}${units === "1" ? "" : ` ${units}`}`;
+  const portrait = solver.portraits[preset];
   const last = job?.need.stages[job.need.stages.length - 1];
   const note = family
     ? `live, ${counted(family.samples)}`
     : job
       ? `a run, ${symbol} to ${last}${units === "1" ? "" : ` ${units}`}`
-      : "not computed yet";
-  const picture = family ? image(family) : job ? painter.frame(job) : el("span", { class: "empty", "aria-hidden": "true" }, "no run stored");
+      : portrait
+        ? `not computed here; at ${at(portrait.stage)}`
+        : "not computed yet";
+  const picture = family
+    ? drawn(family.links.thumbnail)
+    : job
+      ? painter.frame(job)
+      : portrait
+        ? drawn(portrait.href)
+        : el("span", { class: "empty", "aria-hidden": "true" }, "no run stored");
   return linked(`#${words}`, worded(preset), note, picture);
 }
 
 function tableCard(entry: Entry, family: Family, all: Family[]): HTMLElement {
   const words = new URLSearchParams({ room: entry.name, table: family.name });
   for (const [name, value] of Object.entries(family.portrait)) words.set(name, String(value));
-  return linked(`#${words}`, titled(family), `live, ${ranges(family, all).join(", ")}`, image(family));
+  return linked(`#${words}`, titled(family), `live, ${ranges(family, all).join(", ")}`, drawn(family.links.thumbnail));
 }
 
-const image = (family: Family): HTMLElement =>
-  el("img", { src: relative(family.links.thumbnail), alt: "", width: "144", height: "144", loading: "lazy" });
+const drawn = (address: string): HTMLElement =>
+  el("img", { src: relative(address), alt: "", width: "144", height: "144", loading: "lazy" });
 
 const linked = (href: string, name: string, note: string, picture: HTMLElement): HTMLElement =>
   el("li", {}, el("a", { href }, picture, el("span", {}, name), el("small", {}, note)));

@@ -49,6 +49,8 @@ export interface Solver {
   default_fields: string[];
   presets: Record<string, Values>;
   preset_stages: Record<string, number[]>;
+  /** Pictures that come with wizen, by preset. */
+  portraits: Record<string, { href: string; version: string; quality: string; stage: number }>;
   /** Length of r1 by preset [m]. */
   sizes: Record<string, number>;
   looks: Look;

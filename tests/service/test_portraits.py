@@ -1,0 +1,61 @@
+"""Pictures of presets that come with wizen: they are there, of what they say, and of the solvers as they are."""
+
+from __future__ import annotations
+
+import io
+
+import httpx
+import numpy as np
+import pytest
+from PIL import Image
+
+from service import portraits
+from service.portraits.make import portrait
+from solver import registry
+from solver.contract import InvalidInput
+
+from ._asking import checked
+
+
+def test_every_preset_that_says_so_has_its_picture(client: httpx.Client) -> None:
+    seen = set()
+    for name in registry.names():
+        solver = registry.get(name)
+        page = client.get(f"/v1/solvers/{name}").json()
+        assert page["portraits"].keys() == portraits.said(name).keys() & solver.presets.keys()
+        for preset, what in page["portraits"].items():
+            answer = client.get(what["href"])
+            assert answer.headers["content-type"] == "image/png"
+            picture = Image.open(io.BytesIO(answer.content)).convert("RGB")
+            assert picture.size == (192, 192)
+            # something is drawn in the middle of it, and nothing at its upper corners
+            levels = np.asarray(picture, float)
+            assert levels[60:130, 60:130].std() > 4, preset
+            assert levels[:4, :4].std(axis=(0, 1)).max() < 1, preset
+            again = client.get(what["href"], headers={"If-None-Match": answer.headers["etag"]})
+            assert again.status_code == 304
+            low, high = solver.stages.lowest, solver.stages.highest
+            assert low <= what["stage"] <= high
+            seen.add(answer.content)
+    assert len(seen) >= 40  # no two are the same
+
+
+def test_pictures_are_of_the_solvers_as_they_are() -> None:
+    """A picture of another version would show what a run no longer makes: python -m service.portraits.make."""
+    for name in registry.names():
+        versions = {what["version"] for what in portraits.said(name).values()}
+        assert versions <= {registry.get(name).version}
+
+
+@pytest.mark.parametrize("address", ["decay/presets/apple-on-mars", "wood/presets/.."])
+def test_another_picture_is_refused(client: httpx.Client, address: str) -> None:
+    solver = address.partition("/")[0]
+    answer = client.get(f"/v1/solvers/{solver}/presets/apple-on-mars/portrait.png")
+    problem = checked(answer, 404, "unknown-preset")
+    assert next(iter(portraits.said(solver))) in problem["advice"]
+    assert client.get(f"/v1/solvers/{address}/portrait.png").status_code == 404
+
+
+def test_what_takes_long_is_refused_before_it_is_solved() -> None:
+    with pytest.raises(InvalidInput, match="expected to take"):
+        portrait(registry.get("dehydration"), "wolfberry", 1.0)
