@@ -133,8 +133,8 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     document = create_app().openapi()
     operations = {op["operationId"]: op for each in document["paths"].values() for op in each.values()}
     assert set(operations) == {
-        "index", "health", "tables", "table", "solvers", "solver", "portrait", "shape", "info", "batch", "jobs", "ask", "job",
-        "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan", "stages", "scenes",
+        "index", "health", "tables", "table", "solvers", "solver", "portrait", "shape", "info", "batch", "jobs", "ask",
+        "job", "cancel", "events", "fields", "result", "results", "maps", "thumbnail", "plan", "stages", "scenes",
         "match", "mesh",
     }  # fmt: skip
     assert document["servers"]
