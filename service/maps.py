@@ -8,14 +8,15 @@ from typing import Any
 from fastapi import APIRouter, Path, Request
 from starlette.responses import Response
 
-from solver.contract import InvalidGeometry, Solver
+from solver.contract import Solver
 from store.errors import CorruptTable, UnknownTable
 from store.families.choose import Families
 from store.lookup import ShapeTable
+from store.store import Store
 from store.tables import TableInfo
 from sweeps import families as covering
 
-from . import problems, vocabulary
+from . import portraits, problems, vocabulary
 from .shapes.answers import matches
 from .shapes.live import LiveTables
 from .views.addresses import link
@@ -77,10 +78,10 @@ def thumbnail(request: Request, name: str = Path(description="Name of a table; G
     headers = {"ETag": f'"{info.digest[:32]}-thumbnail{_DRAWN}"', "Cache-Control": "public, max-age=86400"}
     if matches(request.headers.get("if-none-match", ""), headers["ETag"]):
         return Response(status_code=304, headers=headers)
-    table = live.get(name)
-    point, stage = covering.portrait(live.store, families, table.info)
-    drawn = _drawn(table, tuple(point.items()), stage, tuple(families.presets_of(table.info)))
-    return Response(drawn, headers=headers, media_type="image/png")
+    found = portraits.of_table(info.digest)
+    if found is None:
+        found = _drawn(live.get(name), families, live.store)
+    return Response(found, headers=headers, media_type="image/png")
 
 
 @router.get(
@@ -104,8 +105,5 @@ def _known(live: LiveTables, name: str) -> tuple[TableInfo, Solver, Families]:
 
 
 @lru_cache(maxsize=64)
-def _drawn(table: ShapeTable, point: tuple[tuple[str, float], ...], stage: float, presets: tuple[str, ...]) -> bytes:
-    try:
-        return covering.thumbnail(table, dict(point), stage, presets=presets)
-    except InvalidGeometry:
-        return covering.thumbnail(table, table.sample(table.size // 2), stage, presets=presets)
+def _drawn(table: ShapeTable, families: Families, store: Store) -> bytes:
+    return covering.drawn(table, families, store)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import registry
-from solver.contract import Solver
+from solver.contract import InvalidGeometry, Solver
 from store.errors import UnknownTable
 from store.families import stored
 from store.families.choose import Families
@@ -20,7 +20,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, path_of
 
-__all__ = ["covered", "gallery", "portrait", "thumbnail"]
+__all__ = ["covered", "drawn", "gallery", "portrait", "thumbnail"]
 
 #: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
 _DRY = 0.67
@@ -126,6 +126,16 @@ def thumbnail(
     out = io.BytesIO()
     Image.fromarray(render(shape.position, shape.poles, pixels, colour=colour)).save(out, "PNG", optimize=True)
     return out.getvalue()
+
+
+def drawn(table: ShapeTable, families: Families, store: Store) -> bytes:
+    """Return a table's thumbnail at its portrait, or at its middle sample where no shape has the portrait's numbers."""
+    point, stage = portrait(store, families, table.info)
+    presets = families.presets_of(table.info)
+    try:
+        return thumbnail(table, point, stage, presets=presets)
+    except InvalidGeometry:
+        return thumbnail(table, table.sample(table.size // 2), stage, presets=presets)
 
 
 def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:

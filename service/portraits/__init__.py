@@ -1,6 +1,7 @@
-"""Pictures of presets that come with wizen: what a preset makes, for people who have not run it yet.
+"""Pictures that come with wizen: of presets, for people who have not run them yet, and of the package's own tables.
 
-`python -m service.portraits.make` draws them; each says of which version, quality and stage it is.
+`python -m service.portraits.make` draws them; a preset's says of which version, quality and stage it is, and a table's
+bears the beginning of the digest of what it shows.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["DRAWN", "png", "said"]
+__all__ = ["DRAWN", "of_table", "png", "said", "table_file"]
 
 #: Directory of the pictures, and of the index that says what they are of.
 DRAWN = Path(__file__).parent / "drawn"
@@ -36,5 +37,18 @@ def png(solver: str, preset: str) -> bytes | None:
         return None
     try:
         return (DRAWN / solver / f"{preset}.png").read_bytes()
+    except OSError:
+        return None
+
+
+def table_file(digest: str) -> Path:
+    """Return where the picture of a table's generation is, if it has one."""
+    return DRAWN / "tables" / f"{digest[:12]}.png"
+
+
+def of_table(digest: str) -> bytes | None:
+    """Return the picture of a table's generation, or nothing where none comes with wizen."""
+    try:
+        return table_file(digest).read_bytes()
     except OSError:
         return None

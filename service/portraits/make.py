@@ -1,7 +1,7 @@
-"""Draw the pictures of presets that come with wizen: python -m service.portraits.make [--only WORD] [--seconds 90].
+"""Draw the pictures that come with wizen: python -m service.portraits.make [--only WORD] [--seconds 90].
 
-Presets of which there is a table are left out: their pictures are of the table. So are those that are expected to take
-longer than `--seconds`; what is drawn already by the solver's version is not drawn again.
+Of the package's tables, and of presets but for those of which there is a table: their pictures are of the table. What is
+expected to take longer than `--seconds` is left out; what is drawn already by the solver's version is not drawn again.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ from solver.contract import Context, InvalidInput, Need, Solver, SolverError
 from store import seal, starter
 from store.errors import UnknownTable
 from store.families import stored
+from store.lookup import ShapeTable
 from store.store import Store
+from sweeps import families as covering
 from sweeps import outputs, tabled
 from sweeps.formats import Made
 from sweeps.pictures.render import View
 from sweeps.pictures.sheet import Panel
 
-from . import DRAWN, said
+from . import DRAWN, said, table_file
 
 #: Side of a picture [pixels].
 _PIXELS = 192
@@ -45,6 +47,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=90.0, help="most that one is expected to take [s]")
     asked = parser.parse_args()
     store = Store.open(starter.ROOT)
+    _draw_tables(store)
     index = {name: dict(said(name)) for name in registry.names()}
     for name in registry.names():
         solver = registry.get(name)
@@ -65,6 +68,20 @@ def main() -> None:
             text = json.dumps({key: value for key, value in index.items() if value}, indent=1, sort_keys=True) + "\n"
             seal.publish(DRAWN / "index.json", text.encode())
             print(f"{name}/{preset}: {len(picture) / 1e3:.0f} kB", file=sys.stderr, flush=True)
+
+
+def _draw_tables(store: Store) -> None:
+    """Draw each table of a store as the service would, and drop pictures of others."""
+    wanted = set()
+    for name in store.table_names():
+        table = ShapeTable.open(store, name, surfaces=registry.surface)
+        wanted.add(path := table_file(table.digest))
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            seal.publish(path, covering.drawn(table, stored.families(store, registry.get(table.info.solver)), store))
+            print(f"table {name}", file=sys.stderr, flush=True)
+    for path in set((DRAWN / "tables").glob("*.png")) - wanted:
+        path.unlink()
 
 
 def _tabled(store: Store, solver: Solver) -> set[str]:

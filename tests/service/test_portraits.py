@@ -13,6 +13,11 @@ from service import portraits
 from service.portraits.make import portrait
 from solver import registry
 from solver.contract import InvalidInput
+from store import starter, tables
+from store.families import stored
+from store.lookup import ShapeTable
+from store.store import Store
+from sweeps import families
 
 from ._asking import checked
 
@@ -45,6 +50,21 @@ def test_pictures_are_of_the_solvers_as_they_are() -> None:
     for name in registry.names():
         versions = {what["version"] for what in portraits.said(name).values()}
         assert versions <= {registry.get(name).version}
+
+
+def test_each_table_of_the_package_has_its_picture_as_the_service_would_draw_it() -> None:
+    store = Store.open(starter.ROOT)
+    digests = {tables.info(store, name).digest for name in store.table_names()}
+    there = {path.stem for path in portraits.table_file("").parent.glob("*.png")}
+    assert there == {digest[:12] for digest in digests}
+    table = ShapeTable.open(store, "sphere-02", surfaces=registry.surface)
+    known = stored.families(store, registry.get(table.info.solver))
+    here, drawn = (
+        np.asarray(Image.open(io.BytesIO(data or b"")).convert("RGB"), float)
+        for data in (portraits.of_table(table.digest), families.drawn(table, known, store))
+    )
+    # another processor rounds a pixel at the edge otherwise
+    assert np.abs(here - drawn).mean() < 0.5
 
 
 @pytest.mark.parametrize("address", ["decay/presets/apple-on-mars", "wood/presets/.."])
