@@ -1,7 +1,8 @@
 """Draw the pictures that come with wizen: python -m service.portraits.make [--only WORD] [--seconds 90].
 
-Of the package's tables, and of presets but for those of which there is a table: their pictures are of the table. What is
-expected to take longer than `--seconds` is left out; what is drawn already by the solver's version is not drawn again.
+Of the package's tables, and of presets but for those of which there is a table: their pictures are of the table. What
+is expected to take longer than `--seconds` is left out; what is drawn already by the solver's version is not drawn
+again.
 """
 
 from __future__ import annotations
