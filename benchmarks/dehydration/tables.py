@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks.figures import Row, markdown
 
-from . import order
+from . import controls, order
 from .precision.buckled import STAGES, kind, summary
 from .precision.spheres import SHIPPED, ratios
 
@@ -44,6 +44,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-speed": _speed,
         "dehydration-skips": _skips,
         "dehydration-meshes": order.table,
+        "dehydration-controls": controls.table,
     }
     return makers[f"{record['name']} {part}".strip()](record)
 

@@ -1,0 +1,116 @@
+"""Cold controls of the package's families: python -m benchmarks.dehydration.controls [--seconds 300].
+
+Of each family that was started from a pattern, the sample that is expected to take least is solved again without it,
+from its bumps alone: what the pattern changes in what is counted and measured, stage by stage. Kept after each run;
+what the record has of the solver's version is not run again, and what is expected to take longer is left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from typing import Any
+
+from benchmarks import figures
+from benchmarks.figures import Row, markdown
+from solver import registry
+from solver.contract import Context, Need
+from solver.dehydration import SOLVER
+from store import starter
+from store.lookup import ShapeTable
+from store.store import Store
+
+__all__ = ["table"]
+
+NAME = "dehydration-controls"
+_COMPARED = ("roughness", "dominant_degree", "buckle_count", "volume")
+
+
+def main() -> None:
+    """Run what is missing, the cheapest first."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=300.0, help="most that one run is expected to take [s]")
+    limit = parser.parse_args().seconds
+    kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
+    runs = [row for row in kept if row["version"] == SOLVER.version]
+    store = Store.open(starter.ROOT)
+    for seconds, name, i in sorted(_cheapest(store, name) for name in store.table_names()):
+        table_ = ShapeTable.open(store, name, surfaces=registry.surface)
+        digest = table_.digest[:12]
+        if not table_.at_parameters(table_.sample(i)).get("pattern") or seconds > limit:
+            continue
+        if any((row["family"], row["digest"]) == (name, digest) for row in runs):
+            continue
+        runs = [row for row in runs if row["family"] != name]
+        runs.append({"version": SOLVER.version, "family": name, "digest": digest, **_controlled(table_, i)})
+        figures.keep(NAME, runs, "dehydration", threads=1)
+        print(name, runs[-1]["cpu"], file=sys.stderr, flush=True)
+
+
+def _need(table_: ShapeTable) -> Need:
+    return SOLVER.settle(Need(stages=table_.stages, quality=table_.info.need["quality"], fields=_COMPARED))
+
+
+def _cheapest(store: Store, name: str) -> tuple[float, str, int]:
+    """Return what the cheapest sample of a family is expected to take [s], its name, and which sample it is."""
+    table_ = ShapeTable.open(store, name, surfaces=registry.surface)
+    need = _need(table_)
+    costs = [SOLVER.cost(_cold(table_, i), need).seconds for i in range(table_.size)]
+    least = min(range(table_.size), key=costs.__getitem__)
+    return costs[least], name, least
+
+
+def _cold(table_: ShapeTable, i: int) -> Any:
+    return SOLVER.parse({**table_.at_parameters(table_.sample(i)), "pattern": None})
+
+
+def _controlled(table_: ShapeTable, i: int) -> Row:
+    """Return the numbers of a sample as it is in its table, and of the same fruit without a pattern."""
+    begin = time.process_time()
+    cold = SOLVER.solve(_cold(table_, i), _need(table_), Context())
+    spent = time.process_time() - begin
+    sample = table_.sample(i)
+    stored = [table_.at(sample, s, fields=()).descriptors for s in table_.stages]
+    return {
+        "sample": sample,
+        "stages": list(table_.stages),
+        "quality": table_.info.need["quality"],
+        "seed": 0,
+        "stored": {name: [one[name] for one in stored] for name in _COMPARED},
+        "cold": {name: cold[name].values.tolist() for name in _COMPARED},
+        "converged": cold["converged"].values.tolist(),
+        "cpu": spent,
+    }
+
+
+def table(record: Row) -> str:
+    """Return by how much the cold run is off the one from the pattern, by family and stage."""
+    lines = []
+    for row in record["runs"]:
+        off = {
+            name: " ".join(_off(c, p) for c, p in zip(row["cold"][name], row["stored"][name], strict=True))
+            for name in _COMPARED
+        }
+        said = ", ".join(f"{axis} {value:g}" for axis, value in row["sample"].items())
+        lines.append([row["family"], said, row["quality"], *off.values(), f"{row['cpu']:.0f}"])
+    stages = ", ".join(f"{s:g}" for s in record["runs"][0]["stages"])
+    head = (
+        "family",
+        "sample",
+        "quality",
+        f"roughness at s = {stages}",
+        "dominant degree",
+        "buckles",
+        "volume",
+        "CPU s",
+    )
+    return markdown(head, lines)
+
+
+def _off(cold: float, stored: float) -> str:
+    return f"{100 * (cold / stored - 1):+.0f} %" if stored else ("=" if not cold else "new")
+
+
+if __name__ == "__main__":
+    main()
