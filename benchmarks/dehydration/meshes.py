@@ -34,6 +34,10 @@ def main() -> None:
     asked = parser.parse_args()
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
     runs = [row for row in kept if row["version"] == SOLVER.version]
+    asked_before = len(runs)
+    runs = [row for row in runs if not _is_replaced(row, runs)]
+    if len(runs) < asked_before:
+        figures.keep(NAME, runs, "dehydration", threads=1)
     # coarse meshes and few seeds first: what is stopped early has measured something everywhere
     for n in asked.n:
         for te in asked.te:
@@ -44,6 +48,12 @@ def main() -> None:
                         runs.append(key | measured(te, gamma, n, seed))
                         figures.keep(NAME, runs, "dehydration", threads=1)
                         print(runs[-1], file=sys.stderr, flush=True)
+
+
+def _is_replaced(row: Row, runs: list[Row]) -> bool:
+    """Return whether a row of means has its seeds' own runs beside it by now."""
+    of = [other["seed"] for other in runs if all(other[k] == row[k] for k in ("te", "gamma", "n")) and "seed" in other]
+    return "seeds" in row and set(row["seeds"]) <= set(of)
 
 
 def measured(te: float, gamma: float, n: int, seed: int) -> Row:

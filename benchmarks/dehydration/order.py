@@ -79,7 +79,7 @@ def table(record: Row) -> str:
             values = np.array([run["roughness"] for run in runs])
             off = values.mean(axis=0) / finest - 1
             lines.append([
-                f"{te:g}", f"{gamma:g}", n, f"{runs[0]['elements']:,}", len(runs),
+                f"{te:g}", f"{gamma:g}", str(n), f"{runs[0]['elements']:,}", str(len(runs)),
                 " ".join(f"{value:.4f}".removeprefix("0") for value in values.mean(axis=0)),
                 "" if n == meshes[-1][0] else " ".join(f"{100 * one:+.0f}" for one in off) + " %",
                 f"{100 * (values.std(axis=0, ddof=1) / values.mean(axis=0)).max():.0f} %",
@@ -87,6 +87,8 @@ def table(record: Row) -> str:
             ])  # fmt: skip
         limit = " ".join(f"{value:.4f}".removeprefix("0") for value in found.limit)
         said = f"{found.value:.1f} +- {found.error:.1f}"
+        if not _TRIED[0] < found.value < _TRIED[-1]:
+            limit, said = "", "none fits"
         lines.append([f"{te:g}", f"{gamma:g}", "limit", "", "", limit, "", "", "", said])
     at = ", ".join(f"{s:g}" for s in STAGES)
     head = ("te", "gamma", "elements an edge", "elements", "seeds", f"roughness [r1] at s = {at}", "against the finest")
