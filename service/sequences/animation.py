@@ -57,12 +57,6 @@ def animation(sequence: Sequence, options: Options) -> bytes:
     return file.bytes()
 
 
-def _white(sequence: Sequence) -> Json:
-    """Return what carries the vertices' colours: as rough as the first stage is on the mean, which is all it can be."""
-    rough = next(iter(sequence)).roughness
-    return {"metallicFactor": 0.0, "roughnessFactor": 0.6 if rough is None else round(float(rough.mean()), 3)}
-
-
 class _File:
     def __init__(self, sequence: Sequence, options: Options) -> None:
         self.sequence, self.options = sequence, options
@@ -71,10 +65,8 @@ class _File:
         self.meshes: list[Json] = []
         self.images: list[Json] = []
         self.animations: list[Json] = []
-        textured = bool(options.pixels)
-        plain = _white(sequence) if sequence.coloured else _PLAIN
-        names = [name or "skin" for name, _ in sequence.materials]
-        self.materials: list[Json] = [] if textured else [{"name": n, "pbrMetallicRoughness": plain} for n in names]
+        self.materials: list[Json] = []
+        self.rough: dict[float, int] = {}
         self.extra: dict[str, int] = {}
         self.extensions: set[str] = set()
         seam = sequence.seam
@@ -133,10 +125,23 @@ class _File:
                 self.shared = indices
         else:
             indices = self.shared
-        first = self._textured(surface) if self.options.pixels else 0
+        first = self._textured(surface) if self.options.pixels else self._plain(surface)
         attributes = self._attributes(surface)
         found = [{"attributes": attributes, "indices": at, "material": first + i} for i, at in enumerate(indices)]
         return found + self._extras(surface)
+
+    def _plain(self, surface: Surface) -> int:
+        """Return the first of a stage's materials, one of each name, as rough as the stage is on the mean.
+
+        glTF has no roughness for vertices; pictures have it for each place (`textures`, `full`).
+        """
+        rough = 0.6 if surface.roughness is None else round(float(surface.roughness.mean()), 2)
+        if rough not in self.rough:
+            self.rough[rough] = len(self.materials)
+            pbr = _PLAIN if surface.colour is None else {"metallicFactor": 0.0, "roughnessFactor": rough}
+            names = [name or "skin" for name, _ in self.sequence.materials]
+            self.materials += [{"name": name, "pbrMetallicRoughness": pbr} for name in names]
+        return self.rough[rough]
 
     def _extras(self, surface: Surface) -> list[Json]:
         """Return stem, calyx and threads as primitives of materials of their own, seen from both sides."""
