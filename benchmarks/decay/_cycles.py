@@ -1,4 +1,4 @@
-"""Run by a Python with Blender's `bpy`: render the stages of USD or GLB files. STEM PIXELS SAMPLES AGES FILE [FILE ...].
+"""Run by a Python with Blender's `bpy`: render USD or GLB files. STEM PIXELS SAMPLES AGES FILE [FILE ...].
 
 A GLB holds all stages, of which the last is rendered; of USD there is a file for each. Blender 4.5 reads curves and
 points of a USD file but not the materials that are bound to them: here they get one that does what those say.
@@ -14,7 +14,7 @@ from mathutils import Vector
 
 
 def loaded(path: str, ages: int) -> tuple[Any, Any]:
-    """Load a file, go to the frame that is to be shown, and return the box about the fruit in the file's first frame."""
+    """Load a file, go to the frame that is to be shown, and return the box about the fruit in its first one."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     if path.endswith(".glb"):
@@ -87,7 +87,13 @@ def lit(low: Any, high: Any, floor: float) -> None:
         body.location = middle + size * Vector(way)
         body.rotation_euler = (middle - body.location).to_track_quat("-Z", "Y").to_euler()
         if name == "camera":
-            data.lens, data.clip_start, data.clip_end, scene.camera = 105, 0.01 * size, 100 * size, body
+            data.lens, data.shift_y, data.clip_start, data.clip_end, scene.camera = (
+                96,
+                0.03,
+                0.01 * size,
+                100 * size,
+                body,
+            )
         else:
             data.energy, data.size = 65 * size * size, size
 

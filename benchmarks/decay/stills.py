@@ -2,8 +2,8 @@
 
     python -m benchmarks.decay.stills SHEET.png PYTHON_WITH_BPY [folder] [preset ...]
 
-Each fruit is solved by `wizen solve` (body and skin) and written by `wizen export --full`: a USDZ for each age, as Blender
-shows one picture of a file whose pictures change, and one GLB. The other Python, in which `bpy` is installed, renders.
+Each fruit is solved by `wizen solve` (body and skin) and written by `wizen export --full`: a USDZ for each age, as
+Blender shows one picture of a file whose pictures change, and one GLB. The other Python, which has `bpy`, renders.
 Rows are presets, columns ages; the last age comes once more, from the GLB.
 """
 
@@ -29,8 +29,8 @@ AGES = {
 }
 #: What is not as the preset has it: thinner skins, whose folds are finer, and a room in which the green mould thrives.
 _THIN = ("--set", "te=0.02")
-_SET = {name: _THIN for name in AGES} | {"orange": ("--set", "humidity=85")}
-_PIXELS, _SAMPLES = 200, 12
+_SET = dict.fromkeys(AGES, _THIN) | {"orange": ("--set", "humidity=85")}
+_PIXELS, _SAMPLES = 180, 10
 #: Wounds that the camera sees.
 _WOUNDS = 'wounds=[{"colatitude":60,"azimuth":70},{"colatitude":110,"azimuth":140}]'
 

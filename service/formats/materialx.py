@@ -57,7 +57,7 @@ def add(
     if normal is not None:
         kinds = Sdf.ValueTypeNames
         bent = UsdShade.Shader.Define(stage, path.AppendChild("normalmap"))
-        bent.CreateIdAttr("ND_normalmap")
+        bent.CreateIdAttr("ND_normalmap_float")  # the name since 1.39
         read = _pictured(stage, path.AppendChild("normal_of_pictures"), normal, "vector3")
         bent.CreateInput("in", kinds.Float3).ConnectToSource(read)
         surface.CreateInput("normal", kinds.Float3).ConnectToSource(bent.CreateOutput("out", kinds.Float3))

@@ -58,8 +58,8 @@ class Peel(BaseModel):
 LESIONS: Mapping[str, Lesion] = {
     "penicillium-expansum": Lesion(colour=(0.26, 0.13, 0.045), cover=0.92, roughness=0.34),
     "penicillium-digitatum": Lesion(colour=(0.47, 0.23, 0.06), cover=0.7, roughness=0.42),
-    "neofabraea": Lesion(colour=(0.075, 0.032, 0.014), cover=0.94, roughness=0.68),
-    "rhizopus": Lesion(colour=(0.17, 0.072, 0.026), cover=0.8, roughness=0.22),
+    "neofabraea": Lesion(colour=(0.095, 0.036, 0.012), cover=0.95, roughness=0.68),
+    "rhizopus": Lesion(colour=(0.17, 0.072, 0.026), cover=0.85, roughness=0.33),
 }
 
 _SEPALS: dict[str, Any] = {"sepals": 5, "sepals_at_stem": False, "sepal": 0.13, "sepal_width": 0.07, "sepal_lift": 0.5}
@@ -69,8 +69,8 @@ _DRY = (0.10, 0.065, 0.03)
 #: flower, at the other end but for the tomato's star and the orange's button.
 PEELS: Mapping[str, Peel] = {
     "apple": Peel(
-        roughness=0.3, bloom=0.15, blush=0.6, blush_colour=(0.55, 0.40, 0.07), streak=0.6, spots=45, spot_radius=0.016,
-        spot_colour=(0.72, 0.52, 0.28), spot_cover=0.75, subsurface=0.15, stem=0.45, stem_width=0.055,
+        roughness=0.3, bloom=0.15, blush=0.6, blush_colour=(0.55, 0.40, 0.07), streak=0.6, spots=60, spot_radius=0.02,
+        spot_colour=(0.80, 0.62, 0.36), spot_cover=0.9, subsurface=0.15, stem=0.45, stem_width=0.055,
         sepal_colour=_DRY, **_SEPALS,
     ),
     "orange": Peel(
@@ -83,7 +83,7 @@ PEELS: Mapping[str, Peel] = {
         stem_width=0.10,
     ),
     "pear": Peel(
-        roughness=0.42, blush=0.3, blush_colour=(0.50, 0.26, 0.06), spots=260, spot_radius=0.011,
+        roughness=0.42, blush=0.3, blush_colour=(0.50, 0.26, 0.06), spots=260, spot_radius=0.014,
         spot_colour=(0.22, 0.16, 0.05), spot_cover=0.7, spot_height=0.0015, subsurface=0.2, stem=0.5, stem_width=0.06,
         sepal_colour=_DRY, **_SEPALS,
     ),

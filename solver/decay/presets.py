@@ -58,16 +58,16 @@ def _lived(name: str, paper: Mapping[str, Any], mould: str) -> dict[str, Any]:
         "transpiration": _TRANSPIRATION.get(name, paper["transpiration"]),
         "mould": MOULDS[mould].model_dump(),
         "rot": ROTS[mould].model_dump(),
-        **({"mould_colour": _OLIVE} if mould == "penicillium-digitatum" else {}),
+        **({"mould_colour": _RIPE[mould]} if mould in _RIPE else {}),
     }
 
 
 _BLUE = (0.16, 0.27, 0.26)
-#: Ripe spores of the green mould; the paper draws them grey-blue.
-_OLIVE = (0.17, 0.185, 0.075)
 _GREY_BLUE = (0.20, 0.27, 0.31)
 _GREY = (0.10, 0.10, 0.09)
 _PALE = (0.45, 0.40, 0.30)
+#: Ripe spores as they are seen, where the paper's colours are others: of the green mould olive, of the blue one duller.
+_RIPE = {"penicillium-digitatum": (0.17, 0.185, 0.075), "penicillium-expansum": (0.15, 0.225, 0.195)}
 
 _APPLE: dict[str, Any] = {"radii": (1.0, 1.04, 1.1, 1.15, 1.14, 1.08, 1.0, 1.15), "stone": (0.3, 0.25)}
 _PEAR: dict[str, Any] = {"radii": (1.0, 1.02, 1.03, 0.98, 0.92, 1.0, 1.2, 0.98), "stone": (0.3, 0.3)}
