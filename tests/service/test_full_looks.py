@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,16 @@ def test_usdz_has_normals_height_and_light_below_the_skin(run: xr.Dataset, tmp_p
     scale = UsdShade.Shader(stage.GetPrimAtPath("/decay/material0/normal"))
     assert tuple(scale.GetInput("scale").Get()) == (2, 2, 2, 2)
     assert tuple(scale.GetInput("bias").Get()) == (-1, -1, -1, -1)
+    with zipfile.ZipFile(path) as archive:
+        height, normal = (
+            np.asarray(Image.open(io.BytesIO(archive.read(f"{name}0.png"))), float)
+            for name in ("displacement", "normal")
+        )
+    # what rises to the right leans to the left, and what rises upwards leans down
+    belt = slice(100, -100)
+    for channel, axis, sign in ((0, 1, -1), (1, 0, 1)):
+        rise = np.gradient(height, axis=axis)[belt]
+        assert np.corrcoef(sign * rise.ravel(), normal[belt, :, channel].ravel())[0, 1] > 0.8
     # pores are as deep as the peel says, and felt stands out
     tall = UsdShade.Shader(stage.GetPrimAtPath("/decay/material0/displacement"))
     assert tall.GetInput("bias").Get(1.0)[0] == pytest.approx(-0.006, abs=5e-4)

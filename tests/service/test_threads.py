@@ -92,8 +92,8 @@ def test_usd_has_curves_and_heads_and_glb_has_cards(tmp_path: Path) -> None:
         "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0},
     }
     assert skin["material"] != cards["material"]
-    for path in ("hyphae", "heads"):
-        prim = Usd.Stage.Open(str(tmp_path / "run.usdc")).GetPrimAtPath(f"/decay/{path}")
+    for name in ("hyphae", "heads"):
+        prim = stage.GetPrimAtPath(f"/decay/{name}")
         bound, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
         shader = UsdShade.Shader(bound.ComputeSurfaceSource()[0])
         assert shader.GetInput("roughness").Get() == 1.0
