@@ -68,8 +68,8 @@ def rendered(sources: list[Path], preset: str, python: str, folder: Path) -> lis
     """Return pictures of files, rendered in another Python."""
     stem = folder / f"{preset}-still"
     script = Path(__file__).with_name("_cycles.py")
-    said = [stem, str(_PIXELS), str(_SAMPLES), str(len(AGES[preset]))]
-    subprocess.run([python, script, *said, *sources], check=True)
+    said = [str(stem), str(_PIXELS), str(_SAMPLES), str(len(AGES[preset]))]
+    subprocess.run([python, str(script), *said, *map(str, sources)], check=True)
     return [stem.with_name(f"{stem.name}-{k}.png") for k in range(len(sources))]
 
 
