@@ -49,6 +49,9 @@ class _Asked:
     threads: Annotated[
         int | None, typer.Option("--threads", help="GLB, USD: N threads of mould at most, as cards or curves.")
     ] = None
+    full: Annotated[
+        bool, typer.Option("--full", help="GLB, USD: threads, stem and calyx; GLB, USDZ: fine pictures of the skin.")
+    ] = False
     cut: Annotated[
         str | None,
         typer.Option(
@@ -76,7 +79,7 @@ class _Asked:
 
 
 #: Options that the formats know by the same names.
-_SHARED = ("colour", "cut", "textures", "threads", "size", "low", "high", "scale", "fps", "step")
+_SHARED = ("colour", "cut", "full", "textures", "threads", "size", "low", "high", "scale", "fps", "step")
 
 
 @grouped(_Asked)
@@ -91,7 +94,7 @@ def export(asked: _Asked) -> None:
 
     wizen solve decay --preset orange --stages 0,4,8 --out run.h5
 
-    wizen export run.h5 --out orange.glb --textures 1024
+    wizen export run.h5 --out orange.glb --full
 
     wizen export run.h5 --out rot.png --map rot --size 512 --stage 8
 

@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweeps.pictures import colours
-from sweeps.pictures.fur import ribbons
-
 from ..errors import UnfitFormat
 from ..formats.about import GENERATOR
 from ..formats.gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack
 from .options import Options
+from .skins import looked, matter
+from .standing import Extra, cards, stems
 
 if TYPE_CHECKING:
     from .view import Sequence, Surface
@@ -44,7 +43,9 @@ def animation(sequence: Sequence, options: Options) -> bytes:
         Unavailable: textures of a surface without texture coordinates need a package that is not installed.
 
     """
-    if options.textures:
+    if options.full and not options.textures and not (sequence.coloured and sequence.kept and sequence.seam):
+        options = options.model_copy(update={"full": False, "threads": options.grown})
+    if options.pixels:
         sequence = sequence.unwrapped()
         if not sequence.coloured:
             raise UnfitFormat("textures need colours, and this result has none.", advice="Leave textures out.")
@@ -56,12 +57,6 @@ def animation(sequence: Sequence, options: Options) -> bytes:
     return file.bytes()
 
 
-def _white(sequence: Sequence) -> Json:
-    """Return what carries the vertices' colours: as rough as the first stage is on the mean, which is all it can be."""
-    rough = next(iter(sequence)).roughness
-    return {"metallicFactor": 0.0, "roughnessFactor": 0.6 if rough is None else round(float(rough.mean()), 3)}
-
-
 class _File:
     def __init__(self, sequence: Sequence, options: Options) -> None:
         self.sequence, self.options = sequence, options
@@ -70,11 +65,10 @@ class _File:
         self.meshes: list[Json] = []
         self.images: list[Json] = []
         self.animations: list[Json] = []
-        textured = bool(options.textures)
-        plain = _white(sequence) if sequence.coloured else _PLAIN
-        names = [name or "skin" for name, _ in sequence.materials]
-        self.materials: list[Json] = [] if textured else [{"name": n, "pbrMetallicRoughness": plain} for n in names]
-        self.felt: int | None = None
+        self.materials: list[Json] = []
+        self.rough: dict[float, int] = {}
+        self.extra: dict[str, int] = {}
+        self.extensions: set[str] = set()
         seam = sequence.seam
         self.copies = slice(None) if seam is None else seam.copies
         self.uv = None if seam is None else self.buffer.add(seam.uv.astype("f4"), FLOAT, "VEC2", VERTICES)
@@ -114,7 +108,7 @@ class _File:
             found["TEXCOORD_0"] = self.buffer.add(seam.uv.astype("f4"), FLOAT, "VEC2", VERTICES)
         elif self.uv is not None:
             found["TEXCOORD_0"] = self.uv
-        if surface.colour is not None and not self.options.textures:
+        if surface.colour is not None and not self.options.pixels:
             found["COLOR_0"] = self.buffer.add(np.clip(surface.colour, 0, 1)[copies], FLOAT, "VEC3", VERTICES)
         for name, values in surface.fields.items():
             word = "_" + re.sub("[^A-Z0-9_]", "_", name.upper())
@@ -131,29 +125,42 @@ class _File:
                 self.shared = indices
         else:
             indices = self.shared
-        first = self._textured(surface) if self.options.textures else 0
+        first = self._textured(surface) if self.options.pixels else self._plain(surface)
         attributes = self._attributes(surface)
         found = [{"attributes": attributes, "indices": at, "material": first + i} for i, at in enumerate(indices)]
-        return found + self._cards(surface)
+        return found + self._extras(surface)
 
-    def _cards(self, surface: Surface) -> list[Json]:
-        """Return the threads on a surface as ribbons of a material of their own, seen from both sides."""
-        threads = self.sequence.threads(surface, self.options.threads)
-        if threads is None or not len(threads.points):
-            return []
-        points, faces, colour, normals = ribbons(threads)
-        points, colour, normals = (part.astype("f4") for part in (points, colour, normals))
-        if self.felt is None:
-            self.felt = len(self.materials)
-            rough = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
-            self.materials.append({"name": "hyphae", "doubleSided": True, "pbrMetallicRoughness": rough})
+    def _plain(self, surface: Surface) -> int:
+        """Return the first of a stage's materials, one of each name, as rough as the stage is on the mean.
+
+        glTF has no roughness for vertices; pictures have it for each place (`textures`, `full`).
+        """
+        rough = 0.6 if surface.roughness is None else round(float(surface.roughness.mean()), 2)
+        if rough not in self.rough:
+            self.rough[rough] = len(self.materials)
+            pbr = _PLAIN if surface.colour is None else {"metallicFactor": 0.0, "roughnessFactor": rough}
+            names = [name or "skin" for name, _ in self.sequence.materials]
+            self.materials += [{"name": name, "pbrMetallicRoughness": pbr} for name in names]
+        return self.rough[rough]
+
+    def _extras(self, surface: Surface) -> list[Json]:
+        """Return stem, calyx and threads as primitives of materials of their own, seen from both sides."""
+        found = stems(self.sequence, surface, self.options)
+        threads = cards(self.sequence, surface, self.options)
+        return [self._extra(one) for one in (*found, *((threads,) if threads is not None else ()))]
+
+    def _extra(self, one: Extra) -> Json:
+        if one.name not in self.extra:
+            self.extra[one.name] = len(self.materials)
+            rough = {"metallicFactor": 0.0, "roughnessFactor": one.roughness}
+            self.materials.append({"name": one.name, "doubleSided": True, "pbrMetallicRoughness": rough})
         attributes = {
-            "POSITION": self.buffer.add(points, FLOAT, "VEC3", VERTICES, bounds(points)),
-            "NORMAL": self.buffer.add(normals, FLOAT, "VEC3", VERTICES),
-            "COLOR_0": self.buffer.add(np.clip(colour, 0, 1), FLOAT, "VEC3", VERTICES),
+            "POSITION": self.buffer.add(one.vertices, FLOAT, "VEC3", VERTICES, bounds(one.vertices)),
+            "NORMAL": self.buffer.add(one.normals, FLOAT, "VEC3", VERTICES),
+            "COLOR_0": self.buffer.add(one.colour, FLOAT, "VEC3", VERTICES),
         }
-        indices = self._indices(faces.astype("u4"), len(points))
-        return [{"attributes": attributes, "indices": indices, "material": self.felt}]
+        indices = self._indices(one.triangles, len(one.vertices))
+        return {"attributes": attributes, "indices": indices, "material": self.extra[one.name]}
 
     def morph(self) -> None:
         """Add one mesh with a target per further stage, and weights that fade from each to the next."""
@@ -221,18 +228,25 @@ class _File:
 
     def _textured(self, surface: Surface) -> int:
         """Add a stage's colours and roughness as pictures, a material of each name, and return the first's number."""
-        size = self.options.textures
-        assert surface.colour is not None
-        base = colours.encoded(self.sequence.baked(surface.colour, size))
-        pbr: Json = {"baseColorTexture": {"index": self._image(base)}, "metallicFactor": 0.0, "roughnessFactor": 0.6}
-        if surface.roughness is not None:
-            rough = np.zeros((size, size, 3), np.uint8)  # green is roughness, blue is metal
-            share = self.sequence.baked(surface.roughness, size)
-            rough[..., 1] = np.clip(255 * share + 0.5, 0, 255).astype(np.uint8)
+        look = looked(self.sequence, surface, self.options.pixels, self.options.full)
+        base = {"index": self._image(look.colour)}
+        pbr: Json = {"baseColorTexture": base, "metallicFactor": 0.0, "roughnessFactor": 0.6}
+        more: Json = {}
+        if look.roughness is not None:
+            rough = np.zeros((*look.roughness.shape, 3), np.uint8)  # green is roughness, blue is metal
+            rough[..., 1] = look.roughness
             pbr |= {"metallicRoughnessTexture": {"index": self._image(rough)}, "roughnessFactor": 1.0}
+        if look.normal is not None:
+            more["normalTexture"] = {"index": self._image(look.normal)}
+        said = matter(self.sequence) if self.options.full else None
+        if said is not None and said.sheen > 0 and surface.stage == self.sequence.stages[0]:
+            # down is on fresh skin alone, and a number is for all of it
+            self.extensions.add("KHR_materials_sheen")
+            sheen = {"sheenColorFactor": [0.5 * said.sheen] * 3, "sheenRoughnessFactor": 0.5}
+            more["extensions"] = {"KHR_materials_sheen": sheen}
         first = len(self.materials)
         for name, _ in self.sequence.materials:
-            self.materials.append({"name": f"{name or 'skin'} {surface.stage:g}", "pbrMetallicRoughness": pbr})
+            self.materials.append({"name": f"{name or 'skin'} {surface.stage:g}", "pbrMetallicRoughness": pbr, **more})
         return first
 
     def _image(self, pixels: np.ndarray) -> int:
@@ -257,6 +271,8 @@ class _File:
             document["images"] = self.images
             document["samplers"] = [{"wrapS": 10497, "wrapT": 33071}]  # around in azimuth, not across the poles
             document["textures"] = [{"source": i, "sampler": 0} for i in range(len(self.images))]
+        if self.extensions:
+            document["extensionsUsed"] = sorted(self.extensions)
         if self.animations:
             document["animations"] = self.animations
         return pack(document, self.buffer)

@@ -11,6 +11,10 @@ from ..errors import InvalidQuery, Wrong
 __all__ = ["Options"]
 
 
+#: Pixels and threads of a file that shows all, where nobody says how many.
+_PIXELS, _THREADS = 1024, 12_000
+
+
 class Options(BaseModel):
     """Choices that formats share; each takes what it knows and leaves the rest alone."""
 
@@ -22,6 +26,11 @@ class Options(BaseModel):
     step: float = Field(12.0, gt=0, le=1000, description="Frames from one stage to the next")
     textures: int = Field(0, ge=0, le=4096, description="Pixels of baked textures in place of vertex colours; 0: none")
     threads: int = Field(0, ge=0, le=200_000, description="Most threads of mould, as curves or cards; 0: none")
+    full: bool = Field(
+        False,
+        description="All that is known of the looks: threads, stem and calyx; GLB and USDZ: pictures of colour, "
+        "roughness, normals and height, finer than the mesh",
+    )
     cut: str | None = Field(
         None,
         max_length=200,
@@ -38,6 +47,16 @@ class Options(BaseModel):
         if value == 1:
             raise ValueError("a texture has at least 2 pixels")
         return value
+
+    @property
+    def pixels(self) -> int:
+        """Pixels of pictures, 0: none."""
+        return self.textures or (_PIXELS if self.full else 0)
+
+    @property
+    def grown(self) -> int:
+        """Most threads."""
+        return self.threads or (_THREADS if self.full else 0)
 
     @classmethod
     def parse(cls, values: dict[str, Any]) -> Self:

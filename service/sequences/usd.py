@@ -17,8 +17,10 @@ import numpy as np
 from sweeps.errors import installing
 
 from ..errors import Unavailable
-from ..formats import materialx
+from .matter import Pictures, bind, dressed
 from .options import Options
+from .skins import matter
+from .standing import Extra, stems
 
 if TYPE_CHECKING:
     from sweeps.pictures.fur import Threads
@@ -26,10 +28,7 @@ if TYPE_CHECKING:
     from .seam import Seam
     from .view import Sequence, Surface
 
-__all__ = ["Pictures", "composed", "usda", "usdc"]
-
-#: What a material takes from pictures: time and path in the file, by what it is.
-Pictures = dict[str, list[tuple[float, str]]]
+__all__ = ["composed", "usda", "usdc"]
 
 
 def composed(sequence: Sequence, options: Options, pictures: Pictures | None = None) -> Any:
@@ -63,7 +62,7 @@ def composed(sequence: Sequence, options: Options, pictures: Pictures | None = N
     mesh.GetPrim().SetCustomDataByKey("stages", _doubles(about["stages"]["values"]))
     if sequence.seam is not None:
         _texture(mesh, sequence.seam)
-    _materials(stage, mesh, sequence, pictures or {})
+    dressed(stage, mesh, sequence, pictures, matter(sequence) if options.full else None)
     for number, surface in enumerate(sequence):
         at = 1 + number * options.step
         if number == 0 or not sequence.kept:
@@ -72,7 +71,9 @@ def composed(sequence: Sequence, options: Options, pictures: Pictures | None = N
         if surface.seam is not None:
             _texture(mesh, surface.seam, at)
         _sample(mesh, surface, at)
-        _threads(stage, mesh, sequence.threads(surface, options.threads), at)
+        _threads(stage, mesh, sequence.threads(surface, options.grown), at)
+        for one in stems(sequence, surface, options):
+            _stem(stage, mesh, one, at)
     return stage
 
 
@@ -152,6 +153,29 @@ def _threads(stage: Any, mesh: Any, threads: Threads | None, at: float) -> None:
     heads.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(tips), at)
     heads.CreateWidthsAttr().Set(Vt.FloatArray.FromNumpy((2 * threads.heads[headed]).astype(np.float32)), at)
     heads.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(0.03, 0.03, 0.03)])
+    for prim in (curves, heads):
+        bind(stage, prim.GetPrim(), mesh.GetPath().AppendChild("felt"), 1.0)
+
+
+def _stem(stage: Any, mesh: Any, one: Extra, at: float) -> None:
+    """Write a small mesh that stands on the fruit, as it stands there at a time."""
+    from pxr import UsdGeom, Vt
+
+    path = mesh.GetPath().AppendChild(one.name)
+    small = UsdGeom.Mesh.Define(stage, path)
+    small.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    small.CreateDoubleSidedAttr(True)
+    small.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    counts = np.full(len(one.triangles), 3, np.int32)
+    small.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(counts))
+    small.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(one.triangles.ravel(), np.int32)))
+    small.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(one.vertices)), at)
+    small.CreateNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(one.normals)), at)
+    ends = np.stack([one.vertices.min(axis=0), one.vertices.max(axis=0)])
+    small.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(ends), at)
+    paint = small.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    paint.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(one.colour)), at)
+    bind(stage, small.GetPrim(), path.AppendChild("material"), one.roughness)
 
 
 def _texture(mesh: Any, seam: Seam, at: float | None = None) -> None:
@@ -163,69 +187,3 @@ def _texture(mesh: Any, seam: Seam, at: float | None = None) -> None:
     st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
     st.Set(Vt.Vec2fArray.FromNumpy(np.column_stack([seam.uv[:, 0], 1 - seam.uv[:, 1]]).astype("f4")), when)
     st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(seam.triangles.ravel(), np.int32)), when)
-
-
-def _read(stage: Any, path: Any, what: str) -> Any:
-    """Return the output of a reader of the vertices' colour or roughness."""
-    from pxr import Gf, Sdf, UsdShade
-
-    colour = what == "diffuseColor"
-    kind = Sdf.ValueTypeNames.Float3 if colour else Sdf.ValueTypeNames.Float
-    reader = UsdShade.Shader.Define(stage, path.AppendChild(what))
-    reader.CreateIdAttr("UsdPrimvarReader_float3" if colour else "UsdPrimvarReader_float")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor" if colour else what)
-    reader.CreateInput("fallback", kind).Set(Gf.Vec3f(0.5) if colour else 0.5)
-    return reader.CreateOutput("result", kind)
-
-
-def _pictured(stage: Any, path: Any, what: str, pictures: list[tuple[float, str]]) -> Any:
-    """Return the output of a texture whose picture changes from stage to stage."""
-    from pxr import Sdf, UsdShade
-
-    colour, kinds = what == "diffuseColor", Sdf.ValueTypeNames
-    reader = UsdShade.Shader.Define(stage, path.AppendChild("st"))
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", kinds.String).Set("st")
-    texture = UsdShade.Shader.Define(stage, path.AppendChild(what))
-    texture.CreateIdAttr("UsdUVTexture")
-    file = texture.CreateInput("file", kinds.Asset)
-    # who does not follow pictures in time sees the last
-    file.Set(Sdf.AssetPath(pictures[-1][1]))
-    if len(pictures) > 1:
-        for at, name in pictures:
-            file.Set(Sdf.AssetPath(name), at)
-    texture.CreateInput("sourceColorSpace", kinds.Token).Set("sRGB" if colour else "raw")
-    texture.CreateInput("wrapS", kinds.Token).Set("repeat")
-    texture.CreateInput("wrapT", kinds.Token).Set("clamp")
-    texture.CreateInput("st", kinds.Float2).ConnectToSource(reader.CreateOutput("result", kinds.Float2))
-    return texture.CreateOutput("rgb", kinds.Float3) if colour else texture.CreateOutput("r", kinds.Float)
-
-
-def _materials(stage: Any, mesh: Any, sequence: Sequence, pictures: Pictures) -> None:
-    """Bind materials under the mesh's own names, which take colour and roughness from pictures, else the vertices."""
-    from pxr import Sdf, UsdGeom, UsdShade, Vt
-
-    if not sequence.coloured:
-        return
-    # where triangles change from stage to stage none of them stays in its part
-    parts = sequence.materials if sequence.kept else (("", np.empty(0, int)),)
-    api = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
-    for number, (name, faces) in enumerate(parts):
-        path = mesh.GetPath().AppendChild(f"material{number}")
-        material = UsdShade.Material.Define(stage, path)
-        material.GetPrim().SetDisplayName(name or "skin")
-        shader = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
-        shader.CreateIdAttr("UsdPreviewSurface")
-        for what in ("diffuseColor", "roughness"):
-            kind = Sdf.ValueTypeNames.Color3f if what == "diffuseColor" else Sdf.ValueTypeNames.Float
-            found = _pictured(stage, path, what, pictures[what]) if what in pictures else _read(stage, path, what)
-            shader.CreateInput(what, kind).ConnectToSource(found)
-        material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-        colour, roughness = pictures.get("diffuseColor", "displayColor"), pictures.get("roughness", "roughness")
-        materialx.add(stage, material, {"base_color": colour, "specular_roughness": roughness})
-        if len(parts) == 1:
-            api.Bind(material)
-            continue
-        indices = Vt.IntArray.FromNumpy(faces.astype(np.int32))
-        subset = api.CreateMaterialBindSubset(f"part{number}", indices, UsdGeom.Tokens.face)
-        UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)

@@ -10,13 +10,11 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from sweeps.pictures import colours
-
 from ..errors import UnfitFormat
+from .matter import Pictures
 from .options import Options
-from .usd import Pictures, composed
+from .skins import looked
+from .usd import composed
 
 if TYPE_CHECKING:
     from .view import Sequence
@@ -47,7 +45,7 @@ def usdz(sequence: Sequence, options: Options) -> bytes:
         stage.GetRootLayer().Export(str(folder / "result.usdc"))
         out = Sdf.ZipFileWriter.CreateNew(str(folder / "result.usdz"))
         # what is to be opened comes first
-        for name in ("result.usdc", *(name for kind in pictures.values() for _, name in kind)):
+        for name in ("result.usdc", *(name for kind in pictures.files.values() for _, name in kind)):
             out.AddFile(str(folder / name), name)
         out.Save()
         return (folder / "result.usdz").read_bytes()
@@ -57,17 +55,18 @@ def _drawn(sequence: Sequence, options: Options, folder: Path) -> Pictures:
     """Write the pictures of all stages and return their names."""
     from PIL import Image
 
-    size = options.textures or _PIXELS
-    found: Pictures = {}
+    size = options.pixels or _PIXELS
+    found = Pictures({}, [])
     for number, surface in enumerate(sequence):
         at = 1 + number * options.step
-        assert surface.colour is not None
-        drawn = {"diffuseColor": colours.encoded(sequence.baked(surface.colour, size))}
-        if surface.roughness is not None:
-            share = sequence.baked(surface.roughness, size)
-            drawn["roughness"] = np.clip(255 * share + 0.5, 0, 255).astype(np.uint8)
+        look = looked(sequence, surface, size, options.full)
+        drawn = {"diffuseColor": look.colour, "roughness": look.roughness}
+        drawn |= {"normal": look.normal, "displacement": look.height}
+        found.heights.append((at, look.low, look.high))
         for what, pixels in drawn.items():
+            if pixels is None:
+                continue
             name = f"{what}{number}.png"
             Image.fromarray(pixels).save(folder / name, "PNG")
-            found.setdefault(what, []).append((at, name))
+            found.files.setdefault(what, []).append((at, name))
     return found

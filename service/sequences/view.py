@@ -175,6 +175,32 @@ class Sequence:
         return charts.drawn(self.seam, self._texels[size], values, size)
 
     @cached_property
+    def fresh(self) -> Singles:
+        """Vertices (v, 3) of the run's first stage, in the result's unit: places that skin keeps."""
+        return self._bare(0).vertices
+
+    def grained(self, size: int) -> Mapping[str, Array]:
+        """Return what the solver knows of the texels of a picture (size, size) that is finer than its fields."""
+        if size not in self._grains:
+            known, fresh = colours.looks(self.run).grain, self.fresh
+            reach = float(np.ptp(fresh, axis=0).max())
+            found = (
+                {}
+                if known is None
+                else known(self.baked(fresh, size).reshape(-1, 3), np.pi * reach / size, self.params)
+            )
+            self._grains[size] = {name: values.reshape(size, size) for name, values in found.items()}
+        return self._grains[size]
+
+    @cached_property
+    def _grains(self) -> dict[int, Mapping[str, Array]]:
+        return {}
+
+    def index_of(self, surface: Surface) -> int:
+        """Return which of the run's stages a surface is of."""
+        return min(self.indices, key=lambda i: abs(float(self.run["stage"][i]) - surface.stage))
+
+    @cached_property
     def _texels(self) -> dict[int, charts.Texels]:
         return {}
 

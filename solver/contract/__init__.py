@@ -8,7 +8,7 @@ from .clock import Clock
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
 from .live import Live, LiveEngine
-from .looks import Fur, Label, Looks, Place, Shade, Skin
+from .looks import Fur, Label, Looks, Matter, Part, Place, Shade, Skin
 from .need import Need, Quality, Region, Start
 from .params import Params
 from .solver import Cost, Solver, StageAxis, finish
@@ -28,10 +28,12 @@ __all__ = [
     "Live",
     "LiveEngine",
     "Looks",
+    "Matter",
     "Need",
     "NotConverged",
     "OverBudget",
     "Params",
+    "Part",
     "Place",
     "Quality",
     "Region",

@@ -2,20 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from ..arrays import Array
 
-__all__ = ["Fur", "Label", "Looks", "Place", "Shade", "Skin"]
+__all__ = ["Fur", "Label", "Looks", "Matter", "Part", "Place", "Shade", "Skin"]
 
 
 class Skin(NamedTuple):
-    """Colours (..., 3), linear light, and microfacet roughness (...), both 0 to 1."""
+    """Colours (..., 3), linear light, and microfacet roughness (...), both 0 to 1.
+
+    height: (...), of what is too fine for the mesh over it, in the result's unit of length; None where nobody knows.
+    """
 
     colour: Array
     roughness: Array
+    height: Array | None = None
+
+
+class Matter(NamedTuple):
+    """What one number says of a whole surface's material, 0 to 1 but for lengths.
+
+    subsurface: share of the light that goes on below it, so far by red, green and blue in the result's unit of length.
+    sheen: of down or dust that catches light at grazing angles.
+    """
+
+    subsurface: float
+    reach: tuple[float, float, float]
+    sheen: float
+
+
+class Part(NamedTuple):
+    """A small mesh that stands on a surface: points (v, 3) about its foot, y along the normal; triangles (f, 3).
+
+    pole: where it stands, 0 or 1. colour: (v, 3), linear light. roughness: 0 to 1.
+    """
+
+    name: str
+    pole: int
+    points: Array
+    triangles: Array
+    colour: Array
+    roughness: float
 
 
 class Fur(NamedTuple):
@@ -80,6 +110,9 @@ class Looks:
     paint: Callable[[Mapping[str, Array], Mapping[str, Any]], Skin | None] | None = None
     scalars: tuple[str, ...] = ()
     fur: Callable[[Mapping[str, Array], Mapping[str, Any]], Fur | None] | None = None
+    grain: Callable[[Array, float, Mapping[str, Any]], Mapping[str, Array]] | None = None
+    parts: Callable[[Mapping[str, Array], Mapping[str, Any]], Sequence[Part]] | None = None
+    matter: Callable[[Mapping[str, Any]], Matter | None] | None = None
     inside: Callable[[Mapping[str, Array], Array, Mapping[str, Any]], Mapping[str, Array]] | None = None
     aside: str | None = None
     labels: Mapping[str, Label] = field(default_factory=dict)

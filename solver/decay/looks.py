@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..contract import Fur, Label, Looks, Skin
+from ..contract import Fur, Label, Looks, Matter, Skin
+from .grain import grain
+from .stem import parts
 
 __all__ = ["LOOKS"]
 
@@ -16,14 +18,20 @@ _LAYERS = ("rot", "mould", "mould_active")
 #: What a cut face has besides: 1 on flesh, 0 on skin. Pale flesh, chosen by eye; linear light.
 _FLESH = "flesh"
 _PALE = np.array([0.95, 0.87, 0.60])
-#: Rotten flesh under the skin, and the rim of mould that still grows; linear light.
+#: Rotten flesh under the skin where the parameters say no lesion, and the rim of mould that still grows; linear light.
 _ROT = np.array([0.16, 0.075, 0.03])
 _RIM = np.array([0.86, 0.86, 0.82])
-#: Roughness of waxy skin, of wet rot and of felt: chosen by eye, measured by nobody.
+#: Roughness of waxy skin, of wet rot, of felt, and of dry skin: chosen by eye, measured by nobody.
 _WAX, _WET, _FELT, _DULL = 0.35, 0.6, 1.0, 0.65
 #: Share of the weight lost as water at which skin is as brown as it gets, and that brown over the skin's brightness.
 _DRIED = 0.6
 _BROWN = np.array([0.60, 0.29, 0.11])
+#: Wax as dust; what it hides and how rough it is where a peel says 1.
+_DUST, _DUSTY, _POWDER = np.array([0.62, 0.64, 0.70]), 0.4, 0.4
+#: Heights [r1] of felt, of its tufts, and of fine wrinkles in skin that is quite dry.
+_MAT, _TUFT, _SHRIVEL = 0.006, 0.004, 0.006
+#: How far light goes below a fruit's skin, red, green and blue [r1].
+_REACH = (0.08, 0.035, 0.015)
 
 
 def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | None:
@@ -35,23 +43,54 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
         return np.asarray(fields[name], float) if name in fields else np.zeros_like(known[0])
 
     rot, mould, active = (layer(name) for name in _LAYERS)
-    colour = np.broadcast_to(np.array(params["skin_colour"], float), (*known[0].shape, 3))
-    if _FLESH in fields:
-        colour = _over(colour, _PALE, np.asarray(fields[_FLESH], float))
+    peel, lesion = params.get("peel", {}), params.get("lesion", {})
     # what dries darkens and turns brown, and its wax goes dull
     dry = float(_smooth(np.asarray(fields.get("water_lost", 0.0)) / _DRIED))
+    colour, wax = _fresh(fields, params, peel, dry, known[0].shape)
     colour = colour * (1 - 0.35 * dry)
     colour = colour + (_BROWN * colour.sum(axis=-1, keepdims=True) - colour) * (0.6 * dry)
+    wax = wax + (np.maximum(_DULL, wax) - wax) * dry
+    # edges are ragged where that is known
+    edge, fluff = layer("edge"), layer("fluff")
+    rot, mould = rot * (1 + 0.3 * edge), mould * (1 + 0.35 * edge + 0.3 * fluff)
     # rot shows long before it is complete, mould hides what is below it
-    rotten, felted = 0.9 * _smooth(rot / 0.2), 0.95 * _smooth(mould / 0.25)
-    colour = _over(colour, _ROT, rotten)
+    rotten, matted = _smooth(rot / 0.2), _smooth(mould / 0.25)
+    felted = params.get("hyphae", {}).get("mat", 0.95) * matted
+    colour = _over(colour, np.array(lesion.get("colour", _ROT), float), lesion.get("cover", 0.9) * rotten)
     # what grows is white while it is thin, and takes its colour with the spores of a dense or a resting mat
     growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1) * (1 - _smooth((mould - 0.2) / 0.3))
-    centre = np.array(params["mould_colour"], float)
+    centre = np.array(params["mould_colour"], float) * (1 + 0.25 * fluff[..., None])
     colour = _over(colour, centre + (_RIM - centre) * growing[..., None], felted)
-    wax = _WAX + (_DULL - _WAX) * dry
-    roughness = wax + (_WET - wax) * rotten
-    return Skin(colour, roughness + (_FELT - roughness) * felted)
+    roughness = wax + (lesion.get("roughness", _WET) - wax) * rotten
+    roughness = roughness + (_FELT - roughness) * matted
+    height = None
+    if "edge" in fields:
+        spots = peel.get("spot_height", 0.0) * layer("spot") * (1 - rotten)
+        height = spots + _SHRIVEL * dry * layer("shrivel") + felted * (_MAT + _TUFT * fluff)
+    return Skin(np.clip(colour, 0, 1), roughness, height)
+
+
+def _fresh(
+    fields: Mapping[str, Array], params: Mapping[str, Any], peel: Mapping[str, Any], dry: float, shape: tuple[int, ...]
+) -> tuple[Array, Array]:
+    """Return colours and roughness of skin that neither rots nor moulds, and that has not browned yet."""
+    colour = np.broadcast_to(np.array(params["skin_colour"], float), (*shape, 3))
+    if "blush" in fields:
+        colour = _over(colour, np.array(peel["blush_colour"], float), np.asarray(fields["blush"], float))
+    if "spot" in fields:
+        cover = peel["spot_cover"] * np.asarray(fields["spot"], float)
+        colour = _over(colour, np.array(peel["spot_colour"], float), cover)
+    dust = peel.get("bloom", 0.0) * (1 - dry) * (0.7 + 0.3 * np.asarray(fields.get("edge", np.zeros(shape)), float))
+    colour = _over(colour, _DUST, _DUSTY * dust)
+    wax = np.clip(peel.get("roughness", _WAX) + _POWDER * dust, 0, 1)
+    if _FLESH in fields:
+        colour = _over(colour, _PALE, np.asarray(fields[_FLESH], float))
+    return colour, wax
+
+
+def _matter(params: Mapping[str, Any]) -> Matter | None:
+    peel = params.get("peel")
+    return None if peel is None else Matter(float(peel["subsurface"]), _REACH, float(peel["fuzz"]))
 
 
 def _fur(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Fur | None:
@@ -101,6 +140,9 @@ LOOKS = Looks(
     paint=_paint,
     scalars=("water_lost",),
     fur=_fur,
+    grain=grain,
+    parts=parts,
+    matter=_matter,
     inside=_inside,
     advance="Rot",
     labels={

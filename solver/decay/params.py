@@ -14,6 +14,7 @@ from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
 from .heap.given import Heap
 from .hyphae import FURS, Hyphae
+from .peel import LESIONS, PEELS, Lesion, Peel
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
 
@@ -152,6 +153,16 @@ class DecayParams(Fruit):
     hyphae: Hyphae = Field(
         FURS["penicillium-expansum"],
         description="Threads and spore heads of the mould in files and pictures; no field depends on them",
+        json_schema_extra={"units": "1"},
+    )
+    peel: Peel = Field(
+        PEELS["apple"],
+        description="Skin, stem and calyx in files and pictures; no field depends on them",
+        json_schema_extra={"units": "1"},
+    )
+    lesion: Lesion = Field(
+        LESIONS["penicillium-expansum"],
+        description="Skin over rot in files and pictures; no field depends on it",
         json_schema_extra={"units": "1"},
     )
     wounds: tuple[Wound, ...] = Field(

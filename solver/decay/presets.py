@@ -12,6 +12,7 @@ from typing import Any
 
 from .fields.colony import MOULDS, PAPER_MOULDS, PAPER_ROT, ROTS
 from .hyphae import FURS
+from .peel import LESIONS, PEELS
 
 __all__ = ["ENVIRONMENTS", "PRESETS", "SIZES"]
 
@@ -43,6 +44,7 @@ def _fruit(
         "mould": PAPER_MOULDS[mould].model_dump(),
         "rot": PAPER_ROT.model_dump(),
         "hyphae": FURS[mould].model_dump(),
+        "lesion": LESIONS[mould].model_dump(),
         "skin_colour": skin,
         "mould_colour": mould_colour,
         **shape,
@@ -56,6 +58,7 @@ def _lived(name: str, paper: Mapping[str, Any], mould: str) -> dict[str, Any]:
         "transpiration": _TRANSPIRATION.get(name, paper["transpiration"]),
         "mould": MOULDS[mould].model_dump(),
         "rot": ROTS[mould].model_dump(),
+        **({"mould_colour": _RIPE[mould]} if mould in _RIPE else {}),
     }
 
 
@@ -63,6 +66,8 @@ _BLUE = (0.16, 0.27, 0.26)
 _GREY_BLUE = (0.20, 0.27, 0.31)
 _GREY = (0.10, 0.10, 0.09)
 _PALE = (0.45, 0.40, 0.30)
+#: Ripe spores as they are seen, where the paper's colours are others: of the green mould olive, of the blue one duller.
+_RIPE = {"penicillium-digitatum": (0.17, 0.185, 0.075), "penicillium-expansum": (0.15, 0.225, 0.195)}
 
 _APPLE: dict[str, Any] = {"radii": (1.0, 1.04, 1.1, 1.15, 1.14, 1.08, 1.0, 1.15), "stone": (0.3, 0.25)}
 _PEAR: dict[str, Any] = {"radii": (1.0, 1.02, 1.03, 0.98, 0.92, 1.0, 1.2, 0.98), "stone": (0.3, 0.3)}
@@ -77,7 +82,7 @@ ENVIRONMENTS: Mapping[str, Mapping[str, float]] = {
     "cold-desert": {"temperature": 5.0, "humidity": 35.0},
 }
 
-_PAPER: Mapping[str, Mapping[str, Any]] = {
+_TABLES: Mapping[str, Mapping[str, Any]] = {
     "apple": _fruit(138, 84, 0.17, 25, 80, (20, 5), "penicillium-expansum", (0.55, 0.06, 0.04), _BLUE, **_APPLE),
     "apple-neofabraea": _fruit(138, 84, 0.17, 25, 80, (20, 5), "neofabraea", (0.50, 0.42, 0.08), _PALE, **_APPLE),
     "orange": _fruit(
@@ -99,6 +104,9 @@ _SPECIES = {
     "peach": "rhizopus",
     "pear": "penicillium-expansum",
     "tomato": "rhizopus",
+}
+_PAPER: Mapping[str, Mapping[str, Any]] = {
+    name: {**values, "peel": PEELS[name.partition("-")[0]].model_dump()} for name, values in _TABLES.items()
 }
 _FRUITS: Mapping[str, Mapping[str, Any]] = {name: _lived(name, paper, _SPECIES[name]) for name, paper in _PAPER.items()}
 

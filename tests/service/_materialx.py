@@ -10,7 +10,7 @@ import MaterialX.PyMaterialXGenGlsl as glsl
 import MaterialX.PyMaterialXGenShader as gen
 from pxr import Sdf, Usd, UsdShade
 
-KINDS = {"asset": "filename", "color3f": "color3", "float2": "vector2", "token": "surfaceshader"}
+KINDS = {"asset": "filename", "color3f": "color3", "float2": "vector2", "float3": "vector3", "token": "surfaceshader"}
 
 
 @cache

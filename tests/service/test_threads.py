@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, UsdShade
 
 from service.sequences import EXPORTS, Options, of_run, prepared, write
 from solver import registry
@@ -92,3 +92,9 @@ def test_usd_has_curves_and_heads_and_glb_has_cards(tmp_path: Path) -> None:
         "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0},
     }
     assert skin["material"] != cards["material"]
+    for name in ("hyphae", "heads"):
+        prim = stage.GetPrimAtPath(f"/decay/{name}")
+        bound, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+        shader = UsdShade.Shader(bound.ComputeSurfaceSource()[0])
+        assert shader.GetInput("roughness").Get() == 1.0
+        assert shader.GetInput("diffuseColor").HasConnectedSource()

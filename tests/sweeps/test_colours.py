@@ -40,7 +40,7 @@ def test_fresh_skin_rot_rim_and_spores() -> None:
     params = registry.get("decay").parse({}, "orange")
     assert np.allclose(layered(0, 0, 0), params.skin_colour)
     rotten, rim, spores = layered(1, 0, 0), layered(1, 0.2, 0.2), layered(1, 0.9, 0.9)
-    assert rotten.max() < 0.3
+    assert rotten.sum() < 0.8 * sum(params.skin_colour)  # a citrus rots in its own colour, duller
     assert rotten[0] > rotten[1] > rotten[2]
     assert rim.min() > 0.6
     assert np.allclose(spores, params.mould_colour, atol=0.06)
