@@ -1,7 +1,9 @@
 """Results cut open: what a plane leaves of each stage, closed by the cut face with what is known of the inside.
 
 What lies below the skin is the solver's to say (`Looks.inside`): it is given the fields of the surface nearest to each
-place of the cut face, and how deep that lies. A solver that says nothing of its inside cannot be cut open.
+place of the cut face, how deep that lies, and where the result holds fields of the flesh itself (of the points at
+`flesh_position`, in the tetrahedra `flesh_cell`) these as they are at the place. A solver that says nothing of its
+inside cannot be cut open.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from scipy.spatial import Delaunay, KDTree
 
 from solver import meshes
 from solver.arrays import Array
+from solver.geometry.tetrahedra import within
 from solver.meshes import Frame
 
 from .errors import InvalidOption
@@ -78,7 +81,7 @@ def opened(run: xr.Dataset, where: Cut) -> xr.Dataset:
             )
         face = _face(half, rim, where)
         depth, above = _below(whole, face.vertices)
-        told = known.inside(above, depth, params)
+        told = known.inside({**above, **_held(run, index, face.vertices)}, depth, params)
         frames.append(_joined(half, face, told))
     attrs = {**run.attrs, "unit_of_length": run.attrs.get("unit_of_length", "r1")}
     stage = {name: run[name] for name in run.data_vars if run[name].dims == ("stage",)}
@@ -213,6 +216,18 @@ def _below(whole: Frame, places: Array) -> tuple[Array, dict[str, Array]]:
     weight = 1 / np.maximum(far, 1e-9) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
     return far[:, 0], {name: (values[near] * weight).sum(axis=1) for name, values in whole.fields.items()}
+
+
+def _held(run: xr.Dataset, index: int, places: Array) -> dict[str, Array]:
+    """Return the flesh's own fields of a stage at places (k, 3); none where the result has none."""
+    if not {"flesh_position", "flesh_cell"} <= set(run.variables):
+        return {}
+    matrix = within(run["flesh_position"].values[index], run["flesh_cell"].values, places)
+    return {
+        str(name): matrix @ variable.values[index].astype(float)
+        for name, variable in run.data_vars.items()
+        if variable.dims == ("stage", "flesh_point")
+    }
 
 
 def _joined(half: Frame, face: Frame, told: Mapping[str, Array]) -> Frame:

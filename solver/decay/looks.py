@@ -79,7 +79,12 @@ def _fur(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Fur | None:
 
 
 def _inside(fields: Mapping[str, Array], depth: Array, params: Mapping[str, Any]) -> dict[str, Array]:
-    """Return what is in the flesh: rot by the body's own law, as deep as it goes there and fading evenly; no mould."""
+    """Return what is in the flesh: its own fields where it has them, else rot by the body's law; no mould.
+
+    That law is what the skin above has, fading evenly as deep as the body has it.
+    """
+    if "flesh_rot" in fields:
+        return {"rot": np.asarray(fields["flesh_rot"], float), _FLESH: np.ones_like(depth)}
     rot = np.asarray(fields.get("rot", np.zeros_like(depth)), float)
     deep = float(params["flesh"]["rot_depth"])
     return {"rot": rot * np.clip(1 - depth / deep, 0, 1), _FLESH: np.ones_like(depth)}

@@ -16,6 +16,7 @@ from .heap.given import Heap
 from .hyphae import FURS, Hyphae
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
+from .within.given import Within
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 
@@ -187,6 +188,12 @@ class DecayParams(Fruit):
         description="Many such fruits in one run, that lie on each other and infect each other; without, one alone",
         json_schema_extra={"units": "1"},
     )
+    within: Within | None = Field(
+        None,
+        description="Rot, nutrient and water as fields in the flesh, coupled to the skin's; without, rot and nutrient "
+        "are those of the skin, fade out below it, and all flesh dries alike",
+        json_schema_extra={"units": "1"},
+    )
     pressure: tuple[Pressure, ...] = Field(
         (),
         max_length=64,
@@ -258,6 +265,8 @@ class DecayParams(Fruit):
             return self
         if self.mesh is not None or self.neighbours:
             raise ValueError("the fruits of a heap are each other's neighbours: leave mesh and neighbours out")
+        if self.within is not None:
+            raise ValueError("the fruits of a heap have no fields in their flesh: leave within out")
         if self.skin is not None or self.body not in ("none", "quasi-static"):
             raise ValueError("the fruits of a heap have body=none or quasi-static, and no skin that wrinkles")
         if self.pressure or self.pressure_map is not None or self.march is not None:

@@ -23,6 +23,8 @@ from ..params import DecayParams
 from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.seeds import seeds
 from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
+from ..within.joint import Joint, joined
+from ..within.water import Water, activity
 from .colony import Colony
 from .gate import SHUT, gates
 from .layer import Layer, State
@@ -42,11 +44,15 @@ _INOCULUM = 4.0
 
 
 class Both(NamedTuple):
-    """State of the rot, of the mould if there is one, and the water that has evaporated, over the fresh weight."""
+    """State of the rot, of the mould if there is one, and the water that has evaporated, over the fresh weight.
+
+    wet (n): of flesh with fields of its own, its water over the fresh one's, skin first.
+    """
 
     rot: State
     mould: State | None
     water: float = 0.0
+    wet: Floats | None = None
 
 
 def laid(params: DecayParams, cells: int) -> Surface:
@@ -64,16 +70,23 @@ def laid(params: DecayParams, cells: int) -> Surface:
 class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it.
 
-    surface: the fruit's own of so many cells, where it has been laid already. dries, damp: what other fruits near by
-    do to its air: evaporation over that of a fruit alone, and what they add to its humidity [percent].
+    surface: the fruit's own of so many cells, where it has been laid already. inside: points of flesh with fields of
+    its own, about; 0: none. dries, damp: what other fruits near by do to its air: evaporation over that of a fruit
+    alone, and what they add to its humidity [percent].
     """
 
     dries = 1.0
     damp = 0.0
 
-    def __init__(self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None) -> None:
+    def __init__(
+        self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None, inside: int = 0
+    ) -> None:
         self._params = params
         self.surface = surface or laid(params, cells)
+        self.joint: Joint | None = None
+        if params.within is not None and inside:
+            fruit = None if params.mesh is not None else params
+            self.joint = joined(self.surface, inside, params.within.skin, fruit, params.flesh.rind)
         self._rays = geodesic(cells)[0] if params.mesh is None else rays_from(self.surface.points)
         self._tree = KDTree(self._rays)
         own = extent_of(self.surface) if params.mesh is not None else None
@@ -82,7 +95,7 @@ class System:
         self._cardinal = params.climate == "cardinal"
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
         chance = params.spawning / (10 - params.propagation_rate)
-        self.rot = self._layer(params, "rot", for_rot)
+        self.rot = self._layer(params, "rot", for_rot, self.joint)
         self._rot_spawner = Spawner(chance, 0.0, params.spawn_reach, rot_clocks)
         self.mould = self._layer(params, "mould", for_mould) if with_mould else None
         strays = params.rot_spawning if with_mould else 0.0
@@ -91,18 +104,25 @@ class System:
         self._waiting = Waiting()
         self._due: tuple[float, Seed] | None = None
         self._wounds = self._opened()
-        self.start = Both(self.rot.fresh, self.mould.fresh if self.mould else None)
+        self._water = None
+        if params.within is not None and self.joint is not None:
+            self._water = Water(params, params.within, self.joint, self._extent)
+        wet = self._water.fresh if self._water else None
+        self.start = Both(self.rot.fresh, self.mould.fresh if self.mould else None, 0.0, wet)
         for seed in self._wounding():
             if self._cardinal:
                 self._waiting.add(self._waits[seed.rots].day(0.0), seed)
             else:
                 self.start = self._seeded(self.start, 0.0, seed)
 
-    def _layer(self, params: DecayParams, name: str, generator: np.random.Generator) -> Layer:
-        points, size = self.surface.points, params.patch_size
+    def _layer(
+        self, params: DecayParams, name: str, generator: np.random.Generator, joint: Joint | None = None
+    ) -> Layer:
+        medium = joint or self.surface
+        points, size = medium.points, params.patch_size
         fresh = params.nutrient * (1 + params.unevenness * patches(points, size, generator))
         coarse = 1 + params.noise * patches(points, size, generator)
-        return Layer(self.surface, daily(getattr(params, name), params, self._radius), fresh, coarse)
+        return Layer(medium, daily(getattr(params, name), params, self._radius), fresh, coarse)
 
     def _wounding(self) -> Iterator[Seed]:
         """Yield what the wounds bring: rot, and mould where there is one."""
@@ -157,34 +177,49 @@ class System:
 
     def gate(self, rot: State) -> Floats:
         """Return where the mould may spread, 0 to 1 (v)."""
-        return gates(self.rot.share(rot))
+        return gates(self.rotten(rot))
+
+    def rotten(self, rot: State) -> Floats:
+        """Return the map of the rot on the skin (v)."""
+        return self.rot.share(rot)[: len(self.surface.points)]
 
     def advance(self, state: Both, day: float, dt: float) -> Both:
         """Return the state dt [day] after a day, without new colonies; rot and air are those of the step's middle."""
         middle, params = day + dt / 2, self._params
-        flesh = flesh_activity(params, state.water) if self._cardinal else 1.0
-        rates = self._rates(params.rot, middle, self.rot.rates)
-        if self._cardinal:
+        flesh: float | Floats = flesh_activity(params, state.water) if self._cardinal else 1.0
+        rates, pace = self._rates(params.rot, middle, self.rot.rates), None
+        if self._cardinal and state.wet is not None:
+            flesh = activity(state.wet)
+            pace = np.asarray(moisture(params.rot, flesh))
+            flesh = flesh[: len(self.surface.points)]
+        elif self._cardinal:
             rates = rates.slowed(float(moisture(params.rot, flesh)))
-        rot = self.rot.advance(state.rot, dt, rates=rates)
+        rot = self.rot.advance(state.rot, dt, rates=rates, pace=pace)
         broken = [self.broken(x) for x in (state.rot, rot)]
-        water = self._evaporated(state.water, (broken[0] + broken[1]) / 2, day, day + dt)
+        water, wet = self._dried(state, (broken[0] + broken[1]) / 2, day, day + dt)
         if self.mould is None or state.mould is None:
-            return Both(rot, None, water)
-        ground = (self.rot.share(state.rot) + self.rot.share(rot)) / 2
+            return Both(rot, None, water, wet)
+        ground = (self.rotten(state.rot) + self.rotten(rot)) / 2
         pace = None
         if self._cardinal:
             out = surface_activity(params, middle, flesh, (broken[0] + broken[1]) / 2, self.damp)
             pace = np.asarray(moisture(params.mould, flesh + params.mould.exposed * (out - flesh)))
         rates = self._rates(params.mould, middle, self.mould.rates)
-        return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water)
+        return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water, wet)
+
+    def _dried(self, state: Both, broken: Floats, start: float, end: float) -> tuple[float, Floats | None]:
+        """Return the water lost by the end, with a share (v) of the skin broken, and what is left where."""
+        if self._water is None or state.wet is None:
+            return self._evaporated(state.water, broken, start, end), None
+        wet = self._water.advance(state.wet, broken, start, end, self.dries)
+        return self._water.lost(wet), wet
 
     def _rates(self, colony: Colony, day: float, steady: Rates) -> Rates:
         return daily(colony, self._params, self._radius, day) if self._params.weather else steady
 
     def broken(self, rot: State) -> Floats:
         """Return where the skin is rotten or wounded, 0 to 1 (v)."""
-        return np.maximum(self.rot.share(rot), self._wounds)
+        return np.maximum(self.rotten(rot), self._wounds)
 
     def _evaporated(self, before: float, broken: Floats, start: float, end: float) -> float:
         """Return the water lost by the end, with a share (v) of the skin broken meanwhile."""
@@ -217,14 +252,14 @@ class System:
     def distance(self, a: Both, b: Both) -> float:
         """Return the largest relative L2 difference of density u + v between two states, of rot and of mould."""
         worst = 0.0
-        for x, y in zip(a[:2], b[:2], strict=True):
-            if x is None or y is None:
+        for layer, x, y in zip((self.rot, self.mould), a[:2], b[:2], strict=True):
+            if layer is None or x is None or y is None:
                 continue
-            there = y.u + y.v
-            size = self.surface.total(there**2)
+            medium, there = layer.surface, y.u + y.v
+            size = medium.total(there**2)
             if size > 0:
                 gap = x.u + x.v - there
-                worst = max(worst, float(np.sqrt(self.surface.total(gap**2) / size)))
+                worst = max(worst, float(np.sqrt(medium.total(gap**2) / size)))
         return worst
 
     def next_root(self, state: Both, until: float) -> float:
