@@ -16,6 +16,8 @@ _LAYERS = ("rot", "mould", "mould_active")
 #: What a cut face has besides: 1 on flesh, 0 on skin. Pale flesh, chosen by eye; linear light.
 _FLESH = "flesh"
 _PALE = np.array([0.95, 0.87, 0.60])
+#: The same when air has come to it for long; linear light, chosen by eye.
+_OXIDISED = np.array([0.42, 0.23, 0.08])
 #: Rotten flesh under the skin, and the rim of mould that still grows; linear light.
 _ROT = np.array([0.16, 0.075, 0.03])
 _RIM = np.array([0.86, 0.86, 0.82])
@@ -38,6 +40,8 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     colour = np.broadcast_to(np.array(params["skin_colour"], float), (*known[0].shape, 3))
     if _FLESH in fields:
         colour = _over(colour, _PALE, np.asarray(fields[_FLESH], float))
+    if "browned" in fields:
+        colour = _over(colour, _OXIDISED, 0.75 * np.asarray(fields["browned"], float))
     # what dries darkens and turns brown, and its wax goes dull
     dry = float(_smooth(np.asarray(fields.get("water_lost", 0.0)) / _DRIED))
     colour = colour * (1 - 0.35 * dry)

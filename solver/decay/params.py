@@ -14,6 +14,7 @@ from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
 from .heap.given import Heap
 from .hyphae import FURS, Hyphae
+from .surfaces.cut import Cut
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
 from .within.given import Within
@@ -183,6 +184,12 @@ class DecayParams(Fruit):
         description="A triangle mesh in place of the fruit's surface, closed or open; fields are those of its vertices",
         json_schema_extra={"units": "r1"},
     )
+    cuts: tuple[Cut, ...] = Field(
+        (),
+        max_length=8,
+        description="Planes that each take a part of the fruit away: a half, a slice, a wedge, with its cut faces bare",
+        json_schema_extra={"units": "1"},
+    )
     heap: Heap | None = Field(
         None,
         description="Many such fruits in one run, that lie on each other and infect each other; without, one alone",
@@ -271,6 +278,18 @@ class DecayParams(Fruit):
             raise ValueError("the fruits of a heap have body=none or quasi-static, and no skin that wrinkles")
         if self.pressure or self.pressure_map is not None or self.march is not None:
             raise ValueError("a heap takes no pressure, and heap.step is its march")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_the_cuts(self) -> Self:
+        if not self.cuts:
+            return self
+        if self.heap is not None or self.body == "table":
+            raise ValueError("neither a heap nor the table of dried fruits knows cut fruits: leave cuts out")
+        if self.skin is not None:
+            raise ValueError("a cut fruit's skin does not wrinkle: leave skin out")
+        if self.seeds == "contacts" or any(wound.vertex is not None for wound in self.wounds):
+            raise ValueError("a cut fruit takes wounds by angles or positions: leave seeds and vertices out")
         return self
 
     @field_validator("weather")

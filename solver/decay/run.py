@@ -11,12 +11,14 @@ import xarray as xr
 from ..arrays import Floats
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
+from .browning import browned
 from .environment import deficit
 from .fields.stepping import Reached, march
-from .fields.system import System
+from .fields.system import System, laid
 from .names import FIELDS, MOULD, VECTORS, completed
 from .params import DecayParams
-from .settings import Settings, choose, nodes, stepped
+from .settings import Settings, cells_of, choose, nodes, stepped
+from .surfaces.cut import left
 from .surfaces.shape import Shape
 from .surfaces.surface import sampler
 from .told import note
@@ -40,6 +42,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
 
     """
     need = completed(params, need)
+    params = _rest(params, need)
     settings = choose(params, need.quality)
     if params.heap is not None:
         return _heap(params, need, settings, context)
@@ -87,6 +90,14 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             error.last_stage = rows[-1]["stage"]
         raise
     return _dataset(rows, need, attrs, shape, note(params, rows))
+
+
+def _rest(params: DecayParams, need: Need) -> DecayParams:
+    """Return the parameters of what cuts leave of a fruit, which is a mesh; without cuts those that are given."""
+    if not params.cuts:
+        return params
+    rest = left(laid(params, cells_of(need.quality)), params.cuts)
+    return params.model_copy(update={"mesh": rest.mesh, "weight": params.weight * rest.share})
 
 
 def _heap(params: DecayParams, need: Need, settings: Settings, context: Context) -> xr.Dataset:
@@ -152,6 +163,7 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
     row: dict[str, Any] = {name: value for name, value in found.items() if name in wanted}
     if wanted & set(maps):
         if system.imported:
+            row |= _bared(system, reached.day)
             return row | {name: maps[name].astype(need.dtype) for name in sorted(wanted & set(maps))}
         assert need.resolution is not None  # settled
         inside = window(need.resolution, need.region)
@@ -160,6 +172,14 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
             field = (sample @ maps[name]).reshape(need.resolution, -1)
             row[name] = field[inside].astype(need.dtype)
     return row
+
+
+def _bared(system: System, day: float) -> dict[str, Any]:
+    """Return where a cut fruit is bare flesh, and how brown that is."""
+    if not system.bare.any():
+        return {}
+    bare = system.bare.astype(float)
+    return {"flesh": bare, "browned": bare * browned(system.params, day)}
 
 
 def _missing(system: System, reached: Reached) -> float:
@@ -216,7 +236,7 @@ def _stacked(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], data
             data[name] = (("stage", "fruit_number"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
-        elif name in FIELDS and values.ndim == 2:
+        elif name in (*FIELDS, "flesh", "browned") and values.ndim == 2:
             data[name] = (("stage", "vertex"), values)
         elif name in FIELDS:
             data[name] = (("stage", "colatitude", "azimuth"), values)

@@ -13,7 +13,7 @@ from .params import DecayParams
 from .surfaces.seeds import seeds
 from .surfaces.surface import extent
 
-__all__ = ["Settings", "choose", "expected_cost", "moved", "nodes", "stepped"]
+__all__ = ["Settings", "cells_of", "choose", "expected_cost", "moved", "nodes", "stepped"]
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,11 @@ _SKIN_SECONDS = 4e-4
 _BYTES = 1000
 
 
+def cells_of(quality: Quality) -> int:
+    """Return the cells of a quality's geodesic sphere."""
+    return _MESHES[quality][0]
+
+
 def choose(params: DecayParams, quality: Quality) -> Settings:
     """Return the settings of a quality; they follow from parameters and quality alone."""
     cells, tolerance = _MESHES[quality]
@@ -98,7 +103,7 @@ def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:
 
 def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
     """Return whether rot has to be stepped: it is wanted, or bears on the body that moves or on the water lost."""
-    wounded = bool(params.wound_map) or len(seeds(params)) > 0
+    wounded = bool(params.wound_map) or bool(params.cuts) or len(seeds(params)) > 0
     bears = moved(params, wanted) and params.flesh.heeds_rot and wounded
     # broken skin loses more water
     dries = wounded and opened(params) > params.transpiration

@@ -20,6 +20,7 @@ from ...painted import painted
 from ..climate import Germination, flesh_activity, moisture, surface_activity, warmth
 from ..environment import air, evaporated, opened, reference_radius
 from ..params import DecayParams
+from ..surfaces.cut import bare
 from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.seeds import seeds
 from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
@@ -70,6 +71,7 @@ def laid(params: DecayParams, cells: int) -> Surface:
 class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it.
 
+    bare (v): where cuts left flesh without a skin.
     surface: the fruit's own of so many cells, where it has been laid already. inside: points of flesh with fields of
     its own, about; 0: none. dries, damp: what other fruits near by do to its air: evaporation over that of a fruit
     alone, and what they add to its humidity [percent].
@@ -81,13 +83,15 @@ class System:
     def __init__(
         self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None, inside: int = 0
     ) -> None:
-        self._params = params
+        self.params = params
         self.surface = surface or laid(params, cells)
         self.joint: Joint | None = None
         if params.within is not None and inside:
-            fruit = None if params.mesh is not None else params
+            # what cuts leave of a fruit has its stone
+            fruit = params if params.mesh is None or params.cuts else None
             self.joint = joined(self.surface, inside, params.within.skin, fruit, params.flesh.rind)
-        self._rays = geodesic(cells)[0] if params.mesh is None else rays_from(self.surface.points)
+        self.bare = bare(params.cuts, self.surface.points)
+        self._rays = geodesic(cells)[0] if params.mesh is None else self._seen()
         self._tree = KDTree(self._rays)
         own = extent_of(self.surface) if params.mesh is not None else None
         self._extent = own or extent(params)
@@ -124,26 +128,33 @@ class System:
         coarse = 1 + params.noise * patches(points, size, generator)
         return Layer(medium, daily(getattr(params, name), params, self._radius), fresh, coarse)
 
+    def _seen(self) -> Floats:
+        """Return the directions (v, 3) that the mesh is seen in: from its own middle, what is cut from the fruit's."""
+        points = self.surface.points
+        if not self.params.cuts:
+            return rays_from(points)
+        return np.asarray(points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-12))
+
     def _wounding(self) -> Iterator[Seed]:
         """Yield what the wounds bring: rot, and mould where there is one."""
         kinds = (True, False) if self.mould is not None else (True,)
-        for wound in seeds(self._params):
+        for wound in seeds(self.params):
             ray = directions(*np.radians([wound.colatitude, wound.azimuth]))
             if wound.vertex is not None:
                 ray = self._rays[wound.vertex]
             centre = self._place(ray) if wound.vertex is None else self.surface.points[wound.vertex]
             for rots in kinds:
                 yield Seed(rots, ray, centre, wound.radius)
-        if self._params.wound_map:
+        if self.params.wound_map:
             for rots in kinds:
                 yield Seed(rots, None, None, 0.0)
 
     def _opened(self) -> Floats:
-        """Return where wounds have broken the skin on day 0, 0 to 1 (v)."""
-        found = np.zeros(len(self.surface.points))
+        """Return where wounds and cuts have broken the skin on day 0, 0 to 1 (v)."""
+        found = self.bare.astype(float)
         for seed in self._wounding():
             if seed.place is None:
-                found = np.maximum(found, painted(self._params.wound_map, self._rays))
+                found = np.maximum(found, painted(self.params.wound_map, self._rays))
             else:
                 far = ((self.surface.points - seed.place) ** 2).sum(axis=1)
                 found = np.maximum(found, np.clip(1 - far / seed.radius**2, 0, None) ** 2)
@@ -158,7 +169,7 @@ class System:
         gate = None if seed.rots else self.gate(state.rot)
         share = _INOCULUM if self._cardinal else 1.0
         if seed.ray is None or seed.place is None:
-            map_ = share * painted(self._params.wound_map, self._rays)
+            map_ = share * painted(self.params.wound_map, self._rays)
             grown = layer.painted(here, map_ if gate is None else map_ * gate)
         else:
             (self._rot_spawner if seed.rots else self._mould_spawner).settle(seed.ray, day)
@@ -168,12 +179,12 @@ class System:
     @property
     def imported(self) -> bool:
         """Whether the surface is a mesh of the user's own, whose vertices have the fields."""
-        return self._params.mesh is not None
+        return self.params.mesh is not None
 
     @property
     def steady(self) -> bool:
         """Whether nothing from outside changes in time."""
-        return not self._params.weather
+        return not self.params.weather
 
     def gate(self, rot: State) -> Floats:
         """Return where the mould may spread, 0 to 1 (v)."""
@@ -185,7 +196,7 @@ class System:
 
     def advance(self, state: Both, day: float, dt: float) -> Both:
         """Return the state dt [day] after a day, without new colonies; rot and air are those of the step's middle."""
-        middle, params = day + dt / 2, self._params
+        middle, params = day + dt / 2, self.params
         flesh: float | Floats = flesh_activity(params, state.water) if self._cardinal else 1.0
         rates, pace = self._rates(params.rot, middle, self.rot.rates), None
         if self._cardinal and state.wet is not None:
@@ -215,7 +226,7 @@ class System:
         return self._water.lost(wet), wet
 
     def _rates(self, colony: Colony, day: float, steady: Rates) -> Rates:
-        return daily(colony, self._params, self._radius, day) if self._params.weather else steady
+        return daily(colony, self.params, self._radius, day) if self.params.weather else steady
 
     def broken(self, rot: State) -> Floats:
         """Return where the skin is rotten or wounded, 0 to 1 (v)."""
@@ -223,14 +234,14 @@ class System:
 
     def _evaporated(self, before: float, broken: Floats, start: float, end: float) -> float:
         """Return the water lost by the end, with a share (v) of the skin broken meanwhile."""
-        params = self._params
+        params = self.params
         skin = params.transpiration + (opened(params) - params.transpiration) * self.surface.mean(broken)
         lost = skin * evaporated(params, self._extent, start, end) * self.dries
         return min(before + lost, params.water_content / 100)
 
     def conductance(self, rot: State) -> float:
         """Return the mean conductance of the whole skin, rotten places and wounds among it [g/(m2 s MPa)]."""
-        params = self._params
+        params = self.params
         more = opened(params) - params.transpiration
         return params.transpiration + more * self.surface.mean(self.broken(rot))
 
@@ -292,10 +303,10 @@ class System:
 
     def _place(self, ray: Floats) -> Floats:
         """Return the point (3) of the skin in a unit direction; of an imported mesh the vertex nearest to it."""
-        if self._params.mesh is not None:
+        if self.params.mesh is not None:
             return np.asarray(self.surface.points[int(self._tree.query(ray)[1])])
         x, y, z = ray
-        return self._params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
+        return self.params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
 
     def _roots(self, state: Both, landing: Landing, site: int, rots: bool) -> bool:
         rotten = float(self.rot.share(state.rot)[site])
@@ -311,4 +322,4 @@ class System:
     def _growing(self, rots: bool, day: float) -> float:
         if not self._cardinal:
             return 1.0
-        return float(warmth(self._params.rot if rots else self._params.mould, air(self._params, day)[0]))
+        return float(warmth(self.params.rot if rots else self.params.mould, air(self.params, day)[0]))

@@ -11,10 +11,11 @@ from ...arrays import Floats, Ints32
 from ...contract import Context, InvalidInput, Need
 from ...fruit import lattice, window
 from ..body.flesh import Booked
-from ..environment import water_lost
+from ..environment import reference_radius, water_lost
 from ..fields.system import laid
 from ..names import BODY
 from ..params import DecayParams
+from ..puddle import puddle_radius
 from ..settings import Settings, moved
 from . import dried
 from .imported import extent_of
@@ -134,13 +135,7 @@ class Shape:
         (balance, folds), found = self._settled((water, rot, held), context)
         row |= found
         booked = balance.booked if balance and balance.booked else Booked(1 - water, water, 0.0, 0.0)
-        if "water_lost" in wanted:
-            row["water_lost"] = booked.evaporated
-        row |= {
-            name: value
-            for name, value in (("mass", booked.mass), ("juice_lost", booked.juice), ("respired", booked.respired))
-            if name in wanted
-        }
+        row |= self._weighed(booked)
         if self.inner is not None and "flesh_position" in wanted:
             row["flesh_position"] = self.inner.positions(balance).astype(need.dtype)
         if "least_jacobian" in wanted:
@@ -179,6 +174,19 @@ class Shape:
                 swells = _volume(points, self.surface) / _volume(self.surface.points, self.surface)
                 row["density"] = booked.mass / (swells if self._closed else 1.0)
         return row
+
+    def _weighed(self, booked: Booked) -> dict[str, Any]:
+        """Return what is wanted of where the weight is."""
+        grams = booked.juice * self._params.weight
+        radius = reference_radius(self._params, self._extent)
+        found = {
+            "water_lost": booked.evaporated,
+            "mass": booked.mass,
+            "juice_lost": booked.juice,
+            "puddle": puddle_radius(grams, self._params.flesh.gravity) / radius,
+            "respired": booked.respired,
+        }
+        return {name: value for name, value in found.items() if name in self._wanted}
 
     def follow(self, water: float, rot: Floats | None, held: Held | None, context: Context) -> None:
         """Settle a day of the march: later days, stages among them, start from its shape.

@@ -71,6 +71,8 @@ class Water:
 
         dries: evaporation over that of a fruit alone.
         """
+        if end <= start:
+            return wet
         params = self._params
         celsius, humidity = air(params, (start + end) / 2)
         skin = params.transpiration + (opened(params) - params.transpiration) * broken
