@@ -2,9 +2,9 @@
 
     b = 1 - exp(-(k t)^n)
 
-Weibull's law of the lightness of apple slices (Quevedo et al. 2014, doi:10.1007/s11947-013-1169-5, abstract: k = 0.0117
-a minute and n = 0.451 at 5 degC); that b is the share of what it comes to in the end is our reading. The activation
-energy is a choice.
+Weibull's law of the lightness of apple slices (Quevedo et al. 2014, Food Bioprocess Technol. 7, 1526, abstract:
+k = 0.0117 a minute and n = 0.451 at 5 degC); that b is the share of what it comes to in the end is our reading. The
+activation energy is a choice.
 """
 
 from __future__ import annotations

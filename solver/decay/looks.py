@@ -18,6 +18,8 @@ _FLESH = "flesh"
 _PALE = np.array([0.95, 0.87, 0.60])
 #: The same when air has come to it for long; linear light, chosen by eye.
 _OXIDISED = np.array([0.42, 0.23, 0.08])
+#: Skin that is burnt; linear light, chosen by eye.
+_BURNT = np.array([0.06, 0.025, 0.01])
 #: Rotten flesh under the skin, and the rim of mould that still grows; linear light.
 _ROT = np.array([0.16, 0.075, 0.03])
 _RIM = np.array([0.86, 0.86, 0.82])
@@ -40,6 +42,8 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     colour = np.broadcast_to(np.array(params["skin_colour"], float), (*known[0].shape, 3))
     if _FLESH in fields:
         colour = _over(colour, _PALE, np.asarray(fields[_FLESH], float))
+    if "roasted" in fields:
+        colour = _over(colour, _BURNT, 0.85 * np.asarray(fields["roasted"], float))
     if "browned" in fields:
         colour = _over(colour, _OXIDISED, 0.75 * np.asarray(fields["browned"], float))
     # what dries darkens and turns brown, and its wax goes dull

@@ -18,6 +18,7 @@ from .surfaces.cut import Cut
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
 from .within.given import Within
+from .within.oven import Oven
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 
@@ -201,6 +202,12 @@ class DecayParams(Fruit):
         "are those of the skin, fade out below it, and all flesh dries alike",
         json_schema_extra={"units": "1"},
     )
+    oven: Oven | None = Field(
+        None,
+        description="Hot air that the fruit is cooked in from day 0 on (stages are small parts of a day); nothing rots "
+        "in it. Its flesh has fields of its own",
+        json_schema_extra={"units": "1"},
+    )
     pressure: tuple[Pressure, ...] = Field(
         (),
         max_length=64,
@@ -290,6 +297,14 @@ class DecayParams(Fruit):
             raise ValueError("a cut fruit's skin does not wrinkle: leave skin out")
         if self.seeds == "contacts" or any(wound.vertex is not None for wound in self.wounds):
             raise ValueError("a cut fruit takes wounds by angles or positions: leave seeds and vertices out")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_the_oven(self) -> Self:
+        if self.oven is not None and self.within is None:
+            raise ValueError("heat goes into flesh that has fields of its own: give within, {} will do")
+        if self.oven is not None and (self.heap is not None or self.weather or self.march is not None):
+            raise ValueError("an oven holds one fruit in one air: leave heap, weather and march out")
         return self
 
     @field_validator("weather")

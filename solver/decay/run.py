@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..arrays import Floats
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
 from .browning import browned
+from .cooked import cooked
 from .environment import deficit
 from .fields.stepping import Reached, march
 from .fields.system import System, laid
@@ -70,8 +72,8 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
         system = System(params, settings.cells, with_mould, shape.surface, settings.within)
         if system.joint is not None:
             shape.inner = Inner(system.joint, shape.body)
-        attrs["path"] = "rot-and-mould" if with_mould else "rot"
-        for reached in march(system, days, settings.tolerance, settings.longest, context):
+        attrs["path"] = "oven" if params.oven is not None else "rot-and-mould" if with_mould else "rot"
+        for reached in _path(system, days, settings, context):
             state = reached.state.water, system.rotten(reached.state.rot), _held(system, reached, shape)
             if reached.day in followed:
                 shape.follow(*state, context)
@@ -90,6 +92,12 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             error.last_stage = rows[-1]["stage"]
         raise
     return _dataset(rows, need, attrs, shape, note(params, rows))
+
+
+def _path(system: System, days: tuple[float, ...], settings: Settings, context: Context) -> Iterator[Reached]:
+    if system.params.oven is not None:
+        return cooked(system, days, context)
+    return march(system, days, settings.tolerance, settings.longest, context)
 
 
 def _rest(params: DecayParams, need: Need) -> DecayParams:
@@ -161,6 +169,9 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
             "mean_nutrient": surface.mean(state.n),
         }
     row: dict[str, Any] = {name: value for name, value in found.items() if name in wanted}
+    if reached.state.roasted is not None:
+        maps["roasted"] = reached.state.roasted.brown
+        wanted |= {"roasted"} if wanted & {"rot"} else set()
     if wanted & set(maps):
         if system.imported:
             row |= _bared(system, reached.day)
@@ -206,7 +217,10 @@ def _flesh(system: System, reached: Reached, inner: Inner | None, need: Need) ->
         "flesh_nutrient": (reached.state.rot.n, 0.0),
         "flesh_water": (wet, 1.0),
     }
-    return {name: inner.of(*field).astype(need.dtype) for name, field in fields.items() if name in need.fields}
+    if reached.state.roasted is not None:
+        fields["flesh_temperature"] = (reached.state.roasted.warm, 0.0)
+    wanted = {*need.fields, *(("flesh_temperature",) if "flesh_rot" in need.fields else ())}
+    return {name: inner.of(*field).astype(need.dtype) for name, field in fields.items() if name in wanted}
 
 
 def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shape: Shape, said: str) -> xr.Dataset:
@@ -236,9 +250,9 @@ def _stacked(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], data
             data[name] = (("stage", "fruit_number"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
-        elif name in (*FIELDS, "flesh", "browned") and values.ndim == 2:
+        elif name in (*FIELDS, "roasted", "flesh", "browned") and values.ndim == 2:
             data[name] = (("stage", "vertex"), values)
-        elif name in FIELDS:
+        elif name in (*FIELDS, "roasted"):
             data[name] = (("stage", "colatitude", "azimuth"), values)
         elif name != "stage":
             data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)

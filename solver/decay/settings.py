@@ -107,6 +107,8 @@ def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
     bears = moved(params, wanted) and params.flesh.heeds_rot and wounded
     # broken skin loses more water
     dries = wounded and opened(params) > params.transpiration
+    if params.oven is not None:
+        return True
     # the water of flesh with fields of its own is stepped in any case
     dries |= params.within is not None
     bears |= dries and ("water_lost" in wanted or (params.body != "none" and not BODY.isdisjoint(wanted)))

@@ -25,6 +25,7 @@ from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.seeds import seeds
 from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
 from ..within.joint import Joint, joined
+from ..within.roast import Roasted
 from ..within.water import Water, activity
 from .colony import Colony
 from .gate import SHUT, gates
@@ -47,13 +48,15 @@ _INOCULUM = 4.0
 class Both(NamedTuple):
     """State of the rot, of the mould if there is one, and the water that has evaporated, over the fresh weight.
 
-    wet (n): of flesh with fields of its own, its water over the fresh one's, skin first.
+    wet (n): of flesh with fields of its own, its water over the fresh one's, skin first. roasted: what an oven made of
+    it.
     """
 
     rot: State
     mould: State | None
     water: float = 0.0
     wet: Floats | None = None
+    roasted: Roasted | None = None
 
 
 def laid(params: DecayParams, cells: int) -> Surface:
@@ -87,15 +90,16 @@ class System:
         self.surface = surface or laid(params, cells)
         self.joint: Joint | None = None
         if params.within is not None and inside:
-            # what cuts leave of a fruit has its stone
-            fruit = params if params.mesh is None or params.cuts else None
+            # what cuts leave of a fruit has its stone; heat goes through a core
+            own = params.mesh is not None and not params.cuts
+            fruit = None if own or params.oven is not None else params
             self.joint = joined(self.surface, inside, params.within.skin, fruit, params.flesh.rind)
         self.bare = bare(params.cuts, self.surface.points)
         self._rays = geodesic(cells)[0] if params.mesh is None else self._seen()
         self._tree = KDTree(self._rays)
-        own = extent_of(self.surface) if params.mesh is not None else None
-        self._extent = own or extent(params)
-        self._radius = 1e3 * reference_radius(params, self._extent)
+        closed = extent_of(self.surface) if params.mesh is not None else None
+        self.extent = closed or extent(params)
+        self._radius = 1e3 * reference_radius(params, self.extent)
         self._cardinal = params.climate == "cardinal"
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
         chance = params.spawning / (10 - params.propagation_rate)
@@ -110,7 +114,7 @@ class System:
         self._wounds = self._opened()
         self._water = None
         if params.within is not None and self.joint is not None:
-            self._water = Water(params, params.within, self.joint, self._extent)
+            self._water = Water(params, params.within, self.joint, self.extent)
         wet = self._water.fresh if self._water else None
         self.start = Both(self.rot.fresh, self.mould.fresh if self.mould else None, 0.0, wet)
         for seed in self._wounding():
@@ -236,7 +240,7 @@ class System:
         """Return the water lost by the end, with a share (v) of the skin broken meanwhile."""
         params = self.params
         skin = params.transpiration + (opened(params) - params.transpiration) * self.surface.mean(broken)
-        lost = skin * evaporated(params, self._extent, start, end) * self.dries
+        lost = skin * evaporated(params, self.extent, start, end) * self.dries
         return min(before + lost, params.water_content / 100)
 
     def conductance(self, rot: State) -> float:

@@ -44,6 +44,11 @@ class Inner:
         """Return what a body holds of fields (n) of the medium."""
         return Held(self._given @ rot[self._above :], self._given @ wet[self._above :])
 
+    @property
+    def joint(self) -> Joint:
+        """The medium."""
+        return self._joint
+
     def of(self, field: Floats, core: float) -> Floats:
         """Return a field (n) of the medium in the flesh and, as one number, in the core (q)."""
         return np.concatenate([field[self._above :], np.full(len(self._joint.core), core)])

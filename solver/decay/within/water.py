@@ -19,7 +19,7 @@ from .given import Within
 from .joint import Joint
 from .spread import spread
 
-__all__ = ["Water", "activity", "rising"]
+__all__ = ["Water", "activity", "diffusivity", "rising"]
 
 _NO_ROT: Floats = np.empty(0)
 _GAS = 8.314462618e-3
@@ -41,6 +41,12 @@ def rising(wet: Floats) -> Floats:
     return np.asarray(here * (1 - here) / np.maximum(wet, 1e-3))
 
 
+def diffusivity(within: Within, celsius: float) -> float:
+    """Return the diffusivity of water in the flesh at a temperature [m2/s]."""
+    kelvin = celsius + _ZERO
+    return float(within.water * np.exp(within.water_energy / _GAS * (1 / _GIVEN - 1 / kelvin)))
+
+
 class Water:
     """The water of one fruit whose skin and flesh are one medium; extent: of its surface."""
 
@@ -55,12 +61,6 @@ class Water:
         # what a vertex loses at a conductance of 1 where the whole skin loses 1, over what its own flesh holds
         share = skin.area / skin.total(1.0)
         self._per = share * joint.total(1.0) / (joint.area[: len(share)] * params.water_content / 100)
-
-    def diffusivity(self, celsius: float) -> float:
-        """Return the diffusivity at a temperature [r1^2/day]."""
-        kelvin = celsius + _ZERO
-        faster = np.exp(self._within.water_energy / _GAS * (1 / _GIVEN - 1 / kelvin))
-        return float(self._within.water * faster * _DAY / self._radius**2)
 
     def lost(self, wet: Floats) -> float:
         """Return the water that is gone, over the fresh weight."""
@@ -81,7 +81,7 @@ class Water:
         dry = float(humidity) / 100
         give = skin * self._per * whole / max(ACTIVITY - dry, 1e-3)
         count = int(np.clip(np.ceil(float(give.max()) * ACTIVITY / _LARGEST), 1, _MOST))
-        dt, rate = (end - start) / count, self.diffusivity(float(celsius))
+        dt, rate = (end - start) / count, diffusivity(self._within, float(celsius)) * _DAY / self._radius**2
         size = len(give)
         give, gain, loss = give / (end - start), np.zeros(len(wet)), np.zeros(len(wet))
         for _ in range(count):
