@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ..fruit import Fruit
-from ..painted import Painted
+from ..painted import Painted, Photo
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
 from .heap.given import Heap
@@ -167,6 +167,21 @@ class DecayParams(Fruit):
     wound_map: Painted = Field(
         (),
         description="Painted wounds: n rows of 2 n values, 1 where rot and mould enter on day 0",
+        json_schema_extra={"units": "1"},
+    )
+    wound_photo: Photo | None = Field(
+        None,
+        description="Wounds in a photograph that the fruit fills: white where rot and mould enter on day 0",
+        json_schema_extra={"units": "1"},
+    )
+    nutrient_map: Painted = Field(
+        (),
+        description="Painted nutrients: n rows of 2 n values that the fresh nutrient is multiplied by, skin and flesh",
+        json_schema_extra={"units": "1"},
+    )
+    nutrient_photo: Photo | None = Field(
+        None,
+        description="Nutrients by a photograph's brightness, over the mean one, on the half that it shows; a choice",
         json_schema_extra={"units": "1"},
     )
     seeds: Literal["wounds", "contacts"] = Field(

@@ -103,7 +103,7 @@ def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:
 
 def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
     """Return whether rot has to be stepped: it is wanted, or bears on the body that moves or on the water lost."""
-    wounded = bool(params.wound_map) or bool(params.cuts) or len(seeds(params)) > 0
+    wounded = bool(params.wound_map) or params.wound_photo is not None or bool(params.cuts) or len(seeds(params)) > 0
     bears = moved(params, wanted) and params.flesh.heeds_rot and wounded
     # broken skin loses more water
     dries = wounded and opened(params) > params.transpiration

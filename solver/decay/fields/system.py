@@ -16,18 +16,18 @@ from scipy.spatial import KDTree
 from ...arrays import Floats, Ints
 from ...contract import Context
 from ...fruit import directions
-from ...painted import painted
 from ..climate import Germination, flesh_activity, moisture, surface_activity, warmth
 from ..environment import air, evaporated, opened, reference_radius
 from ..params import DecayParams
 from ..surfaces.cut import bare
-from ..surfaces.imported import extent_of, rays_from
+from ..surfaces.imported import extent_of
 from ..surfaces.seeds import seeds
 from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
 from ..within.joint import Joint, joined
 from ..within.roast import Roasted
 from ..within.water import Water, activity
 from .colony import Colony
+from .drawn import fed, opened_skin, seen
 from .gate import SHUT, gates
 from .layer import Layer, State
 from .noise import patches
@@ -95,8 +95,9 @@ class System:
             fruit = None if own or params.oven is not None else params
             self.joint = joined(self.surface, inside, params.within.skin, fruit, params.flesh.rind)
         self.bare = bare(params.cuts, self.surface.points)
-        self._rays = geodesic(cells)[0] if params.mesh is None else self._seen()
+        self._rays = geodesic(cells)[0] if params.mesh is None else seen(params, self.surface.points)
         self._tree = KDTree(self._rays)
+        self._painted = opened_skin(params, self._rays)
         closed = extent_of(self.surface) if params.mesh is not None else None
         self.extent = closed or extent(params)
         self._radius = 1e3 * reference_radius(params, self.extent)
@@ -129,15 +130,10 @@ class System:
         medium = joint or self.surface
         points, size = medium.points, params.patch_size
         fresh = params.nutrient * (1 + params.unevenness * patches(points, size, generator))
+        factor = fed(params, self._rays, points)
+        fresh = fresh if factor is None else fresh * factor
         coarse = 1 + params.noise * patches(points, size, generator)
         return Layer(medium, daily(getattr(params, name), params, self._radius), fresh, coarse)
-
-    def _seen(self) -> Floats:
-        """Return the directions (v, 3) that the mesh is seen in: from its own middle, what is cut from the fruit's."""
-        points = self.surface.points
-        if not self.params.cuts:
-            return rays_from(points)
-        return np.asarray(points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-12))
 
     def _wounding(self) -> Iterator[Seed]:
         """Yield what the wounds bring: rot, and mould where there is one."""
@@ -149,7 +145,7 @@ class System:
             centre = self._place(ray) if wound.vertex is None else self.surface.points[wound.vertex]
             for rots in kinds:
                 yield Seed(rots, ray, centre, wound.radius)
-        if self.params.wound_map:
+        if self._painted is not None:
             for rots in kinds:
                 yield Seed(rots, None, None, 0.0)
 
@@ -158,7 +154,8 @@ class System:
         found = self.bare.astype(float)
         for seed in self._wounding():
             if seed.place is None:
-                found = np.maximum(found, painted(self.params.wound_map, self._rays))
+                assert self._painted is not None
+                found = np.maximum(found, self._painted)
             else:
                 far = ((self.surface.points - seed.place) ** 2).sum(axis=1)
                 found = np.maximum(found, np.clip(1 - far / seed.radius**2, 0, None) ** 2)
@@ -173,7 +170,8 @@ class System:
         gate = None if seed.rots else self.gate(state.rot)
         share = _INOCULUM if self._cardinal else 1.0
         if seed.ray is None or seed.place is None:
-            map_ = share * painted(self.params.wound_map, self._rays)
+            assert self._painted is not None
+            map_ = share * self._painted
             grown = layer.painted(here, map_ if gate is None else map_ * gate)
         else:
             (self._rot_spawner if seed.rots else self._mould_spawner).settle(seed.ray, day)
