@@ -23,6 +23,7 @@ from .filling import Filling, Round
 from .flesh import Softened, softened
 from .loads import Loads
 from .material import blocks, energy
+from .newton import skin_areas
 from .obstacles import Obstacles
 from .pressure import pressed
 from .springs import knit, swung
@@ -130,10 +131,7 @@ class Body:
             return Loads(zero, None, zero, zero, start)
         shared = np.repeat(solid.volume / 4, 4)
         mass: Floats = np.bincount(solid.tets.ravel(), shared * np.repeat(state.mass, 4), count).astype(float)
-        corners = solid.points[solid.skin[solid.faces]]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-        contact = zero.copy()
-        contact[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(areas / 3, 3), len(solid.skin))
+        contact = skin_areas(solid)
         contact *= CONTACT * fresh / float(np.cbrt(solid.volume.mean()))
         volume = np.bincount(solid.tets.ravel(), shared, count)
         tether = np.where(self._filling.core, _TETHER * fresh * volume, 0.0)

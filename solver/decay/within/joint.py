@@ -18,9 +18,9 @@ from ...arrays import Floats, Ints
 from ...contract import InvalidGeometry
 from ...fruit import Fruit
 from ...geometry.nearest import nearest
+from ...geometry.stuffing import boundary, stuffed
 from ...geometry.tetrahedra import edges
 from ..body.rind import rind
-from ..body.stuffing import boundary, stuffed
 from ..surfaces.imported import extent_of
 from ..surfaces.surface import Surface
 

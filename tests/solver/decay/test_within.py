@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 from solver.contract import InvalidGeometry, Need
 from solver.decay import SOLVER, DecayParams
 from solver.decay.body.flesh import Flesh, softened
-from solver.decay.body.stuffing import stuffed
 from solver.decay.environment import reference_radius, saturation
 from solver.decay.fields.diffusion import linked, rkl2, stages_for
 from solver.decay.fields.layer import Layer
@@ -18,6 +17,7 @@ from solver.decay.within import water
 from solver.decay.within.given import Within
 from solver.decay.within.joint import joined
 from solver.fruit import Fruit
+from solver.geometry.stuffing import stuffed
 from solver.geometry.tetrahedra import edges, within
 
 NO_ROT = np.empty(0)
