@@ -64,7 +64,7 @@ class Water:
 
     def lost(self, wet: Floats) -> float:
         """Return the water that is gone, over the fresh weight."""
-        return self._params.water_content / 100 * (1 - self._joint.mean(wet))
+        return max(self._params.water_content / 100 * (1 - self._joint.mean(wet)), 0.0)
 
     def advance(self, wet: Floats, broken: Floats, start: float, end: float, dries: float = 1.0) -> Floats:
         """Return the water at the end [day], with a share (v) of the skin broken meanwhile.

@@ -137,3 +137,30 @@ def test_leaked_juice_makes_a_puddle():
     params = SOLVER.parse({}, preset="apple")
     size = np.cbrt(138e-6 / extent(params).volume)
     assert puddle[2] * size == pytest.approx(puddle_radius(138 * juice[2], 9.81), rel=1e-6)
+
+
+def test_bare_flesh_is_pale_and_goes_brown_and_a_roast_goes_dark():
+    known = DecayParams.parse({}).model_dump()
+    none = np.zeros(1)
+    assert SOLVER.looks.paint is not None
+
+    def bright(**fields: np.ndarray) -> float:
+        skin = SOLVER.looks.paint({"rot": none, **fields}, known)
+        return float(skin.colour.sum())
+
+    one = np.ones(1)
+    skin, pale = bright(), bright(flesh=one)
+    assert pale > 1.5 * skin
+    assert skin < bright(flesh=one, browned=0.5 * one) < 0.8 * pale
+    assert bright(roasted=one) < 0.4 * skin
+    assert bright(roasted=0.2 * one) > 0.6 * skin
+
+
+def test_a_cut_face_takes_the_flesh_s_own_rot_where_there_is_one():
+    known = DecayParams.parse({}).model_dump()
+    assert SOLVER.looks.inside is not None
+    deep, rot = np.array([0.1, 2.0]), np.array([0.4, 0.8])
+    above = {"rot": np.ones(2)}
+    by_law = SOLVER.looks.inside(above, deep, known)["rot"]
+    assert by_law == pytest.approx([0.8, 0.0])
+    assert SOLVER.looks.inside({**above, "flesh_rot": rot}, deep, known)["rot"] == pytest.approx(rot)
