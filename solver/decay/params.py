@@ -12,6 +12,7 @@ from ..fruit import Fruit
 from ..painted import Painted, Photo
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
+from .fitting import contradiction
 from .heap.given import Heap
 from .hyphae import FURS, Hyphae
 from .surfaces.cut import Cut
@@ -272,54 +273,10 @@ class DecayParams(Fruit):
         return self.body == "none"
 
     @model_validator(mode="after")
-    def _fits_the_mesh(self) -> Self:
-        count = len(self.mesh.points) if self.mesh else 0
-        for wound in self.wounds:
-            if wound.vertex is not None and wound.vertex >= count:
-                where = (
-                    f"the mesh has vertices 0 to {count - 1}"
-                    if count
-                    else "only an imported mesh has numbered vertices"
-                )
-                raise ValueError(f"a wound names vertex {wound.vertex}: {where}")
-        if self.mesh is not None and self.body == "table":
-            raise ValueError("the table of dried fruits knows no imported mesh: take body=quasi-static, not table")
-        if self.mesh is not None and self.seeds == "contacts":
-            raise ValueError("an imported mesh has neither stem nor floor: take seeds=wounds")
-        return self
-
-    @model_validator(mode="after")
-    def _fits_the_heap(self) -> Self:
-        if self.heap is None:
-            return self
-        if self.mesh is not None or self.neighbours:
-            raise ValueError("the fruits of a heap are each other's neighbours: leave mesh and neighbours out")
-        if self.within is not None:
-            raise ValueError("the fruits of a heap have no fields in their flesh: leave within out")
-        if self.skin is not None or self.body not in ("none", "quasi-static"):
-            raise ValueError("the fruits of a heap have body=none or quasi-static, and no skin that wrinkles")
-        if self.pressure or self.pressure_map is not None or self.march is not None:
-            raise ValueError("a heap takes no pressure, and heap.step is its march")
-        return self
-
-    @model_validator(mode="after")
-    def _fits_the_cuts(self) -> Self:
-        if not self.cuts:
-            return self
-        if self.heap is not None or self.body == "table":
-            raise ValueError("neither a heap nor the table of dried fruits knows cut fruits: leave cuts out")
-        if self.skin is not None:
-            raise ValueError("a cut fruit's skin does not wrinkle: leave skin out")
-        if self.seeds == "contacts" or any(wound.vertex is not None for wound in self.wounds):
-            raise ValueError("a cut fruit takes wounds by angles or positions: leave seeds and vertices out")
-        return self
-
-    @model_validator(mode="after")
-    def _fits_the_oven(self) -> Self:
-        if self.oven is not None and self.within is None:
-            raise ValueError("heat goes into flesh that has fields of its own: give within, {} will do")
-        if self.oven is not None and (self.heap is not None or self.weather or self.march is not None):
-            raise ValueError("an oven holds one fruit in one air: leave heap, weather and march out")
+    def _together(self) -> Self:
+        why = contradiction(self)
+        if why:
+            raise ValueError(why)
         return self
 
     @field_validator("weather")
