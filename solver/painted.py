@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from .arrays import Floats
 
-__all__ = ["Painted", "PaintedMap", "painted"]
+__all__ = ["Painted", "PaintedMap", "Photo", "painted", "photographed"]
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -35,6 +35,30 @@ class PaintedMap(BaseModel):
     @classmethod
     def _alone(cls, value: Any) -> Any:
         return {"values": value} if isinstance(value, list | tuple) else value
+
+
+class Photo(PaintedMap):
+    """A photograph of a round body that fills it, as seen from a side; rows of brightness from its top down."""
+
+    azimuth: float = Field(
+        90.0, ge=0, le=360, description="Where it was taken from, about the y axis, from x towards z [degree]"
+    )
+
+
+def photographed(photo: Photo, rays: Floats, unseen: float) -> Floats:
+    """Return a photograph at unit rays (v, 3), bilinear: far away and upright; `unseen` on the half that faces away."""
+    from scipy import ndimage
+
+    values, angle = np.array(photo.values, dtype=float), np.radians(photo.azimuth)
+    towards = np.array([np.cos(angle), 0.0, np.sin(angle)])
+    # who looks from there has this to the right: up x towards
+    right = np.array([np.sin(angle), 0.0, -np.cos(angle)])
+    down, along = (1 - rays[:, 1]) / 2, (1 + rays @ right) / 2
+    n, m = values.shape
+    at = [down * n - 0.5, along * m - 0.5]
+    seen = ndimage.map_coordinates(values, at, order=1, mode="nearest")
+    found: Floats = np.where(rays @ towards > 0, seen, unseen)
+    return found
 
 
 def painted(rows: tuple[tuple[float, ...], ...], rays: Floats) -> Floats:

@@ -131,6 +131,16 @@ register(
     fruit_mass=Quantity("1", "weight of each fruit, over its fresh weight", "m"),
     fruit_damp=Quantity("percent", "what the other fruits add to the humidity about each one", "dH"),
     overlap=Quantity("1", "how deep one fruit of a heap is in another, in floor or bowl at most, in r1", "o"),
+    puddle=Quantity("1", "radius of the puddle of juice that leaked, in units of r1", "R_j"),
+    flesh=Quantity("1", "1 on bare flesh, 0 on skin", "-", share=True),
+    browned=Quantity("1", "how brown bare flesh is, over what it comes to in the end", "b", share=True),
+    roasted=Quantity("1", "browning of the skin in an oven, over the colour of what is burnt", "b_r", share=True),
+    flesh_temperature=Quantity("degC", "temperature of a point of the flesh", "T"),
+    flesh_position=Quantity("1", "position of a point of the flesh, in units of r1", "x"),
+    flesh_cell=Quantity("1", "the four points of a tetrahedron of the flesh, from 0", "-"),
+    flesh_rot=Quantity("1", "soft rot in the flesh, over what a nutrient of 1 can feed", "r", share=True),
+    flesh_nutrient=Quantity("1", "nutrient left in the flesh, point by point", "n_r", share=True),
+    flesh_water=Quantity("1", "water of the flesh, over what it had when fresh", "w", share=True),
     water_lost=Quantity("1", "water evaporated from skin, wounds and rot, over the fresh weight", "w"),
 )
 

@@ -1,7 +1,9 @@
 """Results cut open: what a plane leaves of each stage, closed by the cut face with what is known of the inside.
 
 What lies below the skin is the solver's to say (`Looks.inside`): it is given the fields of the surface nearest to each
-place of the cut face, and how deep that lies. A solver that says nothing of its inside cannot be cut open.
+place of the cut face, how deep that lies, and where the result holds fields of the flesh itself (of the points at
+`flesh_position`, in the tetrahedra `flesh_cell`) these as they are at the place. A solver that says nothing of its
+inside cannot be cut open.
 """
 
 from __future__ import annotations
@@ -12,10 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.spatial import Delaunay, KDTree
+from scipy.spatial import KDTree
 
 from solver import meshes
 from solver.arrays import Array
+from solver.geometry.halved import Halved, face, halved
+from solver.geometry.tetrahedra import within
 from solver.meshes import Frame
 
 from .errors import InvalidOption
@@ -70,16 +74,17 @@ def opened(run: xr.Dataset, where: Cut) -> xr.Dataset:
     frames = []
     for index in range(run.sizes["stage"]):
         whole = _whole(run, index)
-        half, rim = _halved(whole, where)
-        if not len(rim):
+        half = halved(whole.vertices, whole.triangles, *where)
+        if not len(half.rim):
             raise InvalidOption(
                 f"the plane misses the fruit on stage {float(run['stage'][index]):g}.",
                 "Move its point: the middle of the fruit is near 0,0,0.",
             )
-        face = _face(half, rim, where)
-        depth, above = _below(whole, face.vertices)
-        told = known.inside(above, depth, params)
-        frames.append(_joined(half, face, told))
+        found = face(half, *where, _gap(half, where))
+        depth, above = _below(whole, found.points)
+        told = known.inside({**above, **_held(run, index, found.points)}, depth, params)
+        left = Frame(half.points, half.triangles, {name: half.taken @ x for name, x in whole.fields.items()})
+        frames.append(_joined(left, Frame(found.points, found.triangles, {}), told))
     attrs = {**run.attrs, "unit_of_length": run.attrs.get("unit_of_length", "r1")}
     stage = {name: run[name] for name in run.data_vars if run[name].dims == ("stage",)}
     return xr.Dataset({**stage, **meshes.changing(frames)}, {"stage": run["stage"]}, attrs)
@@ -127,84 +132,12 @@ def _whole(run: xr.Dataset, index: int) -> Frame:
     return whole
 
 
-def _halved(whole: Frame, where: Cut) -> tuple[Frame, Array]:
-    """Return what the plane leaves, and the edges (e, 2) of its rim: numbers of vertices of what is left."""
-    x, t = whole.vertices, np.asarray(whole.triangles, np.int64)
-    away = (x - where.point) @ where.normal
-    away = np.where(np.abs(away) < 1e-9, -1e-9, away)  # no vertex lies in the plane
-    out = away > 0
-    count = out[t].sum(axis=1)
-    crossed = t[(count == 1) | (count == 2)]
-    # the corner that is alone on its side comes first; turning keeps which side is outside
-    sides = out[crossed]
-    alone = np.argmax(sides == (sides.sum(axis=1) == 1)[:, None], axis=1)
-    a, b, c = np.take_along_axis(crossed, (alone[:, None] + [0, 1, 2]) % 3, axis=1).T
-    ends = np.stack([np.stack([a, b], -1), np.stack([a, c], -1)])
-    keys, number = np.unique(np.sort(ends, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
-    share = (away[keys[:, 0]] / (away[keys[:, 0]] - away[keys[:, 1]]))[:, None]
-    p, q = number.reshape(2, -1) + len(x)
-    lone_out = out[a]
-    kept = [
-        t[count == 0],
-        np.stack([a, p, q], -1)[~lone_out],
-        np.stack([p, b, c], -1)[lone_out],
-        np.stack([p, c, q], -1)[lone_out],
-    ]
-    rim = np.where(lone_out[:, None], np.stack([q, p], -1), np.stack([p, q], -1))
-
-    def on(values: Array) -> Array:
-        more = values[keys[:, 0]] * (1 - share[:, 0]) + values[keys[:, 1]] * share[:, 0]
-        return np.concatenate([values, more])
-
-    points = np.concatenate([x, x[keys[:, 0]] * (1 - share) + x[keys[:, 1]] * share])
-    triangles = np.concatenate(kept)
-    used, again = np.unique(triangles, return_inverse=True)
-    place = np.full(len(points), -1)
-    place[used] = np.arange(len(used))
-    fields = {name: on(values)[used] for name, values in whole.fields.items()}
-    return Frame(points[used], again.reshape(triangles.shape), fields), place[rim]
-
-
-def _face(half: Frame, rim: Array, where: Cut) -> Frame:
-    """Return the cut face: the rim's points and an even net within it, without fields."""
-    numbers = np.unique(rim)
-    outline = half.vertices[numbers]
+def _gap(half: Halved, where: Cut) -> float:
+    """Return how far apart points of a cut face are: a share of its longer side."""
+    outline = half.points[np.unique(half.rim)] - where.point
     right = np.cross(where.normal, np.eye(3)[np.argmin(np.abs(where.normal))])
     right /= np.linalg.norm(right)
-    up = np.cross(where.normal, right)
-    flat = np.stack([(outline - where.point) @ right, (outline - where.point) @ up], -1)
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    gap = float((high - low).max()) / _ALONG
-    axes = [np.arange(low[k] + gap / 2, high[k], gap) for k in range(2)]
-    net = np.stack(np.meshgrid(*axes), -1).reshape(-1, 2)
-    place = np.full(int(numbers.max()) + 1, -1)
-    place[numbers] = np.arange(len(numbers))
-    segments = flat[place[rim]]
-    # what is nearer to the rim than its own edges are long would hide them from Delaunay's triangles
-    longest = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).max())
-    net = net[(KDTree(flat).query(net)[0] > 0.75 * longest) & _within(net, segments)]
-    points = np.concatenate([flat, net])
-    found = Delaunay(points).simplices
-    corners = points[found]
-    found = found[_within(corners.mean(axis=1), segments)]
-    a, b, c = points[found].transpose(1, 0, 2)
-    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    found[turn < 0] = found[turn < 0][:, ::-1]
-    found = found[np.abs(turn) > 1e-14]
-    inside = where.point + net[:, :1] * right + net[:, 1:] * up
-    return Frame(np.concatenate([outline, inside]), found, {})
-
-
-def _within(points: Array, segments: Array) -> Array:
-    """Return which points (k, 2) an outline of segments (s, 2, 2) in any order encloses, by crossings to the right."""
-    (ax, ay), (bx, by) = segments[:, 0].T, segments[:, 1].T
-    found = np.empty(len(points), np.bool_)
-    for begin in range(0, len(points), 2048):
-        x, y = points[begin : begin + 2048, 0, None], points[begin : begin + 2048, 1, None]
-        spans = (ay > y) != (by > y)
-        where = ax + (y - ay) / np.where(by == ay, 1.0, by - ay) * (bx - ax)
-        found[begin : begin + 2048] = (spans & (where > x)).sum(axis=1) % 2 == 1
-    return found
+    return float(max(np.ptp(outline @ right), np.ptp(outline @ np.cross(where.normal, right)))) / _ALONG
 
 
 def _below(whole: Frame, places: Array) -> tuple[Array, dict[str, Array]]:
@@ -213,6 +146,18 @@ def _below(whole: Frame, places: Array) -> tuple[Array, dict[str, Array]]:
     weight = 1 / np.maximum(far, 1e-9) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
     return far[:, 0], {name: (values[near] * weight).sum(axis=1) for name, values in whole.fields.items()}
+
+
+def _held(run: xr.Dataset, index: int, places: Array) -> dict[str, Array]:
+    """Return the flesh's own fields of a stage at places (k, 3); none where the result has none."""
+    if not {"flesh_position", "flesh_cell"} <= set(run.variables):
+        return {}
+    matrix = within(run["flesh_position"].values[index], run["flesh_cell"].values, places)
+    return {
+        str(name): matrix @ variable.values[index].astype(float)
+        for name, variable in run.data_vars.items()
+        if variable.dims == ("stage", "flesh_point")
+    }
 
 
 def _joined(half: Frame, face: Frame, told: Mapping[str, Array]) -> Frame:

@@ -168,7 +168,7 @@ def _scene(
     single = not isinstance(chosen, Export) or chosen.single
     # a cut is made only of what would be sent whole
     sequence = prepared(run, options.model_copy(update={"cut": None}), stage, single)
-    pixels = max(options.size if chosen.name in ("png", "exr") else 0, options.pixels)
+    pixels = max(options.size if chosen.name in ("png", "png-zip", "exr") else 0, options.pixels)
     if pixels > settings.max_map:
         raise InvalidQuery.of([Wrong("size", f"{pixels} pixels are more than {settings.max_map}", "Ask for fewer.")])
     if sequence.samples + len(sequence) * (options.pixels**2 + _CORNERS * options.grown) > settings.max_export_samples:

@@ -45,6 +45,7 @@ EXPORTS: Mapping[str, Export] = {
     for e in (
         Export("exr", "image/x-exr", ".exr", "OpenEXR map of one stage's fields", maps.exr, single=True),
         Export("png", "image/png", ".png", "16-bit PNG map of one field of one stage", maps.png, single=True),
+        Export("png-zip", "application/zip; of=png", ".png.zip", "16-bit PNG maps, one set per stage", maps.png_zip),
         Export("obj-zip", "application/zip; of=obj", ".obj.zip", "OBJ files, one per stage", text.obj_zip),
         Export("ply-zip", "application/zip; of=ply", ".ply.zip", "PLY files, one per stage", text.ply_zip),
         Export("usda", "model/vnd.usda", ".usda", "USD as text, sampled over time", usd.usda),

@@ -10,6 +10,8 @@ from __future__ import annotations
 import io
 import json
 import tempfile
+import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +27,10 @@ from .view import lattice_fields
 if TYPE_CHECKING:
     from .view import Sequence
 
-__all__ = ["exr", "png"]
+__all__ = ["exr", "png", "png_zip"]
+
+#: Time of files in an archive: the same bytes for the same result.
+_EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def _fields(sequence: Sequence) -> dict[str, np.ndarray]:
@@ -51,22 +56,71 @@ def png(sequence: Sequence, options: Options) -> bytes:
         InvalidQuery: there is no such field, or the range is empty.
 
     """
-    from PIL import Image
-    from PIL.PngImagePlugin import PngInfo
-
     sequence = sequence.unwrapped()
     fields = _fields(sequence)
-    name = options.map or next(iter(fields))
-    if name not in fields:
+    name = _named(fields, options) or next(iter(fields))
+    return _png(sequence, name, fields[name], _range(name, [fields[name]], options), options.size)
+
+
+def png_zip(sequence: Sequence, options: Options) -> bytes:
+    """Return the maps of all stages in one archive, one set per stage: `stage_0001/rot.png` and so on.
+
+    `map` asks for one field. A field that is no share runs over what it takes on in all stages. `stages.json` says what
+    the sets are.
+
+    Raises:
+        UnfitFormat: no field, or triangles that change.
+        InvalidQuery: there is no such field, or the range is empty.
+
+    """
+    sequence = sequence.unwrapped()
+    ones = [replace(sequence, indices=(index,)) for index in sequence.indices]
+    sets = [_fields(one) for one in ones]
+    only = _named(sets[0], options)
+    names = [only] if only else list(sets[0])
+    ranges = {name: _range(name, [fields[name] for fields in sets], options) for name in names}
+    folders = [f"stage_{number + 1:04d}" for number in range(len(ones))]
+    files = {folder: one.stages[0] for folder, one in zip(folders, ones, strict=True)}
+    about = {**sequence.about, "fields": names, "size": options.size, "files": files}
+    out = io.BytesIO()
+    # pictures are packed already
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr(zipfile.ZipInfo("stages.json", _EPOCH), json.dumps(about, indent=1))
+        for folder, one, fields in zip(folders, ones, sets, strict=True):
+            for name in names:
+                data = _png(one, name, fields[name], ranges[name], options.size)
+                archive.writestr(zipfile.ZipInfo(f"{folder}/{name}.png", _EPOCH), data)
+    return out.getvalue()
+
+
+def _named(fields: dict[str, np.ndarray], options: Options) -> str | None:
+    """Return the field that was asked for; none if none was."""
+    name = options.map
+    if name is not None and name not in fields:
         raise InvalidQuery.of([Wrong("map", f"there is no field {name[:40]!r}", f"Fields: {', '.join(fields)}.")])
-    values = sequence.baked(fields[name], options.size)
+    return name
+
+
+def _range(name: str, values: list[np.ndarray], options: Options) -> tuple[float, float]:
+    """Return the values that are black and white."""
     known = QUANTITIES.get(name)
-    low, high = (0.0, 1.0) if known and known.share else (float(fields[name].min()), float(fields[name].max()))
+    low, high = (0.0, 1.0)
+    if not (known and known.share):
+        low, high = float(min(v.min() for v in values)), float(max(v.max() for v in values))
     low, high = (low if options.low is None else options.low), (high if options.high is None else options.high)
     if high == low and options.low is None and options.high is None:
         high = low + 1  # a field that is the same everywhere is all black
     if not low < high:
         raise InvalidQuery.of([Wrong("high", f"{high:g} is not above low = {low:g}", "Give low below high.")])
+    return low, high
+
+
+def _png(sequence: Sequence, name: str, field: np.ndarray, between: tuple[float, float], size: int) -> bytes:
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    low, high = between
+    values = sequence.baked(field, size)
     levels = np.clip((values.astype(float) - low) / (high - low), 0, 1) * 65535
     said = PngInfo()
     about = {"field": name, "low": low, "high": high, "stage": sequence.stages[0], "solver": sequence.about["solver"]}
@@ -87,11 +141,9 @@ def exr(sequence: Sequence, options: Options) -> bytes:
     """
     sequence = sequence.unwrapped()
     fields = _fields(sequence)
-    if options.map is not None:
-        if options.map not in fields:
-            advice = f"Fields: {', '.join(fields)}."
-            raise InvalidQuery.of([Wrong("map", f"there is no field {options.map[:40]!r}", advice)])
-        fields = {options.map: fields[options.map]}
+    only = _named(fields, options)
+    if only is not None:
+        fields = {only: fields[only]}
     try:
         import OpenEXR
     except ImportError:

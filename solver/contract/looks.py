@@ -101,9 +101,10 @@ class Looks:
     layers: fields that `paint` makes colours of, given any of them by name (...) and the run's parameters; it returns
     None where these say no colours. scalars: of a stage, which `paint` is given too where a result has them. fur: what
     stands on it, by the same fields; None where nothing grows. inside: fields of a cut face, from those of the
-    surface above it, the depth below it and the parameters; None where nothing is known of what lies there. aside: a
-    field that is 1 on what only took part in the run, as a press, and does not belong to what came of it. labels: by
-    axis or stage symbol. advance: the word for going along the stage axis. shades and places: by their names on pages.
+    surface above it and the flesh's own at it, the depth below it and the parameters; None where nothing is known of
+    what lies there. aside: a field that is 1 on what only took part in the run, as a press, and does not belong to what
+    came of it. labels: by axis or stage symbol. advance: the word for going along the stage axis. shades and places: by
+    their names on pages.
     """
 
     layers: tuple[str, ...] = ()

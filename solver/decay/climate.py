@@ -49,10 +49,12 @@ def flesh_activity(params: DecayParams, water: float) -> float:
     return float(1 / (1 + (1 / ACTIVITY - 1) * fresh / left))
 
 
-def surface_activity(params: DecayParams, day: float, flesh: float, broken: Floats, damp: float = 0.0) -> Floats:
+def surface_activity(
+    params: DecayParams, day: float, flesh: float | Floats, broken: Floats, damp: float = 0.0
+) -> Floats:
     """Return the water activity at the surface (v) where a share of the skin is broken (v), 0 to 1.
 
-    damp: what other fruits add to the humidity [percent].
+    flesh: activity below, of all or place by place (v). damp: what other fruits add to the humidity [percent].
     """
     skin = params.transpiration + (opened(params) - params.transpiration) * broken
     humidity = (float(air(params, day)[1]) + damp) / 100

@@ -18,6 +18,10 @@ _LAYERS = ("rot", "mould", "mould_active")
 #: What a cut face has besides: 1 on flesh, 0 on skin. Pale flesh, chosen by eye; linear light.
 _FLESH = "flesh"
 _PALE = np.array([0.95, 0.87, 0.60])
+#: The same when air has come to it for long; linear light, chosen by eye.
+_OXIDISED = np.array([0.42, 0.23, 0.08])
+#: Skin that is burnt; linear light, chosen by eye.
+_BURNT = np.array([0.06, 0.025, 0.01])
 #: Rotten flesh under the skin where the parameters say no lesion, and the rim of mould that still grows; linear light.
 _ROT = np.array([0.16, 0.075, 0.03])
 _RIM = np.array([0.86, 0.86, 0.82])
@@ -73,7 +77,7 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
 def _fresh(
     fields: Mapping[str, Array], params: Mapping[str, Any], peel: Mapping[str, Any], dry: float, shape: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """Return colours and roughness of skin that neither rots nor moulds, and that has not browned yet."""
+    """Return colours and roughness of skin and cut faces that neither rot nor mould, before they have dried."""
     colour = np.broadcast_to(np.array(params["skin_colour"], float), (*shape, 3))
     if "blush" in fields:
         colour = _over(colour, np.array(peel["blush_colour"], float), np.asarray(fields["blush"], float))
@@ -85,6 +89,10 @@ def _fresh(
     wax = np.clip(peel.get("roughness", _WAX) + _POWDER * dust, 0, 1)
     if _FLESH in fields:
         colour = _over(colour, _PALE, np.asarray(fields[_FLESH], float))
+    if "roasted" in fields:
+        colour = _over(colour, _BURNT, 0.85 * np.asarray(fields["roasted"], float))
+    if "browned" in fields:
+        colour = _over(colour, _OXIDISED, 0.75 * np.asarray(fields["browned"], float))
     return colour, wax
 
 
@@ -118,7 +126,12 @@ def _fur(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Fur | None:
 
 
 def _inside(fields: Mapping[str, Array], depth: Array, params: Mapping[str, Any]) -> dict[str, Array]:
-    """Return what is in the flesh: rot by the body's own law, as deep as it goes there and fading evenly; no mould."""
+    """Return what is in the flesh: its own fields where it has them, else rot by the body's law; no mould.
+
+    That law is what the skin above has, fading evenly as deep as the body has it.
+    """
+    if "flesh_rot" in fields:
+        return {"rot": np.asarray(fields["flesh_rot"], float), _FLESH: np.ones_like(depth)}
     rot = np.asarray(fields.get("rot", np.zeros_like(depth)), float)
     deep = float(params["flesh"]["rot_depth"])
     return {"rot": rot * np.clip(1 - depth / deep, 0, 1), _FLESH: np.ones_like(depth)}

@@ -5,11 +5,13 @@ from __future__ import annotations
 from ..contract import Need
 from .params import DecayParams
 
-__all__ = ["ALL", "BODY", "DEFAULT", "FIELDS", "MASSES", "MOULD", "ROT", "VECTORS", "completed"]
+__all__ = ["ALL", "BODY", "DEFAULT", "FIELDS", "FLESH", "MASSES", "MOULD", "ROT", "VECTORS", "completed"]
 
 _SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutrient", "budget_error", "water_lost")
 #: Where the fresh weight is.
-MASSES = ("mass", "juice_lost", "respired", "density")
+MASSES = ("mass", "juice_lost", "puddle", "respired", "density")
+#: Of flesh that has fields of its own; they come along with those of the skin above it.
+FLESH = ("flesh_position", "flesh_rot", "flesh_nutrient", "flesh_water", "flesh_cell")
 ALL = (
     *("position", "displacement", "mesh_position", "triangle", "volume", "least_jacobian", *MASSES),
     *("rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
@@ -28,13 +30,16 @@ VECTORS = ("position", "displacement")
 def completed(params: DecayParams, need: Need) -> Need:
     """Return the need with the places that its fields belong to.
 
-    An imported mesh, or the fruits of a heap as one, comes along with what lives on its vertices. Who asks for all
-    that a run keeps by default, of a fruit with a body, gets where the surface is too: the shape could not be shown or
-    exported without. Who names fewer fields gets those.
+    An imported mesh, what cuts leave of a fruit, or the fruits of a heap as one, comes along with what lives on its
+    vertices. Who asks for all that a run keeps by default, of a fruit with a body, gets where the surface is too: the
+    shape could not be shown or exported without. Who names fewer fields gets those. Flesh that has fields of its own
+    comes along with the skin's.
     """
     wanted = set(need.fields)
-    if (params.mesh is not None or params.heap is not None) and wanted & {*FIELDS}:
+    if (params.mesh is not None or params.heap is not None or params.cuts) and wanted & {*FIELDS}:
         wanted = wanted - {"position"} | {"mesh_position", "triangle"}
     elif not params.keeps_shape and wanted >= {*DEFAULT} and wanted.isdisjoint({*VECTORS, "mesh_position"}):
         wanted |= {"position"}
+    if params.within is not None and wanted & {"rot", "substrate"}:
+        wanted |= {*FLESH}
     return need.model_copy(update={"fields": tuple(sorted(wanted))})

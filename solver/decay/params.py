@@ -9,14 +9,18 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ..fruit import Fruit
-from ..painted import Painted
+from ..painted import Painted, Photo
 from .body.flesh import Flesh, Skin, Swing
 from .fields.colony import MOULDS, ROTS, Colony
+from .fitting import contradiction
 from .heap.given import Heap
 from .hyphae import FURS, Hyphae
 from .peel import LESIONS, PEELS, Lesion, Peel
+from .surfaces.cut import Cut
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Pressure, PressureMap, Wound
+from .within.given import Within
+from .within.oven import Oven
 
 __all__ = ["DecayParams", "Weather", "Wound"]
 
@@ -177,6 +181,21 @@ class DecayParams(Fruit):
         description="Painted wounds: n rows of 2 n values, 1 where rot and mould enter on day 0",
         json_schema_extra={"units": "1"},
     )
+    wound_photo: Photo | None = Field(
+        None,
+        description="Wounds in a photograph that the fruit fills: white where rot and mould enter on day 0",
+        json_schema_extra={"units": "1"},
+    )
+    nutrient_map: Painted = Field(
+        (),
+        description="Painted nutrients: n rows of 2 n values that the fresh nutrient is multiplied by, skin and flesh",
+        json_schema_extra={"units": "1"},
+    )
+    nutrient_photo: Photo | None = Field(
+        None,
+        description="Nutrients by a photograph's brightness, over the mean one, on the half that it shows; a choice",
+        json_schema_extra={"units": "1"},
+    )
     seeds: Literal["wounds", "contacts"] = Field(
         "wounds",
         description="Where decay enters: the wounds, or the stem, the floor and the neighbours that are touched",
@@ -193,9 +212,27 @@ class DecayParams(Fruit):
         description="A triangle mesh in place of the fruit's surface, closed or open; fields are those of its vertices",
         json_schema_extra={"units": "r1"},
     )
+    cuts: tuple[Cut, ...] = Field(
+        (),
+        max_length=8,
+        description="Planes that each take a part of the fruit away: a half, a slice, a wedge, with its cut faces bare",
+        json_schema_extra={"units": "1"},
+    )
     heap: Heap | None = Field(
         None,
         description="Many such fruits in one run, that lie on each other and infect each other; without, one alone",
+        json_schema_extra={"units": "1"},
+    )
+    within: Within | None = Field(
+        None,
+        description="Rot, nutrient and water as fields in the flesh, coupled to the skin's; without, rot and nutrient "
+        "are those of the skin, fade out below it, and all flesh dries alike",
+        json_schema_extra={"units": "1"},
+    )
+    oven: Oven | None = Field(
+        None,
+        description="Hot air that the fruit is cooked in from day 0 on (stages are small parts of a day); nothing rots "
+        "in it. Its flesh has fields of its own",
         json_schema_extra={"units": "1"},
     )
     pressure: tuple[Pressure, ...] = Field(
@@ -247,32 +284,10 @@ class DecayParams(Fruit):
         return self.body == "none"
 
     @model_validator(mode="after")
-    def _fits_the_mesh(self) -> Self:
-        count = len(self.mesh.points) if self.mesh else 0
-        for wound in self.wounds:
-            if wound.vertex is not None and wound.vertex >= count:
-                where = (
-                    f"the mesh has vertices 0 to {count - 1}"
-                    if count
-                    else "only an imported mesh has numbered vertices"
-                )
-                raise ValueError(f"a wound names vertex {wound.vertex}: {where}")
-        if self.mesh is not None and self.body == "table":
-            raise ValueError("the table of dried fruits knows no imported mesh: take body=quasi-static, not table")
-        if self.mesh is not None and self.seeds == "contacts":
-            raise ValueError("an imported mesh has neither stem nor floor: take seeds=wounds")
-        return self
-
-    @model_validator(mode="after")
-    def _fits_the_heap(self) -> Self:
-        if self.heap is None:
-            return self
-        if self.mesh is not None or self.neighbours:
-            raise ValueError("the fruits of a heap are each other's neighbours: leave mesh and neighbours out")
-        if self.skin is not None or self.body not in ("none", "quasi-static"):
-            raise ValueError("the fruits of a heap have body=none or quasi-static, and no skin that wrinkles")
-        if self.pressure or self.pressure_map is not None or self.march is not None:
-            raise ValueError("a heap takes no pressure, and heap.step is its march")
+    def _together(self) -> Self:
+        why = contradiction(self)
+        if why:
+            raise ValueError(why)
         return self
 
     @field_validator("weather")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,19 @@ import xarray as xr
 from ..arrays import Floats
 from ..contract import Context, Need, SolverError
 from ..fruit import azimuths, colatitudes, window
+from .browning import browned
+from .cooked import cooked
 from .environment import deficit
 from .fields.stepping import Reached, march
-from .fields.system import System
+from .fields.system import System, laid
 from .names import FIELDS, MOULD, VECTORS, completed
 from .params import DecayParams
-from .settings import Settings, choose, nodes, stepped
+from .settings import Settings, cells_of, choose, nodes, stepped
+from .surfaces.cut import left
 from .surfaces.shape import Shape
 from .surfaces.surface import sampler
 from .told import note
+from .within.inner import Held, Inner
 
 __all__ = ["run"]
 
@@ -39,6 +44,7 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
 
     """
     need = completed(params, need)
+    params = _rest(params, need)
     settings = choose(params, need.quality)
     if params.heap is not None:
         return _heap(params, need, settings, context)
@@ -55,39 +61,51 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
             attrs["path"] = "closed-form"
             for day in days:
                 if day in followed:
-                    shape.follow(shape.lost(day), None, context)
+                    shape.follow(shape.lost(day), None, None, context)
                 if day not in need.stages:
                     continue
                 row = _row(day, 0, 0.0, True)
-                _finish(rows, row, shape, (shape.lost(day), None), begun, need, context)
+                _finish(rows, row, shape, (shape.lost(day), None, None), begun, need, context)
             return _dataset(rows, need, attrs, shape, note(params, rows))
         with_mould = bool(wanted & MOULD)
         context.report(0.0, f"laying {settings.vertices} points on the fruit")
-        system = System(params, settings.cells, with_mould, shape.surface)
-        attrs["path"] = "rot-and-mould" if with_mould else "rot"
-        for reached in march(system, days, settings.tolerance, settings.longest, context):
-            rot = system.rot.share(reached.state.rot)
+        system = System(params, settings.cells, with_mould, shape.surface, settings.within)
+        if system.joint is not None:
+            shape.inner = Inner(system.joint, shape.body)
+        attrs["path"] = "oven" if params.oven is not None else "rot-and-mould" if with_mould else "rot"
+        for reached in _path(system, days, settings, context):
+            state = reached.state.water, system.rotten(reached.state.rot), _held(system, reached, shape)
             if reached.day in followed:
-                shape.follow(reached.state.water, rot, context)
+                shape.follow(*state, context)
             if reached.day not in need.stages:
                 continue
-            errors = [
-                layer.budget_error(state)
-                for layer, state in zip((system.rot, system.mould), reached.state[:2], strict=True)
-                if layer is not None and state is not None
-            ]
-            sound = reached.error <= 1 and max(errors) <= _ROUND_OFF
+            missing = _missing(system, reached)
+            sound = reached.error <= 1 and missing <= _ROUND_OFF
             row = _row(reached.day, reached.steps, reached.error * settings.tolerance, sound)
             if "budget_error" in wanted:
-                row["budget_error"] = max(errors)
-            row |= _fields(system, reached, need, settings.cells)
-            _finish(rows, row, shape, (reached.state.water, rot), begun, need, context)
+                row["budget_error"] = missing
+            row |= _fields(system, reached, need, settings.cells) | _flesh(system, reached, shape.inner, need)
+            _finish(rows, row, shape, state, begun, need, context)
     except SolverError as error:
         if rows:
             error.partial = _dataset(rows, need, attrs, shape, note(params, rows))
             error.last_stage = rows[-1]["stage"]
         raise
     return _dataset(rows, need, attrs, shape, note(params, rows))
+
+
+def _path(system: System, days: tuple[float, ...], settings: Settings, context: Context) -> Iterator[Reached]:
+    if system.params.oven is not None:
+        return cooked(system, days, context)
+    return march(system, days, settings.tolerance, settings.longest, context)
+
+
+def _rest(params: DecayParams, need: Need) -> DecayParams:
+    """Return the parameters of what cuts leave of a fruit, which is a mesh; without cuts those that are given."""
+    if not params.cuts:
+        return params
+    rest = left(laid(params, cells_of(need.quality)), params.cuts)
+    return params.model_copy(update={"mesh": rest.mesh, "weight": params.weight * rest.share})
 
 
 def _heap(params: DecayParams, need: Need, settings: Settings, context: Context) -> xr.Dataset:
@@ -115,12 +133,12 @@ def _finish(
     rows: list[dict[str, Any]],
     row: dict[str, Any],
     shape: Shape,
-    state: tuple[float, Floats | None],
+    state: tuple[float, Floats | None, Held | None],
     begun: float,
     need: Need,
     context: Context,
 ) -> None:
-    """Add the stage's shape, of the water lost and the rot (v), and seconds to its row, and the row to the others."""
+    """Add the stage's shape, of the water lost, the rot (v) and what the flesh holds, and seconds to its row."""
     row |= shape.at(*state, context)
     row["seconds"] = time.perf_counter() - begun
     rows.append(row)
@@ -134,8 +152,8 @@ def _row(day: float, steps: int, residual: float, converged: bool) -> dict[str, 
 def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[str, Any]:
     """Return maps on the lattice and shares of the area, those that were asked for."""
     surface, wanted = system.surface, set(need.fields)
-    rot = system.rot.share(reached.state.rot)
-    maps = {"rot": rot, "substrate": reached.state.rot.n}
+    rot = system.rotten(reached.state.rot)
+    maps = {"rot": rot, "substrate": reached.state.rot.n[: len(rot)]}
     found = {"rotten_share": surface.mean(rot >= _SEEN), "mean_rot": surface.mean(rot)}
     if system.mould is not None and reached.state.mould is not None:
         state = reached.state.mould
@@ -151,8 +169,12 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
             "mean_nutrient": surface.mean(state.n),
         }
     row: dict[str, Any] = {name: value for name, value in found.items() if name in wanted}
+    if reached.state.roasted is not None:
+        maps["roasted"] = reached.state.roasted.brown
+        wanted |= {"roasted"} if wanted & {"rot"} else set()
     if wanted & set(maps):
         if system.imported:
+            row |= _bared(system, reached.day)
             return row | {name: maps[name].astype(need.dtype) for name in sorted(wanted & set(maps))}
         assert need.resolution is not None  # settled
         inside = window(need.resolution, need.region)
@@ -163,6 +185,44 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
     return row
 
 
+def _bared(system: System, day: float) -> dict[str, Any]:
+    """Return where a cut fruit is bare flesh, and how brown that is."""
+    if not system.bare.any():
+        return {}
+    bare = system.bare.astype(float)
+    return {"flesh": bare, "browned": bare * browned(system.params, day)}
+
+
+def _missing(system: System, reached: Reached) -> float:
+    """Return the larger of what is missing of the organisms' budgets."""
+    layers = zip((system.rot, system.mould), reached.state[:2], strict=True)
+    return max(layer.budget_error(grown) for layer, grown in layers if layer is not None and grown is not None)
+
+
+def _held(system: System, reached: Reached, shape: Shape) -> Held | None:
+    """Return what a body that moves holds of flesh that has its own fields."""
+    if shape.inner is None or shape.body is None or reached.state.wet is None:
+        return None
+    return shape.inner.held(system.rot.share(reached.state.rot), reached.state.wet)
+
+
+def _flesh(system: System, reached: Reached, inner: Inner | None, need: Need) -> dict[str, Any]:
+    """Return the wanted fields of the flesh that has its own."""
+    wet = reached.state.wet
+    if inner is None or wet is None:
+        return {}
+    # a core neither rots nor feeds, and keeps its water
+    fields = {
+        "flesh_rot": (system.rot.share(reached.state.rot), 0.0),
+        "flesh_nutrient": (reached.state.rot.n, 0.0),
+        "flesh_water": (wet, 1.0),
+    }
+    if reached.state.roasted is not None:
+        fields["flesh_temperature"] = (reached.state.roasted.warm, 0.0)
+    wanted = {*need.fields, *(("flesh_temperature",) if "flesh_rot" in need.fields else ())}
+    return {name: inner.of(*field).astype(need.dtype) for name, field in fields.items() if name in wanted}
+
+
 def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shape: Shape, said: str) -> xr.Dataset:
     assert need.resolution is not None
     attrs = {**attrs, **({"note": said} if said else {})}
@@ -171,6 +231,8 @@ def _dataset(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], shap
         data["triangle"] = (("face", "corner"), shape.triangles)
         data |= shape.textured
         attrs = {**attrs, **shape.materials}
+    if "flesh_cell" in need.fields and shape.inner is not None:
+        data["flesh_cell"] = (("flesh_tetrahedron", "flesh_corner"), shape.inner.cells)
     return _stacked(rows, need, attrs, data)
 
 
@@ -180,13 +242,17 @@ def _stacked(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], data
         values = np.array([row[name] for row in rows])
         if name == "mesh_position":
             data[name] = (("stage", "vertex", "component"), values)
+        elif name == "flesh_position":
+            data[name] = (("stage", "flesh_point", "component"), values)
+        elif name.startswith("flesh_"):
+            data[name] = (("stage", "flesh_point"), values)
         elif name.startswith("fruit_"):
             data[name] = (("stage", "fruit_number"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
-        elif name in FIELDS and values.ndim == 2:
+        elif name in (*FIELDS, "roasted", "flesh", "browned") and values.ndim == 2:
             data[name] = (("stage", "vertex"), values)
-        elif name in FIELDS:
+        elif name in (*FIELDS, "roasted"):
             data[name] = (("stage", "colatitude", "azimuth"), values)
         elif name != "stage":
             data[name] = ("stage", values.astype(np.int8) if name == "converged" else values)
@@ -196,6 +262,6 @@ def _stacked(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], data
         down, along = window(need.resolution, need.region)
         coords["colatitude"] = colatitudes(need.resolution)[down]
         coords["azimuth"] = azimuths(need.resolution)[along]
-    if not data.keys().isdisjoint({*VECTORS, "mesh_position"}):
+    if not data.keys().isdisjoint({*VECTORS, "mesh_position", "flesh_position"}):
         coords["component"] = ["x", "y", "z"]
     return xr.Dataset(data, coords, attrs)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from ..contract import Cost, Need, Quality
 from .environment import opened, reference_radius
 from .fields.rates import units
-from .names import BODY, FIELDS, MOULD, ROT, VECTORS, completed
+from .names import BODY, FIELDS, FLESH, MOULD, ROT, VECTORS, completed
 from .params import DecayParams
 from .surfaces.seeds import seeds
 from .surfaces.surface import extent
 
-__all__ = ["Settings", "choose", "expected_cost", "moved", "nodes", "stepped"]
+__all__ = ["Settings", "cells_of", "choose", "expected_cost", "moved", "nodes", "stepped"]
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,8 @@ class Settings:
     """cells: of the geodesic sphere. tolerance: relative L2 error of a step. longest: step [day].
 
     layers: shells of the body. balance, smooth: out-of-balance force of body and of skin over the forces in them.
-    skin: cells of the skin's own mesh. imported: points of a mesh of the user's own, which stands for the sphere.
+    skin: cells of the skin's own mesh. within: points of the flesh that has fields of its own, about; 0: none.
+    imported: points of a mesh of the user's own, which stands for the sphere.
     """
 
     cells: int
@@ -32,6 +33,7 @@ class Settings:
     smooth: float
     skin: int
     imported: int = 0
+    within: int = 0
 
     @property
     def vertices(self) -> int:
@@ -47,6 +49,8 @@ _BODIES: dict[Quality, tuple[int, float, float, int]] = {
 }
 #: Cells and shells of each fruit of a heap, which is seen from farther away than one alone.
 _HEAPS: dict[Quality, tuple[int, int]] = {"preview": (16, 4), "default": (32, 6), "fine": (64, 8)}
+#: Points of flesh that has fields of its own.
+_WITHIN: dict[Quality, int] = {"preview": 12_000, "default": 50_000, "fine": 200_000}
 #: Longest step, in units of the quicker organism's own time.
 _LONGEST = 4.0
 #: Measured on one busy core: seconds per step and vertex with both organisms, and a typical step in model time.
@@ -59,6 +63,11 @@ _HEAP_SECONDS = 1e-5
 _SKIN_SECONDS = 4e-4
 #: Working memory per vertex, mesh and states of both organisms.
 _BYTES = 1000
+
+
+def cells_of(quality: Quality) -> int:
+    """Return the cells of a quality's geodesic sphere."""
+    return _MESHES[quality][0]
 
 
 def choose(params: DecayParams, quality: Quality) -> Settings:
@@ -76,6 +85,7 @@ def choose(params: DecayParams, quality: Quality) -> Settings:
         smooth,
         skin,
         len(params.mesh.points) if params.mesh else 0,
+        _WITHIN[quality] if params.within else 0,
     )
 
 
@@ -93,12 +103,16 @@ def nodes(params: DecayParams, need: Need) -> tuple[float, ...]:
 
 def stepped(params: DecayParams, wanted: Collection[str]) -> bool:
     """Return whether rot has to be stepped: it is wanted, or bears on the body that moves or on the water lost."""
-    wounded = bool(params.wound_map) or len(seeds(params)) > 0
+    wounded = bool(params.wound_map) or params.wound_photo is not None or bool(params.cuts) or len(seeds(params)) > 0
     bears = moved(params, wanted) and params.flesh.heeds_rot and wounded
     # broken skin loses more water
     dries = wounded and opened(params) > params.transpiration
+    if params.oven is not None:
+        return True
+    # the water of flesh with fields of its own is stepped in any case
+    dries |= params.within is not None
     bears |= dries and ("water_lost" in wanted or (params.body != "none" and not BODY.isdisjoint(wanted)))
-    return bears or not {*ROT, *MOULD, "budget_error"}.isdisjoint(wanted)
+    return bears or not {*ROT, *MOULD, *FLESH, "budget_error"}.isdisjoint(wanted)
 
 
 def expected_cost(params: DecayParams, need: Need) -> Cost:
@@ -110,14 +124,16 @@ def expected_cost(params: DecayParams, need: Need) -> Cost:
     assert need.resolution is not None  # settled
     width = 8 if need.dtype == "float64" else 4
     values = sum((3 if f in VECTORS else 1) for f in FIELDS if f in wanted) * 2 * need.resolution**2
-    seconds = 1e-5 * settings.vertices + steps * settings.vertices * _SECONDS * organisms / 2
+    points = settings.vertices + settings.within
+    seconds = 1e-5 * points + steps * (settings.vertices * organisms / 2 + settings.within) * _SECONDS
     if moved(params, wanted):
         count = len(need.stages) + len(nodes(params, need))
         seconds += count * 20 * settings.layers**3 * _BODY_SECONDS
         seconds += count * 10 * settings.skin**2 * _SKIN_SECONDS * (params.skin is not None)
     if params.heap is not None:
         return _heaped(params, need, settings, steps)
-    return Cost(seconds, len(need.stages) * (values * width + 200) + settings.vertices * _BYTES)
+    values += sum(3 if f == "flesh_position" else 1 for f in FLESH if f in wanted) * settings.within
+    return Cost(seconds, len(need.stages) * (values * width + 200) + points * _BYTES)
 
 
 def _heaped(params: DecayParams, need: Need, settings: Settings, steps: float) -> Cost:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,38 @@ def test_exr_holds_the_values_themselves(tmp_path: Path) -> None:
         assert np.array_equal(channels["rot"].pixels, baked(rotting(16)["rot"].values[1], 48))
 
 
-@pytest.mark.parametrize("name", ["png", "exr"])
+def test_one_call_gives_a_set_of_maps_per_stage_at_a_size_of_its_own() -> None:
+    run = rotting(16)
+    archive = zipfile.ZipFile(io.BytesIO(made(run, "png-zip", size=40)))
+    said = json.loads(archive.read("stages.json"))
+    fields = ["rot", "mould", "mould_active"]
+    assert sorted(said["fields"]) == sorted(fields)
+    assert list(said["files"].values()) == run["stage"].values.tolist()
+    assert len(archive.namelist()) == 1 + len(fields) * run.sizes["stage"]
+    for number, (folder, stage) in enumerate(said["files"].items()):
+        for name in fields:
+            data = archive.read(f"{folder}/{name}.png")
+            width, height, rows, info = png.Reader(bytes=data).read()
+            assert (width, height, info["bitdepth"]) == (40, 40, 16)
+            levels = np.vstack([np.frombuffer(row, np.uint16) for row in map(bytes, rows)])
+            assert np.abs(levels / 65535 - baked(run[name].values[number], 40)).max() < 1e-5
+            assert json.loads(Image.open(io.BytesIO(data)).text["wizen"])["stage"] == stage
+    only = zipfile.ZipFile(io.BytesIO(made(run, "png-zip", size=8, map="rot")))
+    assert len(only.namelist()) == 1 + run.sizes["stage"]
+    with pytest.raises(InvalidQuery, match="no field"):
+        made(run, "png-zip", map="moss")
+
+
+def test_what_is_no_share_has_one_range_for_all_stages() -> None:
+    run = rotting(16)
+    grown = run["rot"] * (1 + np.arange(run.sizes["stage"]))[:, None, None]
+    run = run.drop_vars(["rot", "mould", "mould_active"]).assign(roughness=grown)
+    archive = zipfile.ZipFile(io.BytesIO(made(run, "png-zip", size=16)))
+    tops = [np.asarray(Image.open(archive.open(n))).max() for n in sorted(archive.namelist()) if n.endswith("png")]
+    assert tops[0] < tops[1] < tops[2] <= 65535
+
+
+@pytest.mark.parametrize("name", ["png", "png-zip", "exr"])
 def test_maps_need_texture_coordinates_and_a_field(name: str) -> None:
     with pytest.raises(UnfitFormat, match="triangles that stay"):
         made(splitting(), name)

@@ -11,6 +11,7 @@ import pytest
 import trimesh
 import xarray as xr
 from PIL import Image
+from scipy.spatial import Delaunay
 from typer.testing import CliRunner
 
 from service.cli import app
@@ -76,6 +77,27 @@ def test_rot_goes_as_deep_as_the_body_says() -> None:
     assert (rot[flesh == 1] <= most * fades + 1e-5).all()
     assert rot[flesh == 1].max() > 0.2
     assert rot[flesh == 1][fades == 0].max(initial=0) == 0
+
+
+def test_a_cut_face_has_what_the_flesh_has_there() -> None:
+    """Rot of the flesh's own that is no law of depth: linear across it, which its tetrahedra hold exactly."""
+    run = rotting(16)
+    axes = np.linspace(-0.6, 1.8, 7)
+    points = np.stack(np.meshgrid(axes, axes, axes), -1).reshape(-1, 3)
+    slope = np.array([0.2, -0.1, 0.15])
+    stages = run.sizes["stage"]
+    run = run.assign(
+        flesh_position=(("stage", "flesh_point", "component"), np.tile(points, (stages, 1, 1))),
+        flesh_cell=(
+            ("flesh_tetrahedron", "flesh_corner"),
+            Delaunay(points + 1e-3 * np.sin(9 * points[:, ::-1])).simplices,
+        ),
+        flesh_rot=(("stage", "flesh_point"), np.tile(0.4 + points @ slope, (stages, 1))),
+    )
+    rows = opened(run).metadata["_ply_raw"]["vertex"]["data"]
+    found = np.stack([rows[axis].ravel() for axis in "xyz"], -1)
+    flesh, rot = (rows[name].ravel() for name in ("flesh", "rot"))
+    assert np.allclose(rot[flesh == 1], 0.4 + found[flesh == 1] @ slope, atol=1e-5)
 
 
 def test_flesh_is_paler_than_skin_and_brown_where_it_rots() -> None:

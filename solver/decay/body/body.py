@@ -16,12 +16,14 @@ from ...fruit import lattice
 from ..environment import reference_radius
 from ..params import DecayParams
 from ..surfaces.surface import Surface
+from ..within.inner import Held
 from .embedded import Embedded
 from .equilibrium import Balance, rested, settle
 from .filling import Filling, Round
 from .flesh import Softened, softened
 from .loads import Loads
 from .material import blocks, energy
+from .newton import skin_areas
 from .obstacles import Obstacles
 from .pressure import pressed
 from .springs import knit, swung
@@ -64,16 +66,22 @@ class Body:
         self._pressure, self._inertia = DENSITY * params.flesh.gravity * r1, DENSITY * r1**2
         self.radius, self.core = r1, self._filling.core
 
-    def state(self, water: float, rot: Floats | None) -> Softened:
-        """Return the flesh after a share of the weight has gone as water; rot: on the surface's vertices (v)."""
+    def state(self, water: float, rot: Floats | None, held: Held | None = None) -> Softened:
+        """Return the flesh after a share of the weight has gone as water; rot: on the surface's vertices (v).
+
+        held: what flesh with fields of its own has on the body's points; else rot fades out below the skin.
+        """
         solid, flesh = self.solid, self._params.flesh
-        inside = np.zeros(len(solid.tets))
-        if rot is not None:
+        inside, gives = np.zeros(len(solid.tets)), None
+        if held is not None:
+            inside = held.rot[solid.tets].mean(axis=1)
+            gives = np.maximum(1 - held.wet[solid.tets].mean(axis=1), 0.0)
+        elif rot is not None:
             at = self._filling.inwards @ rot * np.clip(1 - solid.depth / flesh.rot_depth, 0, 1)
             inside = at[solid.tets].mean(axis=1)
         fleshy = float(solid.volume[~solid.stone].sum() / solid.volume.sum())
         wet = self._params.water_content / 100 / fleshy
-        state = softened(flesh, self._params.firmness, water, inside, solid.stone, solid.volume, wet)
+        state = softened(flesh, self._params.firmness, water, inside, solid.stone, solid.volume, wet, gives)
         return pressed(state, self._params, solid)
 
     def settled(
@@ -123,10 +131,7 @@ class Body:
             return Loads(zero, None, zero, zero, start)
         shared = np.repeat(solid.volume / 4, 4)
         mass: Floats = np.bincount(solid.tets.ravel(), shared * np.repeat(state.mass, 4), count).astype(float)
-        corners = solid.points[solid.skin[solid.faces]]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-        contact = zero.copy()
-        contact[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(areas / 3, 3), len(solid.skin))
+        contact = skin_areas(solid)
         contact *= CONTACT * fresh / float(np.cbrt(solid.volume.mean()))
         volume = np.bincount(solid.tets.ravel(), shared, count)
         tether = np.where(self._filling.core, _TETHER * fresh * volume, 0.0)

@@ -12,13 +12,13 @@ from scipy import sparse
 from ...arrays import Floats, Ints
 from ...contract import InvalidGeometry
 from ...geometry.nearest import Nearest, nearest
+from ...geometry.stuffing import Stuffed, boundary, pieces, stuffed
 from ..params import DecayParams
 from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.places import Neighbour
 from ..surfaces.surface import Surface, extent
 from .rind import rind
 from .solid import Solid, volumes
-from .stuffing import Stuffed, boundary, pieces, stuffed
 
 __all__ = ["Embedded"]
 

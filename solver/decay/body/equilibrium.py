@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ...contract import NotConverged
 from ...linalg.krylov import conjugate_gradients, times
 from .flesh import Booked
 from .loads import Loads, Touch, below, drop, pushes, touches
 from .material import Blocks, energy, forces, hessian, inverse_edges
+from .newton import Ways, descended, scales, shortened
 
 __all__ = ["Balance", "Rest", "rested", "settle"]
 
 
-#: Newton steps and halvings of a step before giving up; iterations of the linear solver in one step.
-_STEPS, _HALVINGS, _ITERATIONS = 200, 40, 400
+#: Newton steps before giving up; iterations of the linear solver in one step.
+_STEPS, _ITERATIONS = 200, 400
 #: Changes of which points touch, in one direction.
 _CONTACTS = 20
-#: Least part of a direction that is tried for the model.
-_LEAST = 1e-3
 #: Points this near a neighbour may come to touch it in one step [r1].
 _NEAR = 0.3
-#: Strains below this count as none: a body at rest has no forces to measure its residual by.
-_NOTHING = 1e-6
+_ADVICE = "Make the flesh firmer, let the rot take less length (rot_collapse), or ask for stages closer together."
 #: Round-off of the energy, over the energy of a strain of 1.
 _ROUND_OFF = 1e-14
 
@@ -85,46 +83,29 @@ def settle(
         NotConverged: no step lowers the energy any more, or there were too many.
 
     """
-    x = start.copy()
-    x[:, 1] += drop(x, loads)
-    nothing = _NOTHING * float(np.mean(rest.mu)) * float(np.mean(rest.volume)) ** (2 / 3) * len(x) ** 0.5
-    slack = _ROUND_OFF * float(np.sum(rest.mu * rest.volume))
-    now = _potential(x, rest, loads)
-    if not np.isfinite(now):
-        raise NotConverged("the shape to start from is inverted.", advice="Ask for stages closer together.")
-    residual = np.inf
-    for step in range(_STEPS):
-        watch()
+    nothing, slack = scales(rest.mu, rest.volume, len(start), _ROUND_OFF)
+
+    def slope(x: Floats) -> tuple[Floats, float, Any]:
         g, scale, least, reaction = _slope(x, rest, loads)
-        before, residual = residual, float(np.linalg.norm(g) / (np.linalg.norm(scale) + nothing))
+        residual = float(np.linalg.norm(g) / (np.linalg.norm(scale) + nothing))
         if loads.carries:
             # stresses within a body can dwarf its weight, which must be carried all the same
             weight = float(np.sum(loads.weight))
             residual = max(residual, abs(weight - reaction) / weight)
-        if residual <= tolerance:
-            return Balance(x, residual, step, least, reaction, pushes=pushes(x, loads))
-        # a rough direction is enough far from the end (Eisenstat and Walker)
-        asked = min(0.1, max(0.5 * residual / max(before, residual), 0.3 * tolerance / residual, 1e-6))
-        d = _direction(x, rest, loads, pattern, asked)
-        down = float(np.sum(g * d))
-        share = 1.0
-        for _ in range(_HALVINGS):
-            then = _potential(x + share * d, rest, loads)
-            # the last digits of the energy decide nothing: there the step is taken as it is
-            if then <= now + 1e-4 * share * down + slack:
-                break
-            share /= 2
-        else:
-            break
-        x += share * d
-        # the best height is known, and a body that has left what carries it knows no other way back
+        return g, residual, (least, reaction)
+
+    def placed(x: Floats) -> None:
         x[:, 1] += drop(x, loads)
-        now = _potential(x, rest, loads)
-    raise NotConverged(
-        f"the body stopped at a residual of {residual:.1e}.",
-        residual=residual,
-        advice="Make the flesh firmer, let the rot take less length (rot_collapse), or ask for stages closer together.",
+
+    ways = Ways(
+        lambda x: _potential(x, rest, loads),
+        slope,
+        lambda x, _g, _said, asked: _direction(x, rest, loads, pattern, asked),
+        placed,
     )
+    found = descended(start, ways, tolerance, _STEPS, slack, ("body", "shape"), _ADVICE, watch)
+    least, reaction = found.said
+    return Balance(found.points, found.residual, found.steps, least, reaction, pushes=pushes(found.points, loads))
 
 
 def _direction(x: Floats, rest: Rest, loads: Loads, pattern: Blocks, asked: float) -> Floats:
@@ -178,14 +159,11 @@ def _carried(
         )
         if not upwards:
             return d + more, False
-        # contacts that change to and fro would go on for ever: the model itself must fall
         straight = times(pattern.indptr, pattern.indices, a, more)
         straight[:, 1] -= stiff * more[:, 1]
         np.subtract.at(straight, point, np.einsum("ki,ki->k", out, more[point])[:, None] * hard)
         gain, bend = float(np.sum((g + bent) * more)), float(np.sum(more * straight)) / 2
-        part, held = 1.0, _pressed(x, d, loads, near)
-        while part > _LEAST and _pressed(x, d + part * more, loads, near) + part * (gain + part * bend) > held:
-            part /= 2
+        part = shortened(partial(_along, x, d, more, loads, near), gain, bend)
         d += part * more
         bent += part * straight
         before = np.concatenate([touching, leaning])
@@ -202,6 +180,10 @@ def _pressed(x: Floats, d: Floats, loads: Loads, near: Touch) -> float:
     deep = np.maximum(near.depth - np.einsum("ki,ki->k", near.out, d[near.point]), 0.0)
     floor = np.sum(loads.contact * below(x + d, loads) ** 2)
     return float(floor + np.sum(loads.contact[near.point] * deep**2)) / 2
+
+
+def _along(x: Floats, d: Floats, more: Floats, loads: Loads, near: Touch, part: float) -> float:
+    return _pressed(x, d + part * more, loads, near)
 
 
 def _potential(x: Floats, rest: Rest, loads: Loads) -> float:

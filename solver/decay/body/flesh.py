@@ -107,18 +107,34 @@ _LEFT = 0.015
 
 
 def softened(
-    flesh: Flesh, firmness: float, water: float, rot: Floats, stone: Bools, volume: Floats, wet: float = 1.0
+    flesh: Flesh,
+    firmness: float,
+    water: float,
+    rot: Floats,
+    stone: Bools,
+    volume: Floats,
+    wet: float = 1.0,
+    gives: Floats | None = None,
 ) -> Softened:
     """Return the state of tetrahedra of fresh volumes (t); rot (t), 0 to 1. A stone neither shrinks nor rots.
 
     water: evaporated, over the fresh weight. Rotten flesh collapses and its juice leaks: what it loses in volume it
-    loses in weight. What evaporates comes evenly from the flesh that holds its juice, at most a share `wet` of it; some
-    of the rotten flesh is respired. Weight and volume are fresh ones of one density.
+    loses in weight. What evaporates comes evenly from the flesh that holds its juice, or in proportion to what a place
+    `gives` (t), at most a share `wet` of it; some of the rotten flesh is respired. Weight and volume are fresh ones of
+    one density.
     """
     share = np.where(stone, 0.0, volume) / np.sum(volume)
     kept = (1 - flesh.rot_collapse * rot) ** 3
     held = float(np.sum(share * kept))
-    dry = min(water / max(held, 1e-12), wet, 1 - _LEFT - flesh.rot_respired)
+    most = min(wet, 1 - _LEFT - flesh.rot_respired)
+    mean = min(water / max(held, 1e-12), most)
+    dry: float | Floats = mean
+    evaporated = mean * held
+    if gives is not None:
+        given = float(np.sum(share * kept * gives))
+        dry = np.minimum(gives * (water / given), most) if given > 0 else np.zeros_like(kept)
+        evaporated = float(np.sum(share * kept * dry))
+        mean = evaporated / max(held, 1e-12)
     gone = flesh.rot_respired * rot
     left = 1 - flesh.shrinkage * dry - gone
     young = flesh.unit * firmness
@@ -130,9 +146,9 @@ def softened(
         mass,
         Booked(
             float(np.sum(volume * mass) / np.sum(volume)),
-            dry * held,
+            evaporated,
             float(np.sum(share * (1 - kept))),
             float(np.sum(share * kept * gone)),
         ),
-        float(np.cbrt(1 - flesh.shrinkage * dry)),
+        float(np.cbrt(1 - flesh.shrinkage * mean)),
     )

@@ -109,21 +109,25 @@ class Layer:
     ) -> State:
         """Return the state with a new colony: a smooth bump of a share of d2 about a point (3), times the gate.
 
-        Its total does not depend on the mesh; a mesh coarser than the bump takes it all at the nearest vertex.
+        Its total does not depend on the mesh; a mesh coarser than the bump takes it all at the nearest vertex. What
+        has flesh below gets the half of the ball there, too.
         """
-        far = ((self.surface.points - centre) ** 2).sum(axis=1)
-        nearest = int(np.argmin(far))
-        bump = np.clip(1 - far / radius**2, 0, None) ** 2
-        bump[nearest] = max(bump[nearest], 1e-3)
-        whole = self.surface.total(bump)
-        if gate is not None:
-            bump *= gate
-        bump *= share * self.rates.cap * np.pi * radius**2 / 3 / whole
-        return state._replace(u=state.u + bump, added=state.added + self.surface.mean(bump))
+        skin = self.surface.skin
+        count, height = len(skin.points), share * self.rates.cap
+        bump = _bump(skin.points, centre, radius, skin.area, height * np.pi * radius**2 / 3, gate)
+        if count < len(self.surface.points):
+            below, room = self.surface.points[count:], self.surface.area[count:]
+            bump = np.concatenate([bump, _bump(below, centre, radius, room, height * 16 * np.pi * radius**3 / 105)])
+        return self._with(state, bump)
 
     def painted(self, state: State, share: Floats) -> State:
         """Return the state with colonies of height d2 where share (v), 0 to 1, is 1."""
-        more = self.rates.cap * share
+        return self._with(state, self.rates.cap * share)
+
+    def _with(self, state: State, more: Floats) -> State:
+        """Return the state with more of the organism on the skin (v), where all of it enters."""
+        if len(more) < len(state.u):
+            more = np.concatenate([more, np.zeros(len(state.u) - len(more))])
         return state._replace(u=state.u + more, added=state.added + self.surface.mean(more))
 
     def budget_error(self, state: State) -> float:
@@ -131,3 +135,18 @@ class Layer:
         total = self.surface.mean(self.rates.theta * state.n + state.u + state.v)
         there = self._store + state.added
         return abs(total - there) / there
+
+
+def _bump(
+    points: Floats, centre: Floats, radius: float, room: Floats, total: float, gate: Floats | None = None
+) -> Floats:
+    """Return a smooth bump (n) about a centre (3) on points that stand for so much room (n), times a gate (n).
+
+    Its total is the given one where the gate is 1.
+    """
+    far = ((points - centre) ** 2).sum(axis=1)
+    nearest = int(np.argmin(far))
+    bump: Floats = np.clip(1 - far / radius**2, 0, None) ** 2
+    bump[nearest] = max(bump[nearest], 1e-3)
+    whole = float(np.sum(room * bump))
+    return (bump if gate is None else bump * gate) * (total / whole)

@@ -16,14 +16,18 @@ from scipy.spatial import KDTree
 from ...arrays import Floats, Ints
 from ...contract import Context
 from ...fruit import directions
-from ...painted import painted
 from ..climate import Germination, flesh_activity, moisture, surface_activity, warmth
 from ..environment import air, evaporated, opened, reference_radius
 from ..params import DecayParams
-from ..surfaces.imported import extent_of, rays_from
+from ..surfaces.cut import bare
+from ..surfaces.imported import extent_of
 from ..surfaces.seeds import seeds
 from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
+from ..within.joint import Joint, joined
+from ..within.roast import Roasted
+from ..within.water import Water, activity
 from .colony import Colony
+from .drawn import fed, opened_skin, seen
 from .gate import SHUT, gates
 from .layer import Layer, State
 from .noise import patches
@@ -42,11 +46,17 @@ _INOCULUM = 4.0
 
 
 class Both(NamedTuple):
-    """State of the rot, of the mould if there is one, and the water that has evaporated, over the fresh weight."""
+    """State of the rot, of the mould if there is one, and the water that has evaporated, over the fresh weight.
+
+    wet (n): of flesh with fields of its own, its water over the fresh one's, skin first. roasted: what an oven made of
+    it.
+    """
 
     rot: State
     mould: State | None
     water: float = 0.0
+    wet: Floats | None = None
+    roasted: Roasted | None = None
 
 
 def laid(params: DecayParams, cells: int) -> Surface:
@@ -64,25 +74,37 @@ def laid(params: DecayParams, cells: int) -> Surface:
 class System:
     """Everything that decays on one fruit. Without mould the rot is the same, bit by bit, as with it.
 
-    surface: the fruit's own of so many cells, where it has been laid already. dries, damp: what other fruits near by
-    do to its air: evaporation over that of a fruit alone, and what they add to its humidity [percent].
+    bare (v): where cuts left flesh without a skin.
+    surface: the fruit's own of so many cells, where it has been laid already. inside: points of flesh with fields of
+    its own, about; 0: none. dries, damp: what other fruits near by do to its air: evaporation over that of a fruit
+    alone, and what they add to its humidity [percent].
     """
 
     dries = 1.0
     damp = 0.0
 
-    def __init__(self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None) -> None:
-        self._params = params
+    def __init__(
+        self, params: DecayParams, cells: int, with_mould: bool, surface: Surface | None = None, inside: int = 0
+    ) -> None:
+        self.params = params
         self.surface = surface or laid(params, cells)
-        self._rays = geodesic(cells)[0] if params.mesh is None else rays_from(self.surface.points)
+        self.joint: Joint | None = None
+        if params.within is not None and inside:
+            # what cuts leave of a fruit has its stone; heat goes through a core
+            own = params.mesh is not None and not params.cuts
+            fruit = None if own or params.oven is not None else params
+            self.joint = joined(self.surface, inside, params.within.skin, fruit, params.flesh.rind)
+        self.bare = bare(params.cuts, self.surface.points)
+        self._rays = geodesic(cells)[0] if params.mesh is None else seen(params, self.surface.points)
         self._tree = KDTree(self._rays)
-        own = extent_of(self.surface) if params.mesh is not None else None
-        self._extent = own or extent(params)
-        self._radius = 1e3 * reference_radius(params, self._extent)
+        self._painted = opened_skin(params, self._rays)
+        closed = extent_of(self.surface) if params.mesh is not None else None
+        self.extent = closed or extent(params)
+        self._radius = 1e3 * reference_radius(params, self.extent)
         self._cardinal = params.climate == "cardinal"
         for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
         chance = params.spawning / (10 - params.propagation_rate)
-        self.rot = self._layer(params, "rot", for_rot)
+        self.rot = self._layer(params, "rot", for_rot, self.joint)
         self._rot_spawner = Spawner(chance, 0.0, params.spawn_reach, rot_clocks)
         self.mould = self._layer(params, "mould", for_mould) if with_mould else None
         strays = params.rot_spawning if with_mould else 0.0
@@ -91,39 +113,49 @@ class System:
         self._waiting = Waiting()
         self._due: tuple[float, Seed] | None = None
         self._wounds = self._opened()
-        self.start = Both(self.rot.fresh, self.mould.fresh if self.mould else None)
+        self._water = None
+        if params.within is not None and self.joint is not None:
+            self._water = Water(params, params.within, self.joint, self.extent)
+        wet = self._water.fresh if self._water else None
+        self.start = Both(self.rot.fresh, self.mould.fresh if self.mould else None, 0.0, wet)
         for seed in self._wounding():
             if self._cardinal:
                 self._waiting.add(self._waits[seed.rots].day(0.0), seed)
             else:
                 self.start = self._seeded(self.start, 0.0, seed)
 
-    def _layer(self, params: DecayParams, name: str, generator: np.random.Generator) -> Layer:
-        points, size = self.surface.points, params.patch_size
+    def _layer(
+        self, params: DecayParams, name: str, generator: np.random.Generator, joint: Joint | None = None
+    ) -> Layer:
+        medium = joint or self.surface
+        points, size = medium.points, params.patch_size
         fresh = params.nutrient * (1 + params.unevenness * patches(points, size, generator))
+        factor = fed(params, self._rays, points)
+        fresh = fresh if factor is None else fresh * factor
         coarse = 1 + params.noise * patches(points, size, generator)
-        return Layer(self.surface, daily(getattr(params, name), params, self._radius), fresh, coarse)
+        return Layer(medium, daily(getattr(params, name), params, self._radius), fresh, coarse)
 
     def _wounding(self) -> Iterator[Seed]:
         """Yield what the wounds bring: rot, and mould where there is one."""
         kinds = (True, False) if self.mould is not None else (True,)
-        for wound in seeds(self._params):
+        for wound in seeds(self.params):
             ray = directions(*np.radians([wound.colatitude, wound.azimuth]))
             if wound.vertex is not None:
                 ray = self._rays[wound.vertex]
             centre = self._place(ray) if wound.vertex is None else self.surface.points[wound.vertex]
             for rots in kinds:
                 yield Seed(rots, ray, centre, wound.radius)
-        if self._params.wound_map:
+        if self._painted is not None:
             for rots in kinds:
                 yield Seed(rots, None, None, 0.0)
 
     def _opened(self) -> Floats:
-        """Return where wounds have broken the skin on day 0, 0 to 1 (v)."""
-        found = np.zeros(len(self.surface.points))
+        """Return where wounds and cuts have broken the skin on day 0, 0 to 1 (v)."""
+        found = self.bare.astype(float)
         for seed in self._wounding():
             if seed.place is None:
-                found = np.maximum(found, painted(self._params.wound_map, self._rays))
+                assert self._painted is not None
+                found = np.maximum(found, self._painted)
             else:
                 far = ((self.surface.points - seed.place) ** 2).sum(axis=1)
                 found = np.maximum(found, np.clip(1 - far / seed.radius**2, 0, None) ** 2)
@@ -138,7 +170,8 @@ class System:
         gate = None if seed.rots else self.gate(state.rot)
         share = _INOCULUM if self._cardinal else 1.0
         if seed.ray is None or seed.place is None:
-            map_ = share * painted(self._params.wound_map, self._rays)
+            assert self._painted is not None
+            map_ = share * self._painted
             grown = layer.painted(here, map_ if gate is None else map_ * gate)
         else:
             (self._rot_spawner if seed.rots else self._mould_spawner).settle(seed.ray, day)
@@ -148,54 +181,69 @@ class System:
     @property
     def imported(self) -> bool:
         """Whether the surface is a mesh of the user's own, whose vertices have the fields."""
-        return self._params.mesh is not None
+        return self.params.mesh is not None
 
     @property
     def steady(self) -> bool:
         """Whether nothing from outside changes in time."""
-        return not self._params.weather
+        return not self.params.weather
 
     def gate(self, rot: State) -> Floats:
         """Return where the mould may spread, 0 to 1 (v)."""
-        return gates(self.rot.share(rot))
+        return gates(self.rotten(rot))
+
+    def rotten(self, rot: State) -> Floats:
+        """Return the map of the rot on the skin (v)."""
+        return self.rot.share(rot)[: len(self.surface.points)]
 
     def advance(self, state: Both, day: float, dt: float) -> Both:
         """Return the state dt [day] after a day, without new colonies; rot and air are those of the step's middle."""
-        middle, params = day + dt / 2, self._params
-        flesh = flesh_activity(params, state.water) if self._cardinal else 1.0
-        rates = self._rates(params.rot, middle, self.rot.rates)
-        if self._cardinal:
+        middle, params = day + dt / 2, self.params
+        flesh: float | Floats = flesh_activity(params, state.water) if self._cardinal else 1.0
+        rates, pace = self._rates(params.rot, middle, self.rot.rates), None
+        if self._cardinal and state.wet is not None:
+            flesh = activity(state.wet)
+            pace = np.asarray(moisture(params.rot, flesh))
+            flesh = flesh[: len(self.surface.points)]
+        elif self._cardinal:
             rates = rates.slowed(float(moisture(params.rot, flesh)))
-        rot = self.rot.advance(state.rot, dt, rates=rates)
+        rot = self.rot.advance(state.rot, dt, rates=rates, pace=pace)
         broken = [self.broken(x) for x in (state.rot, rot)]
-        water = self._evaporated(state.water, (broken[0] + broken[1]) / 2, day, day + dt)
+        water, wet = self._dried(state, (broken[0] + broken[1]) / 2, day, day + dt)
         if self.mould is None or state.mould is None:
-            return Both(rot, None, water)
-        ground = (self.rot.share(state.rot) + self.rot.share(rot)) / 2
+            return Both(rot, None, water, wet)
+        ground = (self.rotten(state.rot) + self.rotten(rot)) / 2
         pace = None
         if self._cardinal:
             out = surface_activity(params, middle, flesh, (broken[0] + broken[1]) / 2, self.damp)
             pace = np.asarray(moisture(params.mould, flesh + params.mould.exposed * (out - flesh)))
         rates = self._rates(params.mould, middle, self.mould.rates)
-        return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water)
+        return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water, wet)
+
+    def _dried(self, state: Both, broken: Floats, start: float, end: float) -> tuple[float, Floats | None]:
+        """Return the water lost by the end, with a share (v) of the skin broken, and what is left where."""
+        if self._water is None or state.wet is None:
+            return self._evaporated(state.water, broken, start, end), None
+        wet = self._water.advance(state.wet, broken, start, end, self.dries)
+        return self._water.lost(wet), wet
 
     def _rates(self, colony: Colony, day: float, steady: Rates) -> Rates:
-        return daily(colony, self._params, self._radius, day) if self._params.weather else steady
+        return daily(colony, self.params, self._radius, day) if self.params.weather else steady
 
     def broken(self, rot: State) -> Floats:
         """Return where the skin is rotten or wounded, 0 to 1 (v)."""
-        return np.maximum(self.rot.share(rot), self._wounds)
+        return np.maximum(self.rotten(rot), self._wounds)
 
     def _evaporated(self, before: float, broken: Floats, start: float, end: float) -> float:
         """Return the water lost by the end, with a share (v) of the skin broken meanwhile."""
-        params = self._params
+        params = self.params
         skin = params.transpiration + (opened(params) - params.transpiration) * self.surface.mean(broken)
-        lost = skin * evaporated(params, self._extent, start, end) * self.dries
+        lost = skin * evaporated(params, self.extent, start, end) * self.dries
         return min(before + lost, params.water_content / 100)
 
     def conductance(self, rot: State) -> float:
         """Return the mean conductance of the whole skin, rotten places and wounds among it [g/(m2 s MPa)]."""
-        params = self._params
+        params = self.params
         more = opened(params) - params.transpiration
         return params.transpiration + more * self.surface.mean(self.broken(rot))
 
@@ -217,14 +265,14 @@ class System:
     def distance(self, a: Both, b: Both) -> float:
         """Return the largest relative L2 difference of density u + v between two states, of rot and of mould."""
         worst = 0.0
-        for x, y in zip(a[:2], b[:2], strict=True):
-            if x is None or y is None:
+        for layer, x, y in zip((self.rot, self.mould), a[:2], b[:2], strict=True):
+            if layer is None or x is None or y is None:
                 continue
-            there = y.u + y.v
-            size = self.surface.total(there**2)
+            medium, there = layer.surface, y.u + y.v
+            size = medium.total(there**2)
             if size > 0:
                 gap = x.u + x.v - there
-                worst = max(worst, float(np.sqrt(self.surface.total(gap**2) / size)))
+                worst = max(worst, float(np.sqrt(medium.total(gap**2) / size)))
         return worst
 
     def next_root(self, state: Both, until: float) -> float:
@@ -257,10 +305,10 @@ class System:
 
     def _place(self, ray: Floats) -> Floats:
         """Return the point (3) of the skin in a unit direction; of an imported mesh the vertex nearest to it."""
-        if self._params.mesh is not None:
+        if self.params.mesh is not None:
             return np.asarray(self.surface.points[int(self._tree.query(ray)[1])])
         x, y, z = ray
-        return self._params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
+        return self.params.surface(np.arccos(np.clip(y, -1, 1)), np.arctan2(z, x))
 
     def _roots(self, state: Both, landing: Landing, site: int, rots: bool) -> bool:
         rotten = float(self.rot.share(state.rot)[site])
@@ -276,4 +324,4 @@ class System:
     def _growing(self, rots: bool, day: float) -> float:
         if not self._cardinal:
             return 1.0
-        return float(warmth(self._params.rot if rots else self._params.mould, air(self._params, day)[0]))
+        return float(warmth(self.params.rot if rots else self.params.mould, air(self.params, day)[0]))

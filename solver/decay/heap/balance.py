@@ -10,15 +10,16 @@ body that nothing carries from falling without end in one step; it is gone where
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...arrays import Bools, Floats, Ints
-from ...contract import NotConverged
 from ...linalg.krylov import times
 from ..body.equilibrium import Rest
 from ..body.material import Blocks, energy, forces, hessian
+from ..body.newton import Ways, descended, scales, shortened
 from .linear import Ahead, Ranks, coarse, solved
 from .lying import Ground
 from .touching import Pairs, planes
@@ -27,13 +28,13 @@ __all__ = ["Loaded", "Met", "Settled", "settled"]
 
 #: Newton steps, changes of contacts within one, halvings of a step, iterations of the linear solver.
 _STEPS, _CHANGES, _HALVINGS, _ITERATIONS = 120, 20, 30, 250
-#: Least part of a direction that is tried for the model.
-_LEAST = 1e-3
 #: How far a body falls in one step at most, about [r1].
 _FALL = 0.15
-#: Strains below this count as none; round-off of the energy, over the energy of a strain of 1.
-_NOTHING = 1e-6
+#: Round-off of the energy, over the energy of a strain of 1.
 _ROUND_OFF = 1e-13
+
+
+_ADVICE = "Make the flesh firmer, let the rot take less length (rot_collapse), or ask for earlier stages."
 
 
 class Loaded(NamedTuple):
@@ -172,38 +173,22 @@ def settled(
         NotConverged: no step lowers the energy any more, or there were too many.
 
     """
-    x = start.copy()
-    nothing = _NOTHING * float(np.mean(rest.mu)) * float(np.mean(rest.volume)) ** (2 / 3) * len(x) ** 0.5
-    slack = _ROUND_OFF * float(np.sum(rest.mu * rest.volume))
+    nothing, slack = scales(rest.mu, rest.volume, len(start), _ROUND_OFF)
     inertia = loads.weight / _FALL
-    now = _potential(x, rest, loads)
-    if not np.isfinite(now):
-        raise NotConverged("the heap to start from is inverted.", advice="Ask for stages closer together.")
-    residual = np.inf
-    for step in range(_STEPS):
-        watch()
+
+    def slope(x: Floats) -> tuple[Floats, float, Any]:
         g, scale, least, found, lean = _slope(x, rest, loads)
-        before, residual = residual, float(np.linalg.norm(g) / (np.linalg.norm(scale) + nothing))
-        residual = max(residual, _uncarried(g, loads))
-        if residual <= tolerance:
-            return Settled(x, residual, step, least, found)
-        asked = min(0.1, max(0.5 * residual / max(before, residual), 0.3 * tolerance / residual, 1e-6))
-        d = _direction(x, g, rest, loads, pattern, found, lean, inertia, asked)
-        down, share = float(np.sum(g * d)), 1.0
-        for _ in range(_HALVINGS):
-            then = _potential(x + share * d, rest, loads)
-            if then <= now + 1e-4 * share * down + slack:
-                break
-            share /= 2
-        else:
-            break
-        x += share * d
-        now = then
-    raise NotConverged(
-        f"the heap stopped at a residual of {residual:.1e}.",
-        residual=residual,
-        advice="Make the flesh firmer, let the rot take less length (rot_collapse), or ask for earlier stages.",
-    )
+        residual = float(np.linalg.norm(g) / (np.linalg.norm(scale) + nothing))
+        return g, max(residual, _uncarried(g, loads)), (least, found, lean)
+
+    def direction(x: Floats, g: Floats, said: Any, asked: float) -> Floats:
+        _, found, lean = said
+        return _direction(x, g, rest, loads, pattern, found, lean, inertia, asked)
+
+    ways = Ways(lambda x: _potential(x, rest, loads), slope, direction)
+    rested = descended(start, ways, tolerance, _STEPS, slack, ("heap", "heap"), _ADVICE, watch, _HALVINGS)
+    least, found, _ = rested.said
+    return Settled(rested.points, rested.residual, rested.steps, least, found)
 
 
 def _uncarried(g: Floats, loads: Loaded) -> float:
@@ -246,9 +231,7 @@ def _direction(
             straight = system.without(more)
             gain, bend = float(np.sum((plain + bent) * more)), float(np.sum(more * straight)) / 2
             # the model is convex: with its own contacts at d this leads down, if only a part of the way
-            part, held = 1.0, _pressed(x + d, x, found, loads)
-            while part > _LEAST and _pressed(x + d + part * more, x, found, loads) + part * (gain + part * bend) > held:
-                part /= 2
+            part = shortened(partial(_along, x, d, more, found, loads), gain, bend)
             d += part * more
             bent += part * straight
             then = met(x + d, loads)
@@ -273,6 +256,10 @@ def _pressed(y: Floats, x: Floats, found: Met, loads: Loaded) -> float:
     deep = _depth(y, loads, there, lean)
     below = np.maximum(_linear_depth(x, loads.ground) - _way_out(y - x, found), 0.0)
     return float(np.sum(loads.contact * below**2) + np.sum(loads.contact[lean.point] * deep**2)) / 2
+
+
+def _along(x: Floats, d: Floats, more: Floats, found: Met, loads: Loaded, part: float) -> float:
+    return _pressed(x + d + part * more, x, found, loads)
 
 
 def _alike(one: _Linear, other: _Linear) -> bool:

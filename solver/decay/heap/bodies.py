@@ -17,6 +17,7 @@ from ..body.body import CONTACT, DENSITY, Body
 from ..body.equilibrium import rested
 from ..body.flesh import Booked, Softened
 from ..body.material import blocks
+from ..body.newton import skin_areas
 from ..params import DecayParams
 from ..settings import Settings
 from ..surfaces.surface import Surface
@@ -67,10 +68,7 @@ class Bodies:
         cubed = np.repeat(lying.size**3, len(solid.tets))
         self._volume = np.tile(solid.volume, count) * cubed
         fresh = params.flesh.unit * params.firmness
-        areas = np.zeros(size)
-        corners = solid.points[solid.skin[solid.faces]]
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-        areas[solid.skin] = np.bincount(solid.faces.ravel(), np.repeat(area / 3, 3), len(solid.skin))
+        areas = skin_areas(solid)
         edge = float(np.cbrt(solid.volume.mean()))
         self._contact = np.concatenate([areas * s**2 for s in lying.size]) * CONTACT * fresh / edge
         shared = np.repeat(self._volume / 4, 4)

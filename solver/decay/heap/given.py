@@ -49,6 +49,8 @@ class Heap(BaseModel):
     @model_validator(mode="after")
     def _there(self) -> Self:
         count = len(self.places) or self.fruits
+        if self.places and "fruits" in self.model_fields_set and self.fruits != count:
+            raise ValueError(f"{count} places and {self.fruits} fruits: name as many, or leave fruits out")
         for number in self.infected:
             if not 0 <= number < count:
                 raise ValueError(f"infected names fruit {number}: they are numbered 0 to {count - 1}")

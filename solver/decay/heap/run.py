@@ -57,7 +57,8 @@ class HeapRun:
         self._params, self._need, self._settings, self._heap = params, need, settings, params.heap
         self.wanted = wanted
         self._with_mould = bool(wanted & MOULD)
-        self._single = params.model_copy(update={"heap": None, "wounds": (), "wound_map": (), "seeds": "wounds"})
+        sound = {"wounds": (), "wound_map": (), "wound_photo": None, "seeds": "wounds"}
+        self._single = params.model_copy(update={"heap": None, **sound})
         self._surface: Surface = laid(self._single, settings.cells)
         self._lying: Lying = lie(params)
         start = stiff(self._lying, self._surface)
@@ -82,7 +83,7 @@ class HeapRun:
             "seed": int(separate(params, 2 + b).integers(2**31)),
         }
         if b in heap.infected:
-            update |= {"wounds": params.wounds, "wound_map": params.wound_map}
+            update |= {name: getattr(params, name) for name in ("wounds", "wound_map", "wound_photo")}
         if params.seeds == "contacts":
             update["wounds"] = tuple(self._touched(b, start))
         return self._single.model_copy(update=update)

@@ -11,18 +11,21 @@ from ...arrays import Floats, Ints32
 from ...contract import Context, InvalidInput, Need
 from ...fruit import lattice, window
 from ..body.flesh import Booked
-from ..environment import water_lost
+from ..environment import reference_radius, water_lost
 from ..fields.system import laid
 from ..names import BODY
 from ..params import DecayParams
+from ..puddle import puddle_radius
 from ..settings import Settings, moved
 from . import dried
 from .imported import extent_of
 from .surface import Surface, extent, geodesic
 
 if TYPE_CHECKING:
+    from ..body.body import Body
     from ..body.equilibrium import Balance
     from ..body.skin import Settled
+    from ..within.inner import Held, Inner
 
 __all__ = ["Shape"]
 
@@ -40,7 +43,7 @@ _NONE = _Settled(None, None)
 class Shape:
     """What the need asks of the fruit's shape, water lost included; nothing else is laid, filled or settled.
 
-    surface: the mesh that was laid, if one had to be.
+    surface: the mesh that was laid, if one had to be. inner: flesh with fields of its own, put in by who steps them.
     """
 
     def __init__(self, params: DecayParams, need: Need, settings: Settings) -> None:
@@ -55,7 +58,9 @@ class Shape:
         # an open patch does not say how much it closes: water is lost by the fruit of the parameters
         self._closed = extent_of(self.surface) if own and self.surface is not None else extent(params)
         self._extent = self._closed or extent(params)
-        self._body = self._wrinkles = None
+        self.inner: Inner | None = None
+        self._body: Body | None = None
+        self._wrinkles = None
         self._node = self._earlier = _NONE
         if moves and self.surface is not None:
             from ..body.body import Body
@@ -65,6 +70,11 @@ class Shape:
                 from ..body.wrinkles import Wrinkles
 
                 self._wrinkles = Wrinkles(params, params.skin, self._body, settings)
+
+    @property
+    def body(self) -> Body | None:
+        """The body that moves, if one does."""
+        return self._body
 
     def check(self, context: Context) -> None:
         """Refuse, before any step, what no table can answer.
@@ -112,8 +122,8 @@ class Shape:
         assert self.surface is not None
         return self.surface.faces.astype(np.int32)
 
-    def at(self, water: float, rot: Floats | None, context: Context) -> dict[str, Any]:
-        """Return the wanted shape of a day, with rot (v) on the surface's vertices.
+    def at(self, water: float, rot: Floats | None, held: Held | None, context: Context) -> dict[str, Any]:
+        """Return the wanted shape of a day, with rot (v) on the surface's vertices and what the flesh holds.
 
         Raises:
             NotConverged: body or skin found no equilibrium.
@@ -122,16 +132,12 @@ class Shape:
         """
         wanted, need = self._wanted, self._need
         row: dict[str, Any] = {}
-        (balance, folds), found = self._settled(water, rot, context)
+        (balance, folds), found = self._settled((water, rot, held), context)
         row |= found
         booked = balance.booked if balance and balance.booked else Booked(1 - water, water, 0.0, 0.0)
-        if "water_lost" in wanted:
-            row["water_lost"] = booked.evaporated
-        row |= {
-            name: value
-            for name, value in (("mass", booked.mass), ("juice_lost", booked.juice), ("respired", booked.respired))
-            if name in wanted
-        }
+        row |= self._weighed(booked)
+        if self.inner is not None and "flesh_position" in wanted:
+            row["flesh_position"] = self.inner.positions(balance).astype(need.dtype)
         if "least_jacobian" in wanted:
             row["least_jacobian"] = balance.least_jacobian if balance else 1.0
         if wanted & {"position", "displacement"}:
@@ -169,7 +175,20 @@ class Shape:
                 row["density"] = booked.mass / (swells if self._closed else 1.0)
         return row
 
-    def follow(self, water: float, rot: Floats | None, context: Context) -> None:
+    def _weighed(self, booked: Booked) -> dict[str, Any]:
+        """Return what is wanted of where the weight is."""
+        grams = booked.juice * self._params.weight
+        radius = reference_radius(self._params, self._extent)
+        found = {
+            "water_lost": booked.evaporated,
+            "mass": booked.mass,
+            "juice_lost": booked.juice,
+            "puddle": puddle_radius(grams, self._params.flesh.gravity) / radius,
+            "respired": booked.respired,
+        }
+        return {name: value for name, value in found.items() if name in self._wanted}
+
+    def follow(self, water: float, rot: Floats | None, held: Held | None, context: Context) -> None:
         """Settle a day of the march: later days, stages among them, start from its shape.
 
         Raises:
@@ -177,17 +196,17 @@ class Shape:
 
         """
         # nodes are evenly spaced: the last two say where the next one will be; a stage lies somewhere between
-        found, _ = self._settled(water, rot, context, self._earlier)
+        found, _ = self._settled((water, rot, held), context, self._earlier)
         self._earlier, self._node = self._node, found
 
     def _settled(
-        self, water: float, rot: Floats | None, context: Context, earlier: _Settled = _NONE
+        self, state: tuple[float, Floats | None, Held | None], context: Context, earlier: _Settled = _NONE
     ) -> tuple[_Settled, dict[str, Any]]:
         """Return the moved shape of a day, and what is kept of how it was found."""
         if self._body is None:
             return _Settled(None, None), {}
         watch, before = context.check_cancelled, self._node
-        balance = self._body.settled(self._body.state(water, rot), before.balance, watch, earlier.balance)
+        balance = self._body.settled(self._body.state(*state), before.balance, watch, earlier.balance)
         row: dict[str, Any] = {"body_residual": balance.residual, "body_steps": balance.steps}
         folds = None
         if self._wrinkles is not None and (self._wanted & BODY) - {"least_jacobian"}:

@@ -69,6 +69,11 @@ class Surface:
     weight: Floats
     stiffest: float
 
+    @property
+    def skin(self) -> Surface:
+        """What of it is surface, whose points come first: all."""
+        return self
+
     def mean(self, field: Floats | Bools) -> float:
         """Return the area-weighted mean of a field (v)."""
         return self.total(field) / self.total(1.0)

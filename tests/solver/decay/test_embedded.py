@@ -9,11 +9,11 @@ from solver.decay import SOLVER, DecayParams
 from solver.decay.body import embedded
 from solver.decay.body.rind import rind
 from solver.decay.body.solid import volumes
-from solver.decay.body.stuffing import boundary, pieces, stuffed
 from solver.decay.fields.system import laid
 from solver.decay.surfaces.surface import lay
 from solver.geometry.inside import inside
 from solver.geometry.nearest import nearest
+from solver.geometry.stuffing import boundary, pieces, stuffed
 
 BODY = ("mesh_position", "triangle", "volume", "density", "mass", "water_lost", "least_jacobian")
 STILL = {"rot_collapse": 0.0, "rot_softness": 0.0, "rot_respired": 0.0}

@@ -156,3 +156,10 @@ def test_what_a_heap_cannot_be_is_refused():
         SOLVER.solve(
             SOLVER.parse({"heap": {"fruits": 60, "bowl": 1.6}}, "orange"), Need(stages=(0.1,), quality="preview")
         )
+
+
+def test_as_many_fruits_as_places_or_none_are_named():
+    assert SOLVER.parse({"heap": {"places": PILE}}).heap.count == len(PILE)
+    assert SOLVER.parse({"heap": {"places": PILE, "fruits": len(PILE)}}).heap.count == len(PILE)
+    with pytest.raises(InvalidInput, match=f"{len(PILE)} places and 20 fruits"):
+        SOLVER.parse({"heap": {"places": PILE, "fruits": 20}})

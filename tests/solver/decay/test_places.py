@@ -51,6 +51,61 @@ def test_painted_wounds_are_where_the_paint_is_and_keep_the_budget():
     assert run.mean_rot[1] > run.mean_rot[0] > 0
 
 
+def taken_from(azimuth: float, spot: np.ndarray, size: int = 96) -> np.ndarray:
+    """A photograph of a ball by a camera far away, upright: white within 25 degrees of a spot, by a look-at matrix."""
+    camera = np.array([np.cos(np.radians(azimuth)), 0.0, np.sin(np.radians(azimuth))])
+    right = np.cross(-camera, [0.0, 1.0, 0.0])
+    x, y = np.meshgrid((np.arange(2 * size) + 0.5) / size - 1, 1 - (np.arange(size) + 0.5) / size * 2)
+    deep = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
+    place = x[..., None] * right + y[..., None] * np.array([0, 1.0, 0]) + deep[..., None] * camera
+    return np.where((x**2 + y**2 < 1) & (place @ spot > np.cos(np.radians(25))), 1.0, 0.0)
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 90.0, 205.0])
+def test_wounds_of_a_photograph_are_where_they_are_seen(azimuth):
+    spot = directions(np.radians(60.0), np.radians(azimuth + 30))
+    photo = {"values": taken_from(azimuth, spot).tolist(), "azimuth": azimuth}
+    system = System(SOLVER.parse({"wounds": (), "wound_photo": photo, "climate": "paper"}), 16, False)
+    rot, near = system.rot.share(system.start.rot), geodesic(16)[0] @ spot
+    assert (rot[near > np.cos(np.radians(20))] > 0.1).all()
+    assert (rot[near < np.cos(np.radians(31))] == 0).all()
+
+
+def test_a_picture_alone_is_a_photograph_from_the_front():
+    spot = directions(np.radians(100.0), np.radians(90.0))
+    photo = taken_from(90.0, spot).tolist()
+    system = System(SOLVER.parse({"wounds": (), "wound_photo": photo, "climate": "paper"}), 8, False)
+    rot = system.rot.share(system.start.rot)
+    assert rot[np.argmax(geodesic(8)[0] @ spot)] > 0.1
+
+
+def test_bright_skin_feeds_more_and_what_is_not_seen_as_the_mean():
+    """A photograph from z > 0 that is brighter to the right by a straight line."""
+    even = {"unevenness": 0.0, "wounds": (), "nutrient": 0.5}
+    rows = np.tile(np.linspace(0.005, 0.995, 128), (64, 1))
+    fresh = System(SOLVER.parse({**even, "nutrient_photo": rows.tolist()}), 16, True).start
+    rays = geodesic(16)[0]
+    right = np.cross([0, 0, -1.0], [0, 1.0, 0])
+    shown = rays[:, 2] > 0.05
+    expected = 0.5 * (1 + rays @ right)
+    for state in (fresh.rot, fresh.mould):
+        assert np.abs(state.n - expected)[shown].max() < 0.01
+        assert np.allclose(state.n[rays[:, 2] < -0.01], 0.5)
+
+
+def test_painted_nutrients_feed_skin_and_flesh():
+    theta, _ = lattice(32)
+    rows = np.where(theta < np.pi / 2, 1.0, 0.25)
+    values = {"unevenness": 0.0, "nutrient_map": rows.tolist(), "stone": (0, 0), "within": {}}
+    system = System(SOLVER.parse(values), 16, True, None, 3000)
+    assert system.joint is not None
+    state = system.start
+    up = system.joint.points[:, 1]
+    assert np.allclose(state.rot.n[up > 0.15], SOLVER.parse({}).nutrient)
+    assert np.allclose(state.rot.n[up < -0.15], 0.25 * SOLVER.parse({}).nutrient)
+    assert len(state.mould.n) == len(system.surface.points)
+
+
 def test_contacts_seed_stem_floor_and_what_is_touched():
     beside = [{"position": (2.0, 0.0, 0.0)}, {"position": (0.0, 0.0, -2.03)}, {"position": (0.0, 0.0, 3.0)}]
     found = seeds(SOLVER.parse({"seeds": "contacts", "neighbours": beside}, "orange"))

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from ...arrays import Bools, Floats, Ints
-from ...geometry.inside import inside
-from ...geometry.nearest import nearest
+from ..arrays import Bools, Floats, Ints
+from .inside import inside
+from .nearest import nearest
 
 __all__ = ["Stuffed", "boundary", "pieces", "stuffed"]
 

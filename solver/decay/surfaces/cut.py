@@ -1,0 +1,124 @@
+"""Fruits that are cut: halves, slices and wedges as bodies of their own, closed by their cut faces (D54).
+
+Vertices that lie nearer to a plane than a share of an edge are moved into it first, so that no sliver is left to make
+steps dear. What is left is a closed mesh, whose vertices in a plane are bare flesh.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from ...arrays import Bools, Floats, Ints
+from ...contract import InvalidInput
+from ...geometry.halved import Halved, face, halved
+from .imported import Mesh, extent_of
+from .surface import Surface, triangulated
+
+__all__ = ["Cut", "Left", "bare", "left"]
+
+#: Share of an edge within which a vertex is moved into a plane, and the distance below which two places are one [r1].
+_SNAP, _ONE = 0.35, 1e-7
+
+
+class Cut(BaseModel):
+    """A plane that takes a part of the fruit away."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    point: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="A point of the plane [r1]")
+    normal: tuple[float, float, float] = Field(description="Across the plane, to the part that goes [1]")
+
+    @field_validator("normal")
+    @classmethod
+    def _across(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not 1e-9 < np.linalg.norm(value) < 1e9:
+            raise ValueError("a normal has a length: 0,0,1, say")
+        return value
+
+    def away(self, points: Floats) -> Floats:
+        """Return how far points (k, 3) are beyond the plane [r1]."""
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        found: Floats = (points - np.array(self.point)) @ normal
+        return found
+
+
+class Left(BaseModel):
+    """What cuts leave of a fruit: its mesh, and its volume over that of the whole."""
+
+    mesh: Mesh
+    share: float
+
+
+def bare(cuts: tuple[Cut, ...], points: Floats) -> Bools:
+    """Return which points (k, 3) lie in a cut."""
+    found = np.zeros(len(points), np.bool_)
+    for cut in cuts:
+        found |= np.abs(cut.away(points)) < 10 * _ONE
+    return found
+
+
+def left(surface: Surface, cuts: tuple[Cut, ...]) -> Left:
+    """Return what the cuts leave of a closed surface.
+
+    Raises:
+        InvalidInput: the surface is open, or a cut misses it or leaves nothing of it.
+
+    """
+    whole = extent_of(surface)
+    if whole is None:
+        raise InvalidInput("an open mesh has no inside that a cut could show.", advice="Close it, or leave cuts out.")
+    points, faces = surface.points, surface.faces
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    if float(np.sum(a * np.cross(b, c))) < 0:
+        faces = faces[:, ::-1]
+    edge = float(np.median(np.linalg.norm(points[faces[:, 0]] - points[faces[:, 1]], axis=1)))
+    for number, cut in enumerate(cuts):
+        points, faces = _cut(points, faces, cut, edge, number)
+    mesh = Mesh(points=tuple(map(tuple, points.tolist())), faces=tuple(map(tuple, faces.tolist())))
+    found = extent_of(triangulated(points, faces))
+    if found is None:
+        raise InvalidInput(
+            "the cuts do not leave a closed body.", advice="Move them a little, or take a mesh without folds."
+        )
+    return Left(mesh=mesh, share=found.volume / whole.volume)
+
+
+def _cut(points: Floats, faces: Ints, cut: Cut, edge: float, number: int) -> tuple[Floats, Ints]:
+    normal = np.array(cut.normal) / np.linalg.norm(cut.normal)
+    away = cut.away(points)
+    if not away.min() < -edge or not away.max() > edge:
+        raise InvalidInput(
+            f"cut {number} {'leaves nothing of' if away.max() > edge else 'misses'} the fruit.",
+            advice="Move its point: the middle of the fruit is near 0,0,0, and its normal shows to the part that goes.",
+        )
+    near = np.abs(away) < _SNAP * edge
+    points = np.where(near[:, None], points - away[:, None] * normal, points)
+    half = _welded(halved(points, faces, np.array(cut.point), normal))
+    closing = face(half, np.array(cut.point), normal, edge)
+    known = len(closing.numbers)
+    place = np.concatenate([closing.numbers, len(half.points) + np.arange(len(closing.points) - known)])
+    return np.concatenate([half.points, closing.points[known:]]), np.concatenate(
+        [half.triangles, place[closing.triangles]]
+    )
+
+
+def _welded(half: Halved) -> Halved:
+    """Return a half whose points that lie in one place are one, without the triangles that have none left to cover."""
+    pairs = KDTree(half.points).query_pairs(_ONE, output_type="ndarray")
+    graph = sparse.csr_array((np.ones(len(pairs)), pairs.T), shape=(len(half.points),) * 2)
+    linked: Any = graph
+    _, back = connected_components(linked, directed=False)
+    _, first = np.unique(back, return_index=True)
+    triangles, rim = back[half.triangles], back[half.rim]
+    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    used, again = np.unique(triangles[whole], return_inverse=True)
+    place = np.full(len(first), -1)
+    place[used] = np.arange(len(used))
+    rim = place[rim[rim[:, 0] != rim[:, 1]]]
+    return Halved(half.points[first[used]], again.reshape(-1, 3), rim, half.taken[first[used]])
