@@ -103,6 +103,7 @@ def test_glimpses_of_a_step_lead_to_its_equilibrium_and_change_nothing():
         assert np.array_equal(x(live), at_rest)
     seen = [found for found in seen if found is not None]
     assert len(seen) > 5
+    assert not any(np.array_equal(a.surface.vertices, b.surface.vertices) for a, b in pairwise(seen))
     assert {found.stage for found in seen} == {1.0}
     assert np.array_equal(x(live), x(alone))
     assert live.glimpse(()) is None
