@@ -21,7 +21,7 @@ from .words import OWN, QUALITIES, check, number_of, problem
 __all__ = ["Desk"]
 
 #: Seconds of work between two looks at what has come.
-_SLICE = 0.01
+_SLICE = 0.005
 #: Seconds without work after which the client gets every digit.
 _REST = 0.3
 #: Processor seconds after which a step that has no end waits for somebody who wants it.
@@ -228,7 +228,7 @@ class Desk:
         self._exact, self.held = None, True
 
     def work(self) -> None:
-        """Work for a hundredth of a second, and show what came of it."""
+        """Work for some milliseconds, and show what came of it."""
         if self.held:
             return
         try:
