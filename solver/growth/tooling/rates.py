@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..state import State
+from .agreeing import agreed
 from .reach import within
 from .tools import HotCurve, HotSpot, HotStroke, HotSurface, Tool, intensities
 
@@ -61,10 +62,10 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
 def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     """Return rest metrics (f, 3) and rest angles (h,) after dt: G = exp(2 dt strain) in each triangle's rest frame.
 
-    Angles stay under stretching (so that a sphere's curvature scales by 1/s) and take what curving adds. What does not
-    grow keeps its numbers.
+    Neighbours agree on what their common edge grows by (`agreed`). Angles stay under stretching (so that a sphere's
+    curvature scales by 1/s) and take what curving adds. What does not grow keeps its numbers.
     """
-    some = np.flatnonzero(_nonzero(found.strain) | _nonzero(found.curving))
+    mesh, some = state.mesh, np.flatnonzero(_nonzero(found.strain) | _nonzero(found.curving))
     h11, h12, h22 = (dt * found.strain[some]).T
     mean, half = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
     slope = np.where(half > 1e-12, np.sinh(half) / np.maximum(half, 1e-300), 1.0)
@@ -77,7 +78,8 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     u11, u12 = e11 * l11, e11 * l12 + e12 * l22
     u21, u22 = e12 * l11, e12 * l12 + e22 * l22
     moved, g = _nonzero(found.strain[some]), state.g.copy()
-    g[some[moved]] = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)[moved]
+    own = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)[moved]
+    g[some[moved]] = agreed(state.g[some[moved]], own, mesh.face_edges[some[moved]], len(mesh.edges))
     rest = state.rest
     if found.curving.any():
         k11, k12, k22 = (dt * found.curving[some]).T
@@ -90,7 +92,7 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
             ],
             -1,
         )
-        rest = rest + shell.added_angles(b, g, state.mesh)
+        rest = rest + shell.added_angles(b, g, mesh)
     return g, rest
 
 
