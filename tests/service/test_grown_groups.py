@@ -112,7 +112,7 @@ def test_usd_has_them_at_each_time(run, tmp_path: Path):
 
 
 def test_obj_keeps_whole_groups(tmp_path: Path):
-    """Triangles left of x = 0 in two groups, some of them in none: a border between two rows moves by no edge."""
+    """Triangles left of x = 0 in two groups, some of them in none: a border moves by half an edge at most."""
     path = tmp_path / "square.obj"
     lines = [f"v {x:.9g} {y:.9g} 0" for x, y, _ in POINTS]
     for face in FACES:
@@ -137,10 +137,20 @@ def test_obj_keeps_whole_groups(tmp_path: Path):
             inside.append(["left" in named, "low" in named])
     x, y = np.array(places)[:, 0] / GROWN, -np.array(places)[:, 2] / GROWN
     inside = np.array(inside)
+    # weights fall from 1 to 0 over the edges beyond the border
     edge = 2 / (COUNT - 1)
-    clear = (np.abs(x) > edge) & (np.abs(y) > edge)
+    clear = ((x < -1e-3) | (x > 0.75 * edge)) & ((y < -1e-3) | (y > 0.75 * edge))
     assert clear.sum() > 50
     assert np.array_equal(inside[clear], np.stack([x < 0, (x < 0) & (y < 0)], -1)[clear])
+
+
+def test_a_point_that_no_triangle_has_leaves_with_its_weight():
+    points, weights = [[9.0, 9.0, 9.0], *POINTS.tolist()], [7.0, *slope(*POINTS.T[:2]).tolist()]
+    mesh = {"points": points, "faces": (FACES + 1).tolist(), "groups": {"pace": weights}}
+    run = SOLVER.solve(
+        SOLVER.parse({"mesh": mesh, "tools": []}), Need(fields=("mesh_position",), stages=(0.0,), quality="preview")
+    )
+    assert run.group_weight.values[:, 0] == pytest.approx(weights[1:], rel=1e-6)
 
 
 def test_groups_that_do_not_fit_are_refused():
