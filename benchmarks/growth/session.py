@@ -96,7 +96,7 @@ def painted(url: str, token: str, name: str, vertices: int) -> Painted:
         at = [float(np.cos(turn)), float(np.sin(turn)), 0.0]
         way = [-at[1], at[0], 0.0]
         client.do("brush", at=at, way=way, radius=0.4, stretch=[_BY, _BY])
-        client.until(lambda c: _holds(c.frames[-1], c.last))
+        client.until(lambda c: bool(c.frames) and _holds(c.frames[-1], c.last))
         seen = [f for f in client.frames[-_MANY:] if f["input"] >= client.last]
         first.append(seen[0]["ms"])
         rest.append(seen[-1]["ms"])
