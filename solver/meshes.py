@@ -9,7 +9,8 @@ metres stands in `attrs["metres_per_unit"]` where it is known. A mesh that keeps
 coordinates of their corners, `texture_coordinate(texture_vertex, uv)` with v upwards and `texture_triangle(face,
 corner)`, and with `face_material(face)`, numbers of the names in `attrs["materials"]`, a JSON list. One that changes
 its triangles has them end to end as well, with `texture_count(stage)`; its texture triangles count from the first
-texture vertex of their own stage.
+texture vertex of their own stage. Either may have `group_weight(vertex, group)`, weights of the vertices in groups that
+`attrs["groups"]` names, a JSON list; of one that changes its triangles they too stand end to end.
 """
 
 from __future__ import annotations

@@ -152,6 +152,7 @@ register(
     texture_coordinate=Quantity("1", "texture coordinates of a corner, v upwards", "uv"),
     texture_triangle=Quantity("1", "the texture coordinates of a triangle's three corners, from 0", "-"),
     face_material=Quantity("1", "the material of a triangle, from 0, as named in the attribute materials", "-"),
+    group_weight=Quantity("1", "weight of a vertex in a group, as named in the attribute groups", "w"),
     quad=Quantity("1", "the four vertices of a face as solved, whose triangles are (0, 1, 2) and (0, 2, 3)", "-"),
     vertex_count=Quantity("1", "number of vertices of this stage's mesh", "n_v"),
     face_count=Quantity("1", "number of triangles of this stage's mesh", "n_f"),

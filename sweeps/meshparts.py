@@ -1,4 +1,4 @@
-"""What a mesh file holds besides its shape: texture coordinates by corner, and the materials of its triangles.
+"""What a mesh file holds besides its shape: texture coordinates by corner, materials of triangles, groups of vertices.
 
 OBJ and GLB are read here as they are written. Libraries split an OBJ's vertices along its seams, lay several textures
 into one, and round what is stored; here each corner keeps its own pair of numbers, and each triangle its material.
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.arrays import Array, Floats, Ints
+from solver.contract.mesh import MOST_GROUPS
 
 __all__ = ["Parts", "glb", "obj"]
 
@@ -20,7 +21,7 @@ __all__ = ["Parts", "glb", "obj"]
 class Parts(NamedTuple):
     """Points (p, 3); triangles (f, 3); uv (w, 2), v upwards, and its numbers by corner (f, 3), or None of both.
 
-    materials: names; material (f): the number of each triangle's.
+    materials: names; material (f): the number of each triangle's. groups: weights (p,) of points by name.
     """
 
     points: Floats
@@ -29,6 +30,7 @@ class Parts(NamedTuple):
     corners: Ints | None
     materials: tuple[str, ...]
     material: Ints
+    groups: dict[str, Floats]
 
 
 def obj(text: str) -> Parts:
@@ -45,6 +47,8 @@ def obj(text: str) -> Parts:
     names: dict[str, int] = {}
     material: list[int] = []
     current = -1
+    groups: dict[str, set[int]] = {}
+    entered: list[set[int]] = []
     for line in text.splitlines():
         words = line.split()
         if words[:1] == ["v"]:
@@ -53,8 +57,13 @@ def obj(text: str) -> Parts:
             uv.append([float(word) for word in [*words[1:3], "0"][:2]])
         elif words[:1] == ["usemtl"]:
             current = names.setdefault(" ".join(words[1:]) or "material", len(names))
+        elif words[:1] == ["g"]:
+            # so Blender calls what is in none, and OBJ itself
+            entered = [groups.setdefault(word, set()) for word in words[1:] if word not in ("off", "default")]
         elif words[:1] == ["f"]:
             ends = [[_number(word, k, (len(points), len(uv))) for k in (0, 1)] for word in words[1:]]
+            for group in entered:
+                group.update(end[0] for end in ends)
             for b, c in pairwise(ends[1:]):
                 faces.append([ends[0][0], b[0], c[0]])
                 corners.append([ends[0][1], b[1], c[1]])
@@ -70,7 +79,18 @@ def obj(text: str) -> Parts:
         of_corner if textured else None,
         (*names, *(["skin"] if plain and names else [])),
         np.where(owned < 0, len(names), owned),
+        _weights({name: inside for name, inside in groups.items() if inside}, len(points)),
     )
+
+
+def _weights(groups: dict[str, set[int]], points: int) -> dict[str, Floats]:
+    """Return 1 for the points in each group, and 0; nothing where there are so many that they are parts of a scene."""
+    if len(groups) > MOST_GROUPS:
+        return {}
+    found: dict[str, Floats] = {name: np.zeros(points) for name in groups}
+    for name, inside in groups.items():
+        found[name][list(inside)] = 1.0
+    return found
 
 
 def _number(word: str, place: int, counts: tuple[int, int]) -> int:
@@ -126,17 +146,26 @@ def glb(data: bytes) -> Parts:
     points = np.concatenate([part.points for part in owners])
     if names == [""]:
         names = []
-    return Parts(points, faces, uv, None if uv is None else faces, tuple(name or "skin" for name in names), owned)
+    groups = {
+        name: np.concatenate([part.groups.get(name, np.zeros(len(part.points))) for part in owners])
+        for name in dict.fromkeys(name for part in owners for name in part.groups)
+    }
+    named = tuple(name or "skin" for name in names)
+    return Parts(points, faces, uv, None if uv is None else faces, named, owned, groups)
 
 
 class _Primitive(NamedTuple):
-    """Points (p, 3), faces (f, 3) and uv (p, 2), v downwards; key: which node and accessors the points are of."""
+    """Points (p, 3), faces (f, 3) and uv (p, 2), v downwards; key: which node and accessors the points are of.
+
+    groups: numbers (p,) of the application's own, attributes `_NAME`.
+    """
 
     points: Floats
     faces: Ints
     uv: Array | None
     material: str
     key: tuple[int, ...]
+    groups: dict[str, Floats]
 
 
 def _walk(document: dict[str, Any], binary: bytes, number: int, above: Floats, found: list[_Primitive]) -> None:
@@ -158,8 +187,11 @@ def _walk(document: dict[str, Any], binary: bytes, number: int, above: Floats, f
             name = ""
             if "material" in part:
                 name = document["materials"][part["material"]].get("name") or f"material {part['material']}"
-            key = (number, part["attributes"]["POSITION"], -1 if at is None else at)
-            found.append(_Primitive(points, faces, uv, name, key))
+            own = {n[1:]: k for n, k in part["attributes"].items() if n.startswith("_")}
+            scalars = {n: k for n, k in own.items() if document["accessors"][k]["type"] == "SCALAR"}
+            groups = {n: _accessor(document, binary, k).astype(float).ravel() for n, k in scalars.items()}
+            key = (number, part["attributes"]["POSITION"], -1 if at is None else at, *scalars.values())
+            found.append(_Primitive(points, faces, uv, name, key, groups))
     for child in node.get("children", []):
         _walk(document, binary, child, here, found)
 

@@ -1,4 +1,5 @@
 """Texture coordinates of meshes: those that a mesh came with, or such as xatlas lays out; and fields drawn on them.
+And the groups that a mesh came with.
 
 A texel has the value at its middle, linear on the triangle that covers it. What lies between the charts takes the
 nearest texel's, so that nothing of the background bleeds in where a picture is filtered or made smaller.
@@ -6,6 +7,9 @@ nearest texel's, so that nothing of the background bleeds in where a picture is 
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Collection
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,7 +23,10 @@ from .seam import Seam
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Texels", "drawn", "laid", "materials", "own", "texels"]
+__all__ = ["Texels", "drawn", "groups", "laid", "materials", "own", "texels"]
+
+#: What vertices of PLY files have.
+_TAKEN = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue")
 
 
 def own(run: xr.Dataset, index: int = 0) -> Seam | None:
@@ -45,6 +52,21 @@ def materials(run: xr.Dataset, index: int) -> Array | None:
     if "face_material" not in run:
         return None
     return np.asarray(run["face_material"].values[_part(run["face_count"].values, index)])
+
+
+def groups(run: xr.Dataset, index: int, taken: Collection[str]) -> dict[str, Array]:
+    """Return weights (v) of a stage's vertices in the groups that its mesh came with, by names that files can hold.
+
+    taken: names of fields; a group of such a name, or of one that files have for something else, gets a longer one.
+    """
+    if "group_weight" not in run:
+        return {}
+    weights = np.asarray(run["group_weight"].values, "f4")
+    if "vertex_count" in run:
+        weights = weights[_part(run["vertex_count"].values, index)]
+    names = (re.sub(r"\W", "_", name, flags=re.ASCII) for name in json.loads(run.attrs["groups"]))
+    taken = {*taken, *_TAKEN}
+    return {f"group_{n}" if n in taken or n[0].isdigit() else n: weights[:, k] for k, n in enumerate(names)}
 
 
 def _part(counts: Array, index: int) -> slice:

@@ -54,6 +54,8 @@ class Surface(NamedTuple):
     #: Texture coordinates and materials of its own, where triangles change from stage to stage; else the sequence's.
     seam: Seam | None = None
     material: Array | None = None
+    #: Which of the fields are weights in groups.
+    groups: tuple[str, ...] = ()
 
     def normals(self) -> Singles:
         """Return outward unit normals (v, 3), weighted by area; (0, 1, 0) where no triangle has any."""
@@ -287,13 +289,16 @@ class Sequence:
 
             found = meshes.frame(self.run, index)
             fields = {n: np.asarray(v, "f4") for n, v in found.fields.items() if np.ndim(v) == 1}
+            grouped = charts.groups(self.run, index, fields)
+            fields |= grouped
             vertices, triangles = np.asarray(found.vertices, "f4"), np.asarray(found.triangles, "u4")
             if self.run.attrs.get("up") == "z":
                 vertices = vertices[:, [0, 2, 1]] * np.array([1, 1, -1], "f4")
             if self.kept:
-                return Surface(stage, vertices, triangles, fields)
+                return Surface(stage, vertices, triangles, fields, groups=tuple(grouped))
             seam, material = charts.own(self.run, index), charts.materials(self.run, index)
-            return Surface(stage, vertices, triangles, fields, seam=seam, material=material)
+            rest: Any = {"seam": seam, "material": material, "groups": tuple(grouped)}
+            return Surface(stage, vertices, triangles, fields, **rest)
         position = _positions(self.run, index)
         vertices = mesh.vertices(position, spectra.poles(spectra.spectrum(position)))
         fields = {name: _flat(values) for name, values in lattice_fields(self.run, index).items()}

@@ -7,7 +7,7 @@ progress, cancellation and randomness, and every failure is a `SolverError` that
 from .clock import Clock
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
-from .live import Live, LiveEngine
+from .live import Glimpse, Live, LiveEngine
 from .looks import Fur, Label, Looks, Matter, Part, Place, Shade, Skin
 from .need import Need, Quality, Region, Start
 from .params import Params
@@ -22,6 +22,7 @@ __all__ = [
     "Extent",
     "Fresh",
     "Fur",
+    "Glimpse",
     "InvalidGeometry",
     "InvalidInput",
     "Label",

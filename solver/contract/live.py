@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from pydantic import BaseModel, ValidationError
 
@@ -16,7 +16,15 @@ from .words import say
 if TYPE_CHECKING:
     from ..meshes import Frame
 
-__all__ = ["Live", "LiveEngine"]
+__all__ = ["Glimpse", "Live", "LiveEngine"]
+
+
+class Glimpse(NamedTuple):
+    """A surface on its way to a stage, and how far it is from equilibrium there."""
+
+    surface: Frame
+    stage: float
+    residual: float
 
 
 class LiveEngine(Protocol):
@@ -92,7 +100,13 @@ class LiveEngine(Protocol):
     def frame(self, fields: Sequence[str]) -> Frame:
         """Return the present surface."""
 
-    def settled(self, fields: Sequence[str]) -> Generator[None, None, tuple[Frame, float]]:
+    def glimpse(self, fields: Sequence[str]) -> Glimpse | None:
+        """Return the surface that the step under way has come to, None where that is none that was not returned yet.
+
+        When it is asked for changes nothing.
+        """
+
+    def settled(self, fields: Sequence[str]) -> Generator[object, None, tuple[Frame, float]]:
         """Settle the present state as a batch run does; yields between pieces of work. Returns surface and residual."""
 
 

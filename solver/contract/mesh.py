@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import re
+from collections.abc import Mapping, Sequence
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-__all__ = ["GivenMesh", "check_textures"]
+__all__ = ["MOST_GROUPS", "GivenMesh", "check_groups", "check_textures", "named_groups"]
+
+#: Groups of a mesh, and letters of the name of one, at most.
+MOST_GROUPS, _LETTERS = 64, 64
 
 
 class GivenMesh(BaseModel):
@@ -40,3 +45,29 @@ def check_textures(
             raise ValueError(f"{name} has a row for each of the {faces} triangles, of numbers below {known}")
     if uv and not uv_faces:
         raise ValueError("uv without uv_faces belongs to no triangle")
+
+
+def check_groups(points: int, groups: Mapping[str, Sequence[float]]) -> None:
+    """Refuse groups that do not belong to a mesh of so many points, or whose names files could not tell apart.
+
+    Raises:
+        ValueError: too many, too few weights, a name that is empty, long, or another's but for signs and capitals.
+
+    """
+    if len(groups) > MOST_GROUPS:
+        raise ValueError(f"{len(groups)} groups are more than {MOST_GROUPS}")
+    known: dict[str, str] = {}
+    for name, weights in groups.items():
+        if len(weights) != points:
+            raise ValueError(f"the group {name[:40]!r} has {len(weights)} weights for {points} points")
+        plain = re.sub(r"\W", "_", name, flags=re.ASCII).upper()
+        if not plain.strip("_") or len(name) > _LETTERS:
+            raise ValueError(f"the group {name[:40]!r} needs a name of letters and digits, at most {_LETTERS}")
+        if plain in known:
+            raise ValueError(f"files do not tell the groups {known[plain]!r} and {name!r} apart: rename one")
+        known[plain] = name
+
+
+def named_groups(groups: Mapping[str, object]) -> dict[str, str]:
+    """Return the names of a mesh's groups, as an attribute of a result."""
+    return {"groups": json.dumps(list(groups))} if groups else {}

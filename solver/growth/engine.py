@@ -64,7 +64,9 @@ class Engine:
         self.params, self.tolerance = params, tolerance
         self._tools, self._solids = list(params.tools), list(params.solids)
         self._keeps, self._history = history, History()
-        self._work: Generator[None, None, None] | None = None
+        self._work: Generator[State | None, None, None] | None = None
+        #: Where the step under way has come to, None where there is none or it has only begun.
+        self.underway: State | None = None
         begun = params.mesh.shape() if params.mesh else start(params.shape, vertices, params.aspect)
         self.state = fresh(params, begun)
         through = crossings(self.state.x, self.state.mesh.triangles).count if params.contact != 0 else 0
@@ -147,9 +149,9 @@ class Engine:
             if self._work is None:
                 self._work = self._step(self.params.step)
             try:
-                next(self._work)
+                self.underway = next(self._work) or self.underway
             except StopIteration:
-                self._work = None
+                self._work = self.underway = None
                 completed = True
             except Exception:
                 self._give_up()
@@ -204,7 +206,7 @@ class Engine:
         """Leave the step off that is under way, without a trace."""
         if self._work is not None:
             self._work.close()
-            self._work = None
+            self._work = self.underway = None
 
     def _moment(self) -> Moment:
         return Moment(self._steps, self.state, tuple(self._tools), tuple(self._solids), self._carried)
@@ -229,7 +231,7 @@ class Engine:
                 return found
             context.check_cancelled()
 
-    def reaching(self, time: float) -> Generator[None, None, State]:
+    def reaching(self, time: float) -> Generator[State | None, None, State]:
         """Do what `reach` does; yields after every piece of work."""
         self._give_up()
         state, distance = yield from self._reached(time)
@@ -250,7 +252,7 @@ class Engine:
             yield
         return found
 
-    def _reached(self, time: float) -> Generator[None, None, tuple[State, float]]:
+    def _reached(self, time: float) -> Generator[State | None, None, tuple[State, float]]:
         """Find the state at a growth time as the way on leaves it, and the distance that its parts keep."""
         while (self._steps + 1) * self.params.step <= time + 1e-9:
             yield from self._step(self.params.step)
@@ -263,7 +265,7 @@ class Engine:
         state, carried = yield from self._way.step(self.state, fresh, tools, solids, max(rest, 0.0))
         return state, carried.distance
 
-    def _step(self, dt: float) -> Generator[None, None, None]:
+    def _step(self, dt: float) -> Generator[State | None, None, None]:
         """Grow by dt and find the equilibrium; yields after every piece of work."""
         kept = self._moment()
         self.state, self._carried = yield from self._way.step(self.state, self._carried, kept.tools, kept.solids, dt)

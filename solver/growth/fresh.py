@@ -7,7 +7,7 @@ import numpy as np
 from .. import shell
 from ..contract import Context
 from .matter import matter
-from .own.textured import corners_of, faces_of
+from .own.textured import corners_of, faces_of, groups_of
 from .params import GrowthParams
 from .shapes import Mesh
 from .state import State
@@ -41,7 +41,7 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         held=held,
         spots={},
         curves={},
-        matter=matter(params.ribs, params.colours, mesh, border(top), params.seed),
+        matter=matter(params.ribs, params.colours, mesh, border(top), params.seed) | groups_of(params.mesh),
         corners=corners_of(params.mesh),
         faces=faces_of(params.mesh),
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from .. import shell
 from ..geometry.crossings import crossings
@@ -21,6 +21,7 @@ from .settling.active import Habit
 from .settling.energy import StepEnergy
 from .settling.equilibrium import balanced, begun
 from .settling.impossible import check_held, check_outward
+from .settling.minimise import Point
 from .settling.tangent import Tangent
 from .settling.watch import Watch
 from .state import State
@@ -28,7 +29,7 @@ from .tooling.placing import branched, started
 from .tooling.rates import grown, rates
 from .tooling.tools import Tool
 
-__all__ = ["Carried", "Steps"]
+__all__ = ["Carried", "Pieces", "Steps"]
 
 
 class Carried(NamedTuple):
@@ -38,6 +39,10 @@ class Carried(NamedTuple):
     habit: Habit
     #: That parts keep from each other, 0 as long as none has come near another.
     distance: float
+
+
+#: Pieces of work, after each of which it is said where the shape has come to on its way to the step's end, if anywhere.
+Pieces: TypeAlias = Generator[State | None, None, tuple[State, Carried]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +63,7 @@ class Steps:
 
     def step(
         self, before: State, carried: Carried, tools: Sequence[Tool], solids: Sequence[Solid], dt: float
-    ) -> Generator[None, None, tuple[State, Carried]]:
+    ) -> Pieces:
         """Grow by dt and find the equilibrium; yields after every piece of work.
 
         Raises:
@@ -70,9 +75,9 @@ class Steps:
         meshed, state, after = found
         if self.params.contact is None and not carried.distance:
             clear = meshed is before or not crossings(meshed.x, meshed.mesh.triangles).count
-            yield
+            yield None
             if not (clear and (yield from self.watch.apart(meshed.x, state))):
-                yield
+                yield None
                 near = carried._replace(distance=self.params.thickness)
                 _, state, after = yield from self._taken(before, near, tools, solids, dt)
         return state, after
@@ -83,7 +88,7 @@ class Steps:
 
     def _taken(
         self, before: State, carried: Carried, tools: Sequence[Tool], solids: Sequence[Solid], dt: float
-    ) -> Generator[None, None, tuple[State, State, Carried]]:
+    ) -> Generator[State | None, None, tuple[State, State, Carried]]:
         """Take a step; the value is the state on the step's mesh, the one at its end, and what is carried."""
         p, distance = self.params, carried.distance
         # the way on from here is the same after an undo only with the same inverse
@@ -93,7 +98,7 @@ class Steps:
         middle = state.time + dt / 2
         acting = dict(enumerate(tools))
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
-        yield
+        yield None
         state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
         there = present(solids, state.time)
         energy = StepEnergy(state, self._material, p.pressure, there, carried.tangent, p.gravity, distance, p.bending)
@@ -101,9 +106,10 @@ class Steps:
         if not there:
             # whatever the shape, nothing will take up what pulls now
             check_held(energy, state, goal, before.time)
-        yield
+        yield None
         first = yield from begun(energy, meshed, dt, goal, p, carried.habit)
-        point, spent = yield from balanced(energy, first.x, first.spent, goal, self.most, p, before.time)
+        way = balanced(energy, first.x, first.spent, goal, self.most, p, before.time)
+        point, spent = yield from _seen(way, state)
         forces = point.gradient / state.length
         drift = (point.x - state.x) / dt if dt else None
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
@@ -111,7 +117,7 @@ class Steps:
         check_held(energy, state, max(goal, point.gradient), before.time)
         check_outward(state, self.volume, before.time, p)
         state = branched(state, acting, p.seed)
-        yield
+        yield None
         return meshed, state, carried._replace(habit=first.habit)
 
     def _readied(self, state: State, carried: Carried) -> Generator[None, None, tuple[State, Carried]]:
@@ -133,3 +139,14 @@ class Steps:
             tangent = tangent if changes else Tangent(finer.mesh, tangent.inverse)
             habit = habit.remeshed(finer.mesh, changes)
         return finer, carried._replace(tangent=tangent, habit=habit)
+
+
+def _seen(way: Generator[Point, None, tuple[Point, int]], state: State) -> Generator[State, None, tuple[Point, int]]:
+    """Follow the search for a state's equilibrium; yields the state where it has come to."""
+    while True:
+        try:
+            point = next(way)
+        except StopIteration as end:
+            found: tuple[Point, int] = end.value
+            return found
+        yield replace(state, x=point.x, forces=point.gradient / state.length)

@@ -14,7 +14,7 @@ from numba import njit
 from ..arrays import Floats, Ints
 from .topology import Topology
 
-__all__ = ["angles", "bending", "bending_tangent", "hinge_stiffness"]
+__all__ = ["angles", "bending", "bending_tangent", "hinge_slopes", "hinge_stiffness"]
 
 
 def hinge_stiffness(g: Floats, mesh: Topology, flexural: float) -> Floats:
@@ -45,16 +45,19 @@ def _stiffness(g: Floats, hinge_faces: Ints, hinge_corners: Ints, flexural: floa
 def angles(x: Floats, hinges: Ints) -> Floats:
     """Return the angle (h,) between the normals of each hinge's triangles [radian]."""
     found = np.empty(len(hinges))
-    slopes = np.empty((4, 3))
     for t in range(len(hinges)):
-        found[t] = _hinge(x, hinges[t], slopes)
+        found[t] = _hinge(x, hinges, t)[0]
     return found
 
 
-@njit(cache=True, error_model="numpy")
-def _hinge(x: Floats, hinge: Ints, slopes: Floats) -> float:
-    """Return the angle and write its derivatives by the four points to `slopes` (4, 3)."""
-    i, j, k, m = hinge[0], hinge[1], hinge[2], hinge[3]
+@njit(inline="always", error_model="numpy")
+def _hinge(x: Floats, hinges: Ints, t: int) -> tuple[float, ...]:
+    """Return a hinge's angle, its derivatives by the two points off its edge, and how they share out on the edge.
+
+    The edge's second point feels -(s a + r b), its first -((1 - s) a + (1 - r) b). Numbers, not views of arrays, which
+    take longer.
+    """
+    i, j, k, m = hinges[t, 0], hinges[t, 1], hinges[t, 2], hinges[t, 3]
     ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
     ux, uy, uz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
     wx, wy, wz = x[m, 0] - x[i, 0], x[m, 1] - x[i, 1], x[m, 2] - x[i, 2]
@@ -69,8 +72,15 @@ def _hinge(x: Floats, hinge: Ints, slopes: Floats) -> float:
     p = -length / first if first > 0 else 0.0
     q = -length / second if second > 0 else 0.0
     s, r = (ux * ex + uy * ey + uz * ez) / square, (wx * ex + wy * ey + wz * ez) / square
-    slopes[2, 0], slopes[2, 1], slopes[2, 2] = p * nx, p * ny, p * nz
-    slopes[3, 0], slopes[3, 1], slopes[3, 2] = q * ox, q * oy, q * oz
+    return angle, p * nx, p * ny, p * nz, q * ox, q * oy, q * oz, s, r
+
+
+@njit(cache=True, error_model="numpy")
+def hinge_slopes(x: Floats, hinges: Ints, t: int, slopes: Floats) -> float:
+    """Return a hinge's angle and write its derivatives by the four points to `slopes` (4, 3)."""
+    angle, ax, ay, az, bx, by, bz, s, r = _hinge(x, hinges, t)
+    slopes[2, 0], slopes[2, 1], slopes[2, 2] = ax, ay, az
+    slopes[3, 0], slopes[3, 1], slopes[3, 2] = bx, by, bz
     for d in range(3):
         slopes[1, d] = -(s * slopes[2, d] + r * slopes[3, d])
         slopes[0, d] = -((1 - s) * slopes[2, d] + (1 - r) * slopes[3, d])
@@ -81,15 +91,25 @@ def _hinge(x: Floats, hinge: Ints, slopes: Floats) -> float:
 def bending(x: Floats, hinges: Ints, rest: Floats, stiffness: Floats, gradient: Floats) -> float:
     """Return the bending energy and add its gradient to `gradient` (n, 3); rest and stiffness (h,)."""
     energy = 0.0
-    slopes = np.empty((4, 3))
     for t in range(len(hinges)):
-        gap = _hinge(x, hinges[t], slopes) - rest[t]
+        angle, ax, ay, az, bx, by, bz, s, r = _hinge(x, hinges, t)
+        gap = angle - rest[t]
         energy += stiffness[t] * gap * gap
         force = 2 * stiffness[t] * gap
-        for v in range(4):
-            at = hinges[t, v]
-            for d in range(3):
-                gradient[at, d] += force * slopes[v, d]
+        i, j, k, m = hinges[t, 0], hinges[t, 1], hinges[t, 2], hinges[t, 3]
+        u, v = 1 - s, 1 - r
+        gradient[i, 0] += force * -(u * ax + v * bx)
+        gradient[i, 1] += force * -(u * ay + v * by)
+        gradient[i, 2] += force * -(u * az + v * bz)
+        gradient[j, 0] += force * -(s * ax + r * bx)
+        gradient[j, 1] += force * -(s * ay + r * by)
+        gradient[j, 2] += force * -(s * az + r * bz)
+        gradient[k, 0] += force * ax
+        gradient[k, 1] += force * ay
+        gradient[k, 2] += force * az
+        gradient[m, 0] += force * bx
+        gradient[m, 1] += force * by
+        gradient[m, 2] += force * bz
     return energy
 
 
@@ -98,7 +118,7 @@ def bending_tangent(x: Floats, hinges: Ints, stiffness: Floats, places: Ints, bl
     """Add the Gauss-Newton tangent 2 k grad(theta) grad(theta)^T to `blocks` (nnz, 3, 3); places (h, 16)."""
     slopes = np.empty((4, 3))
     for t in range(len(hinges)):
-        _hinge(x, hinges[t], slopes)
+        hinge_slopes(x, hinges, t, slopes)
         for u in range(4):
             for v in range(4):
                 at = places[t, 4 * u + v]

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from ..arrays import Floats, Ints
-from .bending import _hinge, _squares
+from .bending import _squares, hinge_slopes
 from .membrane import areas
 from .topology import Topology
 
@@ -34,7 +34,7 @@ def mean_bending(x: Floats, hinges: Ints, rest: Floats, lengths: Floats, stiffne
     slopes = np.empty((len(hinges), 4, 3))
     gaps = np.zeros(len(x))
     for t in range(len(hinges)):
-        gap = lengths[t] * (_hinge(x, hinges[t], slopes[t]) - rest[t])
+        gap = lengths[t] * (hinge_slopes(x, hinges, t, slopes[t]) - rest[t])
         gaps[hinges[t, 0]] += gap
         gaps[hinges[t, 1]] += gap
     energy = 0.0

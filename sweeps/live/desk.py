@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Generator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -14,34 +14,18 @@ from solver.contract.words import SHORT
 from solver.geometry.crossings import crossings
 from solver.meshes import Frame
 
-from .frames import EXACT, MORE, Encoder, Told
+from .screen import Screen
 from .script import command, toml
+from .words import OWN, QUALITIES, check, number_of, problem
 
-__all__ = ["Desk", "problem"]
+__all__ = ["Desk"]
 
-#: Frames that a client may have without having said that it took them in, and seconds between two of them.
-_WINDOW, _BETWEEN = 2, 1 / 30
 #: Seconds of work between two looks at what has come.
-_SLICE = 0.01
+_SLICE = 0.005
 #: Seconds without work after which the client gets every digit.
 _REST = 0.3
 #: Processor seconds after which a step that has no end waits for somebody who wants it.
 _LONG = 20.0
-_QUALITIES = ("preview", "default", "fine")
-
-
-class _Waiting(NamedTuple):
-    """An input that the geometry holds once so many steps are done; processor time when it was taken [s]."""
-
-    stage: float
-    id: int
-    taken: float
-
-
-def problem(error: SolverError) -> dict[str, Any]:
-    """Return an error in the words of a problem (RFC 9457), but for its status."""
-    title = error.code.replace("-", " ").capitalize()
-    return {"type": f"urn:wizen:problem:{error.code}", "title": title, "detail": error.message, "advice": error.advice}
 
 
 class Desk:
@@ -68,15 +52,12 @@ class Desk:
         if unknown:
             known = ", ".join(solver.live.fields) or "none"
             raise InvalidInput(f"no field {unknown[0]!r} can be shown.", advice=f"Known: {known}.")
-        self._solver, self._live, self._fields, self._say, self._show = solver, solver.live, fields, say, show
+        self._solver, self._live, self._fields, self._say = solver, solver.live, fields, say
         self._engine: LiveEngine = solver.live.open(params, quality)
-        self._encoder = Encoder()
+        self._screen = Screen(show)
         self._until, self._pace, self._since = 0.0, math.inf, (time.monotonic(), 0.0)
-        self._waiting: list[_Waiting] = []
-        self._settling: Generator[None, None, tuple[Frame, float]] | None = None
+        self._settling: Generator[object, None, tuple[Frame, float]] | None = None
         self._exact: tuple[Frame, float] | None = None
-        self._unseen: set[int] = set()
-        self._sent, self._input = 0.0, 0
         #: Whether there is something to show, and whether the client has what is there but for roundings.
         self._is_new, self._is_rough = True, False
         #: Pairs of triangles of the last frame at rest that pass through each other; None while the shape is under way.
@@ -90,8 +71,7 @@ class Desk:
 
     def begin_again(self, more: Mapping[str, Any]) -> None:
         """Speak with a client that holds nothing; `more`: what it is told besides."""
-        self._encoder.forget()
-        self._unseen.clear()
+        self._screen.forget()
         self._told, self._is_new, self.held = {}, True, False
         stages, engine = self._solver.stages, self._engine
         opened = {
@@ -110,7 +90,7 @@ class Desk:
     def take(self, message: Mapping[str, Any]) -> None:
         """Do what a message says, or say what is wrong with it."""
         if message.get("do") == "seen":
-            self._unseen.discard(message.get("frame", 0))
+            self._screen.seen(message.get("frame"))
             return
         number = message.get("id")
         try:
@@ -127,22 +107,22 @@ class Desk:
     def _done(self, message: Mapping[str, Any], number: int) -> Mapping[str, Any]:
         values = {name: value for name, value in message.items() if name not in ("do", "id")}
         what = message.get("do")
-        if not isinstance(what, str) or (what not in _OWN and what not in self._live.actions):
-            known = ", ".join([*_OWN, *self._live.actions])
+        if not isinstance(what, str) or (what not in OWN and what not in self._live.actions):
+            known = ", ".join([*OWN, *self._live.actions])
             raise InvalidInput(f"there is nothing to do by the name {SHORT.repr(what)}.", advice=f"Known: {known}.")
-        if what in _OWN:
-            _check(what, values)
+        if what in OWN:
+            check(what, values)
             said: Mapping[str, Any] | None = getattr(self, f"_do_{what}")(number, **values)
             return said or {}
         found = self._engine.do(self._live.parse(what, values))
         self._leave_settling()
         grown = self._engine.following + self._engine.step
         self._until = max(self._until, grown)
-        self._wait(number, grown)
+        self._screen.wait(number, grown)
         return found
 
     def _do_play(self, number: int, until: Any = None, pace: Any = None) -> None:
-        end, fastest = _number("until", until), _number("pace", pace)
+        end, fastest = number_of("until", until), number_of("pace", pace)
         if end <= self._engine.stage or fastest <= 0:
             raise InvalidInput(
                 f"until and pace are numbers, beyond {self._engine.stage:g} and above 0.", advice="Or leave them out."
@@ -151,7 +131,7 @@ class Desk:
         self._leave_settling()
         self._until, self._pace = min(end, self._solver.stages.highest), fastest
         self._since = time.monotonic(), self._engine.stage
-        self._wait(number, self._engine.following + self._engine.step)
+        self._screen.wait(number, self._engine.following + self._engine.step)
 
     def _do_pause(self, number: int) -> None:
         self._until, self._pace = self._engine.following, math.inf
@@ -167,8 +147,8 @@ class Desk:
         self._jumped(number)
 
     def _do_quality(self, number: int, quality: Any = None) -> None:
-        if quality not in _QUALITIES:
-            raise InvalidInput(f"there is no quality {quality!r}.", advice=f"Known: {', '.join(_QUALITIES)}.")
+        if quality not in QUALITIES:
+            raise InvalidInput(f"there is no quality {quality!r}.", advice=f"Known: {', '.join(QUALITIES)}.")
         self._engine.refine(quality)
         self._jumped(number)
 
@@ -176,8 +156,8 @@ class Desk:
         """The shape is another one, perhaps after the way back that is owed."""
         self._leave_settling()
         self._until, self._pace, self._is_new, self._spent = 0.0, math.inf, True, 0.0
-        self._waiting.clear()
-        self._wait(number, self._engine.owed)
+        self._screen.give_up()
+        self._screen.wait(number, self._engine.owed)
 
     def _do_settle(self, number: int) -> None:
         if self._engine.owed > self._engine.stage + 1e-9:
@@ -185,14 +165,13 @@ class Desk:
         self._until = self._engine.stage
         self._leave_settling()
         self._settling = self._engine.settled(self._fields)
-        self._wait(number, self._engine.stage)
+        self._screen.wait(number, self._engine.stage)
 
     def _do_save(self, number: int) -> Mapping[str, Any]:
         return self.saved()
 
     def _do_whole(self, number: int) -> None:
-        self._encoder.forget()
-        self._unseen.clear()
+        self._screen.forget()
         self._is_new = True
 
     def saved(self) -> dict[str, Any]:
@@ -203,9 +182,6 @@ class Desk:
         text = toml(solver, engine.script, stage, engine.quality)
         told = {"toml": text, "stage": stage, "quality": engine.quality}
         return told | {"command": command(solver, stage, engine.quality)}
-
-    def _wait(self, number: int, stage: float) -> None:
-        self._waiting.append(_Waiting(stage, number, time.process_time()))
 
     def _leave_settling(self) -> None:
         if self._settling is not None:
@@ -234,7 +210,7 @@ class Desk:
         if self.held:
             return False
         due = self._engine.stage + self._engine.step <= self._goal + 1e-9
-        return self._settling is not None or due or (self._may_show and self._has_news)
+        return self._settling is not None or due or (self._screen.may_show and self._has_news)
 
     @property
     def is_waiting(self) -> bool:
@@ -245,14 +221,14 @@ class Desk:
         """Work until nothing is left to do; nobody looks on."""
         self.held = False
         while self._works:
-            self._unseen.clear()
+            self._screen.all_seen()
             self.work()
             if self._pace < math.inf:
                 time.sleep(_SLICE / 2)
         self._exact, self.held = None, True
 
     def work(self) -> None:
-        """Work for a hundredth of a second, and show what came of it."""
+        """Work for some milliseconds, and show what came of it."""
         if self.held:
             return
         try:
@@ -262,15 +238,18 @@ class Desk:
                 self._advance()
         except SolverError as error:
             self._until, self._settling, self._is_new, self._spent = self._engine.stage, None, True, 0.0
-            last = max((w.id for w in self._waiting), default=None)
-            self._waiting.clear()
-            self._say({"say": "error", "id": last, "problem": problem(error)})
-        if self._may_show and self._has_news:
-            self._send()
+            self._say({"say": "error", "id": self._screen.give_up(), "problem": problem(error)})
+        if self._has_news:
+            if self._screen.may_show:
+                self._send()
+        elif self._spent and self._screen.may_glimpse:
+            self._glimpse()
         self._state()
 
     def _advance(self) -> None:
         begin = time.process_time()
+        if not self._spent:
+            self._screen.begin()
         completed = self._engine.advance(_SLICE, self._goal)
         self._worked = time.monotonic()
         self._is_new |= completed
@@ -299,26 +278,22 @@ class Desk:
     def _rests(self) -> bool:
         return not self._works and time.monotonic() - self._worked >= _REST
 
-    @property
-    def _may_show(self) -> bool:
-        return len(self._unseen) < _WINDOW and time.monotonic() - self._sent >= _BETWEEN
-
     def _send(self) -> None:
         """Send the present state, or the settled one."""
         stage = self._engine.stage
         frame, residual = self._exact or (self._engine.frame(self._fields), self._engine.residual)
-        held = [w for w in self._waiting if w.stage <= stage + 1e-9]
-        self._waiting = [w for w in self._waiting if w.stage > stage + 1e-9]
-        spent = 1e3 * (time.process_time() - min(w.taken for w in held)) if held else 0.0
-        self._input = max((w.id for w in held), default=self._input)
         rough = self._exact is None and not self._rests
-        flags = (EXACT if self._exact else 0) | (MORE if rough else 0)
-        told = Told(stage, residual, self._input, spent, flags)
-        self._show(self._encoder.frame(frame, told, exact=not rough))
+        self._screen.rest(frame, stage, residual, self._exact is not None, rough)
         # as the client has it, in single precision
         self._crossings = None if rough else crossings(frame.vertices.astype(np.float32), frame.triangles).count
-        self._unseen.add(self._encoder.number)
-        self._sent, self._is_new, self._is_rough, self._exact = time.monotonic(), False, rough, None
+        self._is_new, self._is_rough, self._exact = False, rough, None
+
+    def _glimpse(self) -> None:
+        """Send where the step under way has come to."""
+        found = self._engine.glimpse(self._fields)
+        if found is not None:
+            self._screen.glimpse(found.surface, found.stage, found.residual)
+            self._crossings, self._is_rough = None, True
 
     def _state(self) -> None:
         """Say how things stand, if anything but the time has changed."""
@@ -335,32 +310,3 @@ class Desk:
         if told != self._told:
             self._told = told
             self._say({"say": "state", "time": engine.stage, **told})
-
-
-#: What every session understands, and the names of what goes with it.
-_OWN: Mapping[str, tuple[str, ...]] = {
-    "play": ("until", "pace"),
-    "pause": (),
-    "undo": (),
-    "redo": (),
-    "quality": ("quality",),
-    "settle": (),
-    "save": (),
-    "whole": (),
-}
-
-
-def _check(what: str, values: Mapping[str, Any]) -> None:
-    strange = [name for name in values if name not in _OWN[what]]
-    if strange:
-        known = ", ".join(_OWN[what]) or "nothing"
-        raise InvalidInput(f"{what} does not take {strange[0]!r}.", advice=f"It takes {known}.")
-
-
-def _number(name: str, value: Any) -> float:
-    """Return a number, infinite where there is none."""
-    if value is None:
-        return math.inf
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InvalidInput(f"{name}: {value!r} is no number.", advice="Or leave it out.")
-    return float(value)

@@ -13,10 +13,10 @@ import numpy as np
 
 from solver.meshes import Frame
 
-__all__ = ["EXACT", "MORE", "Encoder", "Told"]
+__all__ = ["EXACT", "MORE", "UNDERWAY", "Encoder", "Told"]
 
-#: Flags: settled as by a batch run; more is to come.
-EXACT, MORE = 1, 2
+#: Flags: settled as by a batch run; more is to come; on the way to an equilibrium.
+EXACT, MORE, UNDERWAY = 1, 2, 4
 _HEAD = struct.Struct("<4s7IfIdfIfI")
 _MAGIC = b"wzn1"
 #: Quanta that a move has at most, and quanta in a mean edge.

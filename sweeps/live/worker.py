@@ -61,7 +61,8 @@ def main() -> None:
     from solver import registry
     from solver.contract import SolverError
 
-    from .desk import Desk, problem
+    from .desk import Desk
+    from .words import problem
 
     asked = first[1]
     solver = registry.get(asked["solver"])

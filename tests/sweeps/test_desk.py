@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import pytest
 
 from solver import registry
 from sweeps.live import desk as desk_module
+from sweeps.live import screen as screen_module
 from sweeps.live.desk import Desk
 
 BALL = {"shape": "sphere", "thickness": 0.1, "tools": [], "step": 0.05}
@@ -52,3 +54,44 @@ def test_a_step_that_has_no_end_can_be_undone(brushed: tuple[Desk, list[Any]]) -
     assert [t["say"] for t in told[-2:]] == ["done", "state"]
     assert not desk.is_busy
     assert (told[-1]["undo"], told[-1]["redo"]) == (0, 1)
+
+
+def test_a_step_is_shown_on_its_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frames before its end have flag 4, the input that they lead to, and cost what it cost until the first of them."""
+    monkeypatch.setattr(desk_module, "_SLICE", 0.0)
+    monkeypatch.setattr(screen_module, "_UNDERWAY", 0.0)
+    solver, frames = registry.get("growth"), list[bytes]()
+    desk = Desk(solver, solver.parse({**BALL, "step": 1.0}, None), "preview", (), lambda told: None, frames.append)
+    desk.begin_again({})
+    desk.work()
+    desk.take({"do": "seen", "frame": 1})
+    desk.take({"do": "brush", "id": 7, "at": [0, 0, 1], "radius": 0.8, "stretch": [1.5, 1.5]})
+    while desk.is_busy:
+        desk.work()
+        desk.take({"do": "seen", "frame": len(frames)})
+    told = [struct.unpack_from("<dfIfI", frame, 40) for frame in frames]
+    stages, residuals, inputs, spent, flags = zip(*told, strict=True)
+    assert len(frames) > 3
+    assert set(flags[1:-1]) == {2 | 4}
+    assert flags[-1] == 2
+    assert (stages[0], set(stages[1:])) == (0.0, {1.0})
+    assert (inputs[0], set(inputs[1:])) == (0, {7})
+    assert residuals[-1] < min(residuals[1:-1])
+    assert 0 < spent[1] < spent[-1]
+    assert set(spent[2:-1]) <= {0.0}
+
+
+def test_a_client_that_takes_nothing_in_has_no_glimpses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(desk_module, "_SLICE", 0.0)
+    monkeypatch.setattr(screen_module, "_UNDERWAY", 0.0)
+    solver, frames = registry.get("growth"), list[bytes]()
+    desk = Desk(solver, solver.parse({**BALL, "step": 1.0}, None), "preview", (), lambda told: None, frames.append)
+    desk.begin_again({})
+    desk.work()
+    desk.take({"do": "brush", "id": 1, "at": [0, 0, 1], "radius": 0.8, "stretch": [1.5, 1.5]})
+    while desk.is_busy:
+        desk.work()
+    assert len(frames) == 2
+    desk.take({"do": "seen", "frame": 1})
+    desk.work()
+    assert struct.unpack_from("<I", frames[-1], 60) == (2,)

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...arrays import Floats
-from ...contract.mesh import GivenMesh, check_textures
+from ...contract.mesh import GivenMesh, check_groups, check_textures
 from .surface import Extent, Surface
 
 __all__ = ["Mesh", "extent_of", "rays_from"]
@@ -35,6 +35,11 @@ class Mesh(GivenMesh):
     )
     materials: tuple[str, ...] = Field((), max_length=256, description="Names of materials, for files made of it")
     face_materials: tuple[int, ...] = Field((), max_length=800_000, description="The material of each triangle, from 0")
+    groups: dict[str, tuple[float, ...]] = Field(
+        default_factory=dict,
+        max_length=64,
+        description="Vertex groups, or any numbers of points, by name: a weight for each point; files keep them [1]",
+    )
 
     @model_validator(mode="after")
     def _within(self) -> Self:
@@ -44,6 +49,7 @@ class Mesh(GivenMesh):
                 f"a triangle names a vertex that is not there: they are numbered 0 to {len(self.points) - 1}"
             )
         check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
+        check_groups(len(self.points), self.groups)
         return self
 
 

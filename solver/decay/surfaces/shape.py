@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints32
 from ...contract import Context, InvalidInput, Need
+from ...contract.mesh import named_groups
 from ...fruit import lattice, window
 from ..body.flesh import Booked
 from ..environment import reference_radius, water_lost
@@ -108,13 +109,17 @@ class Shape:
             found["texture_triangle"] = (("face", "corner"), np.array(mesh.uv_faces, np.int32))
         if mesh is not None and mesh.face_materials:
             found["face_material"] = (("face",), np.array(mesh.face_materials, np.int32))
+        if mesh is not None and mesh.groups:
+            found["group_weight"] = (("vertex", "group"), np.array(list(mesh.groups.values()), np.float32).T)
         return found
 
     @property
     def materials(self) -> dict[str, str]:
-        """Names of an imported mesh's materials, as an attribute."""
+        """Names of an imported mesh's materials and groups, as attributes."""
         mesh = self._params.mesh
-        return {"materials": json.dumps(mesh.materials)} if mesh is not None and mesh.materials else {}
+        if mesh is None:
+            return {}
+        return ({"materials": json.dumps(mesh.materials)} if mesh.materials else {}) | named_groups(mesh.groups)
 
     @property
     def triangles(self) -> Ints32:

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel
 
-from ...contract import InvalidInput, Quality, SolverError
+from ...arrays import Floats
+from ...contract import Glimpse, InvalidInput, Quality, SolverError
 from ...meshes import Frame
 from ..anchors import place
 from ..engine import Engine, Undone
@@ -55,6 +56,7 @@ class GrowingLive:
         self._gestures: list[_Gesture] = []
         self._undone: list[_Back] = []
         self._stroke: int | None = None
+        self._glimpsed: Floats | None = None
         self.owed, self.step = 0.0, params.step
         self._engine = self._begun(params, quality)
         self.quality: Quality = quality
@@ -237,7 +239,15 @@ class GrowingLive:
         """Return the present surface."""
         return self._shown(self._engine.state, fields)
 
-    def settled(self, fields: Sequence[str]) -> Generator[None, None, tuple[Frame, float]]:
+    def glimpse(self, fields: Sequence[str]) -> Glimpse | None:
+        """Return where the step under way has come to, if it is somewhere else than when it was asked for last."""
+        state = self._engine.underway
+        if state is None or state.x is self._glimpsed:
+            return None
+        self._glimpsed = state.x
+        return Glimpse(self._shown(state, fields), state.time, residual(state, self._engine.params))
+
+    def settled(self, fields: Sequence[str]) -> Generator[object, None, tuple[Frame, float]]:
         """Settle the present state as a batch run does; yields between pieces of work."""
         state = yield from self._engine.reaching(self.stage)
         return self._shown(state, fields), residual(state, self._engine.params)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...contract import InvalidGeometry
-from ...contract.mesh import GivenMesh, check_textures
+from ...contract.mesh import GivenMesh, check_groups, check_textures
 
 if TYPE_CHECKING:
     from ... import shell
@@ -39,6 +39,11 @@ class OwnMesh(GivenMesh):
     )
     materials: tuple[str, ...] = Field((), max_length=256, description="Names of materials, for files made of it")
     face_materials: tuple[int, ...] = Field((), max_length=200_000, description="The material of each triangle, from 0")
+    groups: dict[str, tuple[float, ...]] = Field(
+        default_factory=dict,
+        max_length=64,
+        description="Vertex groups, or any numbers of points, by name: a weight for each point; files keep them [1]",
+    )
 
     @model_validator(mode="after")
     def _is_a_surface(self) -> Self:
@@ -46,6 +51,7 @@ class OwnMesh(GivenMesh):
         from ... import shell
 
         check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
+        check_groups(len(self.points), self.groups)
         points, faces = np.array(self.points), np.array(self.faces, np.int64)
         try:
             top = shell.topology(faces, len(points))

@@ -1,4 +1,4 @@
-"""Texture coordinates and materials of a mesh of one's own: they ride on its triangles."""
+"""What a mesh of one's own brings: texture coordinates and materials ride on triangles, groups on vertices."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Floats, Ints
+from ...contract.mesh import named_groups
 from ..state import State
 from .imported import OwnMesh
 
-__all__ = ["corners_of", "faces_of", "named", "textured"]
+__all__ = ["corners_of", "faces_of", "groups_of", "named", "textured"]
 
 
 def corners_of(mesh: OwnMesh | None) -> dict[str, Floats]:
@@ -25,13 +26,23 @@ def faces_of(mesh: OwnMesh | None) -> dict[str, Ints]:
     return {"material": np.array(mesh.face_materials, np.int64)} if mesh and mesh.face_materials else {}
 
 
+def groups_of(mesh: OwnMesh | None) -> dict[str, Floats]:
+    """Return weights of the groups (n, k) of a mesh's vertices, for `State.matter`; nothing where it has none."""
+    if mesh is None or not mesh.groups:
+        return {}
+    used = np.unique(np.array(mesh.faces, np.int64))
+    return {"groups": np.array(list(mesh.groups.values()), float).T[used]}
+
+
 def named(mesh: OwnMesh | None) -> dict[str, str]:
-    """Return the names of a mesh's materials, as an attribute."""
-    return {"materials": json.dumps(mesh.materials)} if mesh and mesh.face_materials else {}
+    """Return the names of a mesh's materials and groups, as attributes."""
+    if mesh is None:
+        return {}
+    return ({"materials": json.dumps(mesh.materials)} if mesh.face_materials else {}) | named_groups(mesh.groups)
 
 
 def textured(states: Sequence[State]) -> dict[str, Any]:
-    """Return what rides on the triangles of stages as variables, end to end (`solver.meshes`)."""
+    """Return what rides on the triangles and vertices of stages as variables, end to end (`solver.meshes`)."""
     found: dict[str, Any] = {}
     if states[0].corners:
         seams = [_seam(state) for state in states]
@@ -40,6 +51,9 @@ def textured(states: Sequence[State]) -> dict[str, Any]:
         found["texture_count"] = ("stage", np.array([len(uv) for uv, _ in seams], np.int32))
     if states[0].faces:
         found["face_material"] = (("face",), np.concatenate([s.faces["material"] for s in states]).astype(np.int32))
+    if "groups" in states[0].matter:
+        weights = np.concatenate([s.matter["groups"] for s in states])
+        found["group_weight"] = (("vertex", "group"), weights.astype(np.float32))
     return found
 
 

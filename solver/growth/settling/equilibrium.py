@@ -43,8 +43,8 @@ def begun(
 
 def balanced(
     energy: StepEnergy, begin: Floats, spent: int, goal: float, most: int, params: GrowthParams, last: float
-) -> Generator[None, None, tuple[Point, int]]:
-    """Find the equilibrium from `begin` (n, 3), after `spent` of at most `most` steps; yields after pieces of work.
+) -> Generator[Point, None, tuple[Point, int]]:
+    """Find the equilibrium from `begin` (n, 3), after `spent` of at most `most` steps; yields where it has come to.
 
     goal: largest force. last: growth time of the state before. The generator's value is the equilibrium and the steps.
 
@@ -67,7 +67,7 @@ def balanced(
                 check_near(state, point.x, last)
             if spent > most:
                 break
-            yield
+            yield point
         begin = _off(energy, point, params.seed) if nudges else point.x
         nudges -= 1
         if begin is point.x:

@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..state import State
+from .agreeing import agreed
 from .reach import within
 from .tools import HotCurve, HotSpot, HotStroke, HotSurface, Tool, intensities
 
@@ -18,16 +19,20 @@ __all__ = ["Rates", "grown", "rates"]
 
 
 class Rates(NamedTuple):
-    """Per unit time, in each triangle's orthonormal rest frame (f, 3: 11, 12, 22): logarithmic strain, curvature."""
+    """Per unit time, in each triangle's orthonormal rest frame (f, 3: 11, 12, 22): logarithmic strain, curvature.
+
+    edges: (f, 3, 3) logarithmic strain at the middle of each edge, edge k opposite to corner k; strain is their mean.
+    """
 
     strain: Floats
+    edges: Floats
     curving: Floats
 
 
 def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
     """Return the sum of what all tools do at a growth time."""
     count = len(state.mesh.triangles)
-    strain, curving = np.zeros((count, 3)), np.zeros((count, 3))
+    edges, curving = np.zeros((count, 3, 3)), np.zeros((count, 3))
     for number, tool in tools.items():
         # places with clocks of their own have their intensity in their share
         own = (isinstance(tool, HotCurve) and bool(tool.offsets or tool.paces)) or (
@@ -52,32 +57,30 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
             first, second = np.where(still, (first + second) / 2, first), np.where(still, (first + second) / 2, second)
         share = strength * share
         v = _in_rest_frame(state, along, some)
-        strain[some] += _tensor(share * first, share * second, v)
+        for k in range(3):
+            edges[some, k] += _tensor(share[:, k] * first, share[:, k] * second, v)
         if isinstance(tool, HotSurface) and any(tool.curl):
-            curving[some] += _tensor(share * tool.curl[0], share * tool.curl[1], v)
-    return Rates(strain, curving)
+            mean = share.mean(axis=1)
+            curving[some] += _tensor(mean * tool.curl[0], mean * tool.curl[1], v)
+    return Rates(edges.mean(axis=1), edges, curving)
 
 
 def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
     """Return rest metrics (f, 3) and rest angles (h,) after dt: G = exp(2 dt strain) in each triangle's rest frame.
 
-    Angles stay under stretching (so that a sphere's curvature scales by 1/s) and take what curving adds. What does not
-    grow keeps its numbers.
+    Neighbours agree on what their common edge grows by (`agreed`). Angles stay under stretching (so that a sphere's
+    curvature scales by 1/s) and take what curving adds. What does not grow keeps its numbers.
     """
-    some = np.flatnonzero(_nonzero(found.strain) | _nonzero(found.curving))
-    h11, h12, h22 = (dt * found.strain[some]).T
-    mean, half = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
-    slope = np.where(half > 1e-12, np.sinh(half) / np.maximum(half, 1e-300), 1.0)
-    even = np.cosh(half)
-    e11 = np.exp(mean) * (even + slope * (h11 - h22) / 2)
-    e22 = np.exp(mean) * (even - slope * (h11 - h22) / 2)
-    e12 = np.exp(mean) * slope * h12
+    mesh, some = state.mesh, np.flatnonzero(_nonzero(found.strain) | _nonzero(found.curving))
+    e11, e12, e22 = _exponential(dt * found.strain[some])
     l11, l12, l22 = _frames(state.g[some])
     # rows of the stretched frame: U L
     u11, u12 = e11 * l11, e11 * l12 + e12 * l22
     u21, u22 = e12 * l11, e12 * l12 + e22 * l22
     moved, g = _nonzero(found.strain[some]), state.g.copy()
-    g[some[moved]] = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)[moved]
+    own = np.stack([u11 * u11 + u21 * u21, u11 * u12 + u21 * u22, u12 * u12 + u22 * u22], -1)[moved]
+    ratios = _stretched(found.edges[some[moved]] * dt, l11[moved], l12[moved], l22[moved])
+    g[some[moved]] = agreed(state.g[some[moved]], own, ratios, mesh.face_edges[some[moved]], len(mesh.edges))
     rest = state.rest
     if found.curving.any():
         k11, k12, k22 = (dt * found.curving[some]).T
@@ -90,8 +93,27 @@ def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
             ],
             -1,
         )
-        rest = rest + shell.added_angles(b, g, state.mesh)
+        rest = rest + shell.added_angles(b, g, mesh)
     return g, rest
+
+
+def _exponential(strain: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return exp of symmetric matrices (m, 3: 11, 12, 22)."""
+    h11, h12, h22 = strain.T
+    mean, half = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
+    slope = np.where(half > 1e-12, np.sinh(half) / np.maximum(half, 1e-300), 1.0)
+    even = np.cosh(half)
+    grows = np.exp(mean)
+    return grows * (even + slope * (h11 - h22) / 2), grows * slope * h12, grows * (even - slope * (h11 - h22) / 2)
+
+
+def _stretched(strain: Floats, l11: Floats, l12: Floats, l22: Floats) -> Floats:
+    """Return what the squares of three edges (m, 3) grow by, each by the strain (m, 3, 3) at its own middle."""
+    found = []
+    for k, (a, b) in enumerate(((l12 - l11, l22), (l12, l22), (l11, np.zeros_like(l11)))):
+        e11, e12, e22 = _exponential(strain[:, k])
+        found.append(((e11 * a + e12 * b) ** 2 + (e12 * a + e22 * b) ** 2) / (a * a + b * b))
+    return np.stack(found, -1)
 
 
 def _nonzero(rates: Floats) -> Bools:
@@ -127,12 +149,12 @@ def _tensor(first: Floats, second: Floats, v: Floats) -> Floats:
     return np.stack([first * c * c + second * s * s, (first - second) * c * s, first * s * s + second * c * c], -1)
 
 
-def _corners(state: State, share: Floats) -> tuple[Ints, Floats]:
-    """Return triangles (m,) and the mean of their corners' shares where it is not 0 (the paper's, over edge tips)."""
-    i, j, k = state.mesh.triangles.T
-    mean = (share[i] + share[j] + share[k]) / 3
-    some = np.flatnonzero(mean)
-    return some, mean[some]
+def _tips(state: State, share: Floats) -> tuple[Ints, Floats]:
+    """Return triangles (m,) and the means of their edges' tips' shares (m, 3), as the paper has it, where not 0."""
+    i, j, k = (share[corner] for corner in state.mesh.triangles.T)
+    some = np.flatnonzero((i != 0) | (j != 0) | (k != 0))
+    i, j, k = i[some], j[some], k[some]
+    return some, np.stack([(j + k) / 2, (k + i) / 2, (i + j) / 2], -1)
 
 
 def _stretches(state: State, tool: Tool, number: int) -> Floats:
@@ -159,7 +181,7 @@ def _surface(state: State, tool: HotSurface, number: int, time: float) -> tuple[
     values = state.shares[number]
     if tool.later is not None:
         values = values[:, 0] * intensities(tool, time - tool.start - tool.offset * values[:, 1])
-    some, share = _corners(state, values)
+    some, share = _tips(state, values)
     if tool.frame == "around":
         middle = state.x[state.mesh.triangles[some]].mean(axis=1)
         return some, share, np.stack([-middle[:, 1], middle[:, 0], np.zeros(len(middle))], -1)
@@ -175,7 +197,7 @@ def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Ints,
         away = np.linalg.norm(x - spot.anchor.at(x, triangles)[0], axis=1)
         near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
         whole[near] = np.maximum(whole[near], _kernel(tool.kernel, away[near] / spot.radius))
-    some, share = _corners(state, whole)
+    some, share = _tips(state, whole)
     p = x[triangles[some]]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -198,7 +220,7 @@ def _stroke(state: State, tool: HotStroke, number: int, time: float) -> tuple[In
         stronger = value > whole[near]
         whole[near[stronger]] = value[stronger]
         ways[near[stronger]] = tool.ways[spot.dab] if tool.ways else 0.0
-    some, share = _corners(state, whole)
+    some, share = _tips(state, whole)
     return some, share, ways[triangles[some]].mean(axis=1)
 
 
@@ -241,5 +263,5 @@ def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[In
     near = within(state, np.unique(KDTree(x).query(path)[1]), tool.radius, best)
     whole = np.zeros(len(x))
     whole[near] = share[near] * _kernel("smooth", best[near] / tool.radius)
-    some, mean = _corners(state, whole)
+    some, mean = _tips(state, whole)
     return some, mean, along[triangles[some]].mean(axis=1)

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from solver.contract.mesh import MOST_GROUPS
+
 from ... import foreign
 from ...errors import InvalidOption, SweepError
 from ...foreign import KINDS
@@ -14,9 +16,14 @@ from ...meshparts import Parts, glb, obj
 
 __all__ = ["KINDS", "read"]
 
+#: Properties of a PLY file's vertices that say something else than how much they belong to a group.
+_USUAL = frozenset(
+    ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "alpha", "s", "t", "u", "v", "texture_u", "texture_v")
+)
+
 
 def read(path: Path) -> dict[str, Any]:
-    """Return points and faces of a mesh file, and its texture coordinates and materials if it has some.
+    """Return points and faces of a mesh file, and its texture coordinates, materials and vertex groups if it has some.
 
     Points in one place become one, as triangles must share them; the others keep their order. Texture coordinates stay
     those of the file's corners.
@@ -45,7 +52,19 @@ def _parts(path: Path) -> Parts:
             # what is packed is for the library to unpack, without texture coordinates
     mesh = foreign.read(path)
     faces = np.asarray(mesh.faces, np.int64)
-    return Parts(np.asarray(mesh.vertices, float), faces, None, None, (), np.zeros(len(faces), np.int64))
+    rest = None, None, (), np.zeros(len(faces), np.int64), _properties(mesh) if kind == ".ply" else {}
+    return Parts(np.asarray(mesh.vertices, float), faces, *rest)
+
+
+def _properties(mesh: Any) -> dict[str, Any]:
+    """Return the numbers of a PLY file's vertices that are neither place, normal, colour nor texture coordinate."""
+    try:
+        rows = mesh.metadata["_ply_raw"]["vertex"]["data"]
+        names = [name for name in (rows.dtype.names if hasattr(rows, "dtype") else rows) if name not in _USUAL]
+        found = {name: np.asarray(rows[name], float).ravel() for name in names}
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return {}
+    return {name: values for name, values in found.items() if len(values) == len(mesh.vertices)}
 
 
 def _merged(parts: Parts) -> dict[str, Any]:
@@ -63,9 +82,15 @@ def _merged(parts: Parts) -> dict[str, Any]:
     shared = number[faces]
     # two corners in one place leave no triangle
     flat = (shared == np.roll(shared, 1, axis=1)).any(axis=1)
-    found: dict[str, Any] = {"points": parts.points[kept[first[order]]].tolist(), "faces": shared[~flat].tolist()}
+    chosen = kept[first[order]]
+    found: dict[str, Any] = {"points": parts.points[chosen].tolist(), "faces": shared[~flat].tolist()}
     if parts.uv is not None and parts.corners is not None:
         found |= {"uv": parts.uv.tolist(), "uv_faces": parts.corners[~flat].tolist()}
     if parts.materials:
         found |= {"materials": list(parts.materials), "face_materials": parts.material[~flat].tolist()}
+    groups = {name: weights[chosen] for name, weights in parts.groups.items()}
+    groups = {name: weights.tolist() for name, weights in groups.items() if np.isfinite(weights).all()}
+    # so many are parts of a scene, or measurements
+    if 0 < len(groups) <= MOST_GROUPS:
+        found["groups"] = groups
     return found

@@ -44,7 +44,8 @@ def test_a_shape_is_painted_while_it_grows(browser: Browser, studio: str) -> Non
     assert begun["stage"] == 0
     # by keys alone, then with the pointer
     page.get_by_role("button", name="Dab in the middle").press("Enter")
-    dabbed = visit.shown("shown.stage > 0")
+    # the next dab is taken once this one is at rest
+    dabbed = visit.shown("shown.stage > 0 && !shown.underway")
     box = page.locator("#view").bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

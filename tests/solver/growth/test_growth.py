@@ -10,7 +10,7 @@ from solver.contract import InvalidInput, Need, NotConverged, SolverError
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.remeshing.cuts import cut
-from solver.growth.settling.energy import StepEnergy
+from solver.growth.settling.energy import StepEnergy, elastic
 from solver.growth.settling.minimise import conjugate_gradients, lbfgs, quasi_newton
 from solver.growth.settling.tangent import Tangent
 from solver.growth.tooling.tools import HotSpot
@@ -224,9 +224,10 @@ def test_undo_and_the_same_way_again_give_the_same_bytes():
 
 
 def test_plasticity_forgets_what_is_beyond_the_yield():
-    spot = {"kind": "spot", "at": (0.0, 0.0, 1.0), "radius": 0.5, "stretch": (5.0, 5.0)}
+    """Also in the five steps after growth has ended."""
+    spot = {"kind": "spot", "at": (0.0, 0.0, 1.0), "radius": 0.5, "stretch": (5.0, 5.0), "duration": 0.5}
     common = {"step": 0.1, "thickness": 0.05, "tools": [spot]}
-    stiff, soft = grow(300, 0.5, **common), grow(300, 0.5, plasticity=0.8, yield_strain=0.01, **common)
+    stiff, soft = grow(300, 1.0, **common), grow(300, 1.0, plasticity=0.8, yield_strain=0.001, **common)
 
     def worst(state):
         ratio = shell.areas(shell.metric(state.x, state.mesh.triangles)) / shell.areas(state.g)
@@ -308,11 +309,16 @@ def test_tools_that_the_shape_cannot_have_are_refused():
 
 
 def test_the_bulge_of_a_hot_spot_converges_with_the_mesh():
-    """Second order: 1.86 was measured between 640, 2560 and 10240 vertices; here smaller meshes."""
+    """Energy of second order, as 1.95 was measured between 640, 2560 and 10240 vertices; here smaller meshes.
+
+    Heights are within 0.1 % of the bulge from 640 vertices on: two errors, of either sign, have no order there.
+    """
     spot = {"kind": "spot", "at": (0.0, 0.0, 1.0), "radius": 0.8, "stretch": (1.3, 1.3)}
-    heights = []
+    heights, energies = [], []
     for vertices in (160, 640, 2560):
         engine = grow(vertices, 1.0, 1e-5, imperfection=0, remesh=0, thickness=0.1, step=0.25, tools=[spot])
-        heights.append(np.ptp(engine.state.x[:, 2]))
-    order = np.log2((heights[1] - heights[0]) / (heights[2] - heights[1]))
-    assert order > 1.5
+        heights.append(np.ptp(engine.state.x[:, 2]) - 2)
+        energies.append(elastic(engine.state, shell.Material(0.1, 0.3), "hinges"))
+    assert np.log2((energies[1] - energies[0]) / (energies[2] - energies[1])) > 1.5
+    assert heights[:2] == pytest.approx([heights[2]] * 2, rel=0.01)
+    assert heights[1] == pytest.approx(heights[2], rel=0.002)

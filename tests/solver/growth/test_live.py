@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,9 @@ from solver.growth.engine import Engine
 from solver.growth.living import history
 from solver.growth.living.live import GrowingLive
 from solver.growth.params import GrowthParams
+from solver.growth.settling.energy import elastic
 from solver.growth.tooling.tools import HotStroke
+from solver.shell import Material
 
 
 @pytest.fixture(autouse=True)
@@ -83,6 +86,42 @@ def test_gestures_go_back_and_forth_to_the_last_bit(monkeypatch):
     assert live.redo() is False
     run = SOLVER.solve(live.script, Need(stages=(live.stage,), quality="preview", dtype="float64"))
     assert np.array_equal(run.mesh_position.values, end_of(live))
+
+
+def test_glimpses_of_a_step_lead_to_its_equilibrium_and_change_nothing():
+    """Each is lower than the one before, against the rest state to which it leads."""
+    values = {"shape": "disc", "thickness": 0.02, "step": 1.0}
+    dab = {"at": [0.6, 0, 0], "way": [0, 1, 0], "radius": 0.8, "stretch": [1.3, 1.1]}
+    live, alone = begun(**values), begun(**values)
+    act(alone, "brush", **dab)
+    assert live.glimpse(()) is None
+    live.do(SOLVER.live.parse("brush", dab))
+    seen, at_rest = [], x(live)
+    while not live.advance(0.0, 1.0):
+        seen.append(live.glimpse(()))
+        assert live.glimpse(()) is None
+        assert np.array_equal(x(live), at_rest)
+    seen = [found for found in seen if found is not None]
+    assert len(seen) > 5
+    assert not any(np.array_equal(a.surface.vertices, b.surface.vertices) for a, b in pairwise(seen))
+    assert {found.stage for found in seen} == {1.0}
+    assert np.array_equal(x(live), x(alone))
+    assert live.glimpse(()) is None
+    state = live._engine.state
+    costs = [elastic(replace(state, x=found.surface.vertices), Material(0.02, 0.3), "hinges") for found in seen]
+    costs.append(elastic(state, Material(0.02, 0.3), "hinges"))
+    assert all(after <= before * (1 + 1e-12) for before, after in pairwise(costs))
+    assert costs[-1] < 0.9 * costs[0]
+    assert seen[-1].residual < seen[0].residual
+
+
+def test_a_step_that_is_given_up_has_no_glimpse():
+    live = begun(shape="disc", thickness=0.02, step=1.0)
+    live.do(SOLVER.live.parse("brush", {"at": [0.6, 0, 0], "way": [0, 1, 0], "radius": 0.8, "stretch": [1.3, 1.1]}))
+    while live._engine.underway is None:
+        assert not live.advance(0.0, 1.0)
+    assert live.undo()
+    assert live.glimpse(()) is None
 
 
 def test_a_gesture_ends_what_could_be_brought_again():

@@ -137,16 +137,16 @@ class Live {
     const { house, sheet } = this;
     if (sheet.take(surface)) house.studio.aim();
     house.studio.reshaped();
-    this.dabs = Math.max(this.dabs, surface.input);
+    if (!surface.underway) this.dabs = Math.max(this.dabs, surface.input);
     this.words.do(() => this.tell(surface));
-    house.canvas.dataset.shown = JSON.stringify({ stage: surface.stage, vertices: surface.positions.length / 3, input: surface.input, exact: surface.exact });
+    house.canvas.dataset.shown = JSON.stringify({ stage: surface.stage, vertices: surface.positions.length / 3, input: this.dabs, exact: surface.exact, underway: surface.underway });
   }
 
   private tell(surface: Surface): void {
     const { symbol } = this.solver.stages;
     this.house.say(`${worded(this.preset)}, ${symbol} = ${digits(surface.stage)}`, `live, ${this.quality}`, {
       level: surface.exact ? "good" : "fair",
-      text: surface.exact ? "settled as a batch run settles" : surface.residual ? `live: residual ${surface.residual.toExponential(1)}` : "as it begins",
+      text: surface.exact ? "settled as a batch run settles" : surface.residual ? `${surface.underway ? "on its way" : "live"}: residual ${surface.residual.toExponential(1)}` : "as it begins",
       why: "Settle brings it to the equilibrium that a batch run of the saved file gives.",
     });
     this.counts.textContent = `${(surface.positions.length / 3).toLocaleString("en")} vertices, ${(surface.triangles.length / 3).toLocaleString("en")} triangles`;

@@ -31,9 +31,10 @@ export interface Surface {
   triangles: Uint32Array;
   stage: number;
   residual: number;
-  /** Last input that it holds. */
+  /** Last input that it holds, or, under way, that the equilibrium will hold to which it is on its way. */
   input: number;
   exact: boolean;
+  underway: boolean;
   /** Whether its triangles are others than in the frame before. */
   rebuilt: boolean;
 }
@@ -77,7 +78,8 @@ export function decode(data: ArrayBuffer, before: Surface | undefined): { number
     stage: head.getFloat64(40, true),
     residual: head.getFloat32(48, true),
     input: at(52),
-    exact: (at(60) & 1) === 1,
+    exact: (at(60) & 1) !== 0,
+    underway: (at(60) & 4) !== 0,
     rebuilt: r > 0 || positions.length !== before?.positions.length || triangles.length !== before?.triangles.length,
   };
   return { number, surface };
