@@ -23,7 +23,7 @@ from .model.sawing import crossed
 from .model.state import Wood
 from .params import WoodParams
 
-__all__ = ["Breaks", "break_worst", "overstress", "sawed", "sever"]
+__all__ = ["Breaks", "bows", "break_worst", "overstress", "sawed", "sever"]
 
 #: A break closer to a vertex than this, over the edge, is one at the vertex.
 _NEAR = 0.25
@@ -41,10 +41,10 @@ class Breaks(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _hinges(
+def bows(
     rods: Rods, t: np.ndarray, theta: np.ndarray, reference: np.ndarray, bow: np.ndarray, turning: bool
 ) -> np.ndarray:
-    """Return curvature beyond that at rest [1/m] and twist [radian/m] (h, 2) of whole hinges."""
+    """Return curvature beyond that at rest [1/m] and twist [radian/m] (h, 2) of whole hinges; 0 of broken ones."""
     out = np.zeros((len(rods.before), 2))
     for h in range(len(rods.before)):
         if rods.whole[h] == 0:
@@ -82,7 +82,7 @@ def overstress(
     `twist.turn` writes it, read if `turning`. Twist
     lengthens the outer fibre by sqrt(1 + (radius x twist)^2) (sec. 6.1).
     """
-    bent = _hinges(rods, t, theta, reference, bow, turning)
+    bent = bows(rods, t, theta, reference, bow, turning)
     count = len(rods.a)
     ratio[:] = 0.0
     place[:] = 0.0

@@ -28,6 +28,7 @@ from .settings import choose
 from .stepping.marching import explicit
 from .stepping.moment import Reached
 from .stepping.stability import longest_step, touchable
+from .stresses import BOND, ROD, Stresses
 from .surface.skin import Skin
 from .surface.solids import among
 
@@ -69,6 +70,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
     }
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
+    strained = None if {*ROD, *BOND}.isdisjoint(need.fields) else Stresses(params, wood)
     laid, wood = wood, sawed(wood, params)
     frames: list[Frame] = []
     balance = _BALANCE[need.quality]
@@ -92,6 +94,9 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
                 if skin is not None:
                     frames.append(among(skin.frame(reached.state.wood), params, reached.time))
                 rows.append(_row(reached, laid, params, need, time.perf_counter() - begun))
+                if strained is not None:
+                    found = strained.read(reached.state)
+                    rows[-1] |= {name: found[name].astype(need.dtype) for name in (*ROD, *BOND) if name in need.fields}
                 context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
@@ -186,7 +191,9 @@ def _dataset(
         "fragment_length": ("stage", "fragment"),
         "tip_position": ("stage", "component"),
         "rod_position": ("stage", "rod_edge", "end", "component"),
-        "rod_cut": ("stage", "rod_edge"),
+        **dict.fromkeys(("rod_cut", *ROD), ("stage", "rod_edge")),
+        **dict.fromkeys(BOND, ("stage", "bond")),
+        "bond_position": ("stage", "bond", "component"),
     }
     data: dict[str, Any] = {}
     for name in READ:
