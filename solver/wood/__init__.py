@@ -72,7 +72,7 @@ _STRESSES = ("rod_strain", "rod_stress", "bond_position", "bond_tension", "bond_
 
 SOLVER = Solver(
     name="wood",
-    version="8",
+    version="9",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body", *_STRESSES),

@@ -76,7 +76,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]
     if params.mode == "explicit":
-        contact = float(law(wood, params)[1]) if params.rod_contact else 0.0
+        contact = float(law(wood, params)[1]) if params.touching else 0.0
         longest = longest_step(wood, contact)
         dt = min(settings.courant * longest, params.step or np.inf)
         wood = touchable(wood, dt, contact)

@@ -1,4 +1,4 @@
-"""Contact between rods, bonded or not: a penalty between closest points of two edges, and friction.
+"""Contact between rods that no bond holds together: a penalty between closest points of two edges, and friction.
 
 Edges are capsules of one thickness, somewhat below the least distance of rods in the section, so that nothing touches
 as laid. The same force acts on both closest points, shared by the ends of their edges: linear momentum is kept to
