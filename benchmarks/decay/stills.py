@@ -37,13 +37,13 @@ def solved(preset: str, folder: Path) -> tuple[Path, Path]:
     said = ["--set", "body=quasi-static", "--set", "skin={}", "--set", _WOUNDS, "--quality", "preview"]
     if usd.exists() and glb.exists():
         return usd, glb  # to look at them in another light
-    _wizen("solve", "decay", "--preset", preset, *said, "--stages", stages, "--out", str(run))
+    wizen("solve", "decay", "--preset", preset, *said, "--stages", stages, "--out", str(run))
     for path in (usd, glb):
-        _wizen("export", str(run), "--out", str(path))
+        wizen("export", str(run), "--out", str(path))
     return usd, glb
 
 
-def _wizen(*words: str) -> None:
+def wizen(*words: str) -> None:
     """Run the command in this process: what it imports and compiles is there the next time."""
     before, sys.argv = sys.argv, ["wizen", *words]
     try:

@@ -1,7 +1,8 @@
 """Which rods may touch, kept up while they move: lists of `pairs.pairs` with a margin.
 
-Pairs stay listed while no vertex has left its own margin (after Verlet 1967), also where rods break. Of those, what whole bonds hold
-together does not touch: bonds resist pressure themselves, and in a bundle that is whole nothing is looked at.
+Pairs stay listed while no vertex has left its own margin (after Verlet 1967), also where rods break. Of those, what
+whole bonds hold together does not touch: bonds resist pressure themselves, and in a bundle that is whole nothing is
+looked at.
 """
 
 from __future__ import annotations
