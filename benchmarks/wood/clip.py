@@ -1,9 +1,9 @@
 """A clip opened in Blender: python -m benchmarks.wood.clip PYTHON_WITH_BPY [PARAMS.toml].
 
 `wizen solve` stores a run with its surface, `wizen export` makes a GLB of it, and a Python in which `bpy` is installed
-opens that: how many meshes and frames there are, and how many bodies and pieces of wood are shown in the middle of every
-stage. Bodies are told from wood by the file's colours. Beside it the run's own number of fragments; those that are one
-vertex have no surface.
+opens that: how many meshes and frames there are, and how many bodies and pieces of wood are shown in the middle of
+every stage. Bodies are told from wood by the file's colours. Beside it the run's own number of fragments; those that
+are one vertex have no surface.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ def opened(clip: Path, python: str) -> dict[str, Any]:
     """Return what Blender finds in a clip."""
     script = Path(__file__).with_name("_blender.py")
     done = subprocess.run(
-        [python, str(script), str(clip), str(len(_STAGES))], capture_output=True, text=True, check=True, cwd=clip.parent,
+        [python, str(script), str(clip), str(len(_STAGES))],
+        capture_output=True, text=True, check=True, cwd=clip.parent,
         env={"HOME": str(clip.parent), "PATH": "/usr/bin:/bin"},
     )  # fmt: skip
     found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
