@@ -20,7 +20,8 @@ __all__ = ["Listing", "Near", "law"]
 
 #: Thickness over the least distance of rods as laid, and the list's margin over the thickness.
 _THICK, _MARGIN = 0.8, 1.0
-#: How many times as far as it goes ahead a vertex may go besides until pairs are listed anew.
+#: How many times as far as it goes ahead a vertex may go besides until pairs are listed anew. At 16 times, the moments
+#: after a break, when all moves, list everything.
 _AHEAD = 10.0
 #: Share of an edge's stiffness that a contact of rods has: about as round rods of wood that cross have across the grain
 #: (Hertz).
