@@ -190,7 +190,7 @@ class WoodParams(Params):
     )
     rod_contact: bool | None = Field(
         None,
-        description="Whether rods touch each other that no bond holds together; by default where they may break, in "
+        description="Whether rods touch each other where no bond holds them apart; by default where they may break, in "
         "explicit runs",
         json_schema_extra={"units": "1"},
     )
