@@ -21,7 +21,7 @@ from solver.wood.stepping.explicit import march
 from solver.wood.stepping.moment import begin
 from solver.wood.stepping.stability import longest_step
 
-from .splinters import splinters
+from .shared.splinters import splinters
 
 _PLAIN: dict[str, Any] = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ..contract import Need
 from .fibres.timber import timber
 from .fracture import bows
 from .model.joining import lying, moduli
@@ -40,8 +39,11 @@ def _along(state: State) -> tuple[np.ndarray, np.ndarray]:
 class Stresses:
     """What reads them: it knows what bonds were laid as, before they broke."""
 
-    def __init__(self, params: WoodParams, laid: Wood) -> None:
+    def __init__(self, params: WoodParams, laid: Wood, need: Need) -> None:
+        self._wanted, self._dtype = {*ROD, *BOND} & {*need.fields}, need.dtype
         self._real = laid.rods.k > 0
+        if not self._wanted:
+            return
         self._across, self._shear = moduli(params, timber(params), laid.straight, laid.rods, laid.bonds)
 
     def _bonds(self, state: State) -> dict[str, np.ndarray]:
@@ -61,7 +63,10 @@ class Stresses:
             "bond_damage": np.where(bonds.on > 0, bonds.damage, 1.0),
         }
 
-    def read(self, state: State) -> dict[str, Any]:
-        """Return all that `ROD` and `BOND` name."""
+    def read(self, state: State) -> dict[str, np.ndarray]:
+        """Return what is wanted of `ROD` and `BOND`."""
+        if not self._wanted:
+            return {}
         strain, stress = _along(state)
-        return {"rod_strain": strain[self._real], "rod_stress": stress[self._real], **self._bonds(state)}
+        found = {"rod_strain": strain[self._real], "rod_stress": stress[self._real], **self._bonds(state)}
+        return {name: found[name].astype(self._dtype) for name in self._wanted}

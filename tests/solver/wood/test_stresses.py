@@ -43,7 +43,7 @@ def bundle():
     x = wood.motion.x
     way = x[wood.rods.a[wood.bonds.i]] - x[wood.rods.a[wood.bonds.j]]
     up = way[:, 2] / np.hypot(way[:, 1], way[:, 2])
-    return begin(wood), Stresses(params, wood), up
+    return begin(wood), Stresses(params, wood, Need(stages=(0.0,), fields=(*ROD, *BOND))), up
 
 
 def test_what_is_drawn_out_across_bears_its_modulus_times_the_strain(bundle):

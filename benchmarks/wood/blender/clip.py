@@ -1,4 +1,4 @@
-"""A clip opened in Blender: python -m benchmarks.wood.clip PYTHON_WITH_BPY [PARAMS.toml].
+"""A clip opened in Blender: python -m benchmarks.wood.blender.clip PYTHON_WITH_BPY [PARAMS.toml].
 
 `wizen solve` stores a run with its surface, `wizen export` makes a GLB of it, and a Python in which `bpy` is installed
 opens that: how many meshes and frames there are, and how many bodies and pieces of wood are shown in the middle of
@@ -36,7 +36,7 @@ def written(params: Path, folder: Path) -> tuple[Path, Path]:
 
 def opened(clip: Path, python: str) -> dict[str, Any]:
     """Return what Blender finds in a clip."""
-    script = Path(__file__).with_name("_blender.py")
+    script = Path(__file__).with_name("inside.py")
     done = subprocess.run(
         [python, str(script), str(clip), str(len(_STAGES))],
         capture_output=True, text=True, check=True, cwd=clip.parent,
