@@ -1,8 +1,8 @@
 """Numbers of a run by stage, as a table (.csv) and drawn (.svg): a test bench's curves.
 
 What has the dimension `stage` and at most two short ones besides is a column each: `body_force 0 z [N]`. Of fields
-called `X_force` and `X_shift`, force is drawn over way, and moment over turn of `X_torque` and `X_turn`; of a run
-without such, all plain numbers over the stage.
+called `X_force` and `X_shift`, force is drawn over way, and moment over turn of `X_torque` and `X_turn`; below, force
+and moment of all that bears any over the stage. Of a run without such, all plain numbers over the stage.
 """
 
 from __future__ import annotations
@@ -75,17 +75,35 @@ def _paired(run: xr.Dataset, load: str, way: str) -> Iterator[tuple[str, Array, 
                 yield f"{name.removesuffix(load)} {n}", gone, felt
 
 
+def _felt(run: xr.Dataset, load: str) -> Iterator[tuple[str, Array, Array]]:
+    """Yield label, stage and load (stages,) of all that bears any: sizes of vectors."""
+    for name in (str(n) for n in run.data_vars if str(n).endswith(load)):
+        for n in range(run.sizes[str(run[name].dims[1])]):
+            felt = np.linalg.norm(run[name].values[:, n], axis=-1)
+            if felt.any():
+                yield f"{name.removesuffix(load)} {n}", run["stage"].values, felt
+
+
+def _panels(run: xr.Dataset) -> list[tuple[_Axes, list[tuple[str, Array, Array]]]]:
+    """Return axes and labelled curves: loads over ways and turns, then over the stage."""
+    unit = str(run["stage"].attrs.get("units", "1"))
+    found = [(over, list(_paired(run, *kind))) for kind, over in _OVER.items()]
+    for (load, _), over in _OVER.items():
+        found.append((_Axes(1.0, f"stage [{unit}]", over.up), list(_felt(run, load))))
+    return [(axes, curves) for axes, curves in found if curves]
+
+
 def as_svg(run: xr.Dataset) -> bytes:
-    """Return the curves as a drawing: loads over ways and turns where the run knows both, else numbers by stage."""
+    """Return the curves as a drawing: loads over ways, turns and stages if the run knows loads, else its numbers."""
     from matplotlib.figure import Figure
 
-    drawn = {kind: found for kind in _OVER if (found := list(_paired(run, *kind)))}
-    figure = Figure(figsize=(6.4, 4.2 * max(len(drawn), 1)), layout="constrained")
+    drawn = _panels(run)
+    figure = Figure(figsize=(6.4, 3.2 * max(len(drawn), 1)), layout="constrained")
     if drawn:
-        for axes, (kind, found) in zip(figure.subplots(len(drawn), 1, squeeze=False)[:, 0], drawn.items(), strict=True):
+        for axes, (over, found) in zip(figure.subplots(len(drawn), 1, squeeze=False)[:, 0], drawn, strict=True):
             for label, way, load in found:
-                axes.plot(_OVER[kind].scale * way, load, lw=1.2, label=label)
-            axes.set(xlabel=_OVER[kind].across, ylabel=_OVER[kind].up)
+                axes.plot(over.scale * way, load, lw=1.2, label=label)
+            axes.set(xlabel=over.across, ylabel=over.up)
             axes.legend()
     else:
         plain = [c for c in columns(run) if " " not in c[0]][1:]

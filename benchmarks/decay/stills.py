@@ -43,16 +43,16 @@ def solved(preset: str, folder: Path) -> list[Path]:
     said = ["--set", "body=quasi-static", "--set", "skin={}", "--set", _WOUNDS, *_SET[preset]]
     if not run.exists():
         stages = ",".join(map(str, AGES[preset]))
-        _wizen("solve", "decay", "--preset", preset, *said, "--stages", stages, "--out", str(run))
+        wizen("solve", "decay", "--preset", preset, *said, "--stages", stages, "--out", str(run))
     for age, path in zip(AGES[preset], usd, strict=True):
         if not path.exists():
-            _wizen("export", str(run), "--full", "--stage", str(age), "--out", str(path))
+            wizen("export", str(run), "--full", "--stage", str(age), "--out", str(path))
     if not glb.exists():
-        _wizen("export", str(run), "--full", "--out", str(glb))
+        wizen("export", str(run), "--full", "--out", str(glb))
     return [*usd, glb]
 
 
-def _wizen(*words: str) -> None:
+def wizen(*words: str) -> None:
     """Run the command in this process: what it imports and compiles is there the next time."""
     before, sys.argv = sys.argv, ["wizen", *words]
     try:

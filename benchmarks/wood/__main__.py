@@ -21,7 +21,7 @@ from solver.wood.stepping.explicit import march
 from solver.wood.stepping.moment import begin
 from solver.wood.stepping.stability import longest_step
 
-from .splinters import splinters
+from .shared.splinters import splinters
 
 _PLAIN: dict[str, Any] = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 
@@ -132,10 +132,19 @@ def _asked() -> None:
     parser.add_argument("--modes", nargs="+", choices=("scaled", "explicit"), default=["scaled"])
     parser.add_argument("--scaling", type=float, nargs="+", default=[1e4], help="masses over real ones when scaled")
     parser.add_argument("--no-elastic", action="store_true", help="leave the run without fracture out")
+    parser.add_argument("--contact", nargs="+", choices=("yes", "no"), default=["yes"], help="whether rods touch")
     asked = parser.parse_args()
     if asked.fig42:
         masses = [1.0] * ("explicit" in asked.modes) + asked.scaling * ("scaled" in asked.modes)
-        splinters(asked.rods, asked.vertices, asked.seeds, asked.until, masses, not asked.no_elastic)
+        splinters(
+            asked.rods,
+            asked.vertices,
+            asked.seeds,
+            asked.until,
+            masses,
+            not asked.no_elastic,
+            [word == "yes" for word in asked.contact],
+        )
     else:
         main()
 

@@ -23,7 +23,7 @@ from benchmarks.figures import Sheet, load
 from solver.contract import Need
 from solver.wood import SOLVER
 
-from .softening import Flexure
+from .shared.softening import Flexure
 
 __all__ = ["DCB", "ENF", "E_ACROSS", "WIDE", "E", "G", "Trial", "chi", "measured", "trial"]
 

@@ -67,12 +67,15 @@ _NUMBERS = (
     "fragment_length",
 )
 
+#: On request: they are as large as the rods' places.
+_STRESSES = ("rod_strain", "rod_stress", "bond_position", "bond_tension", "bond_shear", "bond_damage")
+
 SOLVER = Solver(
     name="wood",
-    version="8",
+    version="9",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
-    fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),
+    fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body", *_STRESSES),
     default_fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body"),
     stages=StageAxis("t", "time", "s", 0.0, 60.0, (0.005, 0.01, 0.015, 0.02)),
     default_resolution={"preview": 32, "default": 64, "fine": 128},

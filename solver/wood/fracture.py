@@ -23,7 +23,7 @@ from .model.sawing import crossed
 from .model.state import Wood
 from .params import WoodParams
 
-__all__ = ["Breaks", "break_worst", "overstress", "sawed", "sever"]
+__all__ = ["Breaks", "bows", "break_worst", "overstress", "sawed", "sever"]
 
 #: A break closer to a vertex than this, over the edge, is one at the vertex.
 _NEAR = 0.25
@@ -41,10 +41,10 @@ class Breaks(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _hinges(
+def bows(
     rods: Rods, t: np.ndarray, theta: np.ndarray, reference: np.ndarray, bow: np.ndarray, turning: bool
 ) -> np.ndarray:
-    """Return curvature beyond that at rest [1/m] and twist [radian/m] (h, 2) of whole hinges."""
+    """Return curvature beyond that at rest [1/m] and twist [radian/m] (h, 2) of whole hinges; 0 of broken ones."""
     out = np.zeros((len(rods.before), 2))
     for h in range(len(rods.before)):
         if rods.whole[h] == 0:
@@ -82,7 +82,7 @@ def overstress(
     `twist.turn` writes it, read if `turning`. Twist
     lengthens the outer fibre by sqrt(1 + (radius x twist)^2) (sec. 6.1).
     """
-    bent = _hinges(rods, t, theta, reference, bow, turning)
+    bent = bows(rods, t, theta, reference, bow, turning)
     count = len(rods.a)
     ratio[:] = 0.0
     place[:] = 0.0
@@ -213,9 +213,13 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float
     would be stretched and sheared, at a strong bend by many times what it bears, and what bonds hold would be made of
     nothing. So they are as if laid on the curve that is left: stretch, shear and energy stay what they were.
     """
-    length, slope = stretched(wood.motion.x, wood.rods, wood.bonds)
     edges = np.flatnonzero(ratio > 1)
-    rods = wood.rods
+    rods, bonds = wood.rods, wood.bonds
+    # a break bends the curve of its own rod alone: all other bonds stay as they are
+    near = np.zeros(int(wood.rod.max()) + 1, bool)
+    near[wood.rod[edges]] = True
+    mine = np.flatnonzero(near[wood.rod[bonds.i]] | near[wood.rod[bonds.j]])
+    length, slope = stretched(wood.motion.x, rods, Bonds(*(a[mine] for a in bonds)))
     spent, broken, gone = 0.0, 0, 0
     for e in map(int, edges[np.argsort(-ratio[edges], kind="stable")]):
         strain = float(wood.strength[e, round(float(place[e]) * (len(SAMPLES) - 1))]) * float(ratio[e])
@@ -237,12 +241,12 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float
             # the vertex beyond is already split or a clamp's: cut as close to it as a stub allows
             gone += sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
             broken += 1
-    later, lean = stretched(wood.motion.x, rods, wood.bonds)
+    later, lean = stretched(wood.motion.x, rods, Bonds(*(a[mine] for a in bonds)))
     # no stiffer than the step bears
     longer = np.maximum(later / np.maximum(length, _TINY), _SHORTEST)
-    wood.bonds.rest[:] *= longer
-    wood.bonds.k[:] /= longer
-    wood.bonds.cosine[:] += lean - slope
+    bonds.rest[mine] *= longer
+    bonds.k[mine] /= longer
+    bonds.cosine[mine] += lean - slope
     return Breaks(wood, broken, gone)
 
 

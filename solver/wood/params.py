@@ -188,9 +188,10 @@ class WoodParams(Params):
         "by default a tenth of an edge's in tension",
         json_schema_extra={"units": "N/m"},
     )
-    rod_contact: bool = Field(
-        False,
-        description="Whether rods touch each other",
+    rod_contact: bool | None = Field(
+        None,
+        description="Whether rods touch each other where no bond holds them apart; by default where they may break, in "
+        "explicit runs",
         json_schema_extra={"units": "1"},
     )
     rod_friction: float = Field(
@@ -222,6 +223,12 @@ class WoodParams(Params):
     def wide(self) -> float:
         """Radius of the disk of the section's area [m]."""
         return (abs(polygon_area(self.outline)) / math.pi) ** 0.5 if self.outline else self.radius
+
+    @property
+    def touching(self) -> bool:
+        """Whether rods touch each other."""
+        chosen = self.rod_contact
+        return chosen if chosen is not None else self.mode != "static" and self.fracture != "none" and self.rods > 1
 
     @field_validator("mode", mode="before")
     @classmethod

@@ -28,6 +28,7 @@ from .settings import choose
 from .stepping.marching import explicit
 from .stepping.moment import Reached
 from .stepping.stability import longest_step, touchable
+from .stresses import BOND, ROD, Stresses
 from .surface.skin import Skin
 from .surface.solids import among
 
@@ -56,25 +57,15 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     params, said = _settled(params, settings.vertices)
     context.report(0.0, said.get("note", "laying the bundle"))
     wood = hewn(lay(params, settings.vertices), params)
-    attrs: dict[str, Any] = {
-        "path": params.mode,
-        "mass_scaling": params.mass_scaling,
-        **said,
-        "rods": len(np.unique(wood.rod[wood.rods.k > 0])),
-        "vertices": settings.vertices,
-        "bonds": len(wood.bonds.i),
-        "metres_per_unit": 1.0,
-        "up": "z",
-        # what a picture should show, middle and radius: fragments fly far
-        "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
-    }
+    attrs = _said(wood, params, said)
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
+    strained = Stresses(params, wood, need)
     laid, wood = wood, sawed(wood, params)
     frames: list[Frame] = []
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]
     if params.mode == "explicit":
-        contact = float(law(wood, params)[1]) if params.rod_contact else 0.0
+        contact = float(law(wood, params)[1]) if params.touching else 0.0
         longest = longest_step(wood, contact)
         dt = min(settings.courant * longest, params.step or np.inf)
         wood = touchable(wood, dt, contact)
@@ -92,6 +83,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
                 if skin is not None:
                     frames.append(among(skin.frame(reached.state.wood), params, reached.time))
                 rows.append(_row(reached, laid, params, need, time.perf_counter() - begun))
+                rows[-1] |= strained.read(reached.state)
                 context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
@@ -118,6 +110,22 @@ def _settled(params: WoodParams, vertices: int) -> tuple[WoodParams, dict[str, A
             f"at loads that are too high (by .6 at twice that), and all at once; {wanted} vertices on a rod are enough"
         )
     return params, said | ({"note": "; ".join(notes)} if notes else {})
+
+
+def _said(wood: Wood, params: WoodParams, said: dict[str, Any]) -> dict[str, Any]:
+    """Return what the result says of itself."""
+    return {
+        "path": params.mode,
+        "mass_scaling": params.mass_scaling,
+        **said,
+        "rods": len(np.unique(wood.rod[wood.rods.k > 0])),
+        "vertices": wood.grid.shape[1],
+        "bonds": len(wood.bonds.i),
+        "metres_per_unit": 1.0,
+        "up": "z",
+        # what a picture should show, middle and radius: fragments fly far
+        "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
+    }
 
 
 def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: float) -> dict[str, Any]:
@@ -186,7 +194,9 @@ def _dataset(
         "fragment_length": ("stage", "fragment"),
         "tip_position": ("stage", "component"),
         "rod_position": ("stage", "rod_edge", "end", "component"),
-        "rod_cut": ("stage", "rod_edge"),
+        **dict.fromkeys(("rod_cut", *ROD), ("stage", "rod_edge")),
+        **dict.fromkeys(BOND, ("stage", "bond")),
+        "bond_position": ("stage", "bond", "component"),
     }
     data: dict[str, Any] = {}
     for name in READ:

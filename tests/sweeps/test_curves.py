@@ -28,22 +28,30 @@ def words(svg: bytes) -> list[str]:
 @pytest.mark.parametrize(
     ("fields", "wanted", "unwanted"),
     [
-        ({"grip_force": LOAD, "grip_shift": WAY}, ["way [mm]", "force [N]", "grip 0"], ["grip 1", "moment [N m]"]),
+        (
+            {"grip_force": LOAD, "grip_shift": WAY},
+            {"way [mm]": 1, "force [N]": 2, "grip 0": 2, "grip 1": 1, "stage [1]": 1},
+            ["moment [N m]"],
+        ),
         (
             {"grip_torque": LOAD, "grip_turn": WAY[:, ::-1] * np.pi / 180},
-            ["turn [degree]", "moment [N m]", "grip 1"],
-            ["grip 0", "force [N]"],
+            {"turn [degree]": 1, "moment [N m]": 2, "grip 1": 2, "grip 0": 1, "stage [1]": 1},
+            ["force [N]"],
         ),
         (
             {"grip_force": LOAD, "grip_shift": WAY, "grip_torque": LOAD, "grip_turn": WAY[:, ::-1]},
-            ["way [mm]", "force [N]", "turn [degree]", "moment [N m]", "grip 0", "grip 1"],
-            ["stage"],
+            {"way [mm]": 1, "turn [degree]": 1, "stage [1]": 2, "force [N]": 2, "moment [N m]": 2},
+            [],
         ),
+        # what rests bears a moment all the same, and what bears nothing is left out
+        ({"body_torque": LOAD * [[1.0], [0.0]]}, {"moment [N m]": 1, "body 0": 1, "stage [1]": 1}, ["body 1"]),
     ],
 )
-def test_loads_are_drawn_over_what_moved(fields: dict[str, np.ndarray], wanted: list[str], unwanted: list[str]) -> None:
+def test_loads_are_drawn_over_what_moved_and_over_the_stage(
+    fields: dict[str, np.ndarray], wanted: dict[str, int], unwanted: list[str]
+) -> None:
     found = words(as_svg(run(**fields)))
-    assert set(wanted) <= set(found)
+    assert {word: found.count(word) for word in wanted} == wanted
     assert not set(unwanted) & set(found)
 
 

@@ -1,4 +1,4 @@
-"""Contact between rods, bonded or not: a penalty between closest points of two edges, and friction.
+"""Contact between rods that no bond holds together: a penalty between closest points of two edges, and friction.
 
 Edges are capsules of one thickness, somewhat below the least distance of rods in the section, so that nothing touches
 as laid. The same force acts on both closest points, shared by the ends of their edges: linear momentum is kept to
@@ -50,6 +50,19 @@ def crossed(
 
 
 @njit(cache=True, error_model="numpy")
+def _beyond(x: np.ndarray, rods: Rods, e: int, w: int, thick: float) -> bool:
+    """Return whether the boxes of two edges are farther apart than `thick` [m]: most listed pairs are, at each step."""
+    a, b, c, d = rods.a[e], rods.b[e], rods.a[w], rods.b[w]
+    for k in range(3):
+        if (
+            min(x[c, k], x[d, k]) - max(x[a, k], x[b, k]) > thick
+            or min(x[a, k], x[b, k]) - max(x[c, k], x[d, k]) > thick
+        ):
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
 def rub(
     x: np.ndarray,
     v: np.ndarray,
@@ -68,6 +81,8 @@ def rub(
     vertex = np.zeros(4, np.int64)
     weight = np.zeros(4)
     for m in range(len(rubbing.pair)):
+        if _beyond(x, rods, rubbing.pair[m, 0], rubbing.pair[m, 1], thick):
+            continue
         apart = crossed(x, rods, rubbing.pair[m], thick, vertex, weight, n)
         gap = thick - apart
         if gap <= 0.0 or apart == 0.0:

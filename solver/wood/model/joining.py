@@ -13,7 +13,7 @@ from .curves import held
 from .grain import Field, rayed, ringed
 from .outline import area, corners, sawn_through
 
-__all__ = ["bodied", "bonded", "longest_edge", "resolved", "stretched"]
+__all__ = ["bodied", "bonded", "longest_edge", "lying", "moduli", "resolved", "stretched"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
@@ -81,7 +81,7 @@ def bodied(params: WoodParams, k: float, ease: float, rest: np.ndarray) -> Bodie
     )
 
 
-def _lying(
+def lying(
     x: np.ndarray, rods: Rods, i: np.ndarray, at: np.ndarray, j: np.ndarray, share: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """Return the middles (b, 3) [m], lengths (b,) [m] and slopes along themselves (b,) of bonds between edges.
@@ -100,8 +100,20 @@ def stretched(x: np.ndarray, rods: Rods, bonds: Bonds) -> tuple[np.ndarray, np.n
 
     x (v, 3) [m]: vertices.
     """
-    _, length, slope = _lying(x, rods, bonds.i, bonds.at, bonds.j, bonds.share)
+    _, length, slope = lying(x, rods, bonds.i, bonds.at, bonds.j, bonds.share)
     return length, slope
+
+
+def moduli(
+    params: WoodParams, log: WoodParams, straight: np.ndarray, rods: Rods, bonds: Bonds
+) -> tuple[np.ndarray, ...]:
+    """Return the moduli [Pa] across and in shear (b,) that bonds as laid stand for, with the grain's share.
+
+    straight (v, 3) [m]: places in the straight bundle; log: what the bundle is hewn from.
+    """
+    part = straight[rods.b[bonds.i], 0] - straight[rods.a[bonds.i], 0]
+    volume = area(corners(log)) * params.length * part / max(float(part.sum()), 1e-300)
+    return bonds.k * bonds.rest / (_NET * volume), bonds.s / volume
 
 
 def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[float, float]:
@@ -204,7 +216,7 @@ def bonded(
     pairs[1::2] = pairs[1::2, ::-1]
     i, e, u, part = _closest(pairs, s, course, edge)
     at = np.full(len(i), 0.5)
-    middle, length, cosine = _lying(rest, rods, i, at, e, u)
+    middle, length, cosine = lying(rest, rods, i, at, e, u)
     way = (held(rest, rods, i, at)[0] - held(rest, rods, e, u)[0])[:, 1:]
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")

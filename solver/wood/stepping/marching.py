@@ -33,23 +33,25 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     anywhere = params.fracture == "stress"
     damaged, parted, gone = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
     # most looks find nothing: a bound says so for less
-    if not (damaged or gone) and anywhere and not wood.turning and float(scratch.found[:, 3].max()) < _BELOW:
+    bound = float(scratch.found[:, 3].max()) if anywhere and not wood.turning else 1.0
+    if not (damaged or gone) and bound < _BELOW:
         return state
     ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
-    m = wood.motion
-    top = overstress(
-        wood.rods,
-        scratch.t,
-        scratch.inverse,
-        wood.strength,
-        m.theta,
-        m.reference,
-        scratch.bent,
-        wood.turning,
-        anywhere,
-        ratio,
-        place,
-    )
+    m, top = wood.motion, 0.0
+    if bound >= _BELOW:
+        top = overstress(
+            wood.rods,
+            scratch.t,
+            scratch.inverse,
+            wood.strength,
+            m.theta,
+            m.reference,
+            scratch.bent,
+            wood.turning,
+            anywhere,
+            ratio,
+            place,
+        )
     if top <= 1 and not (damaged or gone):
         return state
     before = state.books[: CONTACT + 1].sum() + real(state)
@@ -108,8 +110,7 @@ def _refreshed(listing: Listing, state: State, ahead: float, time: float, dt: fl
 
     What rods that touch at the start have is booked as taken from what is lost.
     """
-    m = state.wood.motion
-    fitted = listing.fitted(state, ahead * float(np.sqrt((m.v**2).sum(1).max())) if listing.on else 0.0)
+    fitted = listing.fitted(state, ahead)
     if fitted is state:
         return state
     w, before = state.wood, float(state.books[: CONTACT + 1].sum())
@@ -133,7 +134,7 @@ def explicit(
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking = params.fracture != "none"
     # scaled masses follow what touches, at times that do not depend on which are wanted
-    often = breaking or params.rod_contact or bool(wood.grips) or wood.scaling > 1
+    often = breaking or params.touching or bool(wood.grips) or wood.scaling > 1
     chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
     scale, since, listing = floor(wood, params), 0, Listing(wood, params)
     for wanted in times:

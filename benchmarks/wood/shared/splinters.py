@@ -19,7 +19,16 @@ from solver.wood import SOLVER, WoodParams
 __all__ = ["splinters"]
 
 _FIELDS = ("elastic_energy", "broken_rods", "broken_bonds")
-_HEAD = ("masses over real ones", "seed", "breaks of rods", "of bonds", "CPU s", "wall s", "worst balance")
+_HEAD = (
+    "masses over real ones",
+    "seed",
+    "rods touch",
+    "breaks of rods",
+    "of bonds",
+    "CPU s",
+    "wall s",
+    "worst balance",
+)
 
 
 def _run(values: dict[str, Any], until: float) -> dict[str, Any]:
@@ -32,6 +41,7 @@ def _run(values: dict[str, Any], until: float) -> dict[str, Any]:
         "seed": params.seed,
         "scaling": params.mass_scaling,
         "fracture": params.fracture,
+        "touching": params.touching,
     }
     begun, clock = time.process_time(), time.perf_counter()
     try:
@@ -57,7 +67,7 @@ def _run(values: dict[str, Any], until: float) -> dict[str, Any]:
 
 def _cells(run: dict[str, Any]) -> list[str]:
     seed = str(run["seed"]) if run["fracture"] != "none" else "none breaks"
-    begun = [f"{run['scaling']:.0f}", seed]
+    begun = [f"{run['scaling']:.0f}", seed, "yes" if run["touching"] else "no"]
     if "broken_rods" not in run:
         return [*begun, run["failed"], *[""] * 4]
     said = f", ended at {run['until']:.2f} s: {run['failed']}" if "failed" in run else ""
@@ -66,9 +76,18 @@ def _cells(run: dict[str, Any]) -> list[str]:
 
 
 def splinters(
-    rods: int, vertices: int, seeds: Sequence[int], until: float, masses: Sequence[float], elastic: bool
+    rods: int,
+    vertices: int,
+    seeds: Sequence[int],
+    until: float,
+    masses: Sequence[float],
+    elastic: bool,
+    contact: Sequence[bool] = (True,),
 ) -> None:
-    """Print a row for every seed and mass, and those without fracture; explicit runs take 0.8 of the longest step."""
+    """Print a row for every seed and mass, and those without fracture; explicit runs take half the longest step.
+
+    contact: whether rods touch, all of them in turn.
+    """
     sheet = Sheet(f"wood-fig42-{rods}", _HEAD, "wood")
     # preview's step, and half of its edges: the same bundle
     twice: dict[str, Any] = {"rods": rods, "vertices": 2 * vertices - 1}
@@ -76,14 +95,20 @@ def splinters(
         values = {**twice, "mass_scaling": scaling} if scaling > 1 else twice
         # compiles, so that the rows do not
         _run({**values, "rods": 8, "vertices": 6}, 1e-3)
-        runs = []
-        for seed in ("elastic", *seeds) if elastic and scaling > 1 else seeds:
-            own = {"fracture": "none"} if seed == "elastic" else {"seed": seed}
-            run = _run({**values, **own}, until)
+        if elastic and scaling > 1:
+            run = _run({**values, "fracture": "none"}, until)
             sheet.add(_cells(run), **run)
-            runs += [run] if run["fracture"] != "none" and "failed" not in run else []
-        if len(runs) > 1:  # a row of no run of its own
-            mean = {name: np.mean([run[name] for run in runs]) for name in ("broken_rods", "broken_bonds", "cpu")}
-            counts = [f"{mean[name]:.0f}" for name in ("broken_rods", "broken_bonds")]
-            sheet.rows.append([f"{scaling:.0f}", f"mean of {len(runs)}", *counts, f"{mean['cpu']:.1f}", "", ""])
+        for touching in contact:
+            runs = []
+            for seed in seeds:
+                run = _run({**values, "seed": seed, "rod_contact": touching}, until)
+                sheet.add(_cells(run), **run)
+                runs += [run] if "failed" not in run else []
+            if len(runs) > 1:  # a row of no run of its own
+                mean = {name: np.mean([run[name] for run in runs]) for name in ("broken_rods", "broken_bonds", "cpu")}
+                counts = [f"{mean[name]:.0f}" for name in ("broken_rods", "broken_bonds")]
+                said = "yes" if touching else "no"
+                sheet.rows.append(
+                    [f"{scaling:.0f}", f"mean of {len(runs)}", said, *counts, f"{mean['cpu']:.1f}", "", ""]
+                )
     sheet.keep(until=until)

@@ -1,0 +1,1 @@
+"""What Blender makes of clips of wood."""
