@@ -105,7 +105,7 @@ def triangles(run: xr.Dataset) -> list[Panel]:
     grown = standing.on_meshes(run, frames)
     for index, (frame, more) in enumerate(zip(frames, grown, strict=True)):
         skin = colours.painted(run, index, frame.fields)
-        paint, rough = (None, None) if skin is None else skin
+        paint, rough = (None, None) if skin is None else (skin.colour, skin.roughness)
         place = (frame.vertices - np.asarray(middle)) / size
         away = np.linalg.norm(place, axis=1, keepdims=True)
         # what is far outside would only stretch the shadow
