@@ -43,10 +43,10 @@ from .shapes.compiling import Compiling
 from .shapes.live import LiveTables
 from .shapes.shortcut import Shortcut
 from .shapes.turns import Turns
+from .shapes.warming import warm
 from .stopping import at_signals
 from .telemetry import Metrics, Telemetry, record
 from .views.addresses import Rooted
-from .warming import warm
 
 __all__ = ["create_app"]
 
@@ -65,7 +65,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Door]]:
         try:
             memory.keep("service")
             if app.state.is_warmed:
-                warm(app.state)
+                warm(app.state.tables, maps.listed)
             yield {DOOR: app.state.door}
         finally:
             await app.state.sessions.close_all()

@@ -9,7 +9,8 @@ from typing import Any
 
 from benchmarks.figures import Row, markdown
 
-from . import controls, order
+from .claims import controls
+from .precision import order
 from .precision.buckled import STAGES, kind, summary
 from .precision.spheres import SHIPPED, ratios
 

@@ -1,6 +1,6 @@
 """Pictures that come with wizen: of presets, for people who have not run them yet, and of the package's own tables.
 
-`python -m service.portraits.make` draws them; a preset's says of which version, quality and stage it is, and a table's
+`python -m benchmarks.portraits` draws them; a preset's says of which version, quality and stage it is, and a table's
 bears the beginning of the digest of what it shows.
 """
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arrays import Array
 from ..contract import Fur, Label, Looks, Matter, Skin
-from .grain import grain
-from .stem import parts
+from .dress.grain import grain
+from .dress.stem import parts
 
 __all__ = ["LOOKS"]
 

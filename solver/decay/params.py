@@ -11,11 +11,11 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from ..fruit import Fruit
 from ..painted import Painted, Photo
 from .body.flesh import Flesh, Skin, Swing
+from .dress.peel import LESIONS, PEELS, Lesion, Peel
 from .fields.colony import MOULDS, ROTS, Colony
 from .fitting import contradiction
 from .heap.given import Heap
 from .hyphae import FURS, Hyphae
-from .peel import LESIONS, PEELS, Lesion, Peel
 from .surfaces.cut import Cut
 from .surfaces.imported import Mesh
 from .surfaces.places import Neighbour, Pressure, PressureMap, Wound

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .dress.peel import LESIONS, PEELS
 from .fields.colony import MOULDS, PAPER_MOULDS, PAPER_ROT, ROTS
 from .hyphae import FURS
-from .peel import LESIONS, PEELS
 
 __all__ = ["ENVIRONMENTS", "PRESETS", "SIZES"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.dehydration.order import order, table
+from benchmarks.dehydration.precision.order import order, table
 
 LIMIT = np.array([0.02, 0.04, 0.05, 0.055, 0.06])
 MESHES = (18, 26, 36, 48)

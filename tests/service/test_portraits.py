@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.portraits import portrait
 from service import portraits
-from service.portraits.make import portrait
 from solver import registry
 from solver.contract import InvalidInput
 from store import starter, tables
@@ -46,7 +46,7 @@ def test_every_preset_that_says_so_has_its_picture(client: httpx.Client) -> None
 
 
 def test_pictures_are_of_the_solvers_as_they_are() -> None:
-    """A picture of another version would show what a run no longer makes: python -m service.portraits.make."""
+    """A picture of another version would show what a run no longer makes: python -m benchmarks.portraits."""
     for name in registry.names():
         versions = {what["version"] for what in portraits.said(name).values()}
         assert versions <= {registry.get(name).version}

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from service import warming
-from service.app import create_app
-from service.settings import Settings
+from service import maps
+from service.shapes import warming
+from service.shapes.live import LiveTables
 from store.starter import ROOT
 from store.store import Store
 
@@ -54,7 +54,7 @@ def test_an_empty_or_damaged_store_is_left_to_those_who_ask(
     Store.open(empty, create=True)
     with caplog.at_level(logging.INFO):
         for root in (tmp_path / "missing", damaged, empty):
-            thread = warming.warm(create_app(Settings(store=root)).state)
+            thread = warming.warm(LiveTables(root, 60.0), maps.listed)
             thread.join(60)
             assert not thread.is_alive()
     assert caplog.text.count("nothing to load") == 2  # an empty one has nothing wrong with it
@@ -62,5 +62,5 @@ def test_an_empty_or_damaged_store_is_left_to_those_who_ask(
 
 def test_it_waits_a_moment() -> None:
     begun = time.monotonic()
-    warming.warm(create_app(Settings(store=Path("nowhere"))).state).join()
+    warming.warm(LiveTables(Path("nowhere"), 60.0), maps.listed).join()
     assert time.monotonic() - begun >= warming._PAUSE

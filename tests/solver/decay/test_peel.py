@@ -7,8 +7,8 @@ import pytest
 from scipy import ndimage
 
 from solver import registry
-from solver.decay.grain import grain, spotted
-from solver.decay.peel import LESIONS, PEELS
+from solver.decay.dress.grain import grain, spotted
+from solver.decay.dress.peel import LESIONS, PEELS
 
 
 def params(preset: str) -> dict:

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.figures import Row, markdown
 
-from .meshes import STAGES
+from ..meshes import STAGES
 
 __all__ = ["Order", "order", "table"]
 

@@ -1,4 +1,4 @@
-"""Many small runs at once: python -m benchmarks.dehydration.many [--turns 2].
+"""Many small runs at once: python -m benchmarks.dehydration.precision.many [--turns 2].
 
 A plan of twelve eighths at preview, swept into an empty store by one process, which may use all cores, and by as many
 processes as there are cores, which share them; in turns, compiled before. Samples an hour, and how many cores were

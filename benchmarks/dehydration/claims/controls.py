@@ -1,4 +1,4 @@
-"""Cold controls of the package's families: python -m benchmarks.dehydration.controls [--seconds 300].
+"""Cold controls of the package's families: python -m benchmarks.dehydration.claims.controls [--seconds 300].
 
 Of each family that was started from a pattern, the sample that is expected to take least is solved again without it,
 from its bumps alone: what the pattern changes in what is counted and measured, stage by stage. Kept after each run;

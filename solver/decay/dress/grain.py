@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Floats, Ints
-from .fields.noise import patches
+from ...arrays import Array, Floats, Ints
+from ..fields.noise import patches
 
 __all__ = ["grain", "spotted"]
 

@@ -1,4 +1,4 @@
-"""Draw the pictures that come with wizen: python -m service.portraits.make [--only WORD] [--seconds 90].
+"""Draw the pictures that come with wizen: python -m benchmarks.portraits [--only WORD] [--seconds 90].
 
 Of the package's tables, and of presets but for those of which there is a table: their pictures are of the table. What
 is expected to take longer than `--seconds` is left out; what is drawn already by the solver's version is not drawn
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from service.portraits import DRAWN, said, table_file
 from solver import registry
 from solver.contract import Context, InvalidInput, Need, Solver, SolverError
 from store import seal, starter
@@ -28,8 +29,6 @@ from sweeps import outputs, tabled
 from sweeps.formats import Made
 from sweeps.pictures.render import View
 from sweeps.pictures.sheet import Panel
-
-from . import DRAWN, said, table_file
 
 #: Side of a picture [pixels].
 _PIXELS = 192

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import threading
 import time
-
-from starlette.datastructures import State
+from collections.abc import Callable
 
 from solver import registry
 from store.errors import StoreError
 
-from .errors import ServiceError
-from .shapes.live import LiveTables
-from .telemetry import LOGGER
+from ..errors import ServiceError
+from ..telemetry import LOGGER
+from .live import LiveTables
 
 __all__ = ["warm"]
 
@@ -27,34 +26,31 @@ _PAUSE = 0.2
 _FIRST = ("default", "sphere")
 
 
-def warm(state: State) -> threading.Thread:
-    """Begin to load what an application's first questions need; return the thread that does it.
+def warm(tables: LiveTables, then: Callable[[LiveTables], object]) -> threading.Thread:
+    """Begin to load what a service's first questions need, and do what comes `then`; return the thread that does it.
 
     A store that is missing or damaged is left to those who ask: they are told what is wrong with it.
     """
-    thread = threading.Thread(target=_load, args=(state,), name="warming", daemon=True)
+    thread = threading.Thread(target=_load, args=(tables, then), name="warming", daemon=True)
     thread.start()
     return thread
 
 
-def _load(state: State) -> None:
+def _load(tables: LiveTables, then: Callable[[LiveTables], object]) -> None:
     time.sleep(_PAUSE)
     for name in registry.names():
         registry.get(name)
     try:
-        _open_first(state)
+        _open_first(tables)
+        then(tables)
     except (StoreError, ServiceError, OSError) as error:
         LOGGER.info("nothing to load before the first question: %s", error)
 
 
-def _open_first(state: State) -> None:
-    """Look up one shape of the table that the page begins with, and what all of them cover."""
-    from . import maps  # what it draws with is not needed to start
-
-    tables: LiveTables = state.tables
+def _open_first(tables: LiveTables) -> None:
+    """Look up one shape of the table that the page begins with."""
     names = tables.names()
     for name in [name for name in _FIRST if name in names][:1] or names[:1]:
         table = tables.get(name)
         middle = {axis: (low + high) / 2 for axis, (low, high) in table.info.axes.items()}
         table.at(middle, max(table.info.stages, key=abs), resolution=64)
-    maps.listed(tables)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Floats, Ints
-from ..contract import Part
+from ...arrays import Array, Floats, Ints
+from ...contract import Part
 
 __all__ = ["parts"]
 

@@ -1,0 +1,1 @@
+"""What a fruit wears: the pattern of its skin, its peel and lesions, stem and calyx."""
