@@ -103,11 +103,11 @@ def portrait(solver: Solver, preset: str, seconds: float) -> tuple[bytes, dict[s
     from PIL import Image
 
     params = solver.parse(_MORE.get(solver.name, {}), preset)
-    plain = solver.settle(Need(quality=_QUALITY), preset, (params,))
-    stages = plain.stages
+    usual = solver.settle(Need(quality=_QUALITY), preset, (params,))
+    stages = usual.stages
     stage = min(stages, key=lambda one: abs(one - _SHOWN.get(solver.name, 1.0) * stages[-1]))
     # with what gives the surface its colours
-    fields = (*plain.fields, *outputs.fields_for(DRAWN / "preset.png", True, solver))
+    fields = (*usual.fields, *outputs.fields_for(DRAWN / "preset.png", True, solver))
     need = solver.settle(Need(quality=_QUALITY, stages=(stage,), fields=fields), preset, (params,))
     expected = solver.cost(params, need).seconds
     if expected > seconds:
@@ -116,6 +116,9 @@ def portrait(solver: Solver, preset: str, seconds: float) -> tuple[bytes, dict[s
     axes = {name: params.axis(name) for name in params.axes}
     shapes = [outputs.of_result(run, axes, 0)] if "position" in run else []
     panel, view = _framed(outputs.panels(Made(shapes, {}, preset, solver.name, run=run))[-1])
+    plain = covering.tint(solver.name, (preset, "clay"))
+    if panel.colour is None and panel.triangles is None and plain is not None:
+        panel = replace(panel, colour=np.broadcast_to(plain, panel.position.shape))
     out = io.BytesIO()
     image = Image.fromarray(panel.image(_PIXELS, view))
     image.quantize(128, Image.Quantize.MEDIANCUT).save(out, "PNG", optimize=True)

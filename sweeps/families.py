@@ -20,7 +20,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, path_of
 
-__all__ = ["covered", "drawn", "gallery", "portrait", "thumbnail"]
+__all__ = ["covered", "drawn", "gallery", "portrait", "thumbnail", "tint"]
 
 #: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
 _DRY = 0.67
@@ -121,8 +121,8 @@ def thumbnail(
 
     shape = table.at(point, stage, resolution=96)
     assert shape.position is not None  # asked for by default
-    tint = _tint(table.info, presets)
-    colour = None if tint is None else np.broadcast_to(tint, shape.position.shape)
+    skin = tint(table.info.solver, (table.info.name, *presets))
+    colour = None if skin is None else np.broadcast_to(skin, shape.position.shape)
     out = io.BytesIO()
     Image.fromarray(render(shape.position, shape.poles, pixels, colour=colour)).save(out, "PNG", optimize=True)
     return out.getvalue()
@@ -157,7 +157,7 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
         shape = table.at(point, stage, resolution=128)
         assert shape.position is not None  # asked for by default
         said = ", ".join(f"{axis} {value:g}" for axis, value in point.items())
-        colour = _tint(table.info, families.presets_of(table.info))
+        colour = tint(table.info.solver, (table.info.name, *families.presets_of(table.info)))
         skin = None if colour is None else np.broadcast_to(colour, shape.position.shape)
         note = f"{name}: {said}, {solver.stages.symbol} {stage:g}"
         panels.append(Panel(shape.position, shape.poles, note, skin))
@@ -166,13 +166,10 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
     return sheet([panels[i : i + columns] for i in range(0, len(panels), columns)], pixels=pixels)
 
 
-def _tint(info: TableInfo, presets: Sequence[str]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """Return the colour, linear light, of the shade that begins a table's name, else that of one of its presets.
-
-    None where there is none.
-    """
-    shades = registry.get(info.solver).looks.shades
-    name = next((name for one in (info.name, *presets) for name in shades if one.startswith(name)), None)
+def tint(solver: str, names: Sequence[str]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """Return the colour, linear light, of the shade that begins the first of `names` that one begins, if any does."""
+    shades = registry.get(solver).looks.shades
+    name = next((shade for one in names for shade in shades if one.startswith(shade)), None)
     if name is None:
         return None
     text = shades[name].ridge[0]
