@@ -15,6 +15,7 @@ from dataclasses import replace
 from statistics import median
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from benchmarks.figures import Sheet
 from solver.contract import Context, SolverError
@@ -80,7 +81,8 @@ def main(preset: str = "apple", days: str = "5,10,25", rate: float = 24.0, count
     for day in map(float, days.split(",")):
         told = {"preset": preset, "day": day, "frames_a_day": rate, "frames": count, "vertices": 10 * cells**2 + 2}
         try:
-            each = frames(preset, day, rate, count, cells)
+            with threadpool_limits(1, user_api="blas"):  # as a run has it
+                each = frames(preset, day, rate, count, cells)
         except SolverError as error:
             sheet.add((f"{preset}, {day:g}", str(error), *[""] * 6), **told, failed=str(error))
             continue

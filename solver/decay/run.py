@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from ..arrays import Floats
 from ..contract import Context, Need, SolverError
@@ -43,6 +44,12 @@ def run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
         Cancelled: the observer asked to stop.
 
     """
+    # as of growth and wood: sums in BLAS depend on the number of threads, which spin between the small ones of a body
+    with threadpool_limits(1, user_api="blas"):
+        return _run(params, need, context)
+
+
+def _run(params: DecayParams, need: Need, context: Context) -> xr.Dataset:
     need = completed(params, need)
     params = _rest(params, need)
     settings = choose(params, need.quality)
