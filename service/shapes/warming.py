@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 
 from solver import registry
+from solver.contract import SolverError
 from store.errors import StoreError
 
 from ..errors import ServiceError
@@ -29,7 +30,8 @@ _FIRST = ("default", "sphere")
 def warm(tables: LiveTables, then: Callable[[LiveTables], object]) -> threading.Thread:
     """Begin to load what a service's first questions need, and do what comes `then`; return the thread that does it.
 
-    A store that is missing or damaged is left to those who ask: they are told what is wrong with it.
+    A store that is missing or damaged, or a table without a shape in its middle, is left to those who ask: they are
+    told what is wrong.
     """
     thread = threading.Thread(target=_load, args=(tables, then), name="warming", daemon=True)
     thread.start()
@@ -43,7 +45,7 @@ def _load(tables: LiveTables, then: Callable[[LiveTables], object]) -> None:
     try:
         _open_first(tables)
         then(tables)
-    except (StoreError, ServiceError, OSError) as error:
+    except (StoreError, ServiceError, SolverError, OSError) as error:
         LOGGER.info("nothing to load before the first question: %s", error)
 
 

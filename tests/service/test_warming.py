@@ -14,6 +14,7 @@ import pytest
 from service import maps
 from service.shapes import warming
 from service.shapes.live import LiveTables
+from solver.contract import InvalidGeometry
 from store.starter import ROOT
 from store.store import Store
 
@@ -58,6 +59,21 @@ def test_an_empty_or_damaged_store_is_left_to_those_who_ask(
             thread.join(60)
             assert not thread.is_alive()
     assert caplog.text.count("nothing to load") == 2  # an empty one has nothing wrong with it
+
+
+def test_a_shape_that_cannot_be_is_no_end_of_the_thread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Tables may have none in the middle of their ranges."""
+    monkeypatch.setattr(warming, "_PAUSE", 0.0)
+
+    def impossible(tables: LiveTables) -> None:
+        raise InvalidGeometry("the stone does not fit.")
+
+    Store.open(tmp_path, create=True)
+    with caplog.at_level(logging.INFO):
+        warming.warm(LiveTables(tmp_path, 60.0), impossible).join(60)
+    assert "nothing to load before the first question: the stone does not fit." in caplog.text
 
 
 def test_it_waits_a_moment() -> None:
