@@ -1,7 +1,7 @@
 """A scene of 1,000 fruits of 50 kinds beside 1,000 requests for them, in one run: python -m benchmarks.scenes.
 
-With --peer PYTHON, one that has xpublish below 0.5 and zarr, it stands beside xpublish too: a server of arrays, which
-is given each fruit's positions on the lattice that the scene gives it, looked up by us beforehand, as a chunk of
+With --peer PYTHON, one that has xpublish and xpublish-zarr, it stands beside xpublish too: a server of arrays, which is
+given each fruit's positions on the lattice that the scene gives it, looked up by us beforehand, as a chunk of
 float32 of its own. Its bytes are positions alone: no triangles, normals, colours or places.
 
 The server is `wizen serve` on the tables in the package; processor time is the server's own, wall time the client's.
@@ -105,7 +105,7 @@ def beside(peer: str, body: dict[str, Any], lattices: list[int], rounds: int) ->
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "arrays.npz"
         np.savez(file, **arrays)
-        with running([peer, "-c", PEER, "{port}", str(file)], "/datasets/d/zarr/v0/0") as (server, port, _):
+        with running([peer, "-c", PEER, "{port}", str(file)], "/datasets/d/zarr/v0/c/0") as (server, port, _):
             process = psutil.Process(server.pid)
             found = [[_arrays(port, process, names) for _ in range(rounds)] for names in (order, list(arrays))]
     return _least(found[0]), _least(found[1])
@@ -114,7 +114,7 @@ def beside(peer: str, body: dict[str, Any], lattices: list[int], rounds: int) ->
 def _arrays(port: int, process: psutil.Process, names: list[str]) -> dict[str, Any]:
     before, start, size = sum(process.cpu_times()[:2]), time.perf_counter(), 0
     for name in names:
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/datasets/d/zarr/{name}/0", timeout=60) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/datasets/d/zarr/{name}/c/0", timeout=60) as answer:
             size += len(answer.read())
     wall, spent = time.perf_counter() - start, sum(process.cpu_times()[:2]) - before
     return {"wall_s": wall, "processor_s": spent, "bytes": size, "memory": process.memory_info().rss}

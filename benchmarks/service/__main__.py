@@ -2,9 +2,8 @@
 
 Parts: `start` (until the first answer; with --before, another checkout's in turns), `load` (requests per second and
 latencies of 200 kB bodies at 16 clients, one worker each, in turns), `batch` (one request against many), `memory` (four
-workers over one table), `swaps` (a new generation 200 times under load). The peer needs a Python with xpublish below
-0.5, whose zarr routes later ones lack:
-python -m venv peers/xpublish && peers/xpublish/bin/pip install 'xpublish<0.5' 'fastapi<0.120' zarr uvicorn.
+workers over one table), `swaps` (a new generation 200 times under load). The peer needs a Python with xpublish and its
+plugin for zarr: python -m venv peers/xpublish && peers/xpublish/bin/pip install 'xpublish>=0.5' xpublish-zarr uvicorn.
 
 `start` serves the table in the package; the others the synthetic one of `benchmarks.service.lookup`: 30 samples, 5
 stages, 96 waves, 34 MB.
@@ -51,7 +50,7 @@ values = np.random.default_rng(0).standard_normal((200, 50000), dtype=np.float32
 data = xr.Dataset({f"v{i}": ("point", row) for i, row in enumerate(values)})  # numpy arrays are one chunk each
 if "raw" in sys.argv:
     for name in data:
-        data[name].encoding.update(compressors=None, compressor=None)
+        data[name].encoding["compressors"] = None
 uvicorn.run(xpublish.Rest({"d": data}).app, host="127.0.0.1", port=int(sys.argv[1]), log_level="error")
 """
 
@@ -78,7 +77,7 @@ uvicorn.run(app, host="127.0.0.1", port=int(sys.argv[1]), log_level="error")
 
 
 def theirs(i: int) -> str:
-    return f"/datasets/d/zarr/v{i * 89 % 200}/0"
+    return f"/datasets/d/zarr/v{i * 89 % 200}/c/0"
 
 
 def free_port() -> int:

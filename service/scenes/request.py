@@ -148,20 +148,26 @@ class Item(_Strict):
             raise ValueError("an item has either a stage or a curve of stages: write one of them")
         if not _finite(self.parameters):
             raise ValueError("parameters are finite numbers")
-        times = [at for at, _ in self.curve]
-        if self.curve and (len(times) < 2 or times[0] < 0 or any(b <= a for a, b in pairwise(times))):
-            raise ValueError("a curve has two or more pairs [seconds, stage], and its times rise, from 0 or later")
+        # what most items have not is asked for first: a scene may have thousands
+        if self.curve:
+            self._lasts()
         if self.transforms and self.place is not None:
             raise ValueError("transforms and place exclude each other: keep one of them")
         if self.transforms and self.count not in (1, len(self.transforms)):
             raise ValueError(f"count is {self.count}, and there are {len(self.transforms)} transforms: leave out count")
-        if (self.vary or self.differ) and self.seed is None:
+        if self.seed is None and (self.vary or self.differ):
             raise ValueError(f"{'vary' if self.vary else 'differ'} needs a seed")
-        if self.variants and self.curve:
-            raise ValueError("variants and a curve exclude each other: keep one of them")
-        if not all(map(math.isfinite, self.variants)):
+        if self.variants and not all(map(math.isfinite, self.variants)):
             raise ValueError("variants are finite numbers")
         return self
+
+    def _lasts(self) -> None:
+        """Check an item with a curve of stages."""
+        times = [at for at, _ in self.curve]
+        if len(times) < 2 or times[0] < 0 or any(b <= a for a, b in pairwise(times)):
+            raise ValueError("a curve has two or more pairs [seconds, stage], and its times rise, from 0 or later")
+        if self.variants:
+            raise ValueError("variants and a curve exclude each other: keep one of them")
 
     def _named(self) -> None:
         """Check an item that names a run."""
@@ -193,8 +199,12 @@ class Item(_Strict):
 def _finite(value: object) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
-    if isinstance(value, dict | list):
-        return all(map(_finite, value.values() if isinstance(value, dict) else value))
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for one in value:  # numbers without a call each
+            if not (math.isfinite(one) if isinstance(one, float) else _finite(one)):
+                return False
     return True
 
 
