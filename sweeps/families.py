@@ -156,10 +156,10 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
         point, stage = portrait(store, families, table.info)
         shape = table.at(point, stage, resolution=128)
         assert shape.position is not None  # asked for by default
-        said = ", ".join(f"{axis} {value:g}" for axis, value in point.items())
+        said = [f"{axis} {value:g}" for axis, value in point.items()]
         colour = tint(table.info.solver, (table.info.name, *families.presets_of(table.info)))
         skin = None if colour is None else np.broadcast_to(colour, shape.position.shape)
-        note = f"{name}: {said}, {solver.stages.symbol} {stage:g}"
+        note = f"{name}: {', '.join([*said, f'{solver.stages.symbol} {stage:g}'])}"
         panels.append(Panel(shape.position, shape.poles, note, skin))
     if not panels:
         raise UnknownTable("the store has no table of shapes.", "Build one: `wizen table build`.")
