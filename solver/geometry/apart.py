@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .crossings import cross
 from .inward import candidates, pairs
 
-__all__ = ["GAP", "Apart", "Topology", "put_apart"]
+__all__ = ["GAP", "ROUNDS", "Apart", "Looked", "Topology", "look", "put_apart"]
 
 Doubles = NDArray[np.float64]
 Words = NDArray[np.int32]
@@ -30,7 +30,9 @@ _ENOUGH, _AT_LAST = 0.5, 0.02
 #: slivers overlap by next to nothing however far they have to go.
 _WAY = 2.0
 #: Most rounds, and rounds between two looks at the whole surface.
-_ROUNDS, _STEPS = 240, 12
+ROUNDS, _STEPS = 240, 12
+#: Axes that are tried for two triangles.
+_AXES = 12
 #: How many points beyond what is pushed others are watched until the next look.
 _RINGS = 3
 
@@ -67,25 +69,48 @@ class Apart(NamedTuple):
     crossings: int
 
 
-def put_apart(x: Doubles, topology: Topology, rounds: int = _ROUNDS) -> Apart:
+class Looked(NamedTuple):
+    """What a look at a surface found: pairs (np, 2) of triangles that may touch, and the sizes (nt,) of these."""
+
+    pairs: Words
+    size: Doubles
+
+
+def look(x: Doubles, topology: Topology) -> Looked:
+    """Look at all of a surface of vertices x (nv, 3): most of what putting it apart takes."""
+    return Looked(*_look(x, topology.triangles))
+
+
+def put_apart(x: Doubles, topology: Topology, rounds: int = ROUNDS, looked: Looked | None = None) -> Apart:
     """Even out, in place, where the surface of vertices x (nv, 3) crosses itself; with no rounds, only count.
 
-    What is counted are pairs of triangles without a common corner that cross after rounding to single precision.
+    `looked`: what a look at these very vertices found. What is counted are pairs of triangles without a common corner
+    that cross after rounding to single precision.
     """
-    return Apart(*_put_apart(x, *topology, rounds))
+    return Apart(*_put_apart(x, *topology, rounds, *(looked or look(x, topology))))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)  # a service has others to answer meanwhile
-def _put_apart(x: Doubles, faces: Words, first: Words, near: Words, rounds: int) -> tuple[int, int, int]:
+def _look(x: Doubles, faces: Words) -> tuple[Words, Doubles]:
+    size = np.empty(len(faces))
+    some = candidates(x, faces, np.empty(0, np.bool_))
+    return (pairs(x, faces, some, size) if len(some) > 0 else np.empty((0, 2), np.int32)), size
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _put_apart(
+    x: Doubles, faces: Words, first: Words, near: Words, rounds: int, found: Words, sizes: Doubles
+) -> tuple[int, int, int]:
     began, spent = -1, 0
-    size, weight, way = np.empty(len(faces)), np.zeros(len(x)), np.zeros(len(x))
+    size, weight, way = sizes.copy(), np.zeros(len(x)), np.zeros(len(x))
     moved = np.empty(0, np.bool_)
     while True:
-        # what did not move since the last look was out of contact then
-        some = candidates(x, faces, size, moved)
-        if len(some) == 0:
-            return max(began, 0), spent, 0
-        found = pairs(x, faces, some, size)
+        if len(moved) > 0:
+            # what did not move since the last look was out of contact then
+            some = candidates(x, faces, moved)
+            if len(some) == 0:
+                return max(began, 0), spent, 0
+            found = pairs(x, faces, some, size)
         axes = np.zeros(len(found), np.int8)
         active, pushed = _weigh(x, faces, found, axes, size, weight, spent)
         began = active if began < 0 else began
@@ -93,7 +118,7 @@ def _put_apart(x: Doubles, faces: Words, first: Words, near: Words, rounds: int)
             return began, spent, 0
         if spent >= rounds:
             if len(moved) > 0:
-                found = pairs(x, faces, candidates(x, faces, size, moved[:0]), size)
+                found = pairs(x, faces, candidates(x, faces, moved[:0]), size)
             return began, spent, _count(x, faces, found)
         moved = np.zeros(len(x), np.bool_)
         few, few_axes = _around(faces, found, axes, pushed, first, near)
@@ -141,16 +166,23 @@ def _around(
 
 @njit(cache=True, error_model="numpy")
 def _along(x: Doubles, faces: Words, a: int, b: int, axis: int) -> float:
-    """By how much two triangles overlap along one of the eleven axes that can tell them apart; less than 0: a gap.
+    """By how much two triangles overlap along one of the axes that can tell them apart; less than 0: a gap.
 
-    The normals of both, then the products of an edge of each. Infinite where the axis has no length.
+    From one's middle to the other's, which tells most pairs apart, the normals of both, then the products of an edge of
+    each. Infinite where the axis has no length.
     """
-    if axis < 2:
-        t = a if axis == 0 else b
+    if axis == 0:
+        nx = ny = nz = 0.0
+        for k in range(3):
+            v, w = faces[a, k], faces[b, k]
+            nx, ny, nz = nx + x[w, 0] - x[v, 0], ny + x[w, 1] - x[v, 1], nz + x[w, 2] - x[v, 2]
+        return _apart_by(x, faces, a, b, nx, ny, nz, nx * nx + ny * ny + nz * nz)
+    if axis < 3:
+        t = a if axis == 1 else b
         p, q, r = faces[t, 0], faces[t, 1], faces[t, 2]
         s, u = p, r
     else:
-        i, j = (axis - 2) // 3, (axis - 2) % 3
+        i, j = (axis - 3) // 3, (axis - 3) % 3
         p, q = faces[a, i], faces[a, (i + 1) % 3]
         s, u = faces[b, j], faces[b, (j + 1) % 3]
     ux, uy, uz = x[q, 0] - x[p, 0], x[q, 1] - x[p, 1], x[q, 2] - x[p, 2]
@@ -158,6 +190,14 @@ def _along(x: Doubles, faces: Words, a: int, b: int, axis: int) -> float:
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     square = nx * nx + ny * ny + nz * nz
     if square <= 1e-8 * (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz):
+        return math.inf
+    return _apart_by(x, faces, a, b, nx, ny, nz, square)
+
+
+@njit(cache=True, error_model="numpy")
+def _apart_by(x: Doubles, faces: Words, a: int, b: int, nx: float, ny: float, nz: float, square: float) -> float:
+    """By how much two triangles overlap along an axis of this squared length."""
+    if square <= 0:
         return math.inf
     low_a = low_b = math.inf
     high_a = high_b = -math.inf
@@ -187,7 +227,7 @@ def _weigh(
         overlap = _along(x, faces, a, b, axes[n])
         if overlap <= -gap:
             continue
-        for axis in range(11):
+        for axis in range(_AXES):
             here = _along(x, faces, a, b, axis)
             if here < overlap:
                 overlap, axes[n] = here, axis

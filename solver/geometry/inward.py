@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .outward import STEEP
 
-__all__ = ["candidates", "pairs"]
+__all__ = ["candidates", "inward", "pairs"]
 
 Doubles = NDArray[np.float64]
 Words = NDArray[np.int32]
@@ -27,25 +27,37 @@ _AROUND = 0.1
 _WIDE = 1.3
 #: Cells along a side, over the root of the number of triangles, and at most.
 _FINE, _MOST = 0.75, 384
+#: Cells that are left out together, both ways.
+_BLOCK = 4
 
 
 @njit(cache=True, error_model="numpy")
-def _look(x: Doubles, faces: Words, t: int, size: Doubles) -> bool:
-    """Note a triangle's size, and return whether it faces the origin, or hardly away from it."""
+def inward(x: Doubles, faces: Words) -> Words:
+    """Return the triangles of vertices x (nv, 3) that face the origin, or hardly away from it."""
+    found, count = np.empty(len(faces), np.int32), 0
+    for t in range(len(faces)):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        ux, uy, uz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        vx, vy, vz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        volume = nx * x[a, 0] + ny * x[a, 1] + nz * x[a, 2]
+        square = (nx * nx + ny * ny + nz * nz) * (x[a, 0] ** 2 + x[a, 1] ** 2 + x[a, 2] ** 2)
+        if volume <= 0 or volume * volume <= STEEP**2 * square:
+            found[count] = t
+            count += 1
+    return found[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _size(x: Doubles, faces: Words, t: int) -> float:
+    """Return the least of a triangle's heights."""
     a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
     ux, uy, uz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     vx, vy, vz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    volume = nx * x[a, 0] + ny * x[a, 1] + nz * x[a, 2]
-    square = nx * nx + ny * ny + nz * nz
     wx, wy, wz = vx - ux, vy - uy, vz - uz
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
-    size[t] = math.sqrt(square / max(longest, 1e-300))
-    if volume <= 0:
-        return True
-    square *= x[a, 0] ** 2 + x[a, 1] ** 2 + x[a, 2] ** 2
-    is_steep: bool = volume * volume <= STEEP**2 * square
-    return is_steep
+    return math.sqrt((nx * nx + ny * ny + nz * nz) / max(longest, 1e-300))
 
 
 @njit(cache=True, error_model="numpy")
@@ -100,20 +112,30 @@ def _mark(x: Doubles, faces: Words, some: Words, marked: NDArray[np.bool_]) -> b
 
 
 @njit(cache=True, error_model="numpy")
-def candidates(x: Doubles, faces: Words, size: Doubles, moved: NDArray[np.bool_]) -> Words:
+def _blocks(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which blocks of cells (6, m, m), with those after them both ways, hold one that is marked."""
+    many = (marked.shape[1] - 1) // _BLOCK + 1
+    found = np.zeros((6, many, many), np.bool_)
+    for side in range(6):
+        for i in range(marked.shape[1]):
+            for j in range(marked.shape[1]):
+                if marked[side, i, j]:
+                    row, column = i // _BLOCK, j // _BLOCK
+                    found[side, max(row - 1, 0) : row + 1, max(column - 1, 0) : column + 1] = True
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def candidates(x: Doubles, faces: Words, moved: NDArray[np.bool_]) -> Words:
     """Return the triangles that lie before or behind one that faces inwards, and one with a corner in `moved` (nv,);
-    where it is empty, each counts as moved. `size` (nt,) is filled.
+    where it is empty, each counts as moved.
     """
-    inward, count = np.empty(len(faces), np.int32), 0
-    for t in range(len(faces)):
-        if _look(x, faces, t, size):
-            inward[count] = t
-            count += 1
-    if count == 0:
-        return inward[:0]
+    hidden = inward(x, faces)
+    if len(hidden) == 0:
+        return hidden
     cells = min(int(_FINE * math.sqrt(len(faces))) + 1, _MOST)
     marked = np.zeros((6, cells, cells), np.bool_)
-    if not _mark(x, faces, inward[:count], marked):
+    if not _mark(x, faces, hidden, marked):
         return np.arange(len(faces)).astype(np.int32)
     if len(moved) > 0:
         others, count = np.empty(len(faces), np.int32), 0
@@ -137,13 +159,18 @@ def candidates(x: Doubles, faces: Words, size: Doubles, moved: NDArray[np.bool_]
         rows[v] = int((x[v, (side + 1) % 3] / depth + _WIDE) * scale)
         columns[v] = int((x[v, (side + 2) % 3] / depth + _WIDE) * scale)
         sides[v] = 2 * side + (x[v, side] < 0)
+    blocks = _blocks(marked)
     some, count = np.empty(len(faces), np.int32), 0
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         side = sides[a]
         if sides[b] == side and sides[c] == side:
-            box[0, 0], box[0, 1] = min(rows[a], rows[b], rows[c]), max(rows[a], rows[b], rows[c])
-            box[1, 0], box[1, 1] = min(columns[a], columns[b], columns[c]), max(columns[a], columns[b], columns[c])
+            low, left = min(rows[a], rows[b], rows[c]), min(columns[a], columns[b], columns[c])
+            high, right = max(rows[a], rows[b], rows[c]), max(columns[a], columns[b], columns[c])
+            is_small = high - low <= _BLOCK and right - left <= _BLOCK
+            if is_small and not blocks[side, low // _BLOCK, left // _BLOCK]:
+                continue
+            box[0, 0], box[0, 1], box[1, 0], box[1, 1] = low, high, left, right
             is_one = False
         else:
             is_one = not _project(x, faces, t, side, cells, box)
@@ -158,11 +185,16 @@ def candidates(x: Doubles, faces: Words, size: Doubles, moved: NDArray[np.bool_]
 
 @njit(cache=True, error_model="numpy")
 def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
-    """Return the pairs (np, 2) among some triangles without a common corner whose boxes touch or nearly do."""
+    """Return the pairs (np, 2) among some triangles without a common corner that touch or nearly do, as far as their
+    boxes and the line between their middles tell.
+
+    The sizes of these triangles are filled into `size` (nt,).
+    """
     count = len(some)
     box = np.empty((count, 6), np.float32)
     for n in range(count):
         t = some[n]
+        size[t] = _size(x, faces, t)
         more = _AROUND * size[t] + 1e-6
         for k in range(3):
             a, b, c = x[faces[t, 0], k], x[faces[t, 1], k], x[faces[t, 2], k]
@@ -181,11 +213,14 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
             ends[strip + 1] += 1
     ends = np.cumsum(ends)
     place, sorted_box, fill = np.empty(ends[-1], np.int32), np.empty((ends[-1], 6), np.float32), ends[:-1].copy()
-    first_strip = np.empty(ends[-1], np.int32)
+    first_strip, corners = np.empty(ends[-1], np.int32), np.empty((ends[-1], 3), np.int32)
     for m in range(count):
         for strip in range(lows[m], highs[m] + 1):
-            place[fill[strip]], first_strip[fill[strip]] = order[m], lows[m]
-            sorted_box[fill[strip]] = box[order[m]]
+            place[fill[strip]], first_strip[fill[strip]] = some[order[m]], lows[m]
+            for k in range(6):
+                sorted_box[fill[strip], k] = box[order[m], k]
+            for k in range(3):
+                corners[fill[strip], k] = faces[some[order[m]], k]
             fill[strip] += 1
     found, room = np.empty((1024, 2), np.int32), 0
     for strip in range(strips):
@@ -205,11 +240,11 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
                 # a pair belongs to the strip in which both are met first
                 if max(first_strip[m], first_strip[o]) != strip:
                     continue
-                if _neighbours(faces, some[place[m]], some[place[o]]):
+                if _neighbours(corners, m, o) or _lie_apart(x, size, corners, place, m, o):
                     continue
                 if room == len(found):
                     found = np.concatenate((found, found))
-                found[room, 0], found[room, 1] = some[place[m]], some[place[o]]
+                found[room, 0], found[room, 1] = place[m], place[o]
                 room += 1
     return found[:room]
 
@@ -221,3 +256,20 @@ def _neighbours(faces: Words, a: int, b: int) -> bool:
             if faces[a, i] == faces[b, j]:
                 return True
     return False
+
+
+@njit(cache=True, error_model="numpy")
+def _lie_apart(x: Doubles, size: Doubles, corners: Words, place: Words, a: int, b: int) -> bool:
+    """Whether two triangles are clearly apart along the line between their middles: most that lie side by side are."""
+    nx = ny = nz = 0.0
+    for k in range(3):
+        v, w = corners[a, k], corners[b, k]
+        nx, ny, nz = nx + x[w, 0] - x[v, 0], ny + x[w, 1] - x[v, 1], nz + x[w, 2] - x[v, 2]
+    high, low = -math.inf, math.inf
+    for k in range(3):
+        v, w = corners[a, k], corners[b, k]
+        high = max(high, nx * x[v, 0] + ny * x[v, 1] + nz * x[v, 2])
+        low = min(low, nx * x[w, 0] + ny * x[w, 1] + nz * x[w, 2])
+    more = _AROUND * (size[place[a]] + size[place[b]]) + 1e-6
+    gap = low - high
+    return gap > 0 and gap * gap > more * more * (nx * nx + ny * ny + nz * nz)

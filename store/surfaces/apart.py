@@ -71,22 +71,24 @@ def even_out(
     before()
     given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
     # compiled: loaded when the first surface that folds is asked for
-    from solver.geometry.apart import put_apart
+    from solver.geometry.apart import ROUNDS, look, put_apart
 
     topology, moved = _topology(n), given.copy()
+    looked = look(moved, topology)
     # of a fine lattice only whether it has to be, at first
-    found = put_apart(moved, topology, 0) if keep or n > COARSE else put_apart(moved, topology)
+    found = put_apart(moved, topology, 0 if keep or n > COARSE else ROUNDS, looked)
     near = found.near
     if not near or (keep and not found.crossings):
         return Evened(None, None, found.crossings, near)
     if keep and n <= COARSE:
-        found = put_apart(moved, topology)
+        found = put_apart(moved, topology, looked=looked)
     if n > COARSE:
         coarse = even_out(whole, max(COARSE, n // 2), before=before)
         if coarse.points is not None and coarse.poles is not None:
             moved[:-2] += _refine(coarse.points, coarse.poles, n).reshape(-1, 3)
             moved[-2:] += coarse.poles
-        found = put_apart(moved, topology)
+            looked = look(moved, topology)
+        found = put_apart(moved, topology, looked=looked)
     shift = moved - given
     return Evened(shift[:-2].reshape(n, 2 * n, 3), shift[-2:], found.crossings, near)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.arrays import Floats
-from solver.geometry.apart import Topology, put_apart
+from solver.geometry.apart import Topology, look, put_apart
 from solver.geometry.crossings import crossings
 from solver.geometry.inward import candidates, pairs
 from solver.lattice import closed_lattice, directions, lattice
@@ -77,28 +77,45 @@ def test_no_jump_where_contact_begins(topology: Topology) -> None:
 
 def test_what_did_not_move_is_not_looked_at_again(topology: Topology) -> None:
     """Candidates are limited to what lies before or behind a triangle that moved."""
-    x, size = sphere(0.4), np.empty(len(topology.triangles))
-    everything = candidates(x, topology.triangles, size, np.empty(0, bool))
+    x = sphere(0.4)
+    everything = candidates(x, topology.triangles, np.empty(0, bool))
     moved = np.zeros(len(x), bool)
-    always = candidates(x, topology.triangles, size, moved)  # those whose cells cannot be told
+    always = candidates(x, topology.triangles, moved)  # those whose cells cannot be told
     assert len(always) < 0.2 * len(everything)
     moved[topology.triangles[everything[0]]] = True
-    some = candidates(x, topology.triangles, size, moved)
+    some = candidates(x, topology.triangles, moved)
     assert len(always) < len(some) < 0.5 * len(everything)
     assert np.isin(some, everything).all()
     assert everything[0] in some
 
 
 def test_pairs_are_those_of_all_boxes_that_touch(topology: Topology) -> None:
+    """But for those that lie apart along the line between their middles."""
     x, faces, size = sphere(0.4), topology.triangles, np.empty(len(topology.triangles))
-    some = candidates(x, faces, size, np.empty(0, bool))
+    some = candidates(x, faces, np.empty(0, bool))
     found = {tuple(sorted(pair)) for pair in pairs(x, faces, some, size).tolist()}
     corners = x[faces[some]]
+    sides = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2).max(axis=1)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    assert np.allclose(size[some], area / sides, rtol=1e-12)
     more = 0.1 * size[some, None] + 1e-6
     low, high = (corners.min(axis=1) - more).astype("f4"), (corners.max(axis=1) + more).astype("f4")
     touch = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
     apart = ~(faces[some][:, None, :, None] == faces[some][None, :, None, :]).any(axis=(2, 3))
-    first, second = np.nonzero(np.triu(touch & apart, 1))
+    line = corners.mean(axis=1)[None] - corners.mean(axis=1)[:, None]
+    line /= np.linalg.norm(line, axis=2, keepdims=True) + 1e-300
+    own, other = np.einsum("ijk,ick->ijc", line, corners), np.einsum("ijk,jck->ijc", line, corners)
+    close = other.min(axis=2) - own.max(axis=2) <= 0.1 * (size[some][:, None] + size[some]) + 1e-6
+    first, second = np.nonzero(np.triu(touch & apart & close, 1))
     expected = {tuple(sorted(pair)) for pair in zip(some[first].tolist(), some[second].tolist(), strict=True)}
     assert len(expected) > 100
+    assert np.triu(touch & apart & ~close, 1).any()
     assert found == expected
+
+
+def test_a_look_may_be_handed_on(topology: Topology) -> None:
+    x, y = sphere(0.4), sphere(0.4)
+    looked = look(x, topology)
+    assert put_apart(x, topology, 0, looked) == put_apart(x, topology, 0)
+    assert put_apart(x, topology, looked=looked) == put_apart(y, topology)
+    assert np.array_equal(x, y)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.geometry.inward import candidates
+from solver.geometry.inward import inward
 from solver.geometry.outward import Field, faces_outward
 from solver.geometry.seen import seen_whole
 from solver.lattice import closed_lattice, directions, lattice
@@ -37,7 +37,7 @@ def test_it_is_whole_where_nothing_faces_inwards(height: float, slide: float) ->
     triangles = closed_lattice(24).astype(np.int32)
     points = wavy(height, slide)
     whole = np.concatenate([points.reshape(-1, 3), ends(points)])
-    found = candidates(whole, triangles, np.empty(len(triangles)), np.empty(0, bool))
+    found = inward(whole, triangles)
     assert seen(points, ends(points)) == (len(found) == 0)
     assert seen(points.astype("f4"), ends(points).astype("f4")) == (len(found) == 0)
 
