@@ -137,6 +137,11 @@ class Item(_Strict):
         (), max_length=16, description="usd: other stages, which the prototype's variant set `stage` offers"
     )
     shade: str | None = Field(None, description="The skin, as the solver names it; the preset's, if not given")
+    full: bool = Field(
+        False,
+        description="Of runs: what stands on the skin too, where anything does: stem and calyx, threads of mould; with "
+        "one stage, not with a curve",
+    )
     place: str | None = Field(None, description="The place that holds it")
     transforms: tuple[Transform, ...] = Field((), description="Where the individuals are, instead of a place")
 
@@ -168,6 +173,8 @@ class Item(_Strict):
             raise ValueError("a curve has two or more pairs [seconds, stage], and its times rise, from 0 or later")
         if self.variants:
             raise ValueError("variants and a curve exclude each other: keep one of them")
+        if self.full:
+            raise ValueError("threads grow, so that full and a curve exclude each other: keep one of them")
 
     def _named(self) -> None:
         """Check an item that names a run."""

@@ -48,9 +48,20 @@ def distinct(
     wrong: list[Wrong] = []
     for i, item in enumerate(items):
         values: object = tuple(sorted(item.parameters.items()))
-        of_run = item.run, item.source, item.quality
+        of_run = item.run, item.source, item.quality, item.full
         unlike = (item.differ, item.shapes, item.seed) if item.differ else None
-        key = (item.solver, item.preset, values, item.stage, item.curve, item.shade, of_run, unlike, item.variants)
+        key = (
+            item.solver,
+            item.preset,
+            values,
+            item.stage,
+            item.curve,
+            item.shade,
+            of_run,
+            unlike,
+            item.variants,
+            item.full,
+        )
         try:
             number = numbers.get(key)
         except TypeError:  # lists among the parameters; rare, where items are many
@@ -145,6 +156,8 @@ def _of_table(item: Item, tables: LiveTables, highest: int) -> list[Looked]:
     if item.quality is not None:
         advice = "Leave it out, or say source = 'run'."
         raise InvalidQuery.of([Wrong("quality", "is of runs: what tables hold was run already", advice)])
+    if item.full:
+        raise InvalidQuery.of([Wrong("full", "is of runs: nothing stands on what tables hold", "Leave it out.")])
     preset = preset_of(solver, item.preset)
     symbol = solver.stages.symbol
     said = {**_numbers(item), symbol: item.first}

@@ -9,6 +9,7 @@ Without that package there is one level, the mesh itself.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import ModuleType
@@ -44,13 +45,32 @@ class Level(NamedTuple):
 @dataclass(eq=False)
 class Solid:
     """Stages of one mesh about its origin: points and normals (v, 3), triangles (f, 3), and colours (v, 3): of every
-    stage, or of the first alone where they stay.
+    stage, or of the first alone where they stay. The first `own` triangles are its body; others stand on it.
     """
 
     stages: tuple[tuple[Array, Array], ...]
     triangles: Array
     colours: tuple[Floats, ...]
+    own: int | None = None
     levels: dict[int, Level] = field(default_factory=dict)
+
+    def under(self, others: Sequence[tuple[Array, Array, Array, Array]]) -> Solid:
+        """Return it with meshes (points, normals, triangles, colours) that stand on its one stage."""
+        if not others:
+            return self
+        (points, normal), (colour,) = self.stages[0], self.colours
+        count, faces = len(points), [self.triangles]
+        for more in others:
+            faces.append(np.asarray(more[2], np.int64) + count)
+            count += len(more[0])
+        joined = (np.concatenate([mine, *(more[k] for more in others)]) for k, mine in ((0, points), (1, normal)))
+        shown = np.concatenate([colour, *(more[3] for more in others)])
+        return Solid((tuple(joined),), np.concatenate(faces), (shown,), len(self.triangles))  # type: ignore[arg-type]
+
+    @property
+    def _body(self) -> Array:
+        """The triangles of its body."""
+        return self.triangles[: self.own]
 
     @property
     def points(self) -> Array:
@@ -135,7 +155,7 @@ class Solid:
     @cached_property
     def is_open(self) -> bool:
         """Whether it has a rim, so that its inside may be seen."""
-        corners = merged(self.points)[self.triangles]
+        corners = merged(self.points)[self._body]
         edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
         edges = edges[edges[:, 0] != edges[:, 1]]
         _, counts = np.unique(edges, axis=0, return_counts=True)
@@ -143,7 +163,7 @@ class Solid:
 
     def holds(self, point: Floats) -> bool:
         """Return whether a point (3) is inside: the solid angles of the triangles add up to more than half."""
-        a, b, c = (self.points[self.triangles[:, k]].astype(float) - point for k in range(3))
+        a, b, c = (self.points[self._body[:, k]].astype(float) - point for k in range(3))
         la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
         over = np.einsum("ij,ij->i", a, np.cross(b, c))
         below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
@@ -153,7 +173,7 @@ class Solid:
     @cached_property
     def around(self) -> Floats:
         """Points (p, 3) of the surface, as near to each other as the origin can tell: what a pile takes it for."""
-        corners = self.points[self.triangles].astype(float)
+        corners = self.points[self._body].astype(float)
         found = [corners.reshape(-1, 3)]
         for _ in range(_HALVINGS):
             away = corners / np.maximum(np.linalg.norm(corners, axis=2, keepdims=True), 1e-300)

@@ -22,6 +22,8 @@ from ...errors import InvalidQuery, Wrong
 from ...formats import mesh
 from ...sequences import Sequence as Stages
 from ...sequences import of_run
+from ...sequences.options import Options
+from ...sequences.standing import Extra, cards, stems
 from ...sequences.view import Surface
 from ..meshes import Packed, Skin, quantised, skin, weathered
 from ..request import Item
@@ -194,14 +196,14 @@ def stored(store: Store, key: str, item: Item) -> Stored:
         StoreError: it is not stored, or damaged.
 
     """
-    made = _read(store.root, key, item.stages, item.shade, item.preset)
+    made = _read(store.root, key, item.stages, item.shade, item.preset, item.full)
     stages, symbol = made.source["stages"], made.source["symbol"]
     last = f"..{stages[-1]:g}" if item.curve else ""
     return Stored(f"{item.preset or made.source['solver']} {symbol}={stages[0]:g}{last}", made, item.curve)
 
 
 @lru_cache(maxsize=12)
-def _read(root: Path, key: str, stages: tuple[float, ...], shade: str | None, preset: str | None) -> Whole:
+def _read(root: Path, key: str, stages: tuple[float, ...], shade: str | None, preset: str | None, full: bool) -> Whole:
     """Return stages of a run, which never changes, as a scene wants them."""
     run = Store(root).get(key)
     sequence = of_run(run)
@@ -214,17 +216,19 @@ def _read(root: Path, key: str, stages: tuple[float, ...], shade: str | None, pr
     solver = registry.get(name) if name in registry.names() else None
     worn = PLAIN if solver is None else shade_of(solver, shade, preset)
     colours, dressed = _coloured(sequence, surfaces, solver, worn[1])
-    solid = _solid(sequence, surfaces, solver, colours)
+    standing = _standing(sequence, surfaces[0]) if full else []
+    solid, dressed = _solid(sequence, surfaces, solver, colours, standing), _brighter(dressed, standing)
     source = {
         "run": key,
         "solver": name,
         "symbol": "stage" if solver is None else solver.stages.symbol,
         "stages": [sequence.stages[row] for row in rows],
         **({"shade": worn[0]} if surfaces[0].colour is None else {}),
+        **({"full": True} if standing else {}),
     }
     converged = all(bool(run["converged"].values[row]) for row in rows) if "converged" in run else None
     trust = {"expected_error": _error(run.attrs, solver), "exact": True, "converged": converged}
-    dressed = dressed._replace(thin=solid.is_open)
+    dressed = dressed._replace(thin=solid.is_open or bool(standing))
     return Whole(solid, dressed, sequence.unit or None, bool(sequence.lattice), source, trust)
 
 
@@ -254,8 +258,27 @@ def _coloured(
     return [weathered(position, mesh.normals(position)[0], worn) * worn.base], worn
 
 
-def _solid(stages: Stages, surfaces: Sequence[Surface], solver: Solver | None, colours: Sequence[Floats]) -> Solid:
-    """Return the mesh without what only took part in the run, about its middle."""
+def _standing(stages: Stages, surface: Surface) -> list[Extra]:
+    """Return what stands on a stage's surface."""
+    options = Options(full=True)
+    threads = cards(stages, surface, options)
+    return [*stems(stages, surface, options), *([] if threads is None else [threads])]
+
+
+def _brighter(worn: Skin, standing: Sequence[Extra]) -> Skin:
+    """Return a skin whose colours hold those of what stands on it, too."""
+    most = np.max([worn.base, *(one.colour.max(axis=0) for one in standing)], axis=0)
+    return worn._replace(ridge=most, furrow=most) if standing else worn
+
+
+def _solid(
+    stages: Stages,
+    surfaces: Sequence[Surface],
+    solver: Solver | None,
+    colours: Sequence[Floats],
+    standing: Sequence[Extra],
+) -> Solid:
+    """Return the mesh without what only took part in the run, about its middle, and behind it what stands on it."""
     first = surfaces[0]
     triangles = first.triangles.astype(np.int64)
     aside = first.fields.get(solver.looks.aside or "") if solver is not None else None
@@ -269,7 +292,8 @@ def _solid(stages: Stages, surfaces: Sequence[Surface], solver: Solver | None, c
             x, y, z = np.asarray(stages.run.attrs["view"], np.float32)[:3]
             middle = np.array([x, z, -y] if stages.run.attrs.get("up") == "z" else [x, y, z], np.float32)
     found = tuple((one.vertices[used] - middle, one.normals()[used]) for one in surfaces)
-    return Solid(found, flat.reshape(-1, 3), tuple(colour[used] for colour in colours))
+    own = Solid(found, flat.reshape(-1, 3), tuple(colour[used] for colour in colours))
+    return own.under([(one.vertices - middle, one.normals, one.triangles, one.colour) for one in standing])
 
 
 def _error(attrs: dict[str, Any], solver: Solver | None) -> dict[str, float] | None:

@@ -253,6 +253,33 @@ def test_runs_and_tables_stand_in_one_file(store: Store) -> None:
         made(store, items, budget={"triangles": 30})
 
 
+def test_what_stands_on_a_fruit_is_drawn_and_bears_nothing(store: Store) -> None:
+    """Threads rise from mould alone, stem and calyx stand at a pole, and it rests where it rests without them."""
+    near = {"position": [0, 3, 5], "height": 2000, "width": 3000}
+    floor = {"places": [{"name": "floor", "rule": "pile", "seed": 1}], "camera": near}
+    item = {"run": ROTTEN, "stage": 5, "count": 2, "seed": 1, "place": "floor", "size": 1.0}
+    bare, full = made(store, [item], **floor), made(store, [{**item, "full": True}], **floor)
+    pairs = zip(instances(bare.data), instances(full.data), strict=True)
+    for (_, plain, triangles, _), (_, dressed, more, _) in pairs:
+        assert len(more) > len(triangles) + 100
+        # a level's triangles are for all of it, so that its body may have lost some
+        assert cKDTree(dressed).query(plain)[0].max() < 0.01
+        standing = dressed[cKDTree(plain).query(dressed)[0] > 0.03]
+        height = np.linalg.norm(standing - plain.mean(axis=0), axis=1)
+        assert len(standing) > 50
+        assert height.max() > 1.02 * np.linalg.norm(plain - plain.mean(axis=0), axis=1).max()
+    sound = made(store, [{**item, "stage": 0, "full": True}], **floor)
+    assert sound.report["triangles"] < full.report["triangles"]
+    assert parsed(full.data)[0]["materials"][0]["doubleSided"]
+
+
+def test_one_run_bare_and_dressed_is_two_shapes(store: Store) -> None:
+    bare = {"run": ROTTEN, "stage": 5, "transforms": [{}]}
+    dressed = {**bare, "full": True, "transforms": [{"position": [3, 0, 0]}]}
+    found = made(store, [bare, dressed, {**dressed, "transforms": [{"position": [-3, 0, 0]}]}], "json").report
+    assert found["kinds"] == 2
+
+
 WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"run": "ffff0000"}, "no result has a key", "wizen results"),
     ({"run": "5" * 4}, "no result has a key", "wizen results"),
@@ -268,6 +295,8 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"preset": "raisin", "parameters": {"te": "thin"}, "stage": 0.1}, "numbers", "source"),
     ({"preset": "raisin", "quality": "fine", "stage": 0.1}, "quality", "source"),
     ({"preset": "raisin", "parameters": {"te": float("nan")}, "stage": 0.1}, "finite", ""),
+    ({"preset": "raisin", "stage": 0.1, "full": True}, "nothing stands on what tables hold", "Leave it out"),
+    ({"run": ROTTEN, "curve": [[0, 0], [1, 5]], "full": True}, "full and a curve exclude each other", ""),
 ]
 
 
