@@ -184,21 +184,27 @@ def candidates(x: Doubles, faces: Words, moved: NDArray[np.bool_]) -> Words:
 
 
 @njit(cache=True, error_model="numpy")
-def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
-    """Return the pairs (np, 2) among some triangles without a common corner that touch or nearly do, as far as their
-    boxes and the line between their middles tell.
-
-    The sizes of these triangles are filled into `size` (nt,).
-    """
-    count = len(some)
-    box = np.empty((count, 6), np.float32)
-    for n in range(count):
+def _around(x: Doubles, faces: Words, some: Words, size: Doubles) -> NDArray[np.float32]:
+    """Fill the sizes of some triangles, and return the boxes (n, 6) around them and a little more."""
+    box = np.empty((len(some), 6), np.float32)
+    for n in range(len(some)):
         t = some[n]
         size[t] = _size(x, faces, t)
         more = _AROUND * size[t] + 1e-6
         for k in range(3):
             a, b, c = x[faces[t, 0], k], x[faces[t, 1], k], x[faces[t, 2], k]
             box[n, k], box[n, 3 + k] = min(a, b, c) - more, max(a, b, c) + more
+    return box
+
+
+@njit(cache=True, error_model="numpy")
+def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
+    """Return the pairs (np, 2) among some triangles without a common corner that touch or nearly do, as far as their
+    boxes and the line between their middles tell.
+
+    The sizes of these triangles are filled into `size` (nt,).
+    """
+    count, box = len(some), _around(x, faces, some, size)
     # in strips across y, each swept along x; what is walked through lies side by side in memory
     first_y, last_y = box[:, 1].min(), box[:, 4].max()
     strips = min(max(int(math.sqrt(count)) // 4, 1), 64)
