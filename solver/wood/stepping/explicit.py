@@ -203,6 +203,8 @@ def march(
                 for e in range(len(motion.spin)):
                     books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)
                     motion.spin[e] *= slow
+    # with the velocities of the end
+    pose(bodies, time + steps * dt, scratch.poses)
     total = books[STRETCH] + books[BENDING] + books[BONDS]
     found: bool = np.isfinite(total) and np.isfinite(v).all() and np.isfinite(bodies.flight.v).all()
     return found
