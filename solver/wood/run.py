@@ -31,7 +31,7 @@ from .stepping.moment import Reached
 from .stepping.stability import longest_step, touchable
 from .stresses import BOND, ROD, Stresses
 from .surface.skin import Skin
-from .surface.solids import among
+from .surface.solids import among, shown
 
 __all__ = ["run"]
 
@@ -117,6 +117,7 @@ def _settled(params: WoodParams, vertices: int) -> tuple[WoodParams, dict[str, A
 
 def _said(wood: Wood, params: WoodParams, said: dict[str, Any]) -> dict[str, Any]:
     """Return what the result says of itself."""
+    middle = (wood.motion.x.min(0) + wood.motion.x.max(0)) / 2
     return {
         "path": params.mode,
         "mass_scaling": params.mass_scaling,
@@ -127,7 +128,7 @@ def _said(wood: Wood, params: WoodParams, said: dict[str, Any]) -> dict[str, Any
         "metres_per_unit": 1.0,
         "up": "z",
         # what a picture should show, middle and radius: fragments fly far
-        "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
+        "view": [*middle, shown(params, middle)],
     }
 
 

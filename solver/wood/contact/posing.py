@@ -66,31 +66,37 @@ def spun(bodies: Bodies, r: int, out: np.ndarray) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _along(bodies: Bodies, r: int, time: float, poses: Poses) -> None:
-    """Write the place, velocity, axes and spin of body r on its way."""
-    ways = bodies.ways
-    n = ways.times.shape[1]
+def _along(
+    times: np.ndarray, points: np.ndarray, time: float, pivot: np.ndarray, speed: np.ndarray
+) -> tuple[int, float]:
+    """Write place and velocity (3,) on a way (w,), (w, 3); return the last waypoint and the time since, -1 at rest."""
+    n = len(times)
     last = 0
-    while last + 1 < n and ways.times[r, last + 1] <= time:
+    while last + 1 < n and times[last + 1] <= time:
         last += 1
-    poses.pivot[r] = ways.points[r, last]
-    poses.speed[r] = 0.0
-    poses.spin[r] = 0.0
-    past = 0.0
-    if last + 1 < n and time >= ways.times[r, last]:
-        width = ways.times[r, last + 1] - ways.times[r, last]
+    for c in range(3):
+        pivot[c] = points[last, c]
+        speed[c] = 0.0
+    if last + 1 < n and time >= times[last]:
+        width = times[last + 1] - times[last]
         if 0.0 < width < np.inf:
-            past = time - ways.times[r, last]
             for c in range(3):
-                poses.speed[r, c] = (ways.points[r, last + 1, c] - ways.points[r, last, c]) / width
-                poses.pivot[r, c] += poses.speed[r, c] * past
-                poses.spin[r, c] = ways.spins[r, last, c]
-    if bodies.turned[r] == 1:
-        turn = np.empty(4)
-        w = poses.spin[r]
-        turning(w[0] * past, w[1] * past, w[2] * past, turn)
-        joined(turn, ways.turns[r, last], turn)
-        framed(turn, poses.frame[r])
+                speed[c] = (points[last + 1, c] - points[last, c]) / width
+                pivot[c] += speed[c] * (time - times[last])
+            return last, time - times[last]
+    return last, -1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(bodies: Bodies, r: int, last: int, past: float, poses: Poses) -> None:
+    """Write axes and spin of body r so long [s] past a waypoint; less than 0: it rests there."""
+    turn, w = np.empty(4), poses.spin[r]
+    for c in range(3):
+        w[c] = bodies.ways.spins[r, last, c] if past >= 0.0 else 0.0
+    past = max(past, 0.0)
+    turning(w[0] * past, w[1] * past, w[2] * past, turn)
+    joined(turn, bodies.ways.turns[r, last], turn)
+    framed(turn, poses.frame[r])
 
 
 @njit(cache=True, error_model="numpy")
@@ -113,19 +119,26 @@ def _flown(bodies: Bodies, r: int, poses: Poses) -> None:
 
 @njit(cache=True, error_model="numpy")
 def pose(bodies: Bodies, time: float, poses: Poses) -> None:
-    """Write where bodies are at `time` [s] and how they move; those on ways rest before and after."""
+    """Write where bodies are at `time` [s] and how they move; those on ways rest before and after.
+
+    The frames of those that never turn are left as they are: the world's.
+    """
+    ways = bodies.ways
     for r in range(len(bodies.kind)):
-        if bodies.turned[r] == 0:
-            for c in range(3):
-                for k in range(3):
-                    poses.frame[r, c, k] = 1.0 if c == k else 0.0
+        turns = bodies.turned[r] == 1
         if bodies.free.mass[r] > 0.0:
             _flown(bodies, r, poses)
         else:
-            _along(bodies, r, time, poses)
+            last, past = _along(ways.times[r], ways.points[r], time, poses.pivot[r], poses.speed[r])
+            if turns:
+                _turned(bodies, r, last, past, poses)
         for c in range(3):
+            if not turns:
+                poses.centre[r, c] = poses.pivot[r, c] - ways.pivot[r, c]
+                poses.box[r, c] = bodies.box[r, c]
+                continue
             poses.centre[r, c] = poses.pivot[r, c]
             poses.box[r, c] = 0.0
             for k in range(3):
-                poses.centre[r, c] -= poses.frame[r, c, k] * bodies.ways.pivot[r, k]
+                poses.centre[r, c] -= poses.frame[r, c, k] * ways.pivot[r, k]
                 poses.box[r, c] += abs(poses.frame[r, c, k]) * bodies.box[r, k]

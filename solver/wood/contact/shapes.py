@@ -12,7 +12,7 @@ from numba import njit
 
 from ..model.arrays import Bodies, Depths
 
-__all__ = ["BALL", "BOX", "CYLINDER", "MESH", "WEDGE", "apart", "eased", "points", "touch"]
+__all__ = ["BALL", "BOX", "CYLINDER", "MESH", "WEDGE", "apart", "depth", "eased", "points", "sampled", "touch"]
 
 BOX, CYLINDER, BALL, WEDGE, MESH = range(5)
 
@@ -23,26 +23,44 @@ Touch = tuple[float, float, float, float]
 @njit(cache=True, error_model="numpy")
 def touch(bodies: Bodies, r: int, o0: float, o1: float, o2: float) -> Touch:
     """Return depth [m] (0: apart) and outward normal in body r at o from its centre [m], all in its own frame."""
-    kind = bodies.kind[r]
-    if kind == BOX:
-        return _box(bodies.half[r], o0, o1, o2)
-    if kind == CYLINDER:
-        return _cylinder(bodies.axis[r], bodies.half[r], o0, o1, o2)
-    if kind == BALL:
-        away = np.sqrt(o0 * o0 + o1 * o1 + o2 * o2)
-        if away >= bodies.half[r, 0] or away == 0.0:
-            return 0.0, 0.0, 0.0, 0.0
-        return bodies.half[r, 0] - away, o0 / away, o1 / away, o2 / away
-    if kind == WEDGE:
-        return _wedge(bodies.half[r], bodies.edge[r], o0, o1, o2)
-    return _sampled(bodies.depths, r, o0, o1, o2)
+    if bodies.kind[r] == MESH:
+        return sampled(bodies.depths, r, o0, o1, o2)
+    half, edge = bodies.half[r], bodies.edge[r]
+    return depth(bodies.kind[r], bodies.axis[r], half[0], half[1], half[2], edge[0], edge[1], edge[2], o0, o1, o2)
 
 
 @njit(cache=True, error_model="numpy")
-def _box(reach: np.ndarray, o0: float, o1: float, o2: float) -> Touch:
-    g0 = reach[0] - abs(o0)
-    g1 = reach[1] - abs(o1)
-    g2 = reach[2] - abs(o2)
+def depth(
+    kind: int,
+    axis: int,
+    h0: float,
+    h1: float,
+    h2: float,
+    g0: float,
+    g1: float,
+    g2: float,
+    o0: float,
+    o1: float,
+    o2: float,
+) -> Touch:
+    """Return what `touch` does, of no mesh; h and g: the rows of `half` and `edge`. Arrays would cost more than all."""
+    if kind == BOX:
+        return _box(h0, h1, h2, o0, o1, o2)
+    if kind == CYLINDER:
+        return _cylinder(axis, h0, h1, o0, o1, o2)
+    if kind == WEDGE:
+        return _wedge(h0, h1, h2, g0, g1, g2, o0, o1, o2)
+    away = np.sqrt(o0 * o0 + o1 * o1 + o2 * o2)
+    if away >= h0 or away == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    return h0 - away, o0 / away, o1 / away, o2 / away
+
+
+@njit(cache=True, error_model="numpy")
+def _box(h0: float, h1: float, h2: float, o0: float, o1: float, o2: float) -> Touch:
+    g0 = h0 - abs(o0)
+    g1 = h1 - abs(o1)
+    g2 = h2 - abs(o2)
     gap = min(g0, min(g1, g2))
     if gap <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -54,14 +72,14 @@ def _box(reach: np.ndarray, o0: float, o1: float, o2: float) -> Touch:
 
 
 @njit(cache=True, error_model="numpy")
-def _cylinder(axis: int, reach: np.ndarray, o0: float, o1: float, o2: float) -> Touch:
+def _cylinder(axis: int, radius: float, half: float, o0: float, o1: float, o2: float) -> Touch:
     along = o0 if axis == 0 else (o1 if axis == 1 else o2)
-    cap = reach[1] - abs(along)
+    cap = half - abs(along)
     c0 = 0.0 if axis == 0 else o0
     c1 = 0.0 if axis == 1 else o1
     c2 = 0.0 if axis == 2 else o2
     away = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
-    gap = reach[0] - away
+    gap = radius - away
     if cap <= 0.0 or gap <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
     if gap > cap and away > 0.0:
@@ -73,15 +91,16 @@ def _cylinder(axis: int, reach: np.ndarray, o0: float, o1: float, o2: float) -> 
 
 
 @njit(cache=True, error_model="numpy")
-def _wedge(reach: np.ndarray, edge: np.ndarray, o0: float, o1: float, o2: float) -> Touch:
-    """The edge runs along y, rounded about a line `edge[0]` above the lowest; its sides part from there upwards."""
-    cap = reach[1] - abs(o1)
-    back = reach[2] - o2
-    flank = reach[0] - abs(o0)
+def _wedge(
+    h0: float, h1: float, h2: float, radius: float, sine: float, cosine: float, o0: float, o1: float, o2: float
+) -> Touch:
+    """The edge runs along y, rounded about a line `radius` above the lowest; its sides part from there upwards."""
+    cap = h1 - abs(o1)
+    back = h2 - o2
+    flank = h0 - abs(o0)
     side = 1.0 if o0 >= 0.0 else -1.0
-    radius, sine, cosine = edge[0], edge[1], edge[2]
     across = abs(o0)
-    up = o2 + reach[2] - radius
+    up = o2 + h2 - radius
     if across * sine + up * cosine < 0.0:
         away = np.sqrt(across * across + up * up)
         bevel = radius - away
@@ -102,7 +121,8 @@ def _wedge(reach: np.ndarray, edge: np.ndarray, o0: float, o1: float, o2: float)
 
 
 @njit(cache=True, error_model="numpy")
-def _sampled(depths: Depths, r: int, o0: float, o1: float, o2: float) -> Touch:
+def sampled(depths: Depths, r: int, o0: float, o1: float, o2: float) -> Touch:
+    """Return what `touch` does, of a mesh; the normal is the depth's slope, not of unit length."""
     n0, n1, n2 = depths.nodes[r, 0], depths.nodes[r, 1], depths.nodes[r, 2]
     step = depths.step[r]
     p, q, s = o0 / step + 0.5 * (n0 - 1), o1 / step + 0.5 * (n1 - 1), o2 / step + 0.5 * (n2 - 1)

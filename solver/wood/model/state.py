@@ -64,7 +64,7 @@ def scratch_for(wood: Wood) -> Scratch:
         1.0 / wood.rods.rest,
         np.zeros(e),
         np.zeros((2, len(wood.bonds.i))),
-        Poses(*(np.zeros((r, *shape)) for shape in ((3,), (3,), (3,), (3, 3), (3,), (3,)))),
+        Poses(*np.zeros((3, r, 3)), np.tile(np.eye(3), (r, 1, 1)), *np.zeros((2, r, 3))),
         np.zeros((r, 6)),
         np.zeros(2),
         np.zeros(len(wood.rods.before)),

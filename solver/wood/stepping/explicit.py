@@ -148,6 +148,7 @@ def march(
     keep = np.full(len(x), slow)
     keep[held] = 1.0
     whole = scratch.fragments
+    flying = bodies.free.mass.any()
     books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
     steady(
         x,
@@ -168,9 +169,10 @@ def march(
         kick(v, f, weight)
         push(x, v, whole, half)
         pin(v, motion.mass, pins)
-        strike(bodies, scratch.poses, scratch.push, half)
         work = drift(x, v, motion.load, dt)
-        work += fly(bodies, dt)
+        if flying:
+            strike(bodies, scratch.poses, scratch.push, half)
+            work += fly(bodies, dt)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -185,7 +187,8 @@ def march(
         kick(v, f, weight)
         push(x, v, whole, half)
         pin(v, motion.mass, pins)
-        strike(bodies, scratch.poses, scratch.push, half)
+        if flying:
+            strike(bodies, scratch.poses, scratch.push, half)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:

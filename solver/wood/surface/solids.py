@@ -11,13 +11,16 @@ from ..contact.solids import pivot_of, solid_of
 from ..model.arrays import Poses
 from ..params import Body, WoodParams
 
-__all__ = ["among", "solid"]
+__all__ = ["among", "shown", "solid"]
+
+#: Radius of what a picture shows over the bundle's length; the most, for bodies' sake; and what of it they may exceed.
+_SHOWN, _MOST, _BESIDE = 0.42, 0.84, 1.5
 
 
 def solid(body: Body, time: float) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices (v, 3) [m] and triangles (f, 3), seen from outside counter-clockwise, of a body at `time` [s].
 
-    It must be one that goes its path.
+    One with a mass, which goes no path, is where it begins.
     """
     points, faces = solid_of(body)
     times = [w.time for w in body.path]
@@ -30,6 +33,19 @@ def solid(body: Body, time: float) -> tuple[np.ndarray, np.ndarray]:
             turn = Rotation.from_rotvec(way * (time - times[n]) / (times[n + 1] - times[n])) * turn
         points = turn.apply(points)
     return points + [np.interp(time, times, [w.position[c] for w in body.path]) for c in range(3)], faces
+
+
+def shown(params: WoodParams, middle: np.ndarray) -> float:
+    """Return the radius [m] about a middle (3,) that a picture shows: the bundle's, and that of bodies' ways.
+
+    Those longer than the bundle, as floors, are not made room for.
+    """
+    far = 0.0
+    for body in params.bodies:
+        if np.ptp(solid_of(body)[0], axis=0).max() <= params.length:
+            for point in body.path:
+                far = max(far, float(np.linalg.norm(solid(body, point.time)[0] - middle, axis=1).max()))
+    return min(max(_SHOWN * params.length, far / _BESIDE), _MOST * params.length)
 
 
 def among(frame: Frame, params: WoodParams, time: float, poses: Poses | None = None) -> Frame:

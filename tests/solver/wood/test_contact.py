@@ -134,7 +134,7 @@ def test_friction_is_coulomb_s(kind):
     rods, body = one(kind)
     f, push, power = np.zeros((2, 3)), np.zeros((1, 6)), np.zeros(2)
     x, v = np.array([[0.0, 0.1, 0.99], [0.0, 0.2, 0.99]]), np.array([[2.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    poses = Poses(*(np.zeros((1, *shape)) for shape in ((3,), (3,), (3,), (3, 3), (3,), (3,))))
+    poses = Poses(*np.zeros((3, 1, 3)), np.eye(3)[None], *np.zeros((2, 1, 3)))
     pose(body, 0.0, poses)
     energy = press(x, v, f, np.ones(2), rods, body, poses, 1e-3, push, power)
     # 1e3 N/m2 on 0.1 m at a depth of 0.01 m
