@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ..contract import Params
-from .contact.given import Body, Newtons, Rate, Waypoint
+from .bodies import Body, Newtons, Rate, Waypoint
 from .outlines import check_outline, polygon_area
 from .parts import Corner, Cut, Grain, Grip, GripPoint, Knot, Notch
 

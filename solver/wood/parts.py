@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from .contact.given import Part, Turn, Vector
+from .bodies import Part, Turn, Vector
 
 __all__ = ["Corner", "Cut", "Grain", "Grip", "GripPoint", "Knot", "Notch"]
 

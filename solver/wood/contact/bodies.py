@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..model.arrays import Bodies, Poses, Rods
-from .shapes import MESH, apart, depth, eased, points, sampled, touch
+from ..model.arrays import MESH, Bodies, Poses, Rods
+from .shapes import apart, depth, eased, points, sampled, touch
 
 __all__ = ["deepest", "press"]
 

@@ -10,11 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..model.arrays import Bodies, Depths
+from ..model.arrays import BOX, CYLINDER, MESH, WEDGE, Bodies, Depths
 
-__all__ = ["BALL", "BOX", "CYLINDER", "MESH", "WEDGE", "apart", "depth", "eased", "points", "sampled", "touch"]
-
-BOX, CYLINDER, BALL, WEDGE, MESH = range(5)
+__all__ = ["apart", "depth", "eased", "points", "sampled", "touch"]
 
 #: Depth [m] and outward normal.
 Touch = tuple[float, float, float, float]

@@ -12,6 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 __all__ = [
+    "BALL",
+    "BOX",
+    "CYLINDER",
+    "MESH",
+    "WEDGE",
     "Bodies",
     "Bonds",
     "Depths",
@@ -24,6 +29,9 @@ __all__ = [
     "Turns",
     "Ways",
 ]
+
+#: Shapes of bodies, as numbers.
+BOX, CYLINDER, BALL, WEDGE, MESH = range(5)
 
 
 class Rods(NamedTuple):

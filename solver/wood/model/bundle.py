@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contract import Context
-from ..contact.building import bodied
 from ..fibres.paths import crowded, placed
 from ..fibres.timber import hews, timber
 from ..params import WoodParams
 from .arrays import Rods, Turns
 from .axis import along, curved, started
+from .bodies.building import bodied
 from .grain import Field, ringed
 from .gripping import courses, pins_of
 from .joining import bonded

@@ -56,6 +56,7 @@ def scratch_for(wood: Wood) -> Scratch:
     held = wood.motion.held.copy()
     held[wood.pins.vertex] = 1
     v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
+    here = [np.zeros((r, 3)) for _ in range(5)]
     return Scratch(
         np.zeros((v, 3)),
         np.zeros((2, e + len(plan.stub), 8)),
@@ -64,7 +65,7 @@ def scratch_for(wood: Wood) -> Scratch:
         1.0 / wood.rods.rest,
         np.zeros(e),
         np.zeros((2, len(wood.bonds.i))),
-        Poses(*np.zeros((3, r, 3)), np.tile(np.eye(3), (r, 1, 1)), *np.zeros((2, r, 3))),
+        Poses(here[0], here[1], here[2], np.tile(np.eye(3), (r, 1, 1)), here[3], here[4]),
         np.zeros((r, 6)),
         np.zeros(2),
         np.zeros(len(wood.rods.before)),

@@ -41,11 +41,10 @@ def steady(
         fast = max(fast, v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
     way = np.sqrt(fast)
     for r in range(len(bodies.kind)):
-        swept = 0.0
+        speed, swept = poses.speed[r], 0.0
         if bodies.turned[r] == 1:
             arm = 2.0 * np.sqrt((poses.box[r] ** 2).sum()) + np.sqrt((bodies.ways.pivot[r] ** 2).sum())
             swept = arm * np.sqrt((poses.spin[r] ** 2).sum())
-        speed = poses.speed[r]
         way = max(way, np.sqrt(fast) + np.sqrt(speed[0] ** 2 + speed[1] ** 2 + speed[2] ** 2) + swept)
     touching = np.zeros(len(parts.gain))
     for e in range(len(rods.a)):
@@ -58,8 +57,7 @@ def steady(
             found = True
             for c in range(3):
                 p = x[a, c] - poses.centre[r, c]
-                d = x[b, c] - x[a, c]
-                found = found and not apart(p, d, poses.box[r, c] + near)
+                found = found and not apart(p, x[b, c] - x[a, c], poses.box[r, c] + near)
             if found:
                 touching[parts.of[a]] += 1.0
                 # the feet of a cut edge's stubs may be of two fragments

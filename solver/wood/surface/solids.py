@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...meshes import Frame
-from ..contact.building import between
-from ..contact.solids import pivot_of, solid_of
 from ..model.arrays import Poses
+from ..model.bodies.building import between
+from ..model.bodies.solids import pivot_of, solid_of
 from ..params import Body, WoodParams
 
 __all__ = ["among", "shown", "solid"]

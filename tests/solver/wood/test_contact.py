@@ -8,9 +8,9 @@ import pytest
 from solver.contract import Need
 from solver.wood import SOLVER
 from solver.wood.contact.bodies import press
-from solver.wood.contact.building import bodied
 from solver.wood.contact.posing import pose
 from solver.wood.model.arrays import Bodies, Poses, Rods
+from solver.wood.model.bodies.building import bodied
 from solver.wood.model.bundle import lay
 from solver.wood.model.state import Wood, scratch_for
 

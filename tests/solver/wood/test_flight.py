@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from solver.contract import Context, InvalidGeometry, InvalidInput, Need
 from solver.wood import SOLVER
-from solver.wood.contact.solids import weight_of
+from solver.wood.model.bodies.solids import weight_of
 from solver.wood.model.bundle import lay
 from solver.wood.params import Body
 from solver.wood.stepping.flying import fly, moving

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from solver.contract import InvalidGeometry, InvalidInput, Need
 from solver.wood import SOLVER
 from solver.wood.contact.bodies import press
-from solver.wood.contact.building import sampled
 from solver.wood.contact.posing import pose
 from solver.wood.contact.shapes import touch
-from solver.wood.contact.solids import solid_of, weight_of
+from solver.wood.model.bodies.building import sampled
+from solver.wood.model.bodies.solids import solid_of, weight_of
 from solver.wood.model.bundle import lay
 from solver.wood.model.state import Wood, scratch_for
 from solver.wood.params import Body

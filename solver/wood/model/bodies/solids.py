@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .given import Body, half_width
+from ...bodies import Body, half_width
 
 __all__ = ["Weight", "pivot_of", "solid_of", "weight_of"]
 

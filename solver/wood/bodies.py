@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ...contract.mesh import GivenMesh
+from ..contract.mesh import GivenMesh
 
 __all__ = ["Body", "Metres", "Newtons", "Part", "Rate", "Solid", "Turn", "Vector", "Waypoint", "half_width"]
 

@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from ...contract import InvalidGeometry
-from ...geometry.inside import inside
-from ...geometry.nearest import nearest
-from ..model.arrays import Bodies, Depths, Flight, Free, Rods, Ways
-from ..params import Body, WoodParams
-from .given import half_width
-from .shapes import BALL, BOX, CYLINDER, MESH, WEDGE
+from ....contract import InvalidGeometry
+from ....geometry.inside import inside
+from ....geometry.nearest import nearest
+from ...bodies import half_width
+from ...params import Body, WoodParams
+from ..arrays import BALL, BOX, CYLINDER, MESH, WEDGE, Bodies, Depths, Flight, Free, Rods, Ways
 from .solids import pivot_of, solid_of, weight_of
 
 __all__ = ["between", "bodied", "sampled"]
@@ -65,7 +64,7 @@ def _half(body: Body) -> np.ndarray:
     if body.shape == "wedge":
         half = body.size[0] / 2 or half_width(body.size[2], body.angle, body.edge)
         return np.array([half, body.size[1] / 2, body.size[2] / 2])
-    return np.ptp(solid_of(body)[0], axis=0) / 2
+    return np.asarray(np.ptp(solid_of(body)[0], axis=0) / 2)
 
 
 def _reach(body: Body) -> np.ndarray:
