@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver import registry
 from solver.decay.surfaces.surface import geodesic
-from sweeps.commands.terminal.options import assignments
+from sweeps.commands.terminal.options import assignments, parameters
 from sweeps.errors import InvalidOption
 
 trimesh = pytest.importorskip("trimesh")
@@ -43,5 +44,5 @@ def test_a_params_file_names_meshes_beside_it(tmp_path: Path) -> None:
     assert np.shape(values["bodies"][0]["mesh"]["points"]) == points.shape
     assert registry.get("wood").parse(values).model_dump()["bodies"][0]["mesh"]["points"]
     (tmp_path / "b.toml").write_text(text.replace("ball", "none"))
-    with pytest.raises(InvalidOption, match="none.obj"):
+    with pytest.raises(InvalidOption, match=r"none\.obj"):
         parameters(tmp_path / "b.toml")

@@ -192,6 +192,26 @@ def test_momenta_of_wood_and_hammer_are_kept_through_blows_friction_and_breaks(m
     assert after.error < 0.01
 
 
+def test_a_thrown_wedge_s_momenta_are_kept():
+    """Its centre of mass is neither its middle nor its edge; it meets a rod with its side."""
+    path = [{"time": 0, "position": (0.09, 0.0, 0.004), "turn": (0.0, 0.3, 0.0)}]
+    wedge = {
+        "shape": "wedge",
+        "size": (0, 0.03, 0.05),
+        "angle": 0.5,
+        "mass": 0.05,
+        "velocity": (0, 0, -5),
+        "path": path,
+    }
+    before, (after,) = marched({**ROD, "bodies": [{**wedge, "spin": (0, 30, 5)}]}, (0.002,))
+    flight, found = after.state.wood.bodies.flight, totals(after.state.wood)
+    assert np.abs(after.state.impulse[0, 2]) > 1e-3
+    assert np.abs(found[0] - before[0]).max() < 1e-12 * np.abs(before[0]).max()
+    assert np.abs(found[1] - before[1]).max() < 1e-12 * np.abs(before[1]).max()
+    assert after.error < 1e-3
+    assert np.linalg.norm(flight.turn[0]) == pytest.approx(1.0, abs=1e-14)
+
+
 def test_a_weight_falls_down_its_guide_and_a_ram_is_driven():
     weight = {"size": (0.02, 0.02, 0.02), "mass": 2.0, "path": [{"time": 0, "position": (0.05, 0, 0.5)}]}
     ram = {**weight, "mass": 3.0, "guide": (0, 3.0, -4.0), "force": (7.0, 0.0, 0.0)}
