@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
 from ...meshes import Frame
@@ -15,6 +17,31 @@ __all__ = ["among", "shown", "solid"]
 
 #: Radius of what a picture shows over the bundle's length; the most, for bodies' sake; and what of it they may exceed.
 _SHOWN, _MOST, _BESIDE = 0.42, 0.84, 1.5
+#: Cosine between normals of two triangles above which their common side is no edge.
+_SMOOTH = 0.8
+
+
+def _drawn(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (v, 3) [m] from its centre and triangles (f, 3) of a body, of a mesh parted at its edges."""
+    points, faces = solid_of(body)
+    if body.shape != "mesh":
+        return points, faces
+    corners = points[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    # corner k of a triangle begins its side k; that of the neighbour runs the other way
+    first, second = faces.ravel(), np.roll(faces, -1, 1).ravel()
+    order = np.argsort(first * len(points) + second)
+    other = order[np.searchsorted(first * len(points) + second, second * len(points) + first, sorter=order)]
+    side = np.arange(len(first))
+    smooth = (normal[side // 3] * normal[other // 3]).sum(1) > _SMOOTH
+    # where two triangles are smooth, this side's first corner is the neighbour's second
+    after = 3 * (other // 3) + (other + 1) % 3
+    joined = coo_matrix((smooth[smooth], (side[smooth], after[smooth])), (len(side), len(side)))
+    number, label = connected_components(joined, directed=False)
+    found = np.empty((number, 3))
+    found[label] = points[first]
+    return found, label.reshape(-1, 3)
 
 
 def solid(body: Body, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -22,7 +49,7 @@ def solid(body: Body, time: float) -> tuple[np.ndarray, np.ndarray]:
 
     One with a mass, which goes no path, is where it begins.
     """
-    points, faces = solid_of(body)
+    points, faces = _drawn(body)
     times = [w.time for w in body.path]
     points = points - pivot_of(body)
     if any(any(w.turn) for w in body.path):
@@ -59,7 +86,7 @@ def among(frame: Frame, params: WoodParams, time: float, poses: Poses | None = N
         if body.mass is None or poses is None:
             points, faces = solid(body, time)
         else:
-            points, faces = solid_of(body)
+            points, faces = _drawn(body)
             points = points @ poses.frame[r].T + poses.centre[r]
         vertices.append(points)
         triangles.append((faces + count).astype(frame.triangles.dtype))

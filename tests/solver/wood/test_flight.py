@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from solver import meshes
 from solver.contract import Context, InvalidGeometry, InvalidInput, Need
 from solver.wood import SOLVER
 from solver.wood.model.bodies.solids import weight_of
@@ -279,3 +280,18 @@ def test_auto_takes_real_masses_for_what_is_thrown():
     run = SOLVER.solve(found.model_copy(update={"rods": 1}), Need(stages=(1e-5,), quality="preview"))
     assert run.attrs["mass_scaling"] == 1.0
     assert "strikes with its inertia" in run.attrs["note"]
+
+
+def test_the_stage_s_mesh_shows_the_body_where_it_has_flown():
+    path = [{"time": 0, "position": (0.12, 0.001, 0.3), "turn": (0.1, 0.2, 0.3)}]
+    values = {"rods": 1, "vertices": 4, "bodies": [{**HAMMER, "path": path, "spin": (30.0, -200.0, 50.0)}], **PLAIN}
+    run = SOLVER.solve(SOLVER.parse(values), Need(stages=(0.0, 0.01), quality="preview"))
+    assert run.body_place.values[1, 0] - run.body_place.values[0, 0] == pytest.approx([0.005, 0.002, -0.08], abs=1e-9)
+    for n in range(2):
+        shown = meshes.frame(run, n)
+        corners = shown.vertices[shown.fields["body"] == 1]
+        turn = Rotation.from_rotvec(run.body_turn.values[n, 0])
+        own = turn.inv().apply(corners - run.body_place.values[n, 0])
+        assert len(own) == 24
+        assert np.abs(own) == pytest.approx(np.tile([0.01, 0.015, 0.015], (24, 1)), abs=1e-6)
+    assert np.linalg.norm(run.body_turn.values[1, 0] - run.body_turn.values[0, 0]) > 1.0
