@@ -16,7 +16,7 @@ from ..params import Body, WoodParams
 __all__ = ["among", "shown", "solid"]
 
 #: Radius of what a picture shows over the bundle's length; the most, for bodies' sake; and what of it they may exceed.
-_SHOWN, _MOST, _BESIDE = 0.42, 0.84, 1.5
+_SHOWN, _MOST, _BESIDE = 0.42, 1.0, 1.5
 #: Cosine between normals of two triangles above which their common side is no edge.
 _SMOOTH = 0.8
 
@@ -65,11 +65,11 @@ def solid(body: Body, time: float) -> tuple[np.ndarray, np.ndarray]:
 def shown(params: WoodParams, middle: np.ndarray) -> float:
     """Return the radius [m] about a middle (3,) that a picture shows: the bundle's, and that of bodies' ways.
 
-    Those longer than the bundle, as floors, are not made room for.
+    Those twice as long as the bundle, as floors, are not made room for.
     """
     far = 0.0
     for body in params.bodies:
-        if np.ptp(solid_of(body)[0], axis=0).max() <= params.length:
+        if np.ptp(solid_of(body)[0], axis=0).max() <= 2 * params.length:
             for point in body.path:
                 far = max(far, float(np.linalg.norm(solid(body, point.time)[0] - middle, axis=1).max()))
     return min(max(_SHOWN * params.length, far / _BESIDE), _MOST * params.length)
