@@ -45,7 +45,9 @@ Set = Annotated[
 Params = Annotated[
     Path | None,
     typer.Option(
-        "--params", metavar="FILE", help="Parameters as TOML or JSON; they go over --preset, --set over them."
+        "--params",
+        metavar="FILE",
+        help='Parameters as TOML or JSON; they go over --preset, --set over them. "@FILE" in it is a mesh beside it.',
     ),
 ]
 Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]

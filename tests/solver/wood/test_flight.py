@@ -100,6 +100,7 @@ def test_a_symmetric_top_precesses_at_its_rate():
     for steps in (1500, 3000):
         before, after = flung(body, time, steps)
         assert before.flight.momentum[0] == pytest.approx(momentum, rel=1e-12)
+        assert moving(before) == pytest.approx(0.5 * momentum @ [6.0, 0, 45.0], rel=1e-12)
         missed.append(
             np.linalg.norm(Rotation.from_quat(after.flight.turn[0], scalar_first=True).apply([0, 0, 1.0]) - wanted)
         )
