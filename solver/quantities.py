@@ -173,22 +173,26 @@ register(
 
 # wood: rods and bonds
 register(
-    kinetic_energy=Quantity("J", "kinetic energy of what is not held", "E_k"),
+    kinetic_energy=Quantity("J", "kinetic energy of what is not held, bodies with a mass among it", "E_k"),
     elastic_energy=Quantity("J", "energy of stretching, bending, twist, bonds and contacts", "E_e"),
     lost_energy=Quantity("J", "energy lost by breaks, friction and damping since the start", "E_l"),
-    work=Quantity("J", "work of loads, weight, grips and bodies since the start", "W"),
+    work=Quantity("J", "work of loads, weight, grips and bodies on paths since the start", "W"),
     broken_rods=Quantity("1", "breaks of rods since the start", "n_r"),
     broken_bonds=Quantity("1", "bonds broken or left without a rod since the start", "n_b"),
     impulse=Quantity("N s", "impulse that the rigid bodies received from the rods since the start", "J"),
     body_impulse=Quantity("N s", "impulse that each rigid body received from the rods since the start", "J"),
     body_moment=Quantity(
-        "N m s", "moment of impulse about its centre that each rigid body received from the rods since the start", "L"
+        "N m s", "moment of impulse about its pivot that each rigid body received from the rods since the start", "L"
     ),
     grip_impulse=Quantity("N s", "impulse that each grip put in since the start", "J"),
     grip_moment=Quantity("N m s", "moment of impulse about its pivot that each grip put in since the start", "L"),
     body_force=Quantity("N", "mean force of the rods on each rigid body since the stage before", "F"),
-    body_torque=Quantity("N m", "mean moment of the rods on each body about its centre since the stage before", "M"),
+    body_torque=Quantity("N m", "mean moment of the rods on each body about its pivot since the stage before", "M"),
     body_shift=Quantity("m", "mean way of each rigid body from its place at time 0, since the stage before", "u"),
+    body_place=Quantity("m", "place of each rigid body's pivot, by default its centre", "x_b"),
+    body_turn=Quantity("radian", "attitude of each rigid body: rotation vector, no longer than half a turn", "phi"),
+    body_velocity=Quantity("m/s", "velocity of each rigid body's pivot", "v"),
+    body_spin=Quantity("radian/s", "angular velocity of each rigid body", "omega"),
     grip_force=Quantity("N", "mean force that each grip put in since the stage before", "F"),
     grip_torque=Quantity("N m", "mean moment about its pivot that each grip put in since the stage before", "M"),
     grip_shift=Quantity("m", "mean way of each grip from its place at time 0, since the stage before", "u"),

@@ -35,6 +35,18 @@ def _box(size: tuple[float, float, float], *way: tuple[float, float, float, floa
     return {"size": size, "path": path}
 
 
+def _thrown(mass: float, speed: float, spin: float, **shape: Any) -> dict[str, Any]:
+    """Return a set-up of few rods at which a body is thrown from above, turned aside."""
+    body = {
+        "size": (0.02, 0.03, 0.03),
+        "mass": mass,
+        "velocity": (0.5, 0.2, -speed),
+        "spin": (spin, -20.0, 5.0),
+        **shape,
+    }
+    return {**_FEW, "bodies": [{"path": [{"time": 0, "position": (0.05, 0, 0.04), "turn": (0.1, 0.2, 0.3)}], **body}]}
+
+
 def _press(rods: int, scaling: float) -> dict[str, Any]:
     """Return three blocks about a bundle, pressed within 0.2 s."""
     ends = [_box((0.016, 0.06, 0.01), (0.0, x, 0.0, -0.0151)) for x in (0.02, 0.13)]
@@ -79,6 +91,30 @@ CASES: dict[str, Case] = {
     ),
     "a body at 100 m/s": Case(
         {**_FEW, "bodies": [_box((0.05, 0.05, 0.05), (0, 0.1, 0, 0.04), (1e-3, 0.1, 0, -0.06))]}, 2e-3
+    ),
+    "a body of a milligram, at 20 m/s": Case(_thrown(1e-6, 20.0, 3.0), 3e-3),
+    "a body of a thousand tons": Case(_thrown(1e6, 20.0, 3.0), 3e-3),
+    "a hammer that spins 1600 times a second": Case(_thrown(0.05, 20.0, 1e4), 3e-3),
+    "a wedge that is nearly flat, thrown, masses scaled": Case(
+        {**_thrown(0.1, 20.0, 3.0, shape="wedge", size=(0, 0.03, 0.03), angle=3.1), "mass_scaling": 100.0}, 3e-3
+    ),
+    "a bar that turns round a thousand times a second": Case(
+        {
+            **_FEW,
+            "bodies": [
+                {
+                    "size": (0.2, 0.02, 0.02),
+                    "path": [{"time": t, "position": (0.05, 0, 0.03), "turn": (0, 6283 * t, 0)} for t in (0, 3e-3)],
+                }
+            ],
+        },
+        3e-3,
+    ),
+    "a mass on a path": Case(
+        {"bodies": [{**_box((0.05, 0.05, 0.05), (0, 0.1, 0, 0.1), (1e-3, 0, 0, 0)), "mass": 1.0}]}, 1e-3, "InvalidInput"
+    ),
+    "a hammer that begins in the wood": Case(
+        {**_FEW, "bodies": [{**_box((0.05, 0.05, 0.05), (0, 0.05, 0, 0.025)), "mass": 1.0}]}, 1e-3, "InvalidGeometry"
     ),
     "edges of 5 micrometres": Case({**_ROD, "length": 2e-3, "radius": 1e-3, "vertices": 400, "unevenness": 0.9}, 2e-8),
     "no rods": Case({"rods": 0}, 1e-3, "InvalidInput"),

@@ -57,6 +57,10 @@ _NUMBERS = (
     "body_force",
     "body_torque",
     "body_shift",
+    "body_place",
+    "body_turn",
+    "body_velocity",
+    "body_spin",
     "grip_force",
     "grip_torque",
     "grip_shift",
@@ -72,7 +76,7 @@ _STRESSES = ("rod_strain", "rod_stress", "bond_position", "bond_tension", "bond_
 
 SOLVER = Solver(
     name="wood",
-    version="9",
+    version="10",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body", *_STRESSES),

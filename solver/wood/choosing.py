@@ -13,7 +13,7 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from .params import WoodParams
+from .params import Body, Waypoint, WoodParams
 
 __all__ = ["Choice", "decide", "error_at"]
 
@@ -60,7 +60,7 @@ class _Held(NamedTuple):
 def _held(params: WoodParams, moving: bool = True) -> _Held:
     """Return what holds; without what moves, if not `moving`."""
     places = {"none": [], "start": [0.0], "both": [0.0, params.length]}[params.clamp]
-    places = places + [b.path[0].position[0] for b in params.bodies if moving or len(b.path) == 1]
+    places = places + [b.path[0].position[0] for b in params.bodies if moving or (len(b.path) == 1 and b.mass is None)]
     grips = [g for g in params.grips if moving or len(g.path) <= 1]
     places += [(max(g.low[0], 0.0) + min(g.high[0], params.length)) / 2 for g in grips]
     inside = sorted({round(min(max(p, 0.0), params.length), 9) for p in places})
@@ -91,7 +91,7 @@ def _driven(params: WoodParams, held: _Held) -> float:
     turns = min(params.strain_limit * reach / r, params.shear_strength / max(params.shear, 1e-9) * reach / r)
     found = [math.inf]
     for body in params.bodies:
-        ways = [(math.dist(a.position, b.position), b.time - a.time) for a, b in pairwise(body.path)]
+        ways = [(_swept(body, a, b), b.time - a.time) for a, b in pairwise(body.path)]
         found.append(_time(ways, sags))
     for grip in params.grips:
         steps = list(pairwise(grip.path))
@@ -100,6 +100,13 @@ def _driven(params: WoodParams, held: _Held) -> float:
     if any(params.pull):
         found.append(params.strain_limit * params.length / math.hypot(*params.pull))
     return min(found)
+
+
+def _swept(body: Body, a: Waypoint, b: Waypoint) -> float:
+    """Return how far [m] a body's farthest point goes from one waypoint to the next, at most."""
+    points = [body.size] if body.mesh is None else body.mesh.points
+    arm = max(math.hypot(*p) for p in points) + (math.hypot(*body.pivot) if body.pivot is not None else 0.0)
+    return math.dist(a.position, b.position) + math.dist(a.turn, b.turn) * arm
 
 
 def _time(ways: list[tuple[float, float]], enough: float) -> float:
@@ -159,6 +166,9 @@ def decide(params: WoodParams) -> Choice:
             bears = "" if params.fracture == "none" else f", and strain rods to {100 * strained:.2g} % of their limit"
             return Choice("static", 1.0, 1 / omega, f"equilibria, as {why}{bears}")
         why = f"dead loads strain rods to {100 * strained:.3g} % of their limit, and equilibria break nothing"
+        return Choice("explicit", 1.0, 0.0, f"real masses, as {why}")
+    if any(body.mass is not None for body in params.bodies):
+        why = "a body with a mass strikes with its inertia, and meets the wood's"
         return Choice("explicit", 1.0, 0.0, f"real masses, as {why}")
     if params.bend or math.isinf(time):
         return Choice("explicit", 1.0, 0.0, "real masses, as the wood swings freely: inertia is all there is")

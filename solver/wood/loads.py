@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from .params import WoodParams
+from .params import Body, WoodParams
 
-__all__ = ["READ", "SUMS", "measured"]
+__all__ = ["MADE", "READ", "measured"]
 
 #: What each reading is made of, a sum since the start: force and moment are its differences over those of the stages.
 SUMS = {
@@ -17,6 +17,8 @@ SUMS = {
     "grip_force": "grip_impulse",
     "grip_torque": "grip_moment",
 }
+#: What readings are made of.
+MADE = {**SUMS, "body_shift": "body_place"}
 READ = ("body_force", "body_torque", "body_shift", "grip_force", "grip_torque", "grip_shift", "grip_turn")
 
 
@@ -28,6 +30,13 @@ def _along(paths: list[tuple[list[float], list[Any]]], times: np.ndarray) -> np.
         for c in range(3):
             found[:, k, c] = np.interp(times, when, places[:, c]) - places[0, c]
     return found
+
+
+def _flown(body: Body, r: int, rows: list[dict[str, Any]]) -> tuple[list[float], list[Any]]:
+    """Return the path (times, places) of body r; where one with a mass has flown is known at the stages."""
+    if body.mass is None:
+        return [w.time for w in body.path], [w.position for w in body.path]
+    return [0.0, *(row["stage"] for row in rows)], [body.path[0].position, *(row["body_place"][r] for row in rows)]
 
 
 def measured(name: str, rows: list[dict[str, Any]], params: WoodParams) -> np.ndarray:
@@ -44,7 +53,7 @@ def measured(name: str, rows: list[dict[str, Any]], params: WoodParams) -> np.nd
         found: np.ndarray = np.where(span > 0, change / np.where(span > 0, span, 1.0), 0.0)
         return found
     if name == "body_shift":
-        paths = [([w.time for w in b.path], [w.position for w in b.path]) for b in params.bodies]
+        paths = [_flown(body, r, rows) for r, body in enumerate(params.bodies)]
     else:
         rest = [(0.0, (0.0, 0.0, 0.0))]
         paths = []

@@ -9,8 +9,9 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ..contract import Params
+from .bodies import Body, Newtons, Rate, Waypoint
 from .outlines import check_outline, polygon_area
-from .parts import Body, Corner, Cut, Grain, Grip, GripPoint, Knot, Newtons, Notch, Rate, Waypoint
+from .parts import Corner, Cut, Grain, Grip, GripPoint, Knot, Notch
 
 __all__ = ["Body", "Cut", "Grain", "Grip", "GripPoint", "Knot", "Notch", "Waypoint", "WoodParams"]
 
@@ -166,10 +167,10 @@ class WoodParams(Params):
     )
     gravity: float = Field(0.0, ge=-100, le=100, description="Gravity along -z", json_schema_extra={"units": "m s-2"})
     damping: float = Field(
-        0.0, ge=0, le=1e5, description="Rate at which velocities decay", json_schema_extra={"units": "1/s"}
+        0.0, ge=0, le=1e5, description="Rate at which velocities of the wood decay", json_schema_extra={"units": "1/s"}
     )
     bodies: tuple[Body, ...] = Field(
-        (), max_length=32, description="Rigid bodies on given paths", json_schema_extra={"units": "1"}
+        (), max_length=32, description="Rigid bodies, on given paths or free", json_schema_extra={"units": "1"}
     )
     cuts: tuple[Cut, ...] = Field(
         (), max_length=64, description="Saw cuts through rods and bonds", json_schema_extra={"units": "1"}

@@ -1,4 +1,4 @@
-"""What a set-up is made of besides the bundle: grain, notches, cuts, bodies and grips, as parameters."""
+"""What a set-up is made of besides bundle and bodies: grain, notches, cuts and grips, as parameters."""
 
 from __future__ import annotations
 
@@ -6,40 +6,16 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-__all__ = [
-    "Body",
-    "Corner",
-    "Cut",
-    "Grain",
-    "Grip",
-    "GripPoint",
-    "Knot",
-    "Newtons",
-    "Notch",
-    "Rate",
-    "Vector",
-    "Waypoint",
-]
+from .bodies import Part, Turn, Vector
 
-Metres = Annotated[float, Field(ge=-10, le=10)]
-Vector = tuple[Metres, Metres, Metres]
-Rate = tuple[
-    Annotated[float, Field(ge=-100, le=100)],
-    Annotated[float, Field(ge=-100, le=100)],
-    Annotated[float, Field(ge=-100, le=100)],
-]
+__all__ = ["Corner", "Cut", "Grain", "Grip", "GripPoint", "Knot", "Notch"]
+
 Corner = tuple[Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)]]
-Turn = Annotated[float, Field(ge=-100, le=100)]
-Newtons = Annotated[float, Field(ge=-1e7, le=1e7)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Knot(_Part):
+class Knot(Part):
     """A dead branch's knot: a cone from the pith, round which fibres pass; it bears nothing itself."""
 
     at: Vector = Field(description="Place of its axis in the unloaded straight bundle at which its radius is given [m]")
@@ -47,7 +23,7 @@ class Knot(_Part):
     elongation: float = Field(1.5, ge=1, le=4, description="How much longer along the fibres than wide it is [1]")
 
 
-class Grain(_Part):
+class Grain(Part):
     """How stiffness and strength vary: a smooth field from the run's seed, growth rings, and rays from the pith.
 
     And where fibres go: along the bundle, but for spiral grain and knots.
@@ -91,7 +67,7 @@ class Grain(_Part):
         return self
 
 
-class Notch(_Part):
+class Notch(Part):
     """A place where all rods are weaker, as if cut in from all sides."""
 
     position: float = Field(ge=0, le=10, description="Along the bundle [m]")
@@ -99,40 +75,12 @@ class Notch(_Part):
     width: float = Field(1e-3, gt=0, le=1, description="Length of the bundle that it weakens [m]")
 
 
-class Waypoint(_Part):
-    """Where a body's centre is at a time; between two of them it moves evenly."""
-
-    time: float = Field(ge=0, le=1000, description="Time [s]")
-    position: Vector = Field(description="Centre [m]")
-
-
-class Body(_Part):
-    """A rigid body on a given path."""
-
-    shape: Literal["box", "cylinder"] = Field("box", description="Shape; it does not turn")
-    size: tuple[float, float, float] = Field(
-        description="Sides of a box along x, y, z; diameter, length and 0 of a cylinder [m]"
-    )
-    axis: Literal["x", "y", "z"] = Field("y", description="Axis of a cylinder")
-    path: tuple[Waypoint, ...] = Field(min_length=1, max_length=64, description="Its way; it rests before and after")
-    friction: float = Field(0.3, ge=0, le=2, description="Coulomb friction with the rods [1]")
-
-    @model_validator(mode="after")
-    def _sound(self) -> Self:
-        wanted = self.size if self.shape == "box" else self.size[:2]
-        if min(wanted) <= 0:
-            raise ValueError("sides, diameter and length must be positive")
-        if any(a.time >= b.time for a, b in pairwise(self.path)):
-            raise ValueError("the times of the path must rise: sort them, and give each once")
-        return self
-
-
 def _ordered(box: Cut | Grip) -> None:
     if any(a > b for a, b in zip(box.low, box.high, strict=True)):
         raise ValueError("the corner `low` must not be above `high` in any direction")
 
 
-class Cut(_Part):
+class Cut(Part):
     """A saw cut without width: bonds that pass the box are broken, rods that pass it where its middle is are parted."""
 
     low: Vector = Field(description="Lowest corner x, y, z of a box in the unloaded straight bundle [m]")
@@ -144,7 +92,7 @@ class Cut(_Part):
         return self
 
 
-class GripPoint(_Part):
+class GripPoint(Part):
     """How far a grip has gone at a time; between two of them it goes evenly."""
 
     time: float = Field(ge=0, le=1000, description="Time [s]")
@@ -154,7 +102,7 @@ class GripPoint(_Part):
     )
 
 
-class Grip(_Part):
+class Grip(Part):
     """Jaws that hold what is in a box of the unloaded bundle, and move and turn it on a path."""
 
     low: Vector = Field(description="Lowest corner x, y, z of the box [m]")

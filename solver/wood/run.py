@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 from ..contract import Context, InvalidInput, Need, SolverError
@@ -17,11 +18,11 @@ from .choosing import decide
 from .contact.listing import law
 from .fibres.hewing import hewn
 from .fracture import sawed
-from .loads import READ, SUMS, measured
+from .loads import MADE, READ, measured
 from .model.bundle import lay
 from .model.joining import longest_edge
 from .model.outline import corners
-from .model.state import Wood
+from .model.state import State, Wood
 from .params import WoodParams
 from .pieces import pieces
 from .settings import choose
@@ -30,7 +31,7 @@ from .stepping.moment import Reached
 from .stepping.stability import longest_step, touchable
 from .stresses import BOND, ROD, Stresses
 from .surface.skin import Skin
-from .surface.solids import among
+from .surface.solids import among, shown
 
 __all__ = ["run"]
 
@@ -81,7 +82,9 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         with threadpool_limits(1, user_api="blas"):
             for reached in marching:
                 if skin is not None:
-                    frames.append(among(skin.frame(reached.state.wood), params, reached.time))
+                    frames.append(
+                        among(skin.frame(reached.state.wood), params, reached.time, reached.state.scratch.poses)
+                    )
                 rows.append(_row(reached, laid, params, need, time.perf_counter() - begun))
                 rows[-1] |= strained.read(reached.state)
                 context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
@@ -114,6 +117,7 @@ def _settled(params: WoodParams, vertices: int) -> tuple[WoodParams, dict[str, A
 
 def _said(wood: Wood, params: WoodParams, said: dict[str, Any]) -> dict[str, Any]:
     """Return what the result says of itself."""
+    middle = (wood.motion.x.min(0) + wood.motion.x.max(0)) / 2
     return {
         "path": params.mode,
         "mass_scaling": params.mass_scaling,
@@ -124,8 +128,14 @@ def _said(wood: Wood, params: WoodParams, said: dict[str, Any]) -> dict[str, Any
         "metres_per_unit": 1.0,
         "up": "z",
         # what a picture should show, middle and radius: fragments fly far
-        "view": [*((wood.motion.x.min(0) + wood.motion.x.max(0)) / 2), 0.42 * params.length],
+        "view": [*middle, shown(params, middle)],
     }
+
+
+def _turned(state: State) -> np.ndarray:
+    """Return the rotation vectors (r, 3) [radian] of bodies, no longer than half a turn."""
+    frames = state.scratch.poses.frame
+    return np.asarray(Rotation.from_matrix(frames).as_rotvec()) if len(frames) else np.zeros((0, 3))
 
 
 def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: float) -> dict[str, Any]:
@@ -149,6 +159,10 @@ def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: 
         "crack_area": float(wood.bonds.area @ wood.bonds.parted),
         "body_impulse": state.impulse[:, :3].copy(),
         "body_moment": state.impulse[:, 3:].copy(),
+        "body_place": state.scratch.poses.pivot.copy(),
+        "body_turn": _turned(state),
+        "body_velocity": state.scratch.poses.speed.copy(),
+        "body_spin": state.scratch.poses.spin.copy(),
         "grip_impulse": state.gripped[:, :3].copy(),
         "grip_moment": state.gripped[:, 3:].copy(),
         "tip_position": weight @ wood.motion.x[ends] / weight.sum(),
@@ -161,8 +175,8 @@ def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: 
         found["rod_cut"] = wood.cut[real].astype(need.dtype)
     if not _PIECES.isdisjoint(need.fields):
         found |= pieces(wood, params)
-    # forces are differences of sums, which go when they have been read
-    wanted = {*need.fields, *(SUMS[name] for name in need.fields if name in SUMS)}
+    # what readings are made of goes when it has been read
+    wanted = {*need.fields, *(MADE[name] for name in need.fields if name in MADE)}
     return {
         "stage": reached.time,
         "residual": reached.error,
@@ -185,6 +199,7 @@ def _dataset(
         "impulse": ("stage", "component"),
         "body_impulse": ("stage", "obstacle", "component"),
         "body_moment": ("stage", "obstacle", "component"),
+        **dict.fromkeys(("body_place", "body_turn", "body_velocity", "body_spin"), ("stage", "obstacle", "component")),
         "grip_impulse": ("stage", "grip", "component"),
         "grip_moment": ("stage", "grip", "component"),
         **dict.fromkeys(("body_force", "body_torque", "body_shift"), ("stage", "obstacle", "component")),
@@ -203,7 +218,7 @@ def _dataset(
         if name in need.fields:
             data[name] = (dims[name], measured(name, rows, params))
     for name in rows[0]:
-        if name in SUMS.values() and name not in need.fields:
+        if name in MADE.values() and name not in need.fields:
             continue
         values = np.array([row[name] for row in rows])
         if name != "stage":

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver import registry
 from solver.decay.surfaces.surface import geodesic
-from sweeps.commands.terminal.options import assignments
+from sweeps.commands.terminal.options import assignments, parameters
 from sweeps.errors import InvalidOption
 
 trimesh = pytest.importorskip("trimesh")
@@ -31,3 +32,17 @@ def test_what_is_no_mesh_is_refused(tmp_path: Path) -> None:
             assignments([f"mesh=@{tmp_path}/{name}"])
     with pytest.raises(InvalidOption):
         assignments([f"mesh=@{tmp_path}/none.obj"])
+
+
+def test_a_params_file_names_meshes_beside_it(tmp_path: Path) -> None:
+    """As of a body that a wood's set-up holds, at any depth, whatever the present folder."""
+    points, faces = geodesic(3)
+    trimesh.Trimesh(0.02 * points, faces, process=False).export(tmp_path / "ball.obj")
+    text = 'bodies = [{ shape = "mesh", mesh = "@ball.obj", path = [{ time = 0, position = [0.07, 0, 0.1] }] }]\n'
+    (tmp_path / "a.toml").write_text(text)
+    values = parameters(tmp_path / "a.toml")
+    assert np.shape(values["bodies"][0]["mesh"]["points"]) == points.shape
+    assert registry.get("wood").parse(values).model_dump()["bodies"][0]["mesh"]["points"]
+    (tmp_path / "b.toml").write_text(text.replace("ball", "none"))
+    with pytest.raises(InvalidOption, match=r"none\.obj"):
+        parameters(tmp_path / "b.toml")

@@ -14,7 +14,7 @@ from numba import njit
 
 from ...geometry.closest import of_segments
 from ..model.arrays import Rods, Rubbing
-from .bodies import eased
+from .shapes import eased
 
 __all__ = ["crossed", "rub"]
 

@@ -11,7 +11,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Bodies", "Bonds", "Pins", "Rods", "Rubbing", "Turns"]
+__all__ = [
+    "BALL",
+    "BOX",
+    "CYLINDER",
+    "MESH",
+    "WEDGE",
+    "Bodies",
+    "Bonds",
+    "Depths",
+    "Flight",
+    "Free",
+    "Pins",
+    "Poses",
+    "Rods",
+    "Rubbing",
+    "Turns",
+    "Ways",
+]
+
+#: Shapes of bodies, as numbers.
+BOX, CYLINDER, BALL, WEDGE, MESH = range(5)
 
 
 class Rods(NamedTuple):
@@ -60,19 +80,73 @@ class Turns(NamedTuple):
     inertia: np.ndarray  # (e,) about the edge's own axis [kg m2]
 
 
-class Bodies(NamedTuple):
-    """Rigid bodies (r,) on given paths."""
+class Ways(NamedTuple):
+    """Where bodies (r,) are to be at times (w,): straight and evenly from one to the next."""
 
-    kind: np.ndarray  # (r,) int32: 0 box, 1 cylinder
-    axis: np.ndarray  # (r,) int32: of a cylinder
-    half: np.ndarray  # (r, 3) half sides of a box [m]; radius, half length, 0 of a cylinder
-    box: np.ndarray  # (r, 3) half sides of the box about it [m]
-    friction: np.ndarray  # (r,)
     times: np.ndarray  # (r, w) [s], rising
-    points: np.ndarray  # (r, w, 3) centre at these times [m]
+    points: np.ndarray  # (r, w, 3) of the pivot [m]
+    turns: np.ndarray  # (r, w, 4) attitude, a unit quaternion, its real part first
+    spins: np.ndarray  # (r, w, 3) angular velocity from then on [radian/s]
+    pivot: np.ndarray  # (r, 3) in the body's frame, from its centre [m]
+
+
+class Free(NamedTuple):
+    """What moves bodies (r,) that go no way of their own."""
+
+    mass: np.ndarray  # (r,) [kg]; 0: it goes its way whatever the force
+    middle: np.ndarray  # (r, 3) centre of mass in the body's frame, from its centre [m]
+    inertia: np.ndarray  # (r, 3) about the centre of mass, about principal axes [kg m2]
+    axes: np.ndarray  # (r, 4) unit quaternion of the principal axes in the body's frame
+    guide: np.ndarray  # (r, 3) unit vector of the line that it slides along without turning; 0: none
+    load: np.ndarray  # (r, 3) weight and steady force [N]
+
+
+class Depths(NamedTuple):
+    """Depths below the surfaces of meshes at the nodes of grids, one after the other; the last index runs fastest."""
+
+    value: np.ndarray  # (n,) [m]; negative outside
+    nodes: np.ndarray  # (r, 3) int64 of each body's grid, about its centre
+    start: np.ndarray  # (r,) int64 where it begins
+    step: np.ndarray  # (r,) [m]
+
+
+class Flight(NamedTuple):
+    """State of bodies (r,) that move freely; of others it says nothing."""
+
+    place: np.ndarray  # (r, 3) of the centre of mass [m]
+    v: np.ndarray  # (r, 3) [m/s]
+    turn: np.ndarray  # (r, 4) attitude, a unit quaternion, its real part first
+    momentum: np.ndarray  # (r, 3) angular, about the centre of mass [kg m2/s]
+
+
+class Bodies(NamedTuple):
+    """Rigid bodies (r,). A body's centre is the middle of the box about it in its own frame."""
+
+    kind: np.ndarray  # (r,) int32: 0 box, 1 cylinder, 2 ball, 3 wedge, 4 mesh
+    axis: np.ndarray  # (r,) int32: of a cylinder
+    half: np.ndarray  # (r, 3) half sides of a box or wedge [m]; radius, half length, 0 of a cylinder; radius of a ball
+    box: np.ndarray  # (r, 3) half sides of the box about it, in its own frame [m]
+    edge: np.ndarray  # (r, 3) of a wedge: radius of its edge [m], sine and cosine of half its angle
+    turned: np.ndarray  # (r,) uint8: whether its frame is ever another than the world's
+    friction: np.ndarray  # (r,)
     k: np.ndarray  # (r,) contact stiffness per length of rod [N/m2]
     ease: np.ndarray  # (r,) depth over which it grows to this [m]
     first: np.ndarray  # (e + 1,) int32: where the numbers of each edge's points begin
+    ways: Ways
+    free: Free
+    depths: Depths
+    flight: Flight  # changes as they move
+
+
+class Poses(NamedTuple):
+    """Where bodies (r,) are at a moment, and how they move."""
+
+    centre: np.ndarray  # (r, 3) [m]
+    pivot: np.ndarray  # (r, 3) the place that the path tells of [m]
+    speed: np.ndarray  # (r, 3) of the pivot [m/s]
+    frame: np.ndarray  # (r, 3, 3) axes of the body by columns
+    spin: np.ndarray  # (r, 3) [radian/s]
+    box: np.ndarray  # (r, 3) half sides of the box about it along x, y, z [m]
 
 
 class Pins(NamedTuple):

@@ -12,9 +12,10 @@ from ..fibres.timber import hews, timber
 from ..params import WoodParams
 from .arrays import Rods, Turns
 from .axis import along, curved, started
+from .bodies.building import bodied
 from .grain import Field, ringed
 from .gripping import courses, pins_of
-from .joining import bodied, bonded
+from .joining import bonded
 from .motion import Motion
 from .outline import area as outlined
 from .outline import corners, inside, stand
@@ -267,7 +268,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         rods,
         bonds,
         _turns(at, rods, motion.d, grain, params),
-        bodied(params, k, _EASE * float(np.median(rods.radius)), rods.rest),
+        bodied(params, k, _EASE * float(np.median(rods.radius)), rods),
         pins_of(params, grips := courses(params, straight, motion.x, motion.held == 0)),
         params.twist or params.curvature != 0 or params.grain.deviates,
         _strengths(at, strong, params),

@@ -1,4 +1,4 @@
-"""Bonds between the rods of a bundle as laid, and the rigid bodies about it."""
+"""Bonds between the rods of a bundle as laid."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...contract import InvalidGeometry
-from ..params import Body, WoodParams
-from .arrays import Bodies, Bonds, Rods
+from ..params import WoodParams
+from .arrays import Bonds, Rods
 from .cracks import widths
 from .curves import held
 from .grain import Field, rayed, ringed
 from .outline import area, corners, sawn_through
 
-__all__ = ["bodied", "bonded", "longest_edge", "lying", "moduli", "resolved", "stretched"]
+__all__ = ["bonded", "longest_edge", "lying", "moduli", "resolved", "stretched"]
 
 #: The transverse spring of a bond over transverse modulus and volume: an isotropic planar net of springs of energy
 #: density c eps_n^2 / 2 has the Young's modulus c / 3.
@@ -28,57 +28,6 @@ _LEAST = 0.25
 _MOST_GIVEN = 0.4
 #: Rounds in which the place beside is found where fibres deviate; a round leaves an error of slope squared.
 _TURNS = 4
-#: Points of contact on what is as long as the narrowest body is wide; the fewest and the most on an edge. Under a
-#: cylinder pressed in by a sixth of its radius, 8 make the force uneven by 1 %, 4 by 5 %.
-_POINTS, _FEWEST, _MOST = 8, 4, 256
-
-
-def _wide(body: Body) -> tuple[float, float]:
-    """Return how wide a body is along x and along y [m]: a cylinder, round, about its radius where it touches."""
-    if body.shape == "box":
-        return body.size[0], body.size[1]
-    across, along = body.size[0] / 2, body.size[1]
-    return (along if body.axis == "x" else across), (along if body.axis == "y" else across)
-
-
-def bodied(params: WoodParams, k: float, ease: float, rest: np.ndarray) -> Bodies:
-    """Return the bodies with a contact stiffness that is gained over the depth `ease` [m].
-
-    k [N/m]: of the mean edge of lengths rest (e,) [m], or of as much of a rod as a narrower body covers.
-    """
-    found, width = params.bodies, max((len(b.path) for b in params.bodies), default=1)
-    times = np.zeros((len(found), width))
-    points = np.zeros((len(found), width, 3))
-    half = np.zeros((len(found), 3))
-    for r, body in enumerate(found):
-        count = len(body.path)
-        times[r, :count] = [w.time for w in body.path]
-        # never reached: the body rests at its last place
-        times[r, count:] = np.inf
-        points[r, :count] = [w.position for w in body.path]
-        points[r, count:] = points[r, count - 1]
-        half[r] = np.array(body.size) / 2
-        if body.shape == "cylinder":
-            half[r, 2] = 0.0
-    widths, mean = [_wide(b) for b in found], float(rest.mean())
-    least = min((min(wide) for wide in widths), default=np.inf)
-    number = np.clip(np.ceil(_POINTS * rest / least), _FEWEST, _MOST)
-    box = half.copy()
-    for r, body in enumerate(found):
-        if body.shape == "cylinder":
-            box[r] = np.where(np.arange(3) == "xyz".index(body.axis), half[r, 1], half[r, 0])
-    return Bodies(
-        np.array([b.shape == "cylinder" for b in found], np.int32),
-        np.array(["xyz".index(b.axis) for b in found], np.int32),
-        half,
-        box,
-        np.array([b.friction for b in found], float),
-        times,
-        points,
-        k / np.array([min(mean, wide[0]) for wide in widths]),
-        np.full(len(found), ease),
-        np.concatenate([[0], np.cumsum(number)]).astype(np.int32),
-    )
 
 
 def lying(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Rubbing
+from .arrays import Poses, Rubbing
 from .fragments import Fragments
 from .plan import Plan
 
@@ -32,7 +32,7 @@ class Motion(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a step writes before it reads it; shapes as in `Motion`, bodies (r, 3); pairs of edges."""
+    """What a step writes before it reads it; shapes as in `Motion`, bodies (r,); pairs of edges."""
 
     f: np.ndarray
     seats: np.ndarray  # (2, s, 8) place [m] and slope of every seat of the plan; force [N] and what pulls on it [N m]
@@ -41,9 +41,8 @@ class Scratch(NamedTuple):
     inverse: np.ndarray
     torque: np.ndarray
     each: np.ndarray
-    centre: np.ndarray
-    speed: np.ndarray
-    push: np.ndarray  # (r, 6) force [N] on each body and its moment about the centre [N m]
+    poses: Poses
+    push: np.ndarray  # (r, 6) force [N] on each body and its moment about its pivot [N m]
     power: np.ndarray
     bent: np.ndarray  # (h,) curvature beyond that at rest, of rods that resist twist [1/m]
     light: np.ndarray  # (v,) mass that friction may stop in half a step [kg]

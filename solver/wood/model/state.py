@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arrays import Bodies, Bonds, Pins, Rods, Rubbing, Turns
+from .arrays import Bodies, Bonds, Flight, Pins, Poses, Rods, Rubbing, Turns
 from .fragments import fragments
 from .gripping import Course
 from .motion import Motion, Scratch
@@ -45,6 +45,7 @@ class Wood:
             rods=Rods(*(a.copy() for a in self.rods)),
             bonds=Bonds(*(a.copy() for a in self.bonds)),
             pins=Pins(*(a.copy() for a in self.pins)),
+            bodies=self.bodies._replace(flight=Flight(*(a.copy() for a in self.bodies.flight))),
             cut=self.cut.copy(),
         )
 
@@ -55,6 +56,7 @@ def scratch_for(wood: Wood) -> Scratch:
     held = wood.motion.held.copy()
     held[wood.pins.vertex] = 1
     v, e, r = len(wood.motion.x), len(wood.rods.a), len(wood.bodies.kind)
+    here = [np.zeros((r, 3)) for _ in range(5)]
     return Scratch(
         np.zeros((v, 3)),
         np.zeros((2, e + len(plan.stub), 8)),
@@ -63,8 +65,7 @@ def scratch_for(wood: Wood) -> Scratch:
         1.0 / wood.rods.rest,
         np.zeros(e),
         np.zeros((2, len(wood.bonds.i))),
-        np.zeros((r, 3)),
-        np.zeros((r, 3)),
+        Poses(here[0], here[1], here[2], np.tile(np.eye(3), (r, 1, 1)), here[3], here[4]),
         np.zeros((r, 6)),
         np.zeros(2),
         np.zeros(len(wood.rods.before)),
@@ -78,7 +79,7 @@ def scratch_for(wood: Wood) -> Scratch:
 
 class State(NamedTuple):
     """A moment of a run. books (6,) [J] as `motion` numbers them; impulse (r, 6) of the bodies, [N s] and
-    its moment about their centres [N m s]; steps taken.
+    moments of it about their pivots [N m s]; steps taken.
 
     gripped (g, 6): impulse [N s] and moment of it about the pivot [N m s] that each grip put in; spent [J]: energy that
     breaks took so far.
@@ -97,8 +98,9 @@ class State(NamedTuple):
 
 def _again(scratch: Scratch) -> Scratch:
     """Return a copy; plan and fragments are not written to, but for what a step writes before it reads it."""
-    kept = ("rubbing", "plan", "fragments")
+    kept = ("rubbing", "plan", "fragments", "poses")
     fresh: dict[str, Any] = {name: getattr(scratch, name).copy() for name in Scratch._fields if name not in kept}
+    fresh["poses"] = Poses(*(a.copy() for a in scratch.poses))
     return scratch._replace(**fresh)
 
 

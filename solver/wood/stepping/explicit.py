@@ -9,12 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..contact.bodies import pose, press
+from ..contact.bodies import press
+from ..contact.posing import pose
 from ..contact.rubbing import rub
 from ..forces.internal import internal
 from ..forces.twist import carry, turn, twists
 from ..model.arrays import Bodies, Bonds, Pins, Rods, Turns
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH, WORK, Motion, Scratch
+from .flying import fly, strike
 from .scaling import push, rigid
 from .touching import steady
 from .verlet import drift, grip, kick, pin, pinned, slowed
@@ -96,7 +98,7 @@ def _fill(
         )
     books[CONTACT] = 0.0
     if len(bodies.kind) > 0:
-        pose(bodies, time, scratch.centre, scratch.speed)
+        pose(bodies, time, scratch.poses)
         books[CONTACT] = press(
             motion.x,
             motion.v,
@@ -104,8 +106,7 @@ def _fill(
             scratch.light,
             rods,
             bodies,
-            scratch.centre,
-            scratch.speed,
+            scratch.poses,
             dt,
             scratch.push,
             scratch.power,
@@ -134,7 +135,7 @@ def march(
     """Advance `steps` steps of `dt` [s] in place; scratch must hold the forces of the start. False: no longer finite.
 
     `damping` [1/s] slows every velocity by exp(-damping t). impulse (r, 6) gathers what each body received:
-    impulse [N s] and moment of it about its centre [N m s].
+    impulse [N s] and moment of it about its pivot [N m s].
     """
     x = motion.x
     v = motion.v
@@ -147,14 +148,14 @@ def march(
     keep = np.full(len(x), slow)
     keep[held] = 1.0
     whole = scratch.fragments
+    flying = bodies.free.mass.any()
     books[LOST] -= rigid(x, v, f, motion.mass, whole, 0.0)
     steady(
         x,
         v,
         rods,
         bodies,
-        scratch.centre,
-        scratch.speed,
+        scratch.poses,
         motion.mass,
         scratch.rubbing.pair,
         whole,
@@ -169,6 +170,9 @@ def march(
         push(x, v, whole, half)
         pin(v, motion.mass, pins)
         work = drift(x, v, motion.load, dt)
+        if flying:
+            strike(bodies, scratch.poses, scratch.push, half)
+            work += fly(bodies, dt)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -183,6 +187,8 @@ def march(
         kick(v, f, weight)
         push(x, v, whole, half)
         pin(v, motion.mass, pins)
+        if flying:
+            strike(bodies, scratch.poses, scratch.push, half)
         if turning:
             for e in range(len(motion.theta)):
                 if turns.inertia[e] > 0.0:
@@ -200,6 +206,8 @@ def march(
                 for e in range(len(motion.spin)):
                     books[LOST] += 0.5 * turns.inertia[e] * motion.spin[e] ** 2 * (1.0 - slow * slow)
                     motion.spin[e] *= slow
+    # with the velocities of the end
+    pose(bodies, time + steps * dt, scratch.poses)
     total = books[STRETCH] + books[BENDING] + books[BONDS]
-    found: bool = np.isfinite(total) and np.isfinite(v).all()
+    found: bool = np.isfinite(total) and np.isfinite(v).all() and np.isfinite(bodies.flight.v).all()
     return found

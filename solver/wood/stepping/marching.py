@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...contract import Context, Unstable
+from ...contract import Context, InvalidGeometry, Unstable
 from ..cohesion import soften
+from ..contact.bodies import deepest
 from ..contact.listing import Listing
 from ..fracture import break_worst, overstress
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH
@@ -119,17 +120,37 @@ def _refreshed(listing: Listing, state: State, ahead: float, time: float, dt: fl
     return fitted
 
 
+def _clear(state: State) -> None:
+    """Refuse bodies that begin in the wood: contact's penalty would throw both apart with an energy out of nothing.
+
+    Raises:
+        InvalidGeometry: see above.
+
+    """
+    wood, depth = state.wood, np.zeros(len(state.wood.bodies.kind))
+    deepest(wood.motion.x, wood.rods, wood.bodies, state.scratch.poses, depth)
+    # what lies against the wood covers the axes of its outer rods by less than one radius
+    most = float(wood.rods.radius.max())
+    for r in np.flatnonzero(depth > most):
+        raise InvalidGeometry(
+            f"body {r} begins in the wood: a rod's axis is {1e3 * depth[r]:.3g} mm deep in it.",
+            advice="Let it begin beside the wood, and move or fly into it.",
+        )
+
+
 def explicit(
     wood: Wood, params: WoodParams, times: Sequence[float], dt: float, tolerance: float, context: Context
 ) -> Iterator[Reached]:
     """Yield the state at each wanted time [s]; what is between does not depend on which times are wanted.
 
     Raises:
+        InvalidGeometry: a body begins in the wood.
         Unstable: positions are no longer finite, or the energy balance is lost.
         Cancelled: the observer asked to stop.
 
     """
     state = begin(wood)
+    _clear(state)
     start = real(state) + float(state.books[: CONTACT + 1].sum())
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking = params.fracture != "none"

@@ -11,6 +11,7 @@ from ..model.motion import CONTACT, LOST, WORK
 from ..model.state import State, Wood, scratch_for
 from ..params import WoodParams
 from .explicit import forces
+from .flying import moving
 from .scaling import saved
 
 __all__ = [
@@ -44,11 +45,11 @@ class Reached(NamedTuple):
 
 
 def kinetic(wood: Wood) -> float:
-    """Return the kinetic energy [J] of what is not held, spinning about the rods' axes included."""
+    """Return the kinetic energy [J] of what is not held, spinning about the rods' axes and flying bodies included."""
     m = wood.motion
     free = m.held == 0
     spin = 0.5 * float((wood.turns.inertia * m.spin**2).sum()) if wood.turning else 0.0
-    return 0.5 * float((m.mass[free, None] * m.v[free] ** 2).sum()) + spin
+    return 0.5 * float((m.mass[free, None] * m.v[free] ** 2).sum()) + spin + moving(wood.bodies)
 
 
 def real(state: State) -> float:

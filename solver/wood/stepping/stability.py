@@ -8,6 +8,7 @@ import numpy as np
 
 from ..model.state import Wood, scratch_for
 from .explicit import forces
+from .flying import softest
 
 __all__ = ["longest_step", "touchable"]
 
@@ -56,6 +57,7 @@ def longest_step(wood: Wood, contact: float = 0.0) -> float:
         # each vertex bears the contact of half its edges
         borne = np.bincount(wood.rods.a, solid / 2, len(free)) + np.bincount(wood.rods.b, solid / 2, len(free))
         highest += float((wood.bodies.k.sum() * borne[free] / motion.mass[free]).max())
+        highest += softest(wood.bodies, len(wood.grid))
     highest += 4 * contact / float(motion.mass[free].min())
     if wood.turning:
         tight = 2 * wood.turns.beta / wood.rods.span

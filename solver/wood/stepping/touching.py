@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..contact.bodies import apart
-from ..model.arrays import Bodies, Rods
+from ..contact.shapes import apart
+from ..model.arrays import Bodies, Poses, Rods
 from ..model.fragments import Fragments
 
 __all__ = ["steady"]
@@ -23,8 +23,7 @@ def steady(
     v: np.ndarray,
     rods: Rods,
     bodies: Bodies,
-    centre: np.ndarray,
-    speed: np.ndarray,
+    poses: Poses,
     mass: np.ndarray,
     pair: np.ndarray,
     parts: Fragments,
@@ -32,8 +31,6 @@ def steady(
     light: np.ndarray,
 ) -> None:
     """Set every g by the edges that may touch within `span` [s]: bodies or, if listed in pair (p, 2), other fragments'.
-
-    centre (r, 3) [m] and speed (r, 3) [m/s]: of the bodies.
 
     light (v,) gets the mass [kg] that friction may stop at once: each touching edge has its share of a fragment's.
     """
@@ -43,8 +40,12 @@ def steady(
     for i in range(len(v)):
         fast = max(fast, v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
     way = np.sqrt(fast)
-    for r in range(len(speed)):
-        way = max(way, np.sqrt(fast) + np.sqrt(speed[r, 0] ** 2 + speed[r, 1] ** 2 + speed[r, 2] ** 2))
+    for r in range(len(bodies.kind)):
+        speed, swept = poses.speed[r], 0.0
+        if bodies.turned[r] == 1:
+            arm = 2.0 * np.sqrt((poses.box[r] ** 2).sum()) + np.sqrt((bodies.ways.pivot[r] ** 2).sum())
+            swept = arm * np.sqrt((poses.spin[r] ** 2).sum())
+        way = max(way, np.sqrt(fast) + np.sqrt(speed[0] ** 2 + speed[1] ** 2 + speed[2] ** 2) + swept)
     touching = np.zeros(len(parts.gain))
     for e in range(len(rods.a)):
         if rods.k[e] == 0.0:
@@ -55,9 +56,8 @@ def steady(
         for r in range(len(bodies.kind)):
             found = True
             for c in range(3):
-                p = x[a, c] - centre[r, c]
-                d = x[b, c] - x[a, c]
-                found = found and not apart(p, d, bodies.box[r, c] + near)
+                p = x[a, c] - poses.centre[r, c]
+                found = found and not apart(p, x[b, c] - x[a, c], poses.box[r, c] + near)
             if found:
                 touching[parts.of[a]] += 1.0
                 # the feet of a cut edge's stubs may be of two fragments

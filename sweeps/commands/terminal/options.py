@@ -45,7 +45,9 @@ Set = Annotated[
 Params = Annotated[
     Path | None,
     typer.Option(
-        "--params", metavar="FILE", help="Parameters as TOML or JSON; they go over --preset, --set over them."
+        "--params",
+        metavar="FILE",
+        help='Parameters as TOML or JSON; they go over --preset, --set over them. "@FILE" in it is a mesh beside it.',
     ),
 ]
 Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]
@@ -100,7 +102,7 @@ def assignments(pairs: Sequence[str] | None, option: str = "--set") -> dict[str,
 
 
 def parameters(path: Path | None) -> dict[str, Any]:
-    """Return the parameters in a file of TOML or JSON; none for None.
+    """Return the parameters in a file of TOML or JSON, meshes and pictures of files beside it read; none for None.
 
     Raises:
         InvalidOption: no such file, or it cannot be read as its suffix says.
@@ -117,15 +119,28 @@ def parameters(path: Path | None) -> dict[str, Any]:
         raise InvalidOption(f"--params {path}: {error}.", "Write TOML, or JSON in a .json file.") from None
     if not isinstance(values, dict):
         raise InvalidOption(f"--params {path} holds no names and values.", 'Write for example {"thickness": 0.02}.')
-    return values
+    return {name: _with_files(value, path.parent) for name, value in values.items()}
+
+
+def _with_files(value: Any, folder: Path) -> Any:
+    """Return a value of a file in `folder` in which every text "@FILE" is what that file holds."""
+    if isinstance(value, dict):
+        return {name: _with_files(each, folder) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_with_files(each, folder) for each in value]
+    return _file(folder / value[1:]) if isinstance(value, str) and value.startswith("@") else value
+
+
+def _file(path: Path) -> Any:
+    """Return the picture or the mesh of a file."""
+    from . import meshfile, picturefile
+
+    return picturefile.read(path) if path.suffix.lower() in picturefile.KINDS else meshfile.read(path)
 
 
 def _value(text: str) -> Any:
     if text.startswith("@"):
-        from . import meshfile, picturefile
-
-        path = Path(text[1:])
-        return picturefile.read(path) if path.suffix.lower() in picturefile.KINDS else meshfile.read(path)
+        return _file(Path(text[1:]))
     readers: list[Callable[[], Any]] = [lambda: tomllib.loads(f"value = {text}")["value"], lambda: json.loads(text)]
     if "," in text:
         readers.append(lambda: tomllib.loads(f"value = [{text}]")["value"])

@@ -7,10 +7,12 @@ import pytest
 
 from solver.contract import Need
 from solver.wood import SOLVER
-from solver.wood.contact.bodies import pose, press
-from solver.wood.model.arrays import Bodies, Rods
+from solver.wood.contact.bodies import press
+from solver.wood.contact.posing import pose
+from solver.wood.model.arrays import Bodies, Poses, Rods
+from solver.wood.model.bodies.building import bodied
 from solver.wood.model.bundle import lay
-from solver.wood.model.state import Wood
+from solver.wood.model.state import Wood, scratch_for
 
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 BODIES = [
@@ -42,10 +44,10 @@ def bundle() -> Wood:
 def pressed(wood: Wood, dt: float = 1e-6):
     """Return energy, forces (v, 3), forces on the bodies and their moments (r, 6), powers (2,)."""
     m, b = wood.motion, wood.bodies
-    centre, speed, push = (np.zeros((len(b.kind), n)) for n in (3, 3, 6))
-    pose(b, 0.1, centre, speed)
+    poses, push = scratch_for(wood).poses, np.zeros((len(b.kind), 6))
+    pose(b, 0.1, poses)
     f, power = np.zeros_like(m.x), np.zeros(2)
-    energy = press(m.x, m.v, f, m.mass, wood.rods, b, centre, speed, dt, push, power)
+    energy = press(m.x, m.v, f, m.mass, wood.rods, b, poses, dt, push, power)
     return energy, f, push, power
 
 
@@ -66,7 +68,7 @@ def test_contact_is_that_of_plain_numpy_and_keeps_momentum():
     m, rods, b = wood.motion, wood.rods, wood.bodies
     energy, f, push, power = pressed(wood, dt)
     speeds = np.array([[0.005, 0.02, -0.023], [0, 0, 0], [0, 0, 0]])
-    centres = b.points[:, 0] + 0.1 * speeds
+    centres = b.ways.points[:, 0] + 0.1 * speeds
     wanted, own, powers, dead = np.zeros_like(f), 0.0, np.zeros(2), 0
     for r in range(3):
         for e in np.flatnonzero(rods.k > 0):
@@ -120,18 +122,10 @@ def one(kind: int, k: float = 1e3) -> tuple[Rods, Bodies]:
     rods = Rods(
         np.zeros(1, np.int32), np.ones(1, np.int32), zero + 0.1, zero + 1, flag, none, none, none, none, none, zero
     )
-    bodies = Bodies(
-        np.array([kind], np.int32),
-        np.ones(1, np.int32),
-        np.ones((1, 3)),
-        np.ones((1, 3)),
-        zero + 0.4,
-        zero[:, None],
-        np.zeros((1, 1, 3)),
-        zero + k,
-        zero,
-        np.array([0, 4], np.int32),
-    )
+    shape = {"size": (2.0, 2.0, 2.0)} if kind == 0 else {"shape": "cylinder", "size": (2.0, 2.0, 0)}
+    body = {**shape, "friction": 0.4, "path": [{"time": 0, "position": (0, 0, 0)}]}
+    bodies = bodied(SOLVER.parse({"bodies": [body]}), k * 0.1, 0.0, rods)
+    assert bodies.k == pytest.approx(k)
     return rods, bodies
 
 
@@ -140,8 +134,9 @@ def test_friction_is_coulomb_s(kind):
     rods, body = one(kind)
     f, push, power = np.zeros((2, 3)), np.zeros((1, 6)), np.zeros(2)
     x, v = np.array([[0.0, 0.1, 0.99], [0.0, 0.2, 0.99]]), np.array([[2.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    rest = np.zeros((1, 3))
-    energy = press(x, v, f, np.ones(2), rods, body, rest, rest, 1e-3, push, power)
+    poses = Poses(*np.zeros((3, 1, 3)), np.eye(3)[None], *np.zeros((2, 1, 3)))
+    pose(body, 0.0, poses)
+    energy = press(x, v, f, np.ones(2), rods, body, poses, 1e-3, push, power)
     # 1e3 N/m2 on 0.1 m at a depth of 0.01 m
     assert f[0] == pytest.approx([-0.2, 0, 0.5])
     assert f[1] == pytest.approx([-0.2, 0, 0.5])

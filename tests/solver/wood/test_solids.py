@@ -38,6 +38,21 @@ def test_a_body_is_on_its_path_and_rests_before_and_after(time, height):
     assert points.mean(0) == pytest.approx([1.0, 2.0, height])
 
 
+def test_a_mesh_is_drawn_with_sharp_edges_and_smooth_sides():
+    """A cylinder: its wall is one sheet, its ends are others; of a box every face is."""
+    for made, sheets, vertices in (
+        (trimesh.creation.cylinder(0.02, 0.1, sections=24), 3, 4 * 24 + 2),
+        (trimesh.creation.box((0.1, 0.2, 0.3)), 6, 24),
+    ):
+        mesh = {"points": made.vertices.tolist(), "faces": made.faces.tolist()}
+        points, faces = solid(Body(shape="mesh", mesh=mesh, path=PATH), 0.0)
+        drawn = trimesh.Trimesh(points, faces, process=False)
+        assert len(points) == vertices
+        assert drawn.body_count == sheets
+        assert drawn.volume == pytest.approx(made.volume)
+        assert points.mean(0) == pytest.approx([1.0, 2.0, 3.0])
+
+
 def test_bodies_follow_the_wood_and_are_told_apart():
     wood = Frame(np.eye(3), np.array([[0, 1, 2]], np.int32), {"inside": np.array([0.0, 1.0, 0.0])})
     body = {"size": (0.1, 0.1, 0.1), "path": PATH}

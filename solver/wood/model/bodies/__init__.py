@@ -1,0 +1,1 @@
+"""Rigid bodies as laid: what their parameters say, as arrays and as meshes."""
