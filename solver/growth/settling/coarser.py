@@ -1,0 +1,328 @@
+"""A coarser sheet that shows a fine one the way: some of its vertices, with what strains and bends it between them.
+
+Where a sheet buckles the way is long, and steps of the minimiser cost what the mesh is large. Where the shape is going
+shows on a coarser one. So large sheets are settled coarse first, from where they are; what that moves is carried over,
+smoothly, and the fine sheet goes on from there. Whether it is a better place to begin, the fine sheet's energy says.
+(Nested iteration; Brandt 1977, and Nash 2000, doi 10.1080/10556780008805795, for minima.)
+
+The coarser mesh is the dual of the cells about its vertices (Voronoi cells along the sheet). Its rest state is the shape
+less what strains and bends the fine one there, as tensors in space: in balance it is so where the fine sheet is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from heapq import heappop, heappush
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ... import shell
+from ...arrays import Bools, Floats, Ints
+from ...contract import InvalidGeometry
+from ...linalg.patterns import of_pairs
+from ...shell.normals import normals
+from ..state import State
+from .energy import StepEnergy
+from .minimise import longest, quasi_newton
+from .tangent import Tangent
+
+__all__ = ["FEWEST", "begun_coarser", "coarser", "Coarser"]
+
+#: Vertices below which a sheet finds its way as it is, and below which a coarser one has no coarser one of its own.
+FEWEST, _LEAST = 8000, 2000
+#: Rings about each vertex of the coarser sheet in which there is no other: a fourteenth is left of a regular mesh.
+_RINGS = 3
+#: Residual of the coarser sheet over the finer one's, and most steps to it: there they cost little, and what it has
+#: not come to the finer one has to find.
+_FINER, _STEPS = 0.3, 600
+#: Forces over the goal up to which a sheet is near its equilibrium, and needs nobody to show it the way.
+_NEAR = 10
+#: Cosine of the turn of a normal beyond which the inverse is taken anew before the finer sheet goes on.
+_TURNED = 0.995
+#: Least square by which slopes are fitted, over the largest.
+_THIN = 1e-3
+
+
+class Coarser(NamedTuple):
+    """Vertices `seeds` (m,) of a finer mesh as a mesh of their own.
+
+    Each vertex of the finer one lies between `corners` (n, 3) of the coarser, by barycentric `weights` (n, 3);
+    within (n,): its triangle there.
+    """
+
+    seeds: Ints
+    mesh: shell.Topology
+    corners: Ints
+    weights: Floats
+    within: Ints
+
+
+def coarser(mesh: shell.Topology, x: Floats) -> Coarser | None:
+    """Return a coarser mesh for vertices at x (n, 3); None where its cells make no surface."""
+    indptr, indices, _ = of_pairs(mesh.edges, mesh.vertices)
+    first = np.unique(mesh.edges[mesh.border])
+    rim = np.zeros(mesh.vertices, np.bool_)
+    rim[first] = True
+    seeds = _spread(indptr, indices, rim, np.concatenate([first, np.flatnonzero(~rim)]), _RINGS)
+    cell = _cells(indptr, indices, x, seeds)
+    between = cell[mesh.triangles]
+    between = between[(between != np.roll(between, 1, axis=1)).all(axis=1)]
+    if not len(between):
+        return None
+    # a triple of cells may meet more than once
+    first_of = np.unique(np.sort(between, axis=1), axis=0, return_index=True)[1]
+    try:
+        found = shell.topology(between[np.sort(first_of)], len(seeds))
+    except InvalidGeometry:
+        return None
+    about = np.bincount(found.triangles.ravel(), minlength=len(seeds))
+    if not about.all():
+        return None
+    order = np.argsort(found.triangles.ravel(), kind="stable") // 3
+    starts = np.concatenate([[0], np.cumsum(about)])
+    within, weights = _located(x, cell, x[seeds], found.triangles, starts, order)
+    return Coarser(seeds, found, found.triangles[within], weights, within)
+
+
+def begun_coarser(
+    energy: StepEnergy, x: Floats, goal: float, fewest: int = FEWEST
+) -> Generator[None, None, Floats]:
+    """Find where to begin from x (n, 3), by a coarser sheet where it shows the way; yields after pieces of work.
+
+    goal: largest force. fewest: vertices of a sheet that asks.
+    """
+    if len(x) < fewest or longest(energy(x)[1]) <= _NEAR * goal:
+        return x
+    found = coarser(energy.state.mesh, x)
+    yield
+    if found is None:
+        return x
+    there = yield from _shown(energy, x, found, goal)
+    triangles = energy.state.mesh.triangles
+    turned = (normals(x, triangles) * normals(there, triangles)).sum(axis=1).min() < _TURNED
+    if energy.ready and turned:
+        yield from energy.refactor(there)
+    return there
+
+
+def _shown(energy: StepEnergy, x: Floats, found: Coarser, goal: float) -> Generator[None, None, Floats]:
+    """Find where a coarser sheet leads to from x (n, 3), if that is lower; yields after pieces of work."""
+    # what is finer than the coarser sheet is noise at the start of a run, and would count as strain
+    x = _lower(energy, x, _carried(found, x, x[found.seeds], x[found.seeds]) - x)
+    sheet = _sheet(energy, found, x)
+    yield
+    if sheet is None:
+        return x
+    coarse = energy.part(sheet, Tangent(sheet.mesh))
+    goal *= _FINER * sheet.length / energy.state.length
+    y, steps = (yield from begun_coarser(coarse, sheet.x, goal, _LEAST)), 0
+    for point in quasi_newton(coarse, y):
+        steps += point.x is not y
+        y = point.x
+        if point.gradient <= goal or point.stuck or steps >= _STEPS or not np.isfinite(point.gradient):
+            break
+        yield
+    return _lower(energy, x, _carried(found, x, sheet.x, y - sheet.x))
+
+
+def _lower(energy: StepEnergy, x: Floats, way: Floats) -> Floats:
+    """Return where a way (n, 3) leads to from x (n, 3), or x if that is lower."""
+    way = np.where(energy.free, way, 0.0)
+    there = x + energy.allowed(x, way, 1.0) * way
+    return there if energy(there)[0] < energy(x)[0] else x
+
+
+def _sheet(energy: StepEnergy, found: Coarser, x: Floats) -> State | None:
+    """Return the coarser sheet of a state at x (n, 3); None where its rest state is none."""
+    state, mesh = energy.state, found.mesh
+    y, triangles = x[found.seeds], state.mesh.triangles
+    sizes = shell.areas(state.g)
+    now = shell.metric(x, triangles)
+    bent = shell.from_angles(shell.angles(x, state.mesh.hinges) - state.rest, state.g, state.mesh)
+    strain = _averaged(x, triangles, (now - state.g) / 2, sizes, found.within, len(mesh.triangles))
+    bend = _averaged(x, triangles, bent, sizes, found.within, len(mesh.triangles))
+    own = shell.metric(y, mesh.triangles)
+    g = own - 2 * _seen(y, mesh.triangles, strain)
+    if not (g[:, 0] * g[:, 2] - g[:, 1] ** 2 > 1e-3 * own[:, 0] * own[:, 2]).all() or not (g[:, [0, 2]] > 0).all():
+        return None
+    angles = shell.angles(y, mesh.hinges)
+    rest = angles - shell.added_angles(_seen(y, mesh.triangles, bend), g, mesh)
+    return replace(
+        state,
+        x=y,
+        mesh=mesh,
+        g=g,
+        rest=rest,
+        held=state.held[found.seeds],
+        matter={name: values[found.seeds] for name, values in state.matter.items()},
+        drift=None, shares={}, spots={}, curves={}, corners={}, faces={},
+    )  # fmt: skip
+
+
+def _averaged(x: Floats, triangles: Ints, forms: Floats, sizes: Floats, within: Ints, count: int) -> Floats:
+    """Return the mean tensors in space (count, 3, 3) of what triangles have as `forms` (f, 3), by where they lie."""
+    total, weight = np.zeros((count, 3, 3)), np.zeros(count)
+    _average(x, triangles, forms, sizes, within, total, weight)
+    return total / np.maximum(weight, 1e-300)[:, None, None]
+
+
+@njit(cache=True, error_model="numpy")
+def _average(
+    x: Floats, triangles: Ints, forms: Floats, sizes: Floats, within: Ints, total: Floats, weight: Floats
+) -> None:
+    dual = np.empty((2, 3))
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        aa = ab = bb = 0.0
+        for d in range(3):
+            a, b = x[j, d] - x[i, d], x[k, d] - x[i, d]
+            aa += a * a
+            ab += a * b
+            bb += b * b
+        determinant = aa * bb - ab * ab
+        if not determinant > 0:
+            continue
+        for d in range(3):
+            a, b = x[j, d] - x[i, d], x[k, d] - x[i, d]
+            dual[0, d], dual[1, d] = (bb * a - ab * b) / determinant, (aa * b - ab * a) / determinant
+        share = sizes[t] / 3
+        for corner in range(3):
+            c = within[triangles[t, corner]]
+            weight[c] += share
+            for d in range(3):
+                for h in range(3):
+                    total[c, d, h] += share * (
+                        forms[t, 0] * dual[0, d] * dual[0, h]
+                        + forms[t, 1] * (dual[0, d] * dual[1, h] + dual[1, d] * dual[0, h])
+                        + forms[t, 2] * dual[1, d] * dual[1, h]
+                    )
+
+
+def _seen(y: Floats, triangles: Ints, tensors: Floats) -> Floats:
+    """Return what triangles at y (m, 3) have of tensors (f, 3, 3), along their edges (f, 3)."""
+    a, b = y[triangles[:, 1]] - y[triangles[:, 0]], y[triangles[:, 2]] - y[triangles[:, 0]]
+    along, across = (tensors @ a[:, :, None])[..., 0], (tensors @ b[:, :, None])[..., 0]
+    return np.stack([(a * along).sum(-1), (b * along).sum(-1), (b * across).sum(-1)], -1)
+
+
+def _carried(found: Coarser, x: Floats, y: Floats, moved: Floats) -> Floats:
+    """Return how far fine vertices at x (n, 3) go where coarse ones at y (m, 3) have `moved` (m, 3).
+
+    Between three corners, half of what lies between their moves goes by their slopes: so even what bends is carried
+    over exactly (quadratic precision), and does not kink at coarse edges.
+    """
+    slopes = _slopes(y, found.mesh.edges, moved)
+    carried = np.zeros_like(x)
+    for k in range(3):
+        corner, weight = found.corners[:, k], found.weights[:, k : k + 1]
+        turned = (slopes[corner] @ (x - y[corner])[:, :, None])[..., 0]
+        carried += weight * (moved[corner] + 0.5 * turned)
+    return carried
+
+
+def _slopes(y: Floats, edges: Ints, moved: Floats) -> Floats:
+    """Return the slopes (m, 3, 3) of moves (m, 3) at y (m, 3) that fit those of the vertices at the other ends best."""
+    i, j = edges.T
+    ways, changes = y[j] - y[i], moved[j] - moved[i]
+    both, square = np.zeros((len(y), 3, 3)), np.zeros((len(y), 3, 3))
+    for end in (i, j):
+        # either end sees both the other way round, which leaves their product
+        np.add.at(both, end, changes[:, :, None] * ways[:, None, :])
+        np.add.at(square, end, ways[:, :, None] * ways[:, None, :])
+    sizes, axes = np.linalg.eigh(square)
+    # across the surface there is nothing to tell slopes from
+    inverse = np.where(np.arange(3) > 0, 1 / np.maximum(sizes, _THIN * sizes[:, 2:]), 0.0)
+    return both @ (axes * inverse[:, None, :]) @ np.swapaxes(axes, 1, 2)
+
+
+@njit(cache=True)
+def _spread(indptr: Ints, indices: Ints, rim: Bools, order: Ints, rings: int) -> Ints:
+    """Return vertices, in order, none of which is within so many rings of another; on the rim, rings along it."""
+    n = len(indptr) - 1
+    covered = np.zeros(n, np.bool_)
+    seen = np.full(n, -1)
+    queue, depth = np.empty(n, np.int64), np.empty(n, np.int64)
+    found, count = np.empty(n, np.int64), 0
+    for v in order:
+        if covered[v]:
+            continue
+        found[count] = v
+        count += 1
+        queue[0], depth[0], seen[v] = v, 0, v
+        first, last = 0, 1
+        while first < last:
+            u = queue[first]
+            covered[u] = True
+            if depth[first] < rings:
+                for at in range(indptr[u], indptr[u + 1]):
+                    w = indices[at]
+                    if seen[w] != v:
+                        seen[w] = v
+                        queue[last], depth[last] = w, depth[first] + 1
+                        last += 1
+            first += 1
+    return found[:count].copy()
+
+
+@njit(cache=True)
+def _cells(indptr: Ints, indices: Ints, x: Floats, seeds: Ints) -> Ints:
+    """Return the number (n,) of the seed that is nearest along edges; -1 where none is (Dijkstra 1959)."""
+    n = len(indptr) - 1
+    cell, far = np.full(n, -1), np.full(n, np.inf)
+    heap = [(0.0, seeds[0])]
+    heap.pop()
+    for k in range(len(seeds)):
+        cell[seeds[k]], far[seeds[k]] = k, 0.0
+        heappush(heap, (0.0, seeds[k]))
+    while len(heap) > 0:
+        away, u = heappop(heap)
+        if away > far[u]:
+            continue
+        for at in range(indptr[u], indptr[u + 1]):
+            v = indices[at]
+            length = 0.0
+            for d in range(3):
+                length += (x[u, d] - x[v, d]) ** 2
+            there = away + np.sqrt(length)
+            if there < far[v]:
+                far[v], cell[v] = there, cell[u]
+                heappush(heap, (there, v))
+    return cell
+
+
+@njit(cache=True, error_model="numpy")
+def _located(
+    x: Floats, cell: Ints, y: Floats, triangles: Ints, starts: Ints, order: Ints
+) -> tuple[Ints, Floats]:
+    """Return the triangle (n,) about its seed in which, or least outside of which, each vertex lies, and where (n, 3)."""
+    within, weights = np.empty(len(x), np.int64), np.empty((len(x), 3))
+    for v in range(len(x)):
+        most = -np.inf
+        for at in range(starts[cell[v]], starts[cell[v] + 1]):
+            t = order[at]
+            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            aa = ab = bb = pa = pb = 0.0
+            for d in range(3):
+                a, b, p = y[j, d] - y[i, d], y[k, d] - y[i, d], x[v, d] - y[i, d]
+                aa += a * a
+                ab += a * b
+                bb += b * b
+                pa += p * a
+                pb += p * b
+            determinant = aa * bb - ab * ab
+            if not determinant > 1e-6 * aa * bb:
+                continue
+            second, third = (bb * pa - ab * pb) / determinant, (aa * pb - ab * pa) / determinant
+            least = min(1 - second - third, min(second, third))
+            if least > most:
+                most = least
+                within[v] = t
+                weights[v, 0], weights[v, 1], weights[v, 2] = 1 - second - third, second, third
+        if most == -np.inf:
+            within[v] = order[starts[cell[v]]]
+            for d in range(3):
+                weights[v, d] = 1.0 if triangles[within[v], d] == cell[v] else 0.0
+    return within, weights
