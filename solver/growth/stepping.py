@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
 from .. import shell
-from ..geometry.crossings import crossings
 from .matter import grown_further
 from .params import GrowthParams, Solid, present
 from .plastic import forgotten
@@ -74,7 +73,7 @@ class Steps:
         found = yield from self._taken(before, carried, tools, solids, dt)
         meshed, state, after = found
         if self.params.contact is None and not carried.distance:
-            clear = meshed is before or not crossings(meshed.x, meshed.mesh.triangles).count
+            clear = meshed is before or self.watch.clear(meshed)
             yield None
             if not (clear and (yield from self.watch.apart(meshed.x, state))):
                 yield None

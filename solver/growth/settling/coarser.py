@@ -49,8 +49,8 @@ _THIN = 1e-3
 class Coarser(NamedTuple):
     """Vertices `seeds` (m,) of a finer mesh as a mesh of their own.
 
-    Each vertex of the finer one lies between `corners` (n, 3) of the coarser, by barycentric `weights` (n, 3);
-    within (n,): its triangle there.
+    Each vertex of the finer one lies between `corners` (n, 3) of the coarser, by barycentric `weights` (n, 3), in
+    triangle `within` (n,) there.
     """
 
     seeds: Ints
@@ -142,8 +142,7 @@ def _sheet(energy: StepEnergy, found: Coarser, x: Floats) -> State | None:
     sizes = shell.areas(state.g)
     now = shell.metric(x, triangles)
     bent = shell.from_angles(shell.angles(x, state.mesh.hinges) - state.rest, state.g, state.mesh)
-    strain = _averaged(x, triangles, (now - state.g) / 2, sizes, found.within, len(mesh.triangles))
-    bend = _averaged(x, triangles, bent, sizes, found.within, len(mesh.triangles))
+    strain, bend = (_averaged(x, triangles, forms, sizes, found) for forms in ((now - state.g) / 2, bent))
     own = shell.metric(y, mesh.triangles)
     g = own - 2 * _seen(y, mesh.triangles, strain)
     if not (g[:, 0] * g[:, 2] - g[:, 1] ** 2 > 1e-3 * own[:, 0] * own[:, 2]).all() or not (g[:, [0, 2]] > 0).all():
@@ -162,18 +161,27 @@ def _sheet(energy: StepEnergy, found: Coarser, x: Floats) -> State | None:
     )  # fmt: skip
 
 
-def _averaged(x: Floats, triangles: Ints, forms: Floats, sizes: Floats, within: Ints, count: int) -> Floats:
-    """Return the mean tensors in space (count, 3, 3) of what triangles have as `forms` (f, 3), by where they lie."""
-    total, weight = np.zeros((count, 3, 3)), np.zeros(count)
-    _average(x, triangles, forms, sizes, within, total, weight)
-    return total / np.maximum(weight, 1e-300)[:, None, None]
+def _averaged(x: Floats, triangles: Ints, forms: Floats, sizes: Floats, found: Coarser) -> Floats:
+    """Return the means in space (f', 3, 3), by `sizes` (f,), of what triangles at x have as `forms` (f, 3).
+
+    Of those in each coarser triangle; one in which there are none takes what there is about its corners.
+    """
+    coarse, n = found.mesh.triangles, len(found.seeds)
+    total, weight = np.zeros((len(coarse), 3, 3)), np.zeros(len(coarse))
+    _average(x, triangles, forms, sizes, found.within, total, weight)
+    bare = weight == 0
+    if bare.any():
+        about, beside = np.zeros((n, 3, 3)), np.bincount(coarse.ravel(), np.repeat(weight, 3), n)
+        np.add.at(about, coarse, total[:, None])
+        total[bare], weight[bare] = about[coarse[bare]].sum(axis=1), beside[coarse[bare]].sum(axis=1)
+    return total / weight[:, None, None]
 
 
 @njit(cache=True, error_model="numpy")
 def _average(
     x: Floats, triangles: Ints, forms: Floats, sizes: Floats, within: Ints, total: Floats, weight: Floats
 ) -> None:
-    dual = np.empty((2, 3))
+    dual, here = np.empty((2, 3)), np.empty((3, 3))
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         aa = ab = bb = 0.0
@@ -188,17 +196,17 @@ def _average(
         for d in range(3):
             a, b = x[j, d] - x[i, d], x[k, d] - x[i, d]
             dual[0, d], dual[1, d] = (bb * a - ab * b) / determinant, (aa * b - ab * a) / determinant
-        share = sizes[t] / 3
+        for d in range(3):
+            for h in range(3):
+                here[d, h] = (
+                    forms[t, 0] * dual[0, d] * dual[0, h]
+                    + forms[t, 1] * (dual[0, d] * dual[1, h] + dual[1, d] * dual[0, h])
+                    + forms[t, 2] * dual[1, d] * dual[1, h]
+                )
         for corner in range(3):
             c = within[triangles[t, corner]]
-            weight[c] += share
-            for d in range(3):
-                for h in range(3):
-                    total[c, d, h] += share * (
-                        forms[t, 0] * dual[0, d] * dual[0, h]
-                        + forms[t, 1] * (dual[0, d] * dual[1, h] + dual[1, d] * dual[0, h])
-                        + forms[t, 2] * dual[1, d] * dual[1, h]
-                    )
+            weight[c] += sizes[t]
+            total[c] += sizes[t] * here
 
 
 def _seen(y: Floats, triangles: Ints, tensors: Floats) -> Floats:
