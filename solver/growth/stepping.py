@@ -31,6 +31,11 @@ from .tooling.tools import Tool
 __all__ = ["Carried", "Pieces", "Steps"]
 
 
+#: How much finer the way is settled of a shape without imperfection, of which only rounding says how it comes to its
+#: residual: what steps leave over goes into the rest state where a tool's reach is measured on the bent shape.
+_PERFECT = 0.01
+
+
 class Carried(NamedTuple):
     """What a step takes over from the one before, beside the state."""
 
@@ -101,7 +106,7 @@ class Steps:
         state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
         there = present(solids, state.time)
         energy = StepEnergy(state, self._material, p.pressure, there, carried.tangent, p.gravity, distance, p.bending)
-        goal = self.tolerance * state.length
+        goal = self.tolerance * state.length * (1.0 if p.imperfection else _PERFECT)
         if not there:
             # whatever the shape, nothing will take up what pulls now
             check_held(energy, state, goal, before.time)
