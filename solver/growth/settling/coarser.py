@@ -35,15 +35,13 @@ __all__ = ["FEWEST", "begun_coarser", "coarser", "Coarser"]
 FEWEST, _LEAST = 8000, 2000
 #: Rings about each vertex of the coarser sheet in which there is no other: a fourteenth is left of a regular mesh.
 _RINGS = 3
-#: Residual of the coarser sheet over the finer one's, and most steps to it: there they cost
-#: little, and what it has not come to the finer one has to find.
+#: Residual of the coarser sheet over the finer one's, and most steps to it: there they cost little, and what it has
+#: not come to the finer one has to find.
 _FINER, _STEPS = 0.3, 600
 #: Forces over the goal up to which a sheet is near its equilibrium, and needs nobody to show it the way.
 _NEAR = 10
 #: Cosine of the turn of a normal beyond which the inverse is taken anew before the finer sheet goes on.
 _TURNED = 0.995
-#: How often a coarser sheet is asked again, after so many steps of the finer one.
-_CYCLES, _BETWEEN = 4, 8
 #: Least square by which slopes are fitted, over the largest.
 _THIN = 1e-3
 
@@ -91,61 +89,36 @@ def coarser(mesh: shell.Topology, x: Floats) -> Coarser | None:
 
 def begun_coarser(
     energy: StepEnergy, x: Floats, goal: float, fewest: int = FEWEST
-) -> Generator[None, None, tuple[Floats, int]]:
+) -> Generator[None, None, Floats]:
     """Find where to begin from x (n, 3), by a coarser sheet where it shows the way; yields after pieces of work.
 
-    goal: largest force. fewest: vertices of a sheet that asks. The generator's value is the place and how many steps
-    the sheet itself took to it.
+    goal: largest force. fewest: vertices of a sheet that asks.
     """
-    spent = 0
     if len(x) < fewest or longest(energy(x)[1]) <= _NEAR * goal:
-        return x, spent
+        return x
     found = coarser(energy.state.mesh, x)
     yield
     if found is None:
-        return x, spent
-    # what is finer than the coarser sheet is noise at the start of a run, and would count as strain
-    there = _lower(energy, x, _carried(found, x, x[found.seeds], x[found.seeds]) - x)
-    there = yield from _shown(energy, there, found, goal, False)
+        return x
+    there = yield from _shown(energy, x, found, goal)
     triangles = energy.state.mesh.triangles
     turned = (normals(x, triangles) * normals(there, triangles)).sum(axis=1).min() < _TURNED
     if energy.ready and turned:
         yield from energy.refactor(there)
-    for _ in range(_CYCLES):
-        steps = 0
-        for point in quasi_newton(energy, there):
-            steps += point.x is not there
-            there = point.x
-            if point.gradient <= goal or point.stuck or steps == _BETWEEN or not np.isfinite(point.gradient):
-                break
-            yield
-        spent += steps
-        if steps < _BETWEEN or point.gradient <= goal:
-            break
-        there = yield from _shown(energy, there, found, goal, True)
-    return there, spent
+    return there
 
 
-def _shown(
-    energy: StepEnergy, x: Floats, found: Coarser, goal: float, near: bool
-) -> Generator[None, None, Floats]:
-    """Find where a coarser sheet leads to from x (n, 3), if that is lower; yields after pieces of work.
-
-    near: whether the coarser sheet feels what forces are left on the finer one, and no others: so it is in balance
-    where that is. Far from there what is finer than the coarser sheet makes the most of them.
-    """
+def _shown(energy: StepEnergy, x: Floats, found: Coarser, goal: float) -> Generator[None, None, Floats]:
+    """Find where a coarser sheet leads to from x (n, 3), if that is lower; yields after pieces of work."""
+    # what is finer than the coarser sheet is noise at the start of a run, and would count as strain
+    x = _lower(energy, x, _carried(found, x, x[found.seeds], x[found.seeds]) - x)
     sheet = _sheet(energy, found, x)
     yield
     if sheet is None:
         return x
     coarse = energy.part(sheet, Tangent(sheet.mesh))
     goal *= _FINER * sheet.length / energy.state.length
-    y = sheet.x
-    if near:
-        coarse.lay(coarse(y)[1] - _gathered(found, energy(x)[1]))
-    else:
-        y, _ = yield from begun_coarser(coarse, y, goal, _LEAST)
-    steps = 0
+    y, steps = (yield from begun_coarser(coarse, sheet.x, goal, _LEAST)), 0
     for point in quasi_newton(coarse, y):
         steps += point.x is not y
         y = point.x
@@ -153,13 +126,6 @@ def _shown(
             break
         yield
     return _lower(energy, x, _carried(found, x, sheet.x, y - sheet.x))
-
-
-def _gathered(found: Coarser, forces: Floats) -> Floats:
-    """Return what coarser vertices feel (m, 3) of forces (n, 3) on the finer ones."""
-    shares = found.weights[:, :, None] * forces[:, None, :]
-    count = len(found.seeds)
-    return np.stack([np.bincount(found.corners.ravel(), shares[:, :, d].ravel(), count) for d in range(3)], -1)
 
 
 def _lower(energy: StepEnergy, x: Floats, way: Floats) -> Floats:

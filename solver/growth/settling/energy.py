@@ -101,10 +101,6 @@ class StepEnergy:
             weight = self.areas[:, None] * np.array(self._gravity)
             self.load = weight if self.load is None else self.load + weight
 
-    def lay(self, more: Floats) -> None:
-        """Lay a further dead load (n, 3) on the sheet, until `follow`."""
-        self._last, self.load = None, more if self.load is None else self.load + more
-
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient; the gradient of held directions is 0. What was asked last is remembered."""
         if self._last is None or self._last[0] is not x:

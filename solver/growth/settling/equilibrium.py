@@ -34,10 +34,10 @@ def begun(
     """Find where the search for the whole begins, from the state before the step; yields after pieces of work."""
     state = energy.state
     if not (params.active and params.imperfection and not energy.touching):
-        x, spent = ahead(energy, state, dt), 0
+        x = ahead(energy, state, dt)
         if params.solver == "quasi_newton" and not energy.touching:
-            x, spent = yield from begun_coarser(energy, x, goal)
-        return Settled(x, spent, habit)
+            x = yield from begun_coarser(energy, x, goal)
+        return Settled(x, 0, habit)
     now, last = state.g.T, before.g.T
     changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])
     if state.rest is not before.rest:
