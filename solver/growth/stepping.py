@@ -11,6 +11,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 from .. import shell
 from .matter import grown_further
 from .params import GrowthParams, Solid, present
@@ -104,6 +106,8 @@ class Steps:
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         yield None
         state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
+        if "led" in state.matter:
+            state = replace(state, x=state.x + np.where(state.held, dt * state.matter["led"], 0.0))
         there = present(solids, state.time)
         energy = StepEnergy(state, self._material, p.pressure, there, carried.tangent, p.gravity, distance, p.bending)
         goal = self.tolerance * state.length * (1.0 if p.imperfection else _PERFECT)
