@@ -5,36 +5,31 @@ shows on a coarser one. So large sheets are settled coarse first, from where the
 smoothly, and the fine sheet goes on from there. Whether it is a better place to begin, the fine sheet's energy says.
 (Nested iteration; Brandt 1977, and Nash 2000, doi 10.1080/10556780008805795, for minima.)
 
-The coarser mesh is the dual of the cells about its vertices (Voronoi cells along the sheet). Its rest state is the shape
-less what strains and bends the fine one there, as tensors in space: in balance it is so where the fine sheet is.
+Its rest state is the shape less what strains and bends the fine one there, as tensors in space: so it is in balance
+about where the fine sheet is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
-from heapq import heappop, heappush
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ... import shell
-from ...arrays import Bools, Floats, Ints
-from ...contract import InvalidGeometry
-from ...linalg.patterns import of_pairs
+from ...arrays import Floats, Ints
 from ...shell.normals import normals
 from ..state import State
+from .cells import Coarser, carried, coarser
 from .energy import StepEnergy
 from .minimise import longest, quasi_newton
 from .tangent import Tangent
 
-__all__ = ["FEWEST", "begun_coarser", "coarser", "Coarser"]
+__all__ = ["FEWEST", "begun_coarser"]
 
 #: Vertices below which a sheet finds its way as it is, and below which a coarser one has no coarser one of its own.
 FEWEST, _LEAST = 8000, 2000
-#: Rings about each vertex of the coarser sheet in which there is no other: a fourteenth is left of a regular mesh.
-_RINGS = 3
 #: Residual of the coarser sheet over the finer one's, and most steps to it: there they cost little, and what it has
 #: not come to the finer one has to find.
 _FINER, _STEPS = 0.3, 600
@@ -42,54 +37,9 @@ _FINER, _STEPS = 0.3, 600
 _NEAR = 10
 #: Cosine of the turn of a normal beyond which the inverse is taken anew before the finer sheet goes on.
 _TURNED = 0.995
-#: Least square by which slopes are fitted, over the largest.
-_THIN = 1e-3
 
 
-class Coarser(NamedTuple):
-    """Vertices `seeds` (m,) of a finer mesh as a mesh of their own.
-
-    Each vertex of the finer one lies between `corners` (n, 3) of the coarser, by barycentric `weights` (n, 3), in
-    triangle `within` (n,) there.
-    """
-
-    seeds: Ints
-    mesh: shell.Topology
-    corners: Ints
-    weights: Floats
-    within: Ints
-
-
-def coarser(mesh: shell.Topology, x: Floats) -> Coarser | None:
-    """Return a coarser mesh for vertices at x (n, 3); None where its cells make no surface."""
-    indptr, indices, _ = of_pairs(mesh.edges, mesh.vertices)
-    first = np.unique(mesh.edges[mesh.border])
-    rim = np.zeros(mesh.vertices, np.bool_)
-    rim[first] = True
-    seeds = _spread(indptr, indices, rim, np.concatenate([first, np.flatnonzero(~rim)]), _RINGS)
-    cell = _cells(indptr, indices, x, seeds)
-    between = cell[mesh.triangles]
-    between = between[(between != np.roll(between, 1, axis=1)).all(axis=1)]
-    if not len(between):
-        return None
-    # a triple of cells may meet more than once
-    first_of = np.unique(np.sort(between, axis=1), axis=0, return_index=True)[1]
-    try:
-        found = shell.topology(between[np.sort(first_of)], len(seeds))
-    except InvalidGeometry:
-        return None
-    about = np.bincount(found.triangles.ravel(), minlength=len(seeds))
-    if not about.all():
-        return None
-    order = np.argsort(found.triangles.ravel(), kind="stable") // 3
-    starts = np.concatenate([[0], np.cumsum(about)])
-    within, weights = _located(x, cell, x[seeds], found.triangles, starts, order)
-    return Coarser(seeds, found, found.triangles[within], weights, within)
-
-
-def begun_coarser(
-    energy: StepEnergy, x: Floats, goal: float, fewest: int = FEWEST
-) -> Generator[None, None, Floats]:
+def begun_coarser(energy: StepEnergy, x: Floats, goal: float, fewest: int = FEWEST) -> Generator[None, None, Floats]:
     """Find where to begin from x (n, 3), by a coarser sheet where it shows the way; yields after pieces of work.
 
     goal: largest force. fewest: vertices of a sheet that asks.
@@ -111,7 +61,7 @@ def begun_coarser(
 def _shown(energy: StepEnergy, x: Floats, found: Coarser, goal: float) -> Generator[None, None, Floats]:
     """Find where a coarser sheet leads to from x (n, 3), if that is lower; yields after pieces of work."""
     # what is finer than the coarser sheet is noise at the start of a run, and would count as strain
-    x = _lower(energy, x, _carried(found, x, x[found.seeds], x[found.seeds]) - x)
+    x = _lower(energy, x, carried(found, x, x[found.seeds], x[found.seeds]) - x)
     sheet = _sheet(energy, found, x)
     yield
     if sheet is None:
@@ -125,7 +75,7 @@ def _shown(energy: StepEnergy, x: Floats, found: Coarser, goal: float) -> Genera
         if point.gradient <= goal or point.stuck or steps >= _STEPS or not np.isfinite(point.gradient):
             break
         yield
-    return _lower(energy, x, _carried(found, x, sheet.x, y - sheet.x))
+    return _lower(energy, x, carried(found, x, sheet.x, y - sheet.x))
 
 
 def _lower(energy: StepEnergy, x: Floats, way: Floats) -> Floats:
@@ -214,123 +164,3 @@ def _seen(y: Floats, triangles: Ints, tensors: Floats) -> Floats:
     a, b = y[triangles[:, 1]] - y[triangles[:, 0]], y[triangles[:, 2]] - y[triangles[:, 0]]
     along, across = (tensors @ a[:, :, None])[..., 0], (tensors @ b[:, :, None])[..., 0]
     return np.stack([(a * along).sum(-1), (b * along).sum(-1), (b * across).sum(-1)], -1)
-
-
-def _carried(found: Coarser, x: Floats, y: Floats, moved: Floats) -> Floats:
-    """Return how far fine vertices at x (n, 3) go where coarse ones at y (m, 3) have `moved` (m, 3).
-
-    Between three corners, half of what lies between their moves goes by their slopes: so even what bends is carried
-    over exactly (quadratic precision), and does not kink at coarse edges.
-    """
-    slopes = _slopes(y, found.mesh.edges, moved)
-    carried = np.zeros_like(x)
-    for k in range(3):
-        corner, weight = found.corners[:, k], found.weights[:, k : k + 1]
-        turned = (slopes[corner] @ (x - y[corner])[:, :, None])[..., 0]
-        carried += weight * (moved[corner] + 0.5 * turned)
-    return carried
-
-
-def _slopes(y: Floats, edges: Ints, moved: Floats) -> Floats:
-    """Return the slopes (m, 3, 3) of moves (m, 3) at y (m, 3) that fit those of the vertices at the other ends best."""
-    i, j = edges.T
-    ways, changes = y[j] - y[i], moved[j] - moved[i]
-    both, square = np.zeros((len(y), 3, 3)), np.zeros((len(y), 3, 3))
-    for end in (i, j):
-        # either end sees both the other way round, which leaves their product
-        np.add.at(both, end, changes[:, :, None] * ways[:, None, :])
-        np.add.at(square, end, ways[:, :, None] * ways[:, None, :])
-    sizes, axes = np.linalg.eigh(square)
-    # across the surface there is nothing to tell slopes from
-    inverse = np.where(np.arange(3) > 0, 1 / np.maximum(sizes, _THIN * sizes[:, 2:]), 0.0)
-    return both @ (axes * inverse[:, None, :]) @ np.swapaxes(axes, 1, 2)
-
-
-@njit(cache=True)
-def _spread(indptr: Ints, indices: Ints, rim: Bools, order: Ints, rings: int) -> Ints:
-    """Return vertices, in order, none of which is within so many rings of another; on the rim, rings along it."""
-    n = len(indptr) - 1
-    covered = np.zeros(n, np.bool_)
-    seen = np.full(n, -1)
-    queue, depth = np.empty(n, np.int64), np.empty(n, np.int64)
-    found, count = np.empty(n, np.int64), 0
-    for v in order:
-        if covered[v]:
-            continue
-        found[count] = v
-        count += 1
-        queue[0], depth[0], seen[v] = v, 0, v
-        first, last = 0, 1
-        while first < last:
-            u = queue[first]
-            covered[u] = True
-            if depth[first] < rings:
-                for at in range(indptr[u], indptr[u + 1]):
-                    w = indices[at]
-                    if seen[w] != v:
-                        seen[w] = v
-                        queue[last], depth[last] = w, depth[first] + 1
-                        last += 1
-            first += 1
-    return found[:count].copy()
-
-
-@njit(cache=True)
-def _cells(indptr: Ints, indices: Ints, x: Floats, seeds: Ints) -> Ints:
-    """Return the number (n,) of the seed that is nearest along edges; -1 where none is (Dijkstra 1959)."""
-    n = len(indptr) - 1
-    cell, far = np.full(n, -1), np.full(n, np.inf)
-    heap = [(0.0, seeds[0])]
-    heap.pop()
-    for k in range(len(seeds)):
-        cell[seeds[k]], far[seeds[k]] = k, 0.0
-        heappush(heap, (0.0, seeds[k]))
-    while len(heap) > 0:
-        away, u = heappop(heap)
-        if away > far[u]:
-            continue
-        for at in range(indptr[u], indptr[u + 1]):
-            v = indices[at]
-            length = 0.0
-            for d in range(3):
-                length += (x[u, d] - x[v, d]) ** 2
-            there = away + np.sqrt(length)
-            if there < far[v]:
-                far[v], cell[v] = there, cell[u]
-                heappush(heap, (there, v))
-    return cell
-
-
-@njit(cache=True, error_model="numpy")
-def _located(
-    x: Floats, cell: Ints, y: Floats, triangles: Ints, starts: Ints, order: Ints
-) -> tuple[Ints, Floats]:
-    """Return the triangle (n,) about its seed in which, or least outside of which, each vertex lies, and where (n, 3)."""
-    within, weights = np.empty(len(x), np.int64), np.empty((len(x), 3))
-    for v in range(len(x)):
-        most = -np.inf
-        for at in range(starts[cell[v]], starts[cell[v] + 1]):
-            t = order[at]
-            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            aa = ab = bb = pa = pb = 0.0
-            for d in range(3):
-                a, b, p = y[j, d] - y[i, d], y[k, d] - y[i, d], x[v, d] - y[i, d]
-                aa += a * a
-                ab += a * b
-                bb += b * b
-                pa += p * a
-                pb += p * b
-            determinant = aa * bb - ab * ab
-            if not determinant > 1e-6 * aa * bb:
-                continue
-            second, third = (bb * pa - ab * pb) / determinant, (aa * pb - ab * pa) / determinant
-            least = min(1 - second - third, min(second, third))
-            if least > most:
-                most = least
-                within[v] = t
-                weights[v, 0], weights[v, 1], weights[v, 2] = 1 - second - third, second, third
-        if most == -np.inf:
-            within[v] = order[starts[cell[v]]]
-            for d in range(3):
-                weights[v, d] = 1.0 if triangles[within[v], d] == cell[v] else 0.0
-    return within, weights

@@ -151,7 +151,8 @@ class Watch:
         flat = state.x @ axes.T
         reach = self._distance + 3 * edge
         away = cKDTree(flat[rim]).query(flat, distance_upper_bound=reach)[0]
-        faces = np.flatnonzero((away < reach)[mesh.triangles].any(axis=1))
+        by_rim: Bools = np.asarray(away < reach)
+        faces = np.flatnonzero(by_rim[mesh.triangles].any(axis=1))
         if len(faces) > _PART * len(mesh.triangles):
             return False
         part, vertices, _ = shell.part_of(mesh, faces)

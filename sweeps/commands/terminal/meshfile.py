@@ -27,8 +27,8 @@ def read(path: Path) -> dict[str, Any]:
     those of the file's corners.
 
     Raises:
-        InvalidOption: no such kind of file, nothing that can be read in it, more groups than a mesh may have, or trimesh
-            is not installed.
+        InvalidOption: no such kind of file, nothing that can be read in it, more groups than a mesh may have, or
+            trimesh is not installed.
 
     """
     try:

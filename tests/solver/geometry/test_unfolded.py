@@ -15,7 +15,7 @@ def ring_of(faces, n):
 
 
 def spiral(points, pitch):
-    """Return a strip along x, .13 wide then, laid on one and a half turns of a spiral that lie so far from each other."""
+    """Return a strip along x, .13 wide then, on one and a half turns of a spiral that lie a pitch from each other."""
     angle = 3 * np.pi * points[:, 0] / np.ptp(points[:, 0])
     radius = 3.0 - pitch * angle / (2 * np.pi) + 0.5 * (points[:, 1] - points[:, 1].mean())
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.1 * np.sin(3 * angle)], axis=1)

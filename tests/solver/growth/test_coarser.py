@@ -11,7 +11,8 @@ from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.settling import coarser as module
 from solver.growth.settling import equilibrium
-from solver.growth.settling.coarser import begun_coarser, coarser
+from solver.growth.settling.cells import carried, coarser
+from solver.growth.settling.coarser import begun_coarser
 from solver.growth.settling.energy import StepEnergy
 from solver.growth.settling.minimise import longest
 from solver.growth.settling.tangent import Tangent
@@ -63,14 +64,14 @@ def test_what_moves_linearly_is_carried_over_exactly_and_what_bends_does_not_kin
     found = coarser(state.mesh, state.x)
     y = state.x[found.seeds]
     matrix = np.random.default_rng(1).normal(size=(3, 3))
-    carried = module._carried(found, state.x, y, y @ matrix.T)
-    assert np.abs(carried - state.x @ matrix.T).max() < 1e-12
+    there = carried(found, state.x, y, y @ matrix.T)
+    assert np.abs(there - state.x @ matrix.T).max() < 1e-12
 
     def raised(x):
         return np.column_stack([0 * x[:, 0], 0 * x[:, 0], np.cos(4 * x[:, 0])])
 
     inner = np.linalg.norm(state.x, axis=1) < 0.8
-    smooth = np.abs(module._carried(found, state.x, y, raised(y)) - raised(state.x))[inner].max()
+    smooth = np.abs(carried(found, state.x, y, raised(y)) - raised(state.x))[inner].max()
     between = (raised(y)[found.corners] * found.weights[:, :, None]).sum(axis=1)
     assert smooth < 0.5 * np.abs(between - raised(state.x))[inner].max()
 
@@ -126,9 +127,7 @@ def test_a_sheet_that_is_held_stays_where_it_is(monkeypatch):
     tool = {"kind": "surface", "where": {"kind": "rim", "width": 0.4}, "stretch": (1.4, 1.0)}
     values = {"shape": "disc", "thickness": 0.03, "curved": False, "attached": held, "tools": [tool], "step": 0.5}
     used = []
-    monkeypatch.setattr(
-        equilibrium, "begun_coarser", lambda *a: used.append(1) or begun_coarser(*a, 300)
-    )
+    monkeypatch.setattr(equilibrium, "begun_coarser", lambda *a: used.append(1) or begun_coarser(*a, 300))
     engine = Engine(GrowthParams.parse(values | {"remesh": 0}), 800)
     begun, state = engine.state, engine.reach(0.5, Context())
     assert used

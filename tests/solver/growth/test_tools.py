@@ -240,7 +240,9 @@ def test_a_polar_spot_grows_away_from_itself_and_around():
         assert whole.sum() > 100
         turned = np.radians(angle)
         cos, sin = way[:, 0] / far, way[:, 1] / far
-        outward = np.stack([cos * np.cos(turned) - sin * np.sin(turned), sin * np.cos(turned) + cos * np.sin(turned)], -1)
+        outward = np.stack(
+            [cos * np.cos(turned) - sin * np.sin(turned), sin * np.cos(turned) + cos * np.sin(turned)], -1
+        )
         first = (p[:, 1] - p[:, 0])[:, :2]
         first /= np.linalg.norm(first, axis=1)[:, None]
         v = np.stack([(outward * first).sum(-1), outward[:, 1] * first[:, 0] - outward[:, 0] * first[:, 1]], -1)
