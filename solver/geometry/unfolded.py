@@ -3,8 +3,8 @@
 If all triangles turn one way as seen from above, and the outline of their only border does not cross itself, each point
 of the plane has as many triangles over it as the outline winds about it: one, or none (the degree of a map; Milnor
 1965). That is told in a tenth of the time in which pairs of triangles are looked at. On a straight way from one place
-to another it holds for all triangles at all times: a normal's height is a quadratic of the time, which is positive where
-its three coefficients over Bernstein's polynomials are.
+to another it holds for all triangles at all times: a normal's height is a quadratic of the time, which is positive
+where its three coefficients over Bernstein's polynomials are.
 """
 
 from __future__ import annotations
