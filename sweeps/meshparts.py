@@ -15,7 +15,9 @@ import numpy as np
 from solver.arrays import Array, Floats, Ints
 from solver.contract.mesh import MOST_GROUPS
 
-__all__ = ["Parts", "glb", "obj"]
+from .errors import InvalidOption
+
+__all__ = ["Parts", "check_count", "glb", "obj"]
 
 
 class Parts(NamedTuple):
@@ -83,10 +85,23 @@ def obj(text: str) -> Parts:
     )
 
 
+def check_count(groups: int) -> None:
+    """Refuse more groups than a mesh may have: none of them is left out without a word.
+
+    Raises:
+        InvalidOption: so many are parts of a scene, or measurements.
+
+    """
+    if groups > MOST_GROUPS:
+        raise InvalidOption(
+            f"the mesh has {groups} vertex groups, more than {MOST_GROUPS}.",
+            f"Write the file without groups, or with the {MOST_GROUPS} that you need at most.",
+        )
+
+
 def _weights(groups: dict[str, set[int]], points: int) -> dict[str, Floats]:
-    """Return 1 for the points in each group, and 0; nothing where there are so many that they are parts of a scene."""
-    if len(groups) > MOST_GROUPS:
-        return {}
+    """Return 1 for the points in each group, and 0."""
+    check_count(len(groups))
     found: dict[str, Floats] = {name: np.zeros(points) for name in groups}
     for name, inside in groups.items():
         found[name][list(inside)] = 1.0

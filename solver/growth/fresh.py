@@ -25,10 +25,13 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
     np.add.at(normals, mesh.triangles, np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, None, :])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
-    held = np.zeros(mesh.x.shape, bool)
+    held, led = np.zeros(mesh.x.shape, bool), np.zeros(mesh.x.shape)
     for attachment in params.attached:
         inside = share(attachment.where, mesh, border(top), params.seed) >= 0.5
         held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
+        # of several the last one that leads anywhere
+        if any(attachment.velocity):
+            led[inside] = attachment.velocity
     angles = shell.angles(mesh.x, top.hinges)
     x = mesh.x + np.where(held, 0.0, offset[:, None] * normals)
     return State(
@@ -41,7 +44,9 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         held=held,
         spots={},
         curves={},
-        matter=matter(params.ribs, params.colours, mesh, border(top), params.seed) | groups_of(params.mesh),
+        matter=matter(params.ribs, params.colours, mesh, border(top), params.seed)
+        | groups_of(params.mesh)
+        | ({"led": led} if led.any() else {}),
         corners=corners_of(params.mesh),
         faces=faces_of(params.mesh),
     )

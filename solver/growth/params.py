@@ -26,14 +26,24 @@ class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+Speed = Annotated[float, Field(ge=-100, le=100)]
+
+
 class Attachment(_Model):
-    """Vertices that are held where they start, in some directions."""
+    """Vertices that are held where they start, or led on from there, in some directions."""
 
     where: Place = Field(description="Vertices whose share is at least one half")
     axes: tuple[Literal["x", "y", "z"], ...] = Field(("x", "y", "z"), min_length=1, description="Held directions")
+    velocity: tuple[Speed, Speed, Speed] = Field(
+        (0.0, 0.0, 0.0), description="How it is led along the held directions [start shape's unit per growth time]"
+    )
 
-
-Speed = Annotated[float, Field(ge=-100, le=100)]
+    @model_validator(mode="after")
+    def _led(self) -> Self:
+        loose = [axis for axis, speed in zip("xyz", self.velocity, strict=True) if speed and axis not in self.axes]
+        if loose:
+            raise ValueError(f"what is led along {', '.join(loose)} must be held there; add it to its axes")
+        return self
 
 
 class _Solid(_Model):

@@ -11,8 +11,9 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 from .. import shell
-from ..geometry.crossings import crossings
 from .matter import grown_further
 from .params import GrowthParams, Solid, present
 from .plastic import forgotten
@@ -30,6 +31,11 @@ from .tooling.rates import grown, rates
 from .tooling.tools import Tool
 
 __all__ = ["Carried", "Pieces", "Steps"]
+
+
+#: How much finer the way is settled of a shape without imperfection, of which only rounding says how it comes to its
+#: residual: what steps leave over goes into the rest state where a tool's reach is measured on the bent shape.
+_PERFECT = 0.01
 
 
 class Carried(NamedTuple):
@@ -74,7 +80,7 @@ class Steps:
         found = yield from self._taken(before, carried, tools, solids, dt)
         meshed, state, after = found
         if self.params.contact is None and not carried.distance:
-            clear = meshed is before or not crossings(meshed.x, meshed.mesh.triangles).count
+            clear = meshed is before or self.watch.clear(meshed)
             yield None
             if not (clear and (yield from self.watch.apart(meshed.x, state))):
                 yield None
@@ -100,9 +106,11 @@ class Steps:
         g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
         yield None
         state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
+        if "led" in state.matter:
+            state = replace(state, x=state.x + np.where(state.held, dt * state.matter["led"], 0.0))
         there = present(solids, state.time)
         energy = StepEnergy(state, self._material, p.pressure, there, carried.tangent, p.gravity, distance, p.bending)
-        goal = self.tolerance * state.length
+        goal = self.tolerance * state.length * (1.0 if p.imperfection else _PERFECT)
         if not there:
             # whatever the shape, nothing will take up what pulls now
             check_held(energy, state, goal, before.time)

@@ -19,6 +19,8 @@ __all__ = ["factor"]
 _PIECE = 5_000_000
 #: Columns of a panel: with a front's whole width they stay in the second cache.
 _PANEL = 32
+#: Rows of a front from which on BLAS takes panels out of it, and their columns then.
+_LARGE, _WIDE = 320, 128
 #: Pivots below are taken for 1 [mu].
 _FLOOR = 1e-8
 
@@ -92,6 +94,19 @@ def _take_four(w: Floats, p: int, e: int) -> None:
         row[r] -= a0 * w0[r] + a1 * w1[r] + a2 * w2[r] + a3 * w3[r]
 
 
+@njit(cache=True, error_model="numpy")
+def _take_panel(w: Floats, panel: int, end: int) -> None:
+    """Take columns panel to end - 1 of a front out of all its rows from end on, by BLAS."""
+    columns = w[panel:end, end:].T.copy()
+    for first in range(0, len(columns), _WIDE):
+        last = min(first + _WIDE, len(columns))
+        product = np.dot(columns[first:last], columns[first:].T)
+        for e in range(first, last):
+            row, taken = w[end + e, end + e :], product[e - first, e - first :]
+            for r in range(len(row)):
+                row[r] -= taken[r]
+
+
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _eliminate(
     first: int, last: int, fronts: Fronts, indptr: Ints, indices: Ints, data: Floats,
@@ -133,13 +148,17 @@ def _eliminate(
         # four columns at a time, so that the rest of the front is read and written a fourth as often, and the rest
         # row by row for a panel of them, which stays in the cache: every entry is taken from in the same order
         fours = pivots - pivots % 4
-        for panel in range(0, fours, _PANEL):
-            end = min(panel + _PANEL, fours)
+        wide = _WIDE if size >= _LARGE else _PANEL
+        for panel in range(0, fours, wide):
+            end = min(panel + wide, fours)
             for p in range(panel, end, 4):
                 if not _pivots(w, p, p + 4, p + 4):
                     return False
                 for e in range(p + 4, end):
                     _take_four(w, p, e)
+            if size >= _LARGE:
+                _take_panel(w, panel, end)
+                continue
             for e in range(end, size):
                 for p in range(panel, end, 4):
                     _take_four(w, p, e)

@@ -36,10 +36,16 @@ def fronts_of(mesh: Topology, x: Floats) -> Fronts:
     """Return the order of elimination for meshes that lie about where x (n, 3) does."""
     t = mesh.triangles
     # a triangle without neighbours is in no hinge, a vertex without triangles in neither
-    lone = np.setdiff1d(np.arange(len(t)), mesh.hinge_faces)
-    bare = np.setdiff1d(np.arange(mesh.vertices), t)
+    lone, bare = _unnamed(mesh.hinge_faces, len(t)), _unnamed(t, mesh.vertices)
     parts = np.concatenate([mesh.hinges, t[lone][:, [0, 1, 2, 2]], np.repeat(bare[:, None], 4, axis=1)])
     return dissect(parts, x[parts].mean(axis=1), mesh.vertices, _LEAF)
+
+
+def _unnamed(numbers: Ints, count: int) -> Ints:
+    """Return which numbers below count are not among some, rising."""
+    there = np.zeros(count, np.bool_)
+    there[numbers] = True
+    return np.flatnonzero(~there)
 
 
 @dataclass(frozen=True, eq=False)

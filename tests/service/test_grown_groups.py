@@ -15,6 +15,7 @@ from service.sequences import EXPORTS, STILLS, Options, prepared, write
 from solver.contract import InvalidInput, Need
 from solver.growth import SOLVER
 from sweeps.commands.terminal.meshfile import read
+from sweeps.errors import InvalidOption
 
 from ._gltf import accessor, parsed
 
@@ -171,3 +172,26 @@ def test_a_group_by_the_name_of_something_else_gets_a_longer_one():
     )
     fields = next(iter(prepared(run, Options(), 0.0, single=True))).fields
     assert {name: float(values[0]) for name, values in fields.items()} == {"group_x": 0.25, "group_2nd_edge": 0.5}
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply"])
+def test_a_file_of_more_groups_than_a_mesh_may_have_is_refused_and_none_is_left_out(kind, tmp_path: Path):
+    def written(count):
+        path = tmp_path / f"{count}.{kind}"
+        if kind == "obj":
+            lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in POINTS]
+            for k, face in enumerate(FACES):
+                lines += [f"g part{k % count}", "f " + " ".join(str(v + 1) for v in face)]
+        else:
+            lines = ["ply", "format ascii 1.0", f"element vertex {len(POINTS)}"]
+            lines += [f"property float {name}" for name in ["x", "y", "z", *(f"part{k}" for k in range(count))]]
+            lines += [f"element face {len(FACES)}", "property list uchar int vertex_indices", "end_header"]
+            lines += [" ".join(f"{v:.6f}" for v in point) + " 0.5" * count for point in POINTS]
+            lines += ["3 " + " ".join(map(str, face)) for face in FACES]
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    assert len(read(written(64))["groups"]) == 64
+    with pytest.raises(InvalidOption, match="65 vertex groups, more than 64") as caught:
+        read(written(65))
+    assert "at most" in caught.value.advice

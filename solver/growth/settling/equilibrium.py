@@ -11,6 +11,7 @@ from ...contract import NotConverged, Unstable
 from ..params import GrowthParams
 from ..state import State
 from .active import Habit, Settled, settle
+from .coarser import begun_coarser
 from .energy import StepEnergy, ahead
 from .impossible import check_near
 from .minimise import Point, conjugate_gradients, lbfgs, quasi_newton
@@ -33,7 +34,10 @@ def begun(
     """Find where the search for the whole begins, from the state before the step; yields after pieces of work."""
     state = energy.state
     if not (params.active and params.imperfection and not energy.touching):
-        return Settled(ahead(energy, state, dt), 0, habit)
+        x = ahead(energy, state, dt)
+        if params.solver == "quasi_newton" and not energy.touching:
+            x = yield from begun_coarser(energy, x, goal)
+        return Settled(x, 0, habit)
     now, last = state.g.T, before.g.T
     changed = (now[0] != last[0]) | (now[1] != last[1]) | (now[2] != last[2])
     if state.rest is not before.rest:

@@ -8,13 +8,15 @@ by what the edges in between changed. Only what was nearer is looked at. What is
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ...geometry.crossings import crossings
+from ...geometry.unfolded import outline, steepest
 from ..state import State
 from .energy import vertex_areas
 from .minimise import longest
@@ -30,6 +32,9 @@ _DRIFT = 0.08
 _CHANGE, _NEARER, _PAYS = 0.06, 0.45, 0.5
 #: Most looks on the way of one step.
 _LOOKS = 16
+#: Rest distance along a sheet over the straight one, from which on places feel each other; room for that ways go along
+#: edges; and the part of a sheet that its rim may be.
+_FELT, _LEAN, _PART = 0.6, 1.1, 0.5
 #: Beside rounding.
 _SURE = 1 + 1e-9
 
@@ -67,6 +72,8 @@ class Watch:
     def __init__(self, distance: float) -> None:
         self._distance = distance
         self._mesh: shell.Topology | None = None
+        #: Vertices along the border in turn, where it is one ring.
+        self._rim: Ints | None = None
         self._along: _Along | None = None
         self._close: _Close | None = None
         self._far: _Far | None = None
@@ -81,10 +88,16 @@ class Watch:
         way -= way.mean(axis=0)
         size, mesh = longest(way), end.mesh
         looks = min(max(int(np.ceil(size / end.length)), 1), _LOOKS)
-        if mesh is not self._mesh:
-            self._mesh, self._along, self._close, self._far = mesh, None, None, None
+        self._meet(mesh)
+        over = 0.0
+        if self._rim is not None:
+            over, axes = steepest(end.x - way, end.x, mesh.triangles, self._rim, looks)
+            yield
+            if over and self._lies_apart(end, over, axes):
+                return True
+            yield
         if size > _FURTHEST * end.length:
-            if (yield from _through(end, way, looks)):
+            if not over and (yield from _through(end, way, looks)):
                 return False
             known = self._along_still(lengths_of(end))
             if known is None:
@@ -98,7 +111,9 @@ class Watch:
         close = self._close_now(along, end, way)
         yield
         # what meets on the way was no further apart at its end than both ends moved
-        if close is None or len(shell.within(end.x, far.pairs, 2 * _SURE * size / self._distance)):
+        if over:
+            through = False
+        elif close is None or len(shell.within(end.x, far.pairs, 2 * _SURE * size / self._distance)):
             through = yield from _through(end, way, looks)
         else:
             through = any(shell.any_cross(end.x - k / looks * way, mesh.triangles, close.pairs) for k in range(looks))
@@ -106,6 +121,43 @@ class Watch:
             return False
         yield
         return not self._touches(along, far, end)
+
+    def clear(self, state: State) -> bool:
+        """Return whether nothing of a state crosses."""
+        self._meet(state.mesh)
+        if self._rim is not None and steepest(state.x, state.x, state.mesh.triangles, self._rim, 1)[0]:
+            return True
+        return not crossings(state.x, state.mesh.triangles).count
+
+    def _meet(self, mesh: shell.Topology) -> None:
+        """Forget what was known of another mesh."""
+        if mesh is not self._mesh:
+            self._mesh, self._along, self._close, self._far = mesh, None, None, None
+            self._rim = outline(mesh.edges[mesh.border])
+
+    def _lies_apart(self, state: State, over: float, axes: Floats) -> bool:
+        """Return whether it is sure that no part of a sheet that lies over a plane is as near another as the distance.
+
+        over: least cosine of its slopes. axes (2, 3): of the plane. Straight above what parts two places, the sheet is
+        no longer than that over the cosine: so they are near along the sheet, and do not feel each other, unless the
+        way leaves the sheet. Then both are as near its rim, which is looked at as a sheet of its own.
+        """
+        lengths, mesh, rim = lengths_of(state), state.mesh, self._rim
+        felt = max(_FELT, self._distance / (self._distance + 2 * float(lengths.max())))
+        if rim is None or over < _LEAN * felt:
+            return False
+        i, j = mesh.edges.T
+        edge = float(np.linalg.norm(state.x[i] - state.x[j], axis=1).max())
+        flat = state.x @ axes.T
+        reach = self._distance + 3 * edge
+        away = cKDTree(flat[rim]).query(flat, distance_upper_bound=reach)[0]
+        by_rim: Bools = np.asarray(away < reach)
+        faces = np.flatnonzero(by_rim[mesh.triangles].any(axis=1))
+        if len(faces) > _PART * len(mesh.triangles):
+            return False
+        part, vertices, _ = shell.part_of(mesh, faces)
+        strip = replace(state, x=state.x[vertices], mesh=part, g=state.g[faces])
+        return not touches(strip, self._distance, vertex_areas(strip))
 
     def _along_now(self, state: State) -> _Along:
         """Return what is near along a state's sheet; ways, and the longest that count, change by no more than edges."""

@@ -51,8 +51,8 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
         else:
             some, share, along = _spots(state, tool, number, time)
         first, second = np.log(_stretches(state, tool, number))
-        if isinstance(tool, HotStroke):
-            # a brush that goes nowhere grows the same area, all round
+        if isinstance(tool, HotStroke) or (isinstance(tool, HotSpot) and tool.polar):
+            # a brush that goes nowhere grows the same area, all round, and so does the middle of a spot
             still = ~along.any(axis=1)
             first, second = np.where(still, (first + second) / 2, first), np.where(still, (first + second) / 2, second)
         share = strength * share
@@ -190,19 +190,28 @@ def _surface(state: State, tool: HotSurface, number: int, time: float) -> tuple[
 
 def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Ints, Floats, Floats]:
     triangles, x = state.mesh.triangles, state.x
-    whole = np.zeros(len(x))
+    whole, middle = np.zeros(len(x)), np.zeros((len(x), 3))
     for spot in state.spots[number]:
         if spot.letter and spot.letter in tool.resting:
             continue
-        away = np.linalg.norm(x - spot.anchor.at(x, triangles)[0], axis=1)
+        there = spot.anchor.at(x, triangles)[0]
+        away = np.linalg.norm(x - there, axis=1)
         near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
-        whole[near] = np.maximum(whole[near], _kernel(tool.kernel, away[near] / spot.radius))
+        value = _kernel(tool.kernel, away[near] / spot.radius)
+        middle[near[value > whole[near]]] = there
+        whole[near] = np.maximum(whole[near], value)
     some, share = _tips(state, whole)
     p = x[triangles[some]]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    axis = np.array(tool.frame)
-    axis = axis - (normal @ axis)[:, None] * normal
+    if tool.polar:
+        # away from the spot that acts most at the corner where any does
+        strongest = np.take_along_axis(triangles[some], whole[triangles[some]].argmax(axis=1)[:, None], 1)[:, 0]
+        axis = p.mean(axis=1) - middle[strongest]
+        axis = axis - (normal * axis).sum(axis=1)[:, None] * normal
+    else:
+        axis = np.array(tool.frame)
+        axis = axis - (normal @ axis)[:, None] * normal
     turn = np.radians(tool.angle + tool.turning * (time - tool.start))
     return some, share, np.cos(turn) * axis + np.sin(turn) * np.cross(normal, axis)
 

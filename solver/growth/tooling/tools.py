@@ -67,6 +67,9 @@ class HotSpot(_Tool):
     kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
     stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the frame [1]")
     frame: Point = Field((1.0, 0.0, 0.0), description="Direction of the first stretch, as projected on the surface [1]")
+    polar: bool = Field(
+        False, description="Stretches away from the spot and around it, in place of along and across the frame [1]"
+    )
     angle: float = Field(0.0, ge=-360, le=360, description="Turns the frame about the normal [degree]")
     turning: float = Field(0.0, ge=-3600, le=3600, description="Turning of the frame [degree per growth time]")
     splits: tuple[float, ...] = Field(

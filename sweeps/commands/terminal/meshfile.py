@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.contract.mesh import MOST_GROUPS
-
 from ... import foreign
 from ...errors import InvalidOption, SweepError
 from ...foreign import KINDS
-from ...meshparts import Parts, glb, obj
+from ...meshparts import Parts, check_count, glb, obj
 
 __all__ = ["KINDS", "read"]
 
@@ -29,7 +27,8 @@ def read(path: Path) -> dict[str, Any]:
     those of the file's corners.
 
     Raises:
-        InvalidOption: no such kind of file, nothing that can be read in it, or trimesh is not installed.
+        InvalidOption: no such kind of file, nothing that can be read in it, more groups than a mesh may have, or
+            trimesh is not installed.
 
     """
     try:
@@ -90,7 +89,7 @@ def _merged(parts: Parts) -> dict[str, Any]:
         found |= {"materials": list(parts.materials), "face_materials": parts.material[~flat].tolist()}
     groups = {name: weights[chosen] for name, weights in parts.groups.items()}
     groups = {name: weights.tolist() for name, weights in groups.items() if np.isfinite(weights).all()}
-    # so many are parts of a scene, or measurements
-    if 0 < len(groups) <= MOST_GROUPS:
+    check_count(len(groups))
+    if groups:
         found["groups"] = groups
     return found

@@ -60,12 +60,12 @@ def test_turning_the_input_turns_the_result(shape: str, tool: dict, more: dict, 
     assert np.abs(onto - found[0]).max() <= 1e-6
 
 
-@pytest.mark.parametrize("turn", [(0.4, 1.1, -2.0), (1.0, 0.2, 0.3)])
-def test_turning_a_flat_disc_that_bulges_turns_it_as_far_as_steps_are_settled(turn: tuple[float, ...]):
+@pytest.mark.parametrize("turn", [(0.4, 1.1, -2.0), (1.0, 0.2, 0.3), (2.0, -0.7, 0.9)])
+def test_turning_a_flat_disc_that_bulges_turns_it(turn: tuple[float, ...]):
     """What is lifted off a plane by a nudge alone, and grows about a spot whose reach is measured on the bent shape.
 
-    How a step comes to its residual hangs on the last digits, so that the rest state differs by what steps leave over:
-    at the default 1e-3 by up to 1e-5, at 1e-5 by less than 1e-6.
+    How a step comes to its residual hangs on the last digits, and the rest state takes what steps leave over: settled
+    to the default's 1e-3 that is 3e-6 to 9e-6, to 1e-5, as shapes without imperfection are, 6e-8 at most.
     """
     mesh, found = start("disc", 120, 2.0), []
     assert not mesh.x[:, 2].any()
@@ -73,7 +73,7 @@ def test_turning_a_flat_disc_that_bulges_turns_it_as_far_as_steps_are_settled(tu
     for turned in (Rotation.identity(), Rotation.from_euler("xyz", turn)):
         values = {"tools": [spot], "step": 0.25, "thickness": 0.1, "imperfection": 0.0}
         params = GrowthParams.parse(values | words(turned.apply(mesh.x), mesh.triangles))
-        state = Engine(params, 120, 1e-5, history=False).reach(1.0, Context())
+        state = Engine(params, 120, history=False).reach(1.0, Context())
         found.append(turned.inv().apply(state.x - state.x.mean(axis=0)))
     assert np.ptp(found[0][:, 2]) > 0.1
     onto = Rotation.align_vectors(found[0], found[1])[0].apply(found[1])

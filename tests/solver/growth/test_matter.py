@@ -167,3 +167,31 @@ def test_a_solid_that_would_pass_through_the_sheet_in_a_step_is_refused():
     with pytest.raises(InvalidInput, match=r"ball moves by 0\.3 in a step of 0\.1.*0\.5 deep"):
         SOLVER.parse({"solids": [ball], "step": 0.1})
     SOLVER.parse({"solids": [ball], "step": 0.05})
+
+
+@pytest.mark.parametrize("remesh", [0.0, 1.2])
+def test_a_strip_that_is_led_apart_at_its_end_is_stretched_evenly(remesh):
+    """By so much as its end has come; its sides come in by Poisson's ratio of a sheet, nu in plane stress."""
+    ends = [{"where": {"kind": "band", "along": "x", "low": s * 1.5, "high": s * 1.9}, "axes": ("x",)} for s in (-1, 1)]
+    ends[1]["velocity"] = (0.1, 0, 0)
+    values = {"shape": "strip", "aspect": 4.0, "thickness": 0.1, "attached": ends, "tools": [], "remesh": remesh}
+    run = Engine(GrowthParams.parse(values | {"imperfection": 0.0, "step": 0.25}), 400, 1e-5)
+    begun, state = run.state, run.reach(1.0, Context())
+    held = begun.held[:, 0]
+    led = held & (begun.x[:, 0] > 0)
+    if not remesh:
+        assert state.x[held, 0] == pytest.approx(begun.x[held, 0] + 0.1 * led[held], abs=1e-12)
+    before, after = begun.x, state.x
+    inner = np.abs(before[:, 0]) < 1.0
+    slope = np.polyfit(before[inner, 0], after[: len(before)][inner, 0], 1)[0]
+    length = before[led, 0].min() - before[held & ~led, 0].max()
+    assert slope - 1 == pytest.approx(0.1 / length, rel=0.02)
+    narrowed = np.polyfit(before[inner, 1], after[: len(before)][inner, 1], 1)[0]
+    # St. Venant and Kirchhoff: Green's strains are in Poisson's ratio
+    assert (1 - narrowed**2) / (slope**2 - 1) == pytest.approx(0.3, rel=0.05)
+
+
+def test_what_is_led_must_be_held():
+    attached = [{"where": {"kind": "everywhere"}, "axes": ("x",), "velocity": (0, 1, 0)}]
+    with pytest.raises(InvalidInput, match="must be held"):
+        GrowthParams.parse({"attached": attached})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from solver.contract import InvalidInput, Need
+from solver.contract import Context, InvalidInput, Need
 from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
@@ -223,3 +223,45 @@ def test_normalised_outgrowth_stays_flat():
         energies.append(float(run.stored_energy[0]))
     print(energies)
     assert energies[1] < 0.25 * min(energies[0], energies[2])
+
+
+def test_a_polar_spot_grows_away_from_itself_and_around():
+    """Whichever way a triangle lies from the spot, turned by an angle as well."""
+    for angle in (0.0, 30.0):
+        spot = {"kind": "spot", "at": (0.2, 0.1, 0), "radius": 0.5, "kernel": "flat", "stretch": (1.5, 1.1)}
+        state = engine(spot | {"polar": True, "angle": angle}, shape="disc").state
+        tool = engine(spot | {"polar": True, "angle": angle}, shape="disc").params.tools[0]
+        state = started(state, [tool], 0.1, 0)
+        found = rates(state, {0: tool}, 0.05).strain
+        p = state.x[state.mesh.triangles]
+        way = p.mean(axis=1) - [0.2, 0.1, 0]
+        far = np.linalg.norm(way, axis=1)
+        whole = (np.linalg.norm(p - [0.2, 0.1, 0], axis=2) < 0.5).all(axis=1) & (far > 0.06)
+        assert whole.sum() > 100
+        turned = np.radians(angle)
+        cos, sin = way[:, 0] / far, way[:, 1] / far
+        outward = np.stack(
+            [cos * np.cos(turned) - sin * np.sin(turned), sin * np.cos(turned) + cos * np.sin(turned)], -1
+        )
+        first = (p[:, 1] - p[:, 0])[:, :2]
+        first /= np.linalg.norm(first, axis=1)[:, None]
+        v = np.stack([(outward * first).sum(-1), outward[:, 1] * first[:, 0] - outward[:, 0] * first[:, 1]], -1)
+        e11, e12, e22 = found.T
+        along = e11 * v[:, 0] ** 2 + 2 * e12 * v[:, 0] * v[:, 1] + e22 * v[:, 1] ** 2
+        assert along[whole] == pytest.approx(np.log(1.5), abs=1e-9)
+        assert (e11 + e22)[whole] == pytest.approx(np.log(1.5) + np.log(1.1), abs=1e-9)
+
+
+def test_a_disc_that_grows_away_from_its_middle_alone_is_a_cone():
+    """ds^2 = s^2 dr^2 + r^2 dphi^2 is the metric of a cone of slant s and base 1, (s^2 - 1)^(1/2) high: no strain."""
+    spot = {"kind": "spot", "at": (0, 0, 0), "radius": 3.0, "kernel": "flat", "stretch": (1.2, 1.0), "polar": True}
+    run = engine(spot, shape="disc", thickness=0.01, curved=False, step=0.25)
+    state = run.reach(1.0, Context())
+    x = state.x - state.x.mean(axis=0)
+    axis = np.linalg.svd(x, full_matrices=False)[2][2]
+    height = np.ptp(x @ axis)
+    # the apex is rounded off over some thicknesses
+    assert height == pytest.approx(np.sqrt(1.2**2 - 1), rel=0.05)
+    rim = border(state.mesh)
+    base = np.linalg.norm(x[rim] - (x[rim] @ axis)[:, None] * axis, axis=1)
+    assert base == pytest.approx(1.0, rel=0.03)

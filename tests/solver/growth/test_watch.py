@@ -190,3 +190,46 @@ def test_triangles_near_each_other_along_the_sheet_that_cross_are_listed():
                 assert (a, b) in known, turn
                 listed += 1
     assert listed > 100
+
+
+def horseshoe(gap):
+    """Return a flat sheet, whose two arms run beside each other at such a distance."""
+    x, y = np.meshgrid(np.arange(81) * 0.05 - 2.0, np.arange(61) * 0.05)
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    corner = np.array([81 * row + column for row in range(60) for column in range(80)])
+    faces = np.concatenate([corner[:, None] + [0, 1, 82], corner[:, None] + [0, 82, 81]])
+    middle = points[faces].mean(axis=1)
+    used, faces = np.unique(faces[(np.abs(middle[:, 0]) > 0.05) | (middle[:, 1] < 1.0)], return_inverse=True)
+    mesh, laid = shell.topology(faces.reshape(-1, 3), len(used)), points[used]
+    laid[:, 0] -= np.where(laid[:, 1] > 1.0 - 1e-9, np.sign(laid[:, 0]) * (0.05 - gap / 2), 0.0)
+    laid[:, 2] = 0.02 * np.sin(5 * laid[:, 1])
+    state = replace(strip(), x=laid, mesh=mesh, g=shell.metric(laid, mesh.triangles), rest=np.zeros(len(mesh.hinges)))
+    return replace(state, held=np.zeros((len(laid), 3), bool))
+
+
+@pytest.mark.parametrize("gap", [0.06, 0.035, 0.028, 0.01])
+def test_arms_of_a_flat_sheet_are_seen_to_come_near_each_other(gap, monkeypatch):
+    """It lies over a plane, so that only its rim is looked at; the answer is that of a look all over."""
+    state = horseshoe(gap)
+    looked = []
+    monkeypatch.setattr(module, "touches", lambda s, *a: looked.append(len(s.x)) or touches(s, *a))
+    begin = horseshoe(0.08).x
+    for start in (begin, state.x):
+        told = done(Watch(DISTANCE).apart(start, state))
+        assert told == told_all_over(start, state, DISTANCE) == (gap > DISTANCE)
+    assert looked
+    assert not (gap > DISTANCE and max(looked) == len(state.x)), "no look all over"
+
+
+def test_a_wavy_sheet_is_apart_whatever_its_slope(monkeypatch):
+    """With slopes of half a radian the middle needs no look, with steep ones it does; the answer is the same."""
+    state = horseshoe(0.08)
+    sure = []
+    lies = Watch._lies_apart
+    monkeypatch.setattr(Watch, "_lies_apart", lambda *a: sure.append(lies(*a)) or sure[-1])
+    for slope in np.arange(0.0, 3.0, 0.25):
+        x = state.x.copy()
+        x[:, 2] = slope / 12 * np.sin(12 * x[:, 1])
+        end = replace(state, x=x, g=shell.metric(x, state.mesh.triangles))
+        assert done(Watch(DISTANCE).apart(state.x, end)) == told_all_over(state.x, end, DISTANCE), slope
+    assert set(sure) == {True, False}
