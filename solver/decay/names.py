@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..contract import Need
 from .params import DecayParams
 
-__all__ = ["ALL", "BODY", "DEFAULT", "FIELDS", "FLESH", "MASSES", "MOULD", "ROT", "VECTORS", "completed"]
+__all__ = ["ALL", "BESIDE", "BODY", "DEFAULT", "FIELDS", "FLESH", "MASSES", "MOULD", "ROT", "VECTORS", "completed"]
 
 _SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutrient", "budget_error", "water_lost")
 #: Where the fresh weight is.
@@ -25,6 +25,8 @@ MOULD = frozenset({"mould", "mould_active", "nutrient", "mouldy_share", "mean_mo
 BODY = frozenset({"position", "displacement", "volume", "least_jacobian", "mesh_position", *MASSES})
 FIELDS = ("position", "displacement", "rot", "substrate", "mould", "mould_active", "nutrient")
 VECTORS = ("position", "displacement")
+#: What comes along with the fields of vertices where it is known.
+BESIDE = ("roasted", "flesh", "browned", "kind", "living", "lost")
 
 
 def completed(params: DecayParams, need: Need) -> Need:

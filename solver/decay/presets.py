@@ -14,7 +14,7 @@ from .dress.peel import LESIONS, PEELS
 from .fields.colony import MOULDS, PAPER_MOULDS, PAPER_ROT, ROTS
 from .hyphae import FURS
 
-__all__ = ["ENVIRONMENTS", "PRESETS", "SIZES"]
+__all__ = ["ENVIRONMENTS", "FRUITS", "PRESETS", "SIZES", "SPECIES"]
 
 #: Transpiration coefficients by area [g/(m2 s MPa)], where Table 1's are implausible; sources in docs/decay.md.
 _TRANSPIRATION = {"orange": 1.72, "peach": 5.2}
@@ -97,7 +97,7 @@ _TABLES: Mapping[str, Mapping[str, Any]] = {
 _SIZES = {"apple": 0.03, "orange": 0.033, "peach": 0.028, "pear": 0.034, "tomato": 0.028}
 
 #: Which species a fruit grows.
-_SPECIES = {
+SPECIES = {
     "apple": "penicillium-expansum",
     "apple-neofabraea": "neofabraea",
     "orange": "penicillium-digitatum",
@@ -108,14 +108,15 @@ _SPECIES = {
 _PAPER: Mapping[str, Mapping[str, Any]] = {
     name: {**values, "peel": PEELS[name.partition("-")[0]].model_dump()} for name, values in _TABLES.items()
 }
-_FRUITS: Mapping[str, Mapping[str, Any]] = {name: _lived(name, paper, _SPECIES[name]) for name, paper in _PAPER.items()}
+#: Fruits in the temperate climate, each with its own species.
+FRUITS: Mapping[str, Mapping[str, Any]] = {name: _lived(name, paper, SPECIES[name]) for name, paper in _PAPER.items()}
 
 #: Fruits in the temperate climate, every fruit in each of the others as e.g. `orange-tropical`, and in the paper's.
 PRESETS: Mapping[str, Mapping[str, Any]] = {
-    **_FRUITS,
+    **FRUITS,
     **{
         f"{fruit}-{climate}": {**values, **air}
-        for fruit, values in _FRUITS.items()
+        for fruit, values in FRUITS.items()
         for climate, air in ENVIRONMENTS.items()
         if climate != "temperate"
     },

@@ -18,7 +18,7 @@ from .cooked import cooked
 from .environment import deficit
 from .fields.stepping import Reached, march
 from .fields.system import System, laid
-from .names import FIELDS, MOULD, VECTORS, completed
+from .names import BESIDE, FIELDS, MOULD, VECTORS, completed
 from .params import DecayParams
 from .settings import Settings, cells_of, choose, nodes, stepped
 from .surfaces.cut import left
@@ -257,7 +257,7 @@ def _stacked(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], data
             data[name] = (("stage", "fruit_number"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
-        elif name in (*FIELDS, "roasted", "flesh", "browned") and values.ndim == 2:
+        elif name in (*FIELDS, *BESIDE) and values.ndim == 2:
             data[name] = (("stage", "vertex"), values)
         elif name in (*FIELDS, "roasted"):
             data[name] = (("stage", "colatitude", "azimuth"), values)

@@ -257,6 +257,14 @@ class System:
             starts = self._waits[rots].day(day) if self._cardinal else day
             self._waiting.add(starts, Seed(rots, ray, self._place(ray), radius))
 
+    def taken_by(self, rot: Colony, mould: Colony) -> None:
+        """Let another species live on a fruit that is sound until now."""
+        self.params = self.params.model_copy(update={"rot": rot, "mould": mould})
+        for layer, colony in ((self.rot, rot), (self.mould, mould)):
+            if layer is not None:
+                layer.taken_by(daily(colony, self.params, self._radius))
+        self._waits = {True: Germination(rot, self.params), False: Germination(mould, self.params)}
+
     def near(self, ray: Floats, radius: float) -> Ints:
         """Return the vertices within a distance on the unit sphere of a direction, the nearest one among them."""
         found = self._tree.query_ball_point(ray, radius)
