@@ -108,6 +108,7 @@ register(
 # decay: maps on the surface, and what they come to
 register(
     rot=Quantity("1", "soft rot, over what a nutrient of 1 can feed", "r", share=True),
+    rot_age=Quantity("day", "time since the soft rot's map reached 0.1, 0 where it has not", "t_r"),
     substrate=Quantity("1", "nutrient left in the flesh, what the rot lives on", "n_r", share=True),
     mould=Quantity("1", "mould, active and inactive, over what a nutrient of 1 can feed", "m", share=True),
     mould_active=Quantity("1", "active mould, over what a nutrient of 1 can feed", "u", share=True),

@@ -15,7 +15,7 @@ from .dress.stem import parts
 
 __all__ = ["LOOKS"]
 
-_LAYERS = ("rot", "mould", "mould_active")
+_LAYERS = ("rot", "rot_age", "mould", "mould_active")
 #: What the vertices of a heap of several kinds have besides.
 _MIXED = ("kind", "living", "lost")
 #: What a cut face has besides: 1 on flesh, 0 on skin. Pale flesh, chosen by eye; linear light.
@@ -49,7 +49,7 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     def layer(name: str) -> Array:
         return np.asarray(fields[name], float) if name in fields else np.zeros_like(known[0])
 
-    rot, mould, active = (layer(name) for name in _LAYERS)
+    rot, age, mould, active = (layer(name) for name in _LAYERS)
     peel, lesion = params.get("peel", {}), params.get("lesion", {})
     # what dries darkens and turns brown, and its wax goes dull
     dry = _smooth(np.asarray(fields.get("water_lost", 0.0)) / _DRIED)
@@ -63,7 +63,7 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     # rot shows long before it is complete, mould hides what is below it
     rotten, matted = _smooth(rot / 0.2), _smooth(mould / 0.25)
     felted = params.get("hyphae", {}).get("mat", 0.95) * matted
-    colour = _over(colour, np.array(lesion.get("colour", _ROT), float), lesion.get("cover", 0.9) * rotten)
+    colour = _over(colour, _lesion(lesion, age), lesion.get("cover", 0.9) * rotten)
     # what grows is white while it is thin, and takes its colour with the spores of a dense or a resting mat
     growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1) * (1 - _smooth((mould - 0.2) / 0.3))
     centre = np.array(params["mould_colour"], float) * (1 + 0.25 * fluff[..., None])
@@ -75,6 +75,18 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
         spots = peel.get("spot_height", 0.0) * layer("spot") * (1 - rotten)
         height = spots + _SHRIVEL * dry * layer("shrivel") + felted * (_MAT + _TUFT * fluff)
     return Skin(np.clip(colour, 0, 1), roughness, height)
+
+
+def _lesion(lesion: Mapping[str, Any], age: Array) -> Array:
+    """Return the colours of skin that has been rotten for so long [day]: some pale again from the middle, in rings."""
+    colour = np.array(lesion.get("colour", _ROT), float)
+    middle = lesion.get("middle")
+    if middle is None:
+        return colour
+    old = age / lesion["paling"]
+    # the rings are those of places that came to be rotten together
+    darker = 1 - lesion["rings"] * (0.5 - 0.5 * np.cos(2 * np.pi * age / lesion["ring"])) * _smooth(old)
+    return _over(colour, np.array(middle, float), _smooth(old / 2)) * darker[..., None]
 
 
 def _fresh(

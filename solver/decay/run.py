@@ -160,7 +160,7 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
     """Return maps on the lattice and shares of the area, those that were asked for."""
     surface, wanted = system.surface, set(need.fields)
     rot = system.rotten(reached.state.rot)
-    maps = {"rot": rot, "substrate": reached.state.rot.n[: len(rot)]}
+    maps = {"rot": rot, "substrate": reached.state.rot.n[: len(rot)], "rot_age": system.age(reached.state, reached.day)}
     found = {"rotten_share": surface.mean(rot >= _SEEN), "mean_rot": surface.mean(rot)}
     if system.mould is not None and reached.state.mould is not None:
         state = reached.state.mould

@@ -18,7 +18,7 @@ class One:
     """One fruit's stage, in numbers."""
 
     def __init__(self, system: System, reached: Reached) -> None:
-        self._system, self._state = system, reached.state
+        self._system, self._state, self._day = system, reached.state, reached.day
         self._rot = system.rot.share(reached.state.rot)
         layers = zip((system.rot, system.mould), reached.state[:2], strict=True)
         self.budget = [layer.budget_error(s) for layer, s in layers if layer is not None and s is not None]
@@ -26,7 +26,8 @@ class One:
 
     def maps(self) -> dict[str, Floats]:
         """Return its fields by name (v)."""
-        found = {"rot": self._rot, "substrate": self._state.rot.n}
+        age = self._system.age(self._state, self._day)
+        found = {"rot": self._rot, "substrate": self._state.rot.n, "rot_age": age}
         if self._system.mould is not None and self._state.mould is not None:
             mould, state = self._system.mould, self._state.mould
             found |= {
