@@ -1,13 +1,14 @@
-"""Fields in the flesh against closed forms, and what they take: python -m benchmarks.decay.within.
+"""Fields in the flesh against closed forms, and what they take: python -m benchmarks.decay.within [lesion].
 
 By points of the flesh: the slowest round mode of an insulated ball, its eigenvalue; a ball that dries through its skin
 (Biot 5.8), water lost after 5 and 30 days against Crank's series; a ball in hot air, its middle after half an hour; and
-CPU seconds of a step of rot and of a day of water. By quality: the share of the flesh that one wound has rotted by
-day 6.
+CPU seconds of a step of rot and of a day of water. By quality, and with `lesion` this alone: the share of the flesh
+that one wound has rotted by day 6.
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from typing import Any
 
@@ -154,7 +155,14 @@ def lesions() -> None:
     sheet.keep()
 
 
-def main() -> None:
+def main(only: str = "") -> None:
+    if not only:
+        forms()
+    lesions()
+
+
+def forms() -> None:
+    """Keep errors against closed forms."""
     head = (
         *("points of the flesh", "eigenvalue", "water, day 5", "day 30", "heat, middle"),
         *("a step of rot", "a day of water"),
@@ -172,8 +180,7 @@ def main() -> None:
         )
         sheet.add(cells, points=len(ball.flesh), errors=errors, seconds=(rot, wet))
     sheet.keep()
-    lesions()
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])
