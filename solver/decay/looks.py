@@ -86,7 +86,8 @@ def _lesion(lesion: Mapping[str, Any], age: Array) -> Array:
     old = age / lesion["paling"]
     # the rings are those of places that came to be rotten together
     darker = 1 - lesion["rings"] * (0.5 - 0.5 * np.cos(2 * np.pi * age / lesion["ring"])) * _smooth(old)
-    return _over(colour, np.array(middle, float), _smooth(old / 2)) * darker[..., None]
+    found: Array = _over(colour, np.array(middle, float), _smooth(old / 2)) * darker[..., None]
+    return found
 
 
 def _fresh(
