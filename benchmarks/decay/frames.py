@@ -35,7 +35,7 @@ _FIRST = 2
 
 def frames(preset: str, day: float, rate: float, count: int, cells: int) -> list[dict[str, float]]:
     """Return milliseconds of fields, body, skin and output of each frame."""
-    params = SOLVER.parse({"body": "quasi-static", "te": 0.03, "skin": {"shrinkage": 0.5}}, preset)
+    params = SOLVER.parse({"body": "quasi-static", "skin": {"shrinkage": 0.5}}, preset)
     assert isinstance(params, DecayParams)
     settings = replace(choose(params, "default"), cells=cells)
     system = System(params, settings.cells, True)

@@ -27,9 +27,8 @@ AGES = {
     "pear": (0, 8, 14, 22),
     "tomato": (0, 1, 2, 5),
 }
-#: What is not as the preset has it: thinner skins, whose folds are finer, and a room in which the green mould thrives.
-_THIN = ("--set", "te=0.02")
-_SET = dict.fromkeys(AGES, _THIN) | {"orange": ("--set", "humidity=85")}
+#: What is not as the preset has it: a room in which the green mould thrives.
+_SET = {"orange": ("--set", "humidity=85")}
 _PIXELS, _SAMPLES = 180, 10
 #: Wounds that the camera sees.
 _WOUNDS = 'wounds=[{"colatitude":60,"azimuth":70},{"colatitude":110,"azimuth":140}]'
@@ -40,7 +39,7 @@ def solved(preset: str, folder: Path) -> list[Path]:
     run = folder / f"{preset}.h5"
     usd = [folder / f"{preset}-{age}.usdz" for age in AGES[preset]]
     glb = folder / f"{preset}.glb"
-    said = ["--set", "body=quasi-static", "--set", "skin={}", "--set", _WOUNDS, *_SET[preset]]
+    said = ["--set", "body=quasi-static", "--set", "skin={}", "--set", _WOUNDS, *_SET.get(preset, ())]
     if not run.exists():
         stages = ",".join(map(str, AGES[preset]))
         wizen("solve", "decay", "--preset", preset, *said, "--stages", stages, "--out", str(run))

@@ -1,25 +1,29 @@
-"""Fields in the flesh against closed forms, and what they take: python -m benchmarks.decay.within.
+"""Fields in the flesh against closed forms, and what they take: python -m benchmarks.decay.within [lesion].
 
 By points of the flesh: the slowest round mode of an insulated ball, its eigenvalue; a ball that dries through its skin
-(Biot 5.8), water lost after 5 and 30 days against Crank's series; a ball in hot air, its middle after half an hour; the
-share of the flesh that one wound has rotted by day 6; and CPU seconds of a step of rot and of a day of water.
+(Biot 5.8), water lost after 5 and 30 days against Crank's series; a ball in hot air, its middle after half an hour; and
+CPU seconds of a step of rot and of a day of water. By quality, and with `lesion` this alone: the share of the flesh
+that one wound has rotted by day 6.
 """
 
 from __future__ import annotations
 
+import sys
 import time
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from benchmarks.figures import Sheet
 from solver.arrays import Floats
-from solver.contract import Context
+from solver.contract import Context, Quality
 from solver.decay import SOLVER, DecayParams
 from solver.decay.environment import saturation
 from solver.decay.fields.diffusion import linked
 from solver.decay.fields.stepping import march
 from solver.decay.fields.system import System
+from solver.decay.settings import choose
 from solver.decay.surfaces.surface import extent, lay
 from solver.decay.within import water
 from solver.decay.within.joint import Joint, joined
@@ -119,38 +123,64 @@ def costs(count: int) -> tuple[float, float]:
     return took[0], took[1]
 
 
-def lesion(count: int) -> float:
-    """Return the share of the flesh that an even apple's one wound has rotted by day 6."""
+def lesion(quality: Quality) -> dict[str, Any]:
+    """Return the share of the flesh that an even apple's one wound has rotted by day 6, and what that took."""
     even = {"stone": (0, 0), "noise": 0.0, "unevenness": 0.0, "spawning": 0.0, "rot_spawning": 0.0}
     params = SOLVER.parse({**even, "wounds": ({"colatitude": 0},), "within": {}})
     assert isinstance(params, DecayParams)
-    system = System(params, CELLS, False, None, count)
-    *_, last = march(system, (6.0,), 1e-4, 0.2, Context())
+    settings, begun = choose(params, quality), time.process_time()
+    system = System(params, settings.cells, False, None, settings.within)
+    laid = time.process_time()
+    *_, last = march(system, (6.0,), settings.tolerance, settings.longest, Context())
     assert system.joint is not None
-    return system.joint.mean(system.rot.share(last.state.rot))
+    return {
+        "quality": quality,
+        "skin": len(system.surface.points),
+        "flesh": len(system.joint.flesh),
+        "rotten": system.joint.mean(system.rot.share(last.state.rot)),
+        "seconds": (laid - begun, time.process_time() - laid),
+    }
 
 
-def main() -> None:
+def lesions() -> None:
+    """Keep what qualities say of one lesion, beside the finest."""
+    head = ("quality", "points of the skin", "of the flesh", "rotten, day 6", "off the finest", "laying", "six days")
+    sheet = Sheet("decay-lesion", head, "decay")
+    rows = [lesion(quality) for quality in ("preview", "default", "fine")]
+    for row in rows:
+        off = row["rotten"] / rows[-1]["rotten"] - 1
+        spent = (f"{seconds:.1f} s" for seconds in row["seconds"])
+        told = (f"{100 * row['rotten']:.2f} %", f"{100 * off:+.1f} %" if row is not rows[-1] else "")
+        sheet.add((row["quality"], row["skin"], row["flesh"], *told, *spent), **row, off=off)
+    sheet.keep()
+
+
+def main(only: str = "") -> None:
+    if not only:
+        forms()
+    lesions()
+
+
+def forms() -> None:
+    """Keep errors against closed forms."""
     head = (
         *("points of the flesh", "eigenvalue", "water, day 5", "day 30", "heat, middle"),
-        *("rotten, day 6", "a step of rot", "a day of water"),
+        *("a step of rot", "a day of water"),
     )
     sheet = Sheet("decay-within", head, "decay")
     for count in POINTS:
         ball = joined(lay(given({}), CELLS), count, 0.01)
         errors = (mode(ball), *drying(ball), heating(ball))
         rot, wet = costs(count)
-        rotten = lesion(count)
         cells = (
             f"{len(ball.flesh)}",
             *(f"{100 * e:+.2f} %" for e in errors),
-            f"{100 * rotten:.2f} %",
             f"{rot:.2f} s",
             f"{wet:.2f} s",
         )
-        sheet.add(cells, points=len(ball.flesh), errors=errors, rotten=rotten, seconds=(rot, wet))
+        sheet.add(cells, points=len(ball.flesh), errors=errors, seconds=(rot, wet))
     sheet.keep()
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

@@ -140,7 +140,8 @@ def _threads(stage: Any, mesh: Any, threads: Threads | None, at: float) -> None:
     points = np.ascontiguousarray(threads.points.reshape(-1, 3), np.float32)
     curves.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(np.full(count, steps, np.int32)), at)
     curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), at)
-    narrow = np.tile(np.linspace(1, 0.35, steps) * threads.width, count).astype(np.float32)
+    wide = np.broadcast_to(threads.width, count)
+    narrow = (wide[:, None] * np.linspace(1, 0.35, steps)).ravel().astype(np.float32)
     curves.CreateWidthsAttr().Set(Vt.FloatArray.FromNumpy(narrow), at)
     curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
     share = np.linspace(0, 1, steps)[None, :, None]

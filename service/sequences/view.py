@@ -178,19 +178,20 @@ class Sequence:
 
     @cached_property
     def fresh(self) -> Singles:
-        """Vertices (v, 3) of the run's first stage, in the result's unit: places that skin keeps."""
-        return self._bare(0).vertices
+        """Places (v, 3) that skin keeps, in the result's unit: as the solver says, or the run's first stage."""
+        said = colours.looks(self.run).fresh
+        return np.asarray(self.run[said].values, "f4") if said in self.run else self._bare(0).vertices
 
     def grained(self, size: int) -> Mapping[str, Array]:
         """Return what the solver knows of the texels of a picture (size, size) that is finer than its fields."""
         if size not in self._grains:
             known, fresh = colours.looks(self.run).grain, self.fresh
             reach = float(np.ptp(fresh, axis=0).max())
-            found = (
-                {}
-                if known is None
-                else known(self.baked(fresh, size).reshape(-1, 3), np.pi * reach / size, self.params)
-            )
+            found: Mapping[str, Array] = {}
+            if known is not None:
+                still = self._bare(0).fields
+                layers = {n: self.baked(still[n], size).ravel() for n in colours.looks(self.run).layers if n in still}
+                found = known(self.baked(fresh, size).reshape(-1, 3), np.pi * reach / size, self.params, layers)
             self._grains[size] = {name: values.reshape(size, size) for name, values in found.items()}
         return self._grains[size]
 

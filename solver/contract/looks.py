@@ -37,7 +37,8 @@ class Matter(NamedTuple):
 class Part(NamedTuple):
     """A small mesh that stands on a surface: points (v, 3) about its foot, y along the normal; triangles (f, 3).
 
-    pole: where it stands, 0 or 1. colour: (v, 3), linear light. roughness: 0 to 1.
+    pole: where it stands, 0 or 1; -1: at the origin, y upwards, and not on the surface. vertex: which it stands on,
+    where a mesh has several such things. colour: (v, 3), linear light. roughness: 0 to 1.
     """
 
     name: str
@@ -46,13 +47,15 @@ class Part(NamedTuple):
     triangles: Array
     colour: Array
     roughness: float
+    vertex: int | None = None
 
 
 class Fur(NamedTuple):
     """Threads that stand on a surface, by vertex (v): how many on a unit of area, how long, and their colours.
 
     foot, tip: (v, 3), linear light. ripe: share of the threads that carry a head. peak: the largest density that there
-    may be. width, head: of a thread's foot, and radius of a head, 0 for none. lean: how far it leans, over its length.
+    may be. width, head: of a thread's foot, and radius of a head, 0 for none. lean: how far it leans, over its length;
+    these three of all threads, or by vertex (v).
     """
 
     density: Array
@@ -61,9 +64,9 @@ class Fur(NamedTuple):
     tip: Array
     ripe: Array
     peak: float
-    width: float
-    head: float
-    lean: float
+    width: float | Array
+    head: float | Array
+    lean: float | Array
 
 
 class Label(NamedTuple):
@@ -99,7 +102,9 @@ class Looks:
     """Colours by field, and words.
 
     layers: fields that `paint` makes colours of, given any of them by name (...) and the run's parameters; it returns
-    None where these say no colours. scalars: of a stage, which `paint` is given too where a result has them. fur: what
+    None where these say no colours. scalars: of a stage, which `paint` is given too where a result has them. constants:
+    variables without a stage that `parts` is given beside these. fresh: one, if any, that says where on its fresh
+    surface each vertex (v, 3) is, for `grain`, which is given the layers of texels too. fur: what
     stands on it, by the same fields; None where nothing grows. inside: fields of a cut face, from those of the
     surface above it and the flesh's own at it, the depth below it and the parameters; None where nothing is known of
     what lies there. aside: a field that is 1 on what only took part in the run, as a press, and does not belong to what
@@ -110,8 +115,10 @@ class Looks:
     layers: tuple[str, ...] = ()
     paint: Callable[[Mapping[str, Array], Mapping[str, Any]], Skin | None] | None = None
     scalars: tuple[str, ...] = ()
+    constants: tuple[str, ...] = ()
+    fresh: str = ""
     fur: Callable[[Mapping[str, Array], Mapping[str, Any]], Fur | None] | None = None
-    grain: Callable[[Array, float, Mapping[str, Any]], Mapping[str, Array]] | None = None
+    grain: Callable[[Array, float, Mapping[str, Any], Mapping[str, Array]], Mapping[str, Array]] | None = None
     parts: Callable[[Mapping[str, Array], Mapping[str, Any]], Sequence[Part]] | None = None
     matter: Callable[[Mapping[str, Any]], Matter | None] | None = None
     inside: Callable[[Mapping[str, Array], Array, Mapping[str, Any]], Mapping[str, Array]] | None = None

@@ -9,12 +9,15 @@ import numpy as np
 
 from ..arrays import Array
 from ..contract import Fur, Label, Looks, Matter, Skin
+from .dress import mixed
 from .dress.grain import grain
 from .dress.stem import parts
 
 __all__ = ["LOOKS"]
 
-_LAYERS = ("rot", "mould", "mould_active")
+_LAYERS = ("rot", "rot_age", "mould", "mould_active")
+#: What the vertices of a heap of several kinds have besides.
+_MIXED = ("kind", "living", "lost")
 #: What a cut face has besides: 1 on flesh, 0 on skin. Pale flesh, chosen by eye; linear light.
 _FLESH = "flesh"
 _PALE = np.array([0.95, 0.87, 0.60])
@@ -46,13 +49,13 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     def layer(name: str) -> Array:
         return np.asarray(fields[name], float) if name in fields else np.zeros_like(known[0])
 
-    rot, mould, active = (layer(name) for name in _LAYERS)
+    rot, age, mould, active = (layer(name) for name in _LAYERS)
     peel, lesion = params.get("peel", {}), params.get("lesion", {})
     # what dries darkens and turns brown, and its wax goes dull
-    dry = float(_smooth(np.asarray(fields.get("water_lost", 0.0)) / _DRIED))
+    dry = _smooth(np.asarray(fields.get("water_lost", 0.0)) / _DRIED)
     colour, wax = _fresh(fields, params, peel, dry, known[0].shape)
-    colour = colour * (1 - 0.35 * dry)
-    colour = colour + (_BROWN * colour.sum(axis=-1, keepdims=True) - colour) * (0.6 * dry)
+    colour = colour * (1 - 0.35 * dry[..., None])
+    colour = colour + (_BROWN * colour.sum(axis=-1, keepdims=True) - colour) * (0.6 * dry[..., None])
     wax = wax + (np.maximum(_DULL, wax) - wax) * dry
     # edges are ragged where that is known
     edge, fluff = layer("edge"), layer("fluff")
@@ -60,7 +63,7 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     # rot shows long before it is complete, mould hides what is below it
     rotten, matted = _smooth(rot / 0.2), _smooth(mould / 0.25)
     felted = params.get("hyphae", {}).get("mat", 0.95) * matted
-    colour = _over(colour, np.array(lesion.get("colour", _ROT), float), lesion.get("cover", 0.9) * rotten)
+    colour = _over(colour, _lesion(lesion, age), lesion.get("cover", 0.9) * rotten)
     # what grows is white while it is thin, and takes its colour with the spores of a dense or a resting mat
     growing = np.clip(active / np.maximum(mould, 1e-9), 0, 1) * (1 - _smooth((mould - 0.2) / 0.3))
     centre = np.array(params["mould_colour"], float) * (1 + 0.25 * fluff[..., None])
@@ -74,8 +77,21 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     return Skin(np.clip(colour, 0, 1), roughness, height)
 
 
+def _lesion(lesion: Mapping[str, Any], age: Array) -> Array:
+    """Return the colours of skin that has been rotten for so long [day]: some pale again from the middle, in rings."""
+    colour = np.array(lesion.get("colour", _ROT), float)
+    middle = lesion.get("middle")
+    if middle is None:
+        return colour
+    old = age / lesion["paling"]
+    # the rings are those of places that came to be rotten together
+    darker = 1 - lesion["rings"] * (0.5 - 0.5 * np.cos(2 * np.pi * age / lesion["ring"])) * _smooth(old)
+    found: Array = _over(colour, np.array(middle, float), _smooth(old / 2)) * darker[..., None]
+    return found
+
+
 def _fresh(
-    fields: Mapping[str, Array], params: Mapping[str, Any], peel: Mapping[str, Any], dry: float, shape: tuple[int, ...]
+    fields: Mapping[str, Array], params: Mapping[str, Any], peel: Mapping[str, Any], dry: Array, shape: tuple[int, ...]
 ) -> tuple[Array, Array]:
     """Return colours and roughness of skin and cut faces that neither rot nor mould, before they have dried."""
     colour = np.broadcast_to(np.array(params["skin_colour"], float), (*shape, 3))
@@ -97,6 +113,13 @@ def _fresh(
 
 
 def _matter(params: Mapping[str, Any]) -> Matter | None:
+    kinds = mixed.kinds(params)
+    if kinds:
+        # one number for all: the mean light below the skins, and no down where most have none
+        each = [(one["peel"], kind["fruits"]) for one, kind in zip(kinds, params["heap"]["kinds"], strict=True)]
+        total = sum(count for _, count in each)
+        below, down = (sum(peel[name] * count for peel, count in each) / total for name in ("subsurface", "fuzz"))
+        return Matter(float(below), _REACH, float(down) if down > 0.35 else 0.0)
     peel = params.get("peel")
     return None if peel is None else Matter(float(peel["subsurface"]), _REACH, float(peel["fuzz"]))
 
@@ -149,11 +172,13 @@ def _smooth(x: Array) -> Array:
 
 
 LOOKS = Looks(
-    layers=_LAYERS,
-    paint=_paint,
-    scalars=("water_lost",),
-    fur=_fur,
-    grain=grain,
+    layers=(*_LAYERS, *_MIXED),
+    paint=mixed.painted(_paint),
+    scalars=("water_lost", "fruit_water_lost"),
+    constants=("fruit_kind", "fruit_size", "fruit_headroom", "pole_vertex"),
+    fresh="fresh_position",
+    fur=mixed.furred(_fur),
+    grain=mixed.grained(grain),
     parts=parts,
     matter=_matter,
     inside=_inside,

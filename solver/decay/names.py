@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..contract import Need
 from .params import DecayParams
 
-__all__ = ["ALL", "BODY", "DEFAULT", "FIELDS", "FLESH", "MASSES", "MOULD", "ROT", "VECTORS", "completed"]
+__all__ = ["ALL", "BESIDE", "BODY", "DEFAULT", "FIELDS", "FLESH", "MASSES", "MOULD", "ROT", "VECTORS", "completed"]
 
 _SHARES = ("rotten_share", "mean_rot", "mouldy_share", "mean_mould", "mean_nutrient", "budget_error", "water_lost")
 #: Where the fresh weight is.
@@ -14,17 +14,19 @@ MASSES = ("mass", "juice_lost", "puddle", "respired", "density")
 FLESH = ("flesh_position", "flesh_rot", "flesh_nutrient", "flesh_water", "flesh_cell")
 ALL = (
     *("position", "displacement", "mesh_position", "triangle", "volume", "least_jacobian", *MASSES),
-    *("rot", "substrate", "mould", "mould_active", "nutrient", *_SHARES),
+    *("rot", "substrate", "rot_age", "mould", "mould_active", "nutrient", *_SHARES),
 )
 #: What a run keeps of a need that names nothing; see `completed`.
-DEFAULT = ("rot", "mould", "mould_active", "nutrient", *_SHARES)
+DEFAULT = ("rot", "rot_age", "mould", "mould_active", "nutrient", *_SHARES)
 #: What has a layer to be stepped for.
-ROT = frozenset({"rot", "substrate", "rotten_share", "mean_rot"})
+ROT = frozenset({"rot", "substrate", "rot_age", "rotten_share", "mean_rot"})
 MOULD = frozenset({"mould", "mould_active", "nutrient", "mouldy_share", "mean_mould", "mean_nutrient"})
 #: What a body has to be settled for, if the fruit has one; `position` is where the surface is.
 BODY = frozenset({"position", "displacement", "volume", "least_jacobian", "mesh_position", *MASSES})
-FIELDS = ("position", "displacement", "rot", "substrate", "mould", "mould_active", "nutrient")
+FIELDS = ("position", "displacement", "rot", "substrate", "rot_age", "mould", "mould_active", "nutrient")
 VECTORS = ("position", "displacement")
+#: What comes along with the fields of vertices where it is known.
+BESIDE = ("roasted", "flesh", "browned", "kind", "living", "lost")
 
 
 def completed(params: DecayParams, need: Need) -> Need:

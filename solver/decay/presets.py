@@ -14,7 +14,7 @@ from .dress.peel import LESIONS, PEELS
 from .fields.colony import MOULDS, PAPER_MOULDS, PAPER_ROT, ROTS
 from .hyphae import FURS
 
-__all__ = ["ENVIRONMENTS", "PRESETS", "SIZES"]
+__all__ = ["ENVIRONMENTS", "FRUITS", "PRESETS", "SIZES", "SPECIES"]
 
 #: Transpiration coefficients by area [g/(m2 s MPa)], where Table 1's are implausible; sources in docs/decay.md.
 _TRANSPIRATION = {"orange": 1.72, "peach": 5.2}
@@ -69,7 +69,13 @@ _PALE = (0.45, 0.40, 0.30)
 #: Ripe spores as they are seen, where the paper's colours are others: of the green mould olive, of the blue one duller.
 _RIPE = {"penicillium-digitatum": (0.17, 0.185, 0.075), "penicillium-expansum": (0.15, 0.225, 0.195)}
 
-_APPLE: dict[str, Any] = {"radii": (1.0, 1.04, 1.1, 1.15, 1.14, 1.08, 1.0, 1.15), "stone": (0.3, 0.25)}
+#: The apple's skin is thin enough to shrivel in folds; the others keep the default, at which orange and tomato have
+#: large shallow dents and folds: looked at, at 0.02 and 0.04 (docs/decay.md).
+_APPLE: dict[str, Any] = {
+    "radii": (1.0, 1.04, 1.1, 1.15, 1.14, 1.08, 1.0, 1.15),
+    "stone": (0.3, 0.25),
+    "exocarp_thickness": 0.03,
+}
 _PEAR: dict[str, Any] = {"radii": (1.0, 1.02, 1.03, 0.98, 0.92, 1.0, 1.2, 0.98), "stone": (0.3, 0.3)}
 _TOMATO: dict[str, Any] = {"radii": (1.0, 1.05, 1.13, 1.18, 1.13, 1.05, 1.0, 1.18), "stone": (0, 0)}
 _ORANGE: dict[str, Any] = {"stone": (0, 0)}
@@ -97,7 +103,7 @@ _TABLES: Mapping[str, Mapping[str, Any]] = {
 _SIZES = {"apple": 0.03, "orange": 0.033, "peach": 0.028, "pear": 0.034, "tomato": 0.028}
 
 #: Which species a fruit grows.
-_SPECIES = {
+SPECIES = {
     "apple": "penicillium-expansum",
     "apple-neofabraea": "neofabraea",
     "orange": "penicillium-digitatum",
@@ -108,14 +114,15 @@ _SPECIES = {
 _PAPER: Mapping[str, Mapping[str, Any]] = {
     name: {**values, "peel": PEELS[name.partition("-")[0]].model_dump()} for name, values in _TABLES.items()
 }
-_FRUITS: Mapping[str, Mapping[str, Any]] = {name: _lived(name, paper, _SPECIES[name]) for name, paper in _PAPER.items()}
+#: Fruits in the temperate climate, each with its own species.
+FRUITS: Mapping[str, Mapping[str, Any]] = {name: _lived(name, paper, SPECIES[name]) for name, paper in _PAPER.items()}
 
 #: Fruits in the temperate climate, every fruit in each of the others as e.g. `orange-tropical`, and in the paper's.
 PRESETS: Mapping[str, Mapping[str, Any]] = {
-    **_FRUITS,
+    **FRUITS,
     **{
         f"{fruit}-{climate}": {**values, **air}
-        for fruit, values in _FRUITS.items()
+        for fruit, values in FRUITS.items()
         for climate, air in ENVIRONMENTS.items()
         if climate != "temperate"
     },

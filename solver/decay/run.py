@@ -18,7 +18,7 @@ from .cooked import cooked
 from .environment import deficit
 from .fields.stepping import Reached, march
 from .fields.system import System, laid
-from .names import FIELDS, MOULD, VECTORS, completed
+from .names import BESIDE, FIELDS, MOULD, VECTORS, completed
 from .params import DecayParams
 from .settings import Settings, cells_of, choose, nodes, stepped
 from .surfaces.cut import left
@@ -160,7 +160,7 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
     """Return maps on the lattice and shares of the area, those that were asked for."""
     surface, wanted = system.surface, set(need.fields)
     rot = system.rotten(reached.state.rot)
-    maps = {"rot": rot, "substrate": reached.state.rot.n[: len(rot)]}
+    maps = {"rot": rot, "substrate": reached.state.rot.n[: len(rot)], "rot_age": system.age(reached.state, reached.day)}
     found = {"rotten_share": surface.mean(rot >= _SEEN), "mean_rot": surface.mean(rot)}
     if system.mould is not None and reached.state.mould is not None:
         state = reached.state.mould
@@ -257,7 +257,7 @@ def _stacked(rows: list[dict[str, Any]], need: Need, attrs: dict[str, Any], data
             data[name] = (("stage", "fruit_number"), values)
         elif name in VECTORS:
             data[name] = (("stage", "colatitude", "azimuth", "component"), values)
-        elif name in (*FIELDS, "roasted", "flesh", "browned") and values.ndim == 2:
+        elif name in (*FIELDS, *BESIDE) and values.ndim == 2:
             data[name] = (("stage", "vertex"), values)
         elif name in (*FIELDS, "roasted"):
             data[name] = (("stage", "colatitude", "azimuth"), values)

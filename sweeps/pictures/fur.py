@@ -35,14 +35,15 @@ class Feet(NamedTuple):
 class Threads(NamedTuple):
     """Threads that stand: points (k, 4, 3) from the foot up, which feet (k), colours of foot and tip (k, 3).
 
-    width: at the foot. heads (k): half-widths of the heads, 0 where there is none. out (k, 3): the skin's normals.
+    width: at the foot, of all or of each (k). heads (k): half-widths of the heads, 0 where there is none. out (k, 3):
+    the skin's normals.
     """
 
     points: Floats
     foot: Ints
     low: Floats
     high: Floats
-    width: float
+    width: float | Floats
     heads: Floats
     out: Floats
 
@@ -76,13 +77,16 @@ def grown(where: Feet, vertices: Array, normals: Array, fur: Fur) -> Threads:
     east /= np.maximum(np.linalg.norm(east, axis=1, keepdims=True), 1e-12)
     turn = 2 * np.pi * where.spin[:, None]
     side = np.cos(turn) * east + np.sin(turn) * np.cross(out, east)
-    lean = fur.lean * (0.3 + where.size[:, None])
+    # what is one number for all threads stays one
+    width, head, leaning = (there(np.asarray(x)) if np.ndim(x) else x for x in (fur.width, fur.head, fur.lean))
+    leaning = np.reshape(leaning, (-1, 1))
+    lean = leaning * (0.3 + where.size[:, None])
     length = there(fur.length)[:, None] * (0.5 + 0.8 * where.size[:, None])
     along = np.linspace(0, 1, _POINTS)
     points = np.stack([root + length * (s * out + lean * (0.4 * s + 0.6 * s**2) * side) for s in along], axis=1)
-    points[..., 1] -= _DROOP * fur.lean * length * along**2
-    heads = np.where(where.ripe < there(fur.ripe), fur.head, 0.0)
-    return Threads(points, stands, there(fur.foot), there(fur.tip), fur.width, heads, out)
+    points[..., 1] -= _DROOP * leaning * length * along**2
+    heads = np.where(where.ripe < there(fur.ripe), head, 0.0)
+    return Threads(points, stands, there(fur.foot), there(fur.tip), width, heads, out)
 
 
 def ribbons(threads: Threads) -> tuple[Floats, Ints, Floats, Floats]:
@@ -98,7 +102,7 @@ def ribbons(threads: Threads) -> tuple[Floats, Ints, Floats, Floats]:
     way = points[:, -1] - points[:, 0]
     across = np.cross(way, out + 0.31)
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-    narrow = np.linspace(1, 0.35, steps)[None, :, None] * threads.width / 2
+    narrow = np.linspace(1, 0.35, steps)[None, :, None] * np.reshape(threads.width, (-1, 1, 1)) / 2
     left, right = points - narrow * across[:, None], points + narrow * across[:, None]
     vertices = np.stack([left, right], axis=2).reshape(-1, 3)
     share = np.repeat(np.linspace(0, 1, steps), 2)[None, :, None]

@@ -134,3 +134,36 @@ def test_full_says_nothing_more_of_a_mesh_without_coordinates_or_of_other_colour
 
     document, _ = parsed(write(replace(of_run(run), colour="rot"), EXPORTS["animation"], FULL))
     assert all(len(mesh["primitives"]) == 1 for mesh in document["meshes"])
+
+
+def test_a_bowl_of_several_kinds_has_each_ones_skin_stems_and_the_bowl() -> None:
+    solver = registry.get("decay")
+    kinds = [{"preset": "apple"}, {"preset": "pear"}, {"preset": "orange"}]
+    heap = {"kinds": kinds, "places": [(0, 1.6, 0), (2.6, 1.9, 0), (-2.7, 1.8, 0)], "bowl": 5.0, "infected": [0, 2]}
+    params = solver.parse({"heap": heap, "wounds": [{"colatitude": 60}]}, preset="apple")
+    found = solver.solve(params, Need(stages=(0.0, 6.0), quality="preview"))
+    sequence = of_run(found)
+    document, binary = parsed(write(sequence, EXPORTS["animation"], FULL))
+    names = [[document["materials"][p["material"]]["name"] for p in mesh["primitives"]] for mesh in document["meshes"]]
+    assert names == [["skin 0", "bowl", "stem", "calyx"], ["skin 6", "bowl", "stem", "calyx", "hyphae"]]
+    first = document["meshes"][0]["primitives"]
+    bowl, stems = (accessor(document, binary, part["attributes"]["POSITION"]) for part in first[1:3])
+    assert np.isclose(bowl[:, 1].min(), 0, atol=1e-6)
+    # a stem of each fruit, and at each one's top
+    points = found["mesh_position"].values[0]
+    count = len(stems) // 3
+    for b in range(3):
+        own, stem = points[found["fruit"].values == b], stems[count * b : count * (b + 1)]
+        top = own[np.argmax(own[:, 1])]
+        assert np.linalg.norm(stem[:, [0, 2]] - top[[0, 2]], axis=1).max() < 0.35
+        assert stem[:, 1].max() > top[1] + 0.03
+    # fresh skins: the pear's is greener than it is red, the orange's and the apple's are not
+    surface = next(iter(sequence))
+    tint = [surface.colour[found["fruit"].values == b].mean(axis=0) for b in range(3)]
+    assert tint[1][1] > 0.8 * tint[1][0]
+    assert tint[2][0] > 2.5 * tint[2][1]
+    assert tint[0][0] > 4 * tint[0][1]
+    # pores belong to places of each fruit, in its own frame
+    fresh = sequence.fresh
+    for b in range(3):
+        assert np.abs(fresh[found["fruit"].values == b].mean(axis=0)).max() < 0.2

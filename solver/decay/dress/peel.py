@@ -24,6 +24,12 @@ class Lesion(BaseModel):
     colour: Colour = Field((0.16, 0.075, 0.03), description="Rotten skin, linear red, green, blue [1]")
     cover: Share = Field(0.9, description="Share of the fresh colour that rot hides [1]")
     roughness: Share = Field(0.45, description="Roughness of rotten skin: low is wet [1]")
+    middle: Colour | None = Field(
+        None, description="Colour of what has long been rotten, linear red, green, blue; none: as the rest [1]"
+    )
+    paling: float = Field(4.0, gt=0, le=120, description="Age of rot at which it is halfway to that colour [day]")
+    rings: Share = Field(0.0, description="How dark rings of one age are in it, over its colour [1]")
+    ring: float = Field(2.5, gt=0, le=60, description="Age from one ring to the next [day]")
 
 
 class Peel(BaseModel):
@@ -58,7 +64,9 @@ class Peel(BaseModel):
 LESIONS: Mapping[str, Lesion] = {
     "penicillium-expansum": Lesion(colour=(0.26, 0.13, 0.045), cover=0.92, roughness=0.34),
     "penicillium-digitatum": Lesion(colour=(0.47, 0.23, 0.06), cover=0.7, roughness=0.42),
-    "neofabraea": Lesion(colour=(0.095, 0.036, 0.012), cover=0.95, roughness=0.68),
+    "neofabraea": Lesion(
+        colour=(0.095, 0.036, 0.012), cover=0.95, roughness=0.68, middle=(0.40, 0.225, 0.10), rings=0.18, ring=4.0
+    ),
     "rhizopus": Lesion(colour=(0.17, 0.072, 0.026), cover=0.85, roughness=0.33),
 }
 

@@ -49,6 +49,11 @@ class Layer:
         self.fresh = State(zero, zero, fresh, 0.0)
         self._store = rates.theta * surface.mean(fresh)
 
+    def taken_by(self, rates: Rates) -> None:
+        """Let another organism live here, where none has been until now."""
+        self._store *= rates.theta / self.rates.theta
+        self.rates = rates
+
     def share(self, state: State) -> Floats:
         """Return u + v over what the nutrient n = 1 can feed: the organism's map, 0 to 1."""
         return np.minimum((state.u + state.v) / self.rates.theta, 1.0)

@@ -35,8 +35,10 @@ from .rates import Rates, daily
 from .spawning import Landing, Spawner
 from .waiting import Seed, Waiting
 
-__all__ = ["Both", "System", "laid"]
+__all__ = ["ROTTEN", "Both", "System", "laid"]
 
+#: Map value from which a place counts as rotten.
+ROTTEN = 0.1
 
 #: Radius of a spawned colony [r1], and the share of the map above which a place is taken already.
 _SPORE = 0.06
@@ -49,7 +51,7 @@ class Both(NamedTuple):
     """State of the rot, of the mould if there is one, and the water that has evaporated, over the fresh weight.
 
     wet (n): of flesh with fields of its own, its water over the fresh one's, skin first. roasted: what an oven made of
-    it.
+    it. since (v): the day on which the skin was rotten first, infinite where it is not; None is nowhere.
     """
 
     rot: State
@@ -57,6 +59,7 @@ class Both(NamedTuple):
     water: float = 0.0
     wet: Floats | None = None
     roasted: Roasted | None = None
+    since: Floats | None = None
 
 
 def laid(params: DecayParams, cells: int) -> Surface:
@@ -210,15 +213,33 @@ class System:
         rot = self.rot.advance(state.rot, dt, rates=rates, pace=pace)
         broken = [self.broken(x) for x in (state.rot, rot)]
         water, wet = self._dried(state, (broken[0] + broken[1]) / 2, day, day + dt)
+        since = self._since(state, rot, day, dt)
         if self.mould is None or state.mould is None:
-            return Both(rot, None, water, wet)
+            return Both(rot, None, water, wet, None, since)
         ground = (self.rotten(state.rot) + self.rotten(rot)) / 2
         pace = None
         if self._cardinal:
             out = surface_activity(params, middle, flesh, (broken[0] + broken[1]) / 2, self.damp)
             pace = np.asarray(moisture(params.mould, flesh + params.mould.exposed * (out - flesh)))
         rates = self._rates(params.mould, middle, self.mould.rates)
-        return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water, wet)
+        return Both(rot, self.mould.advance(state.mould, dt, ground, rates, pace), water, wet, None, since)
+
+    def age(self, state: Both, day: float) -> Floats:
+        """Return for how long the skin has been rotten on a day (v) [day], 0 where it is not."""
+        if state.since is None:
+            return np.zeros(len(self.surface.points))
+        return np.maximum(day - state.since, 0.0)
+
+    def _since(self, state: Both, rot: State, day: float, dt: float) -> Floats | None:
+        """Return since when the skin is rotten, after a step: it became so evenly within it."""
+        before, after = self.rotten(state.rot), self.rotten(rot)
+        newly = (after >= ROTTEN) if state.since is None else (after >= ROTTEN) & np.isinf(state.since)
+        if not newly.any():
+            return state.since
+        since = np.full(len(after), np.inf) if state.since is None else state.since.copy()
+        rise = np.maximum(after - before, 1e-300)
+        since[newly] = day + dt * np.clip((ROTTEN - before) / rise, 0.0, 1.0)[newly]
+        return since
 
     def _dried(self, state: Both, broken: Floats, start: float, end: float) -> tuple[float, Floats | None]:
         """Return the water lost by the end, with a share (v) of the skin broken, and what is left where."""
@@ -256,6 +277,14 @@ class System:
         for rots in (True, False) if self.mould is not None else (True,):
             starts = self._waits[rots].day(day) if self._cardinal else day
             self._waiting.add(starts, Seed(rots, ray, self._place(ray), radius))
+
+    def taken_by(self, rot: Colony, mould: Colony) -> None:
+        """Let another species live on a fruit that is sound until now."""
+        self.params = self.params.model_copy(update={"rot": rot, "mould": mould})
+        for layer, colony in ((self.rot, rot), (self.mould, mould)):
+            if layer is not None:
+                layer.taken_by(daily(colony, self.params, self._radius))
+        self._waits = {True: Germination(rot, self.params), False: Germination(mould, self.params)}
 
     def near(self, ray: Floats, radius: float) -> Ints:
         """Return the vertices within a distance on the unit sphere of a direction, the nearest one among them."""

@@ -12,20 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ..body.body import CONTACT, DENSITY, Body
 from ..body.equilibrium import rested
 from ..body.flesh import Booked, Softened
 from ..body.material import blocks
 from ..body.newton import skin_areas
+from ..body.solid import Solid
 from ..params import DecayParams
 from ..settings import Settings
-from ..surfaces.surface import Surface
 from .balance import Loaded, Settled, settled
+from .kinds import Lot
 from .lying import Lying
 from .touching import paired
 
-__all__ = ["Bodies", "Shaped", "apart", "overlap", "stiff"]
+__all__ = ["Bodies", "Shaped", "apart", "headroom", "overlap", "stiff"]
 
 #: Gap at which two fruits touch [r1]; rounds in which surfaces are laid apart.
 TOUCHING, _ROUNDS = 0.05, 24
@@ -51,36 +52,42 @@ class Shaped(NamedTuple):
 
 
 class Bodies:
-    """Fruits of one kind that lie as given; surface: of one of them, in its own frame."""
+    """Fruits that lie as given, of the kinds of a lot."""
 
-    def __init__(self, params: DecayParams, lying: Lying, surface: Surface, settings: Settings) -> None:
-        self._params, self._lying, self._surface = params, lying, surface
-        single = params.model_copy(update={"heap": None})
-        self._body = Body(single, surface, settings.cells, settings.layers, settings.balance)
-        self._onto = self._body.onto(settings.cells)
+    def __init__(self, params: DecayParams, lying: Lying, lot: Lot, settings: Settings) -> None:
+        self._params, self._lying, self._lot = params, lying, lot
+        kinds = [
+            Body(one, surface, settings.cells, settings.layers, settings.balance)
+            for one, surface in zip(lot.params, lot.surfaces, strict=True)
+        ]
+        # of all fruits: all bodies are cut alike, whatever their shape
+        self._bodies: list[Body] = [kinds[k] for k in lot.kind]
+        self._onto = kinds[0].onto(settings.cells)
         self._tolerance = settings.balance
-        solid, count = self._body.solid, len(lying.size)
-        size = len(solid.points)
-        tets = (solid.tets[None] + size * np.arange(count)[:, None, None]).reshape(-1, 4)
+        solids, count = [body.solid for body in self._bodies], len(lying.size)
+        size = len(solids[0].points)
+        tets = (solids[0].tets[None] + size * np.arange(count)[:, None, None]).reshape(-1, 4)
         self._tets, self._pattern = tets, blocks(tets, size * count)
-        turned = np.einsum("bij,pj->bpi", lying.turn, solid.points) * lying.size[:, None, None]
-        self._fresh = (turned + lying.centre[:, None]).reshape(-1, 3)
-        cubed = np.repeat(lying.size**3, len(solid.tets))
-        self._volume = np.tile(solid.volume, count) * cubed
-        fresh = params.flesh.unit * params.firmness
-        areas = skin_areas(solid)
-        edge = float(np.cbrt(solid.volume.mean()))
-        self._contact = np.concatenate([areas * s**2 for s in lying.size]) * CONTACT * fresh / edge
+        self._skin = solids[0].skin
+        self._fresh = _placed(lying, lot.kind, [body.solid.points for body in kinds]).reshape(-1, 3)
+        cubed = np.repeat(lying.size**3, len(solids[0].tets))
+        self._volume = np.concatenate([solid.volume for solid in solids]) * cubed
+        self._contact = np.concatenate(
+            [
+                _stiffness(body.solid, s, lot.params[k])
+                for s, body, k in zip(lying.size, self._bodies, lot.kind, strict=True)
+            ]
+        )
         shared = np.repeat(self._volume / 4, 4)
         points = np.bincount(tets.ravel(), shared, size * count)
-        self._pressure = DENSITY * params.flesh.gravity * self._body.radius
-        core = np.where(np.tile(self._body.core, count), points, 0.0).reshape(count, -1)
+        self._pressure = DENSITY * params.flesh.gravity * lot.unit
+        core = np.where(np.concatenate([body.core for body in self._bodies]), points, 0.0).reshape(count, -1)
         whole = self._pressure * points.reshape(count, -1).sum(axis=1)
         self._tether = (_HOLD * whole[:, None] * core / core.sum(axis=1, keepdims=True)).ravel()
 
-    def state(self, water: float, rot: Floats) -> Softened:
+    def state(self, fruit: int, water: float, rot: Floats) -> Softened:
         """Return the flesh of a fruit that lost a share of its weight as water, with rot (v) on its surface."""
-        return self._body.state(water, rot)
+        return self._bodies[fruit].state(water, rot)
 
     def settled(
         self, states: Sequence[Softened], before: Shaped | None, watch: Callable[[], None] = lambda: None
@@ -91,11 +98,16 @@ class Bodies:
             NotConverged: it finds no rest.
 
         """
-        count, solid = len(states), self._body.solid
+        count = len(states)
         shrinkage = np.concatenate([state.shrinkage for state in states])
         young = np.concatenate([state.young for state in states])
         rest = rested(self._fresh, self._tets, shrinkage, young, self._params.flesh.poisson)
-        even = np.array([np.cbrt(np.average(state.shrinkage**3, weights=solid.volume)) for state in states])
+        even = np.array(
+            [
+                np.cbrt(np.average(state.shrinkage**3, weights=body.solid.volume))
+                for state, body in zip(states, self._bodies, strict=True)
+            ]
+        )
         last = self._fresh if before is None or before.found is None else before.found.points
         ratio = even if before is None else even / before.even
         per = last.reshape(count, -1, 3)
@@ -130,7 +142,7 @@ class Bodies:
         mass = np.concatenate([state.mass for state in states])
         shared = np.repeat(self._volume / 4, 4)
         weight: Floats = np.bincount(self._tets.ravel(), shared * np.repeat(mass, 4), len(start)).astype(float)
-        skin, count = self._body.solid.skin, len(states)
+        skin, count = self._skin, len(states)
         pairs = paired(start.reshape(count, -1, 3)[:, skin])
         held = start
         if anchor is not None:
@@ -143,20 +155,35 @@ class Bodies:
         """Return the surfaces (b, v, 3) of bodies with points (b * p, 3), as smooth as the fruit is, laid apart."""
         lying = self._lying
         count = len(lying.size)
-        found = np.empty((count, len(self._surface.points), 3))
+        fresh = [self._lot.surfaces[k].points for k in self._lot.kind]
+        found = np.empty((count, len(fresh[0]), 3))
         for b, own in enumerate(points.reshape(count, -1, 3)):
             middle = own.mean(axis=0)
             home = (own - middle) @ lying.turn[b] / lying.size[b]
-            even, left = self._body.parted_of(home)
-            there = (1 + even) * self._surface.points + self._onto @ left
+            even, left = self._bodies[b].parted_of(home)
+            there = (1 + even) * fresh[b] + self._onto @ left
             found[b] = lying.size[b] * there @ lying.turn[b].T + middle
         return apart(found, lying)
 
 
-def stiff(lying: Lying, surface: Surface) -> Floats:
+def _stiffness(solid: Solid, size: float, params: DecayParams) -> Floats:
+    """Return the stiffness of contacts at the points (p) of a fruit's body, so large [Pa r1]."""
+    fresh = params.flesh.unit * params.firmness
+    return skin_areas(solid) * size**2 * CONTACT * fresh / float(np.cbrt(solid.volume.mean()))
+
+
+def stiff(lying: Lying, lot: Lot) -> Floats:
     """Return the surfaces (b, v, 3) of fruits that keep their shape."""
-    turned = np.einsum("bij,vj->bvi", lying.turn, surface.points) * lying.size[:, None, None]
-    return apart(turned + lying.centre[:, None], lying)
+    return apart(_placed(lying, lot.kind, [surface.points for surface in lot.surfaces]), lying)
+
+
+def _placed(lying: Lying, kind: Ints, points: Sequence[Floats]) -> Floats:
+    """Return points (b, p, 3) of fruits where they lie, of those of each kind (k of (p, 3)) in its own frame."""
+    found = np.empty((len(kind), *points[0].shape))
+    for k, own in enumerate(points):
+        found[kind == k] = np.einsum("bij,pj->bpi", lying.turn, own)[kind == k]
+    placed: Floats = found * lying.size[:, None, None] + lying.centre[:, None]
+    return placed
 
 
 def apart(points: Floats, lying: Lying) -> Floats:
@@ -207,6 +234,36 @@ def _grounded(points: Floats, lying: Lying) -> bool:
     out = far > lying.ground.radius
     points[out] = middle + away[out] * ((lying.ground.radius - _CLEAR) / far[out])[:, None]
     return bool(out.any())
+
+
+def headroom(points: Floats, lying: Lying, pole: int) -> Floats:
+    """Return how far one may go straight up from a pole (b) before the next fruit, or what carries them [r1].
+
+    points: surfaces (b, v, 3). Each fruit is known by the planes that part it from others, so there may be more room.
+    """
+    foot = points[:, pole]
+    way = foot - points.mean(axis=1)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    room = np.full(len(points), np.inf)
+    pairs = paired(points)
+    for (i, j), across in zip(pairs.body, pairs.way, strict=True):
+        for one, other, out in ((i, j, across), (j, i, -across)):
+            rise = float(way[one] @ out)
+            if rise > 0:
+                gap = float((points[other] @ out).min() - foot[one] @ out)
+                room[one] = min(room[one], max(gap, 0.0) / rise)
+    if lying.ground is None:
+        sinks = way[:, 1] < 0
+        room[sinks] = np.minimum(room[sinks], foot[sinks, 1] / -way[sinks, 1])
+        return room
+    about = foot - np.array([0.0, lying.ground.height, 0.0])
+    along = np.einsum("bk,bk->b", about, way)
+    inside = np.maximum(lying.ground.radius**2 - np.einsum("bk,bk->b", about, about), 0.0)
+    # above the rim there is no bowl
+    out = -along + np.sqrt(along**2 + inside)
+    hits = foot[:, 1] + out * way[:, 1] < lying.ground.height
+    room[hits] = np.minimum(room[hits], out[hits])
+    return room
 
 
 def overlap(points: Floats, lying: Lying) -> float:

@@ -4,17 +4,44 @@ from __future__ import annotations
 
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-__all__ = ["Heap"]
+from ..presets import FRUITS
+
+__all__ = ["WALL", "Heap", "Kind"]
+
+#: Thickness of the bowl [r1].
+WALL = 0.15
+
+
+class Kind(BaseModel):
+    """Fruits of one preset in a heap: shape, size, skin, flesh and species are its own, air and rules the heap's."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    preset: str = Field(description=f"Which fruit: {', '.join(FRUITS)} [1]")
+    fruits: int = Field(1, ge=1, le=60, description="How many of it there are [1]")
+
+    @field_validator("preset")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if value not in FRUITS:
+            raise ValueError(f"a heap knows no fruit {value!r}: take one of {', '.join(FRUITS)}; the air is the heap's")
+        return value
 
 
 class Heap(BaseModel):
-    """Fruits of one kind that lie on each other; each is the fruit of the parameters, a little larger or smaller."""
+    """Fruits that lie on each other; each is that of the parameters, or of its kind, a little larger or smaller."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     fruits: int = Field(20, ge=1, le=60, description="How many there are [1]")
+    kinds: tuple[Kind, ...] = Field(
+        (),
+        max_length=12,
+        description="Fruits of several presets, numbered in this order and thrown together; without, all are the "
+        "fruit of the parameters. Lengths are in that one's r1 all the same [1]",
+    )
     bowl: float = Field(
         4.0, ge=0, le=20, description="Radius of the opening of the bowl that they lie in; 0: on a floor [r1]"
     )
@@ -48,9 +75,17 @@ class Heap(BaseModel):
 
     @model_validator(mode="after")
     def _there(self) -> Self:
-        count = len(self.places) or self.fruits
+        count = self.count
         if self.places and "fruits" in self.model_fields_set and self.fruits != count:
             raise ValueError(f"{count} places and {self.fruits} fruits: name as many, or leave fruits out")
+        if self.kinds:
+            several = sum(kind.fruits for kind in self.kinds)
+            if "fruits" in self.model_fields_set and self.fruits != several:
+                raise ValueError(f"the kinds are {several} fruits and not {self.fruits}: leave fruits out")
+            if self.places and len(self.places) != several:
+                raise ValueError(f"{len(self.places)} places for {several} fruits of all kinds: name as many")
+            if several > 60:
+                raise ValueError(f"the kinds are {several} fruits together: a heap has 60 at most")
         for number in self.infected:
             if not 0 <= number < count:
                 raise ValueError(f"infected names fruit {number}: they are numbered 0 to {count - 1}")
@@ -61,4 +96,4 @@ class Heap(BaseModel):
     @property
     def count(self) -> int:
         """How many fruits there are."""
-        return len(self.places) or self.fruits
+        return len(self.places) or sum(kind.fruits for kind in self.kinds) or self.fruits

@@ -11,11 +11,13 @@ from ...contract import Context, InvalidInput
 from ...resting import Body, Bowl, settle
 from ..params import DecayParams
 from ..surfaces.surface import lay
+from .given import WALL
+from .kinds import Lot
 
 __all__ = ["Ground", "Lying", "lie", "separate"]
 
-#: Thickness of the bowl [r1], and the facets of the shape that falls.
-_WALL, _CELLS = 0.15, 12
+#: Facets of the shape that falls.
+_CELLS = 12
 #: Of the generator's children, which one throws the fruits; the first four are a single fruit's own.
 _STREAM = 7
 
@@ -46,8 +48,8 @@ def separate(params: DecayParams, stream: int) -> np.random.Generator:
     return Context.generator(int(seeds.generate_state(1, np.uint64)[0]))
 
 
-def lie(params: DecayParams) -> Lying:
-    """Return how the heap of the parameters lies before it decays.
+def lie(params: DecayParams, lot: Lot) -> Lying:
+    """Return how the heap of the parameters lies before it decays; lot: its kinds, which are thrown together.
 
     Raises:
         InvalidInput: a fruit fell beside the bowl, where there is no floor to lie on in this model.
@@ -57,15 +59,19 @@ def lie(params: DecayParams) -> Lying:
     assert heap is not None
     count = heap.count
     random = separate(params, 0)
-    size = 1 + heap.spread * random.uniform(-1, 1, count)
-    bowl = Bowl(heap.bowl, _WALL) if heap.bowl else None
+    size = lot.scales * (1 + heap.spread * random.uniform(-1, 1, count))
+    bowl = Bowl(heap.bowl, WALL) if heap.bowl else None
     ground = None if bowl is None else Ground(bowl.sphere + bowl.thickness, bowl.sphere)
     if heap.places:
         centre, turn = np.array(heap.places, float), np.tile(np.eye(3), (count, 1, 1))
     else:
-        shape = Body(lay(params, _CELLS).points)
-        rest = settle([shape], [0] * count, size, bowl, int(random.integers(2**31)))
-        centre, turn = rest.centre, _matrices(rest.turn)
+        shapes = [Body(lay(one, _CELLS).points) for one in lot.params]
+        seed = int(random.integers(2**31))
+        # who falls first lies at the bottom: several kinds fall in any order
+        order = random.permutation(count) if lot.names else np.arange(count)
+        rest = settle(shapes, lot.kind[order].tolist(), size[order], bowl, seed)
+        back = np.argsort(order)
+        centre, turn = rest.centre[back], _matrices(rest.turn[back])
     inside = np.zeros(count, np.bool_)
     if ground is not None and bowl is not None:
         aside = np.hypot(centre[:, 0], centre[:, 2])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import KDTree
 
 from ...arrays import Floats, Ints
 from ...contract import InvalidGeometry
@@ -86,19 +87,19 @@ def joined(
             "the outermost flesh is thicker than what is left below it.", advice="Take a smaller within.skin."
         )
     shrunk, outside, above = np.cbrt(less), boundary(tets), len(surface.points)
-    below = nearest(surface.points, flesh, outside)
+    over, under, share = _met(surface.points, flesh, outside)
     rows = np.repeat(np.arange(above), np.diff(surface.start))
     keep = rows < surface.near
-    # half of the outermost flesh lies between its middle and the first points of the rest
-    through = (2 / thickness) * surface.area[:, None] * below.shares
+    # half of the outermost flesh lies between its middle and the rest
+    through = (2 / thickness) * surface.area[over] * share
     ends = np.concatenate(
         [
             np.stack([rows[keep], surface.near[keep]], axis=1),
-            np.stack([np.repeat(np.arange(above), 3), above + outside[below.face].ravel()], axis=1),
+            np.stack([over, above + under], axis=1),
             above + links.ends,
         ]
     )
-    weight = np.concatenate([thickness * surface.weight[keep], through.ravel(), shrunk * links.weight])
+    weight = np.concatenate([thickness * surface.weight[keep], through, shrunk * links.weight])
     volume = np.concatenate([thickness * surface.area, less * links.volume])
     size = len(volume)
     _evened(volume, ends, np.abs(weight), above)
@@ -118,6 +119,24 @@ def joined(
         core,
         cells,
     )
+
+
+def _met(skin: Floats, flesh: Floats, outside: Ints) -> tuple[Ints, Ints, Floats]:
+    """Return which vertices (m) of the skin lie over which points (m) of the flesh, and shares (m) of their areas.
+
+    A vertex lies over the one point that is nearest, and over those besides that no vertex would lie over else. Shared
+    among the corners of a face, so short a way would join these to each other, and rot would run along below the skin.
+    """
+    below = nearest(skin, flesh, outside)
+    under = outside[below.face, below.shares.argmax(axis=1)]
+    corners = flesh[outside]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 6
+    of = np.bincount(outside.ravel(), np.repeat(areas, 3), len(flesh))
+    bare = np.setdiff1d(np.unique(outside), under)
+    over = np.concatenate([np.arange(len(skin)), KDTree(skin).query(flesh[bare])[1]])
+    under = np.concatenate([under, bare])
+    share = of[under] / np.bincount(over, of[under], len(skin))[over]
+    return over, under, share
 
 
 def _evened(volume: Floats, ends: Ints, weight: Floats, above: int) -> None:

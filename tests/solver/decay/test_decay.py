@@ -7,6 +7,7 @@ import pytest
 
 from solver.contract import Context, InvalidInput, Need
 from solver.decay import SOLVER, DecayParams, Wound
+from solver.decay.climate import warmth
 from solver.decay.environment import damping, deficit, saturation, water_lost
 from solver.decay.fields.colony import PAPER_MOULDS, PAPER_ROT
 from solver.decay.fields.spawning import Spawner
@@ -105,6 +106,26 @@ def test_frames_do_not_change_the_rot():
             assert np.array_equal(x.u, y.u)
             assert np.array_equal(x.n, y.n)
         assert a.state.water == b.state.water
+
+
+def test_the_age_of_rot_is_the_time_since_its_front_came():
+    """Age falls along a meridian by the distance over the front's speed, and day less age stays."""
+    # without noise everything depends on the distance from the wound alone
+    even = {"noise": 0.0, "unevenness": 0.0, "spawning": 0.0, "rot_spawning": 0.0, "radii": (1.0,) * 8}
+    found = System(SOLVER.parse({**even, "wounds": ({"colatitude": 0},)}), 32, False)
+    early, late = stages(found, (7.0, 9.0))
+    ages = [found.age(at.state, at.day) for at in (early, late)]
+    old = ages[0] > 0
+    assert 50 < old.sum() < len(old) / 2
+    # within a step it comes evenly, and a stage that is shown ends one of its own
+    np.testing.assert_allclose(ages[1][old] - ages[0][old], 2.0, atol=1e-3)
+    assert ((ages[1] > 0) == (found.rot.share(late.state.rot) >= 0.1)).all()
+    ring = (ages[1] > 0.2) & (ages[1] < 1.8)
+    far = np.arccos(np.clip(found.surface.points[:, 1] / np.linalg.norm(found.surface.points, axis=1), -1, 1))
+    slope, _ = np.polyfit(ages[1][ring], 1.04 * far[ring], 1)
+    # the front of the model runs at the speed that its species was measured to have, in mm a day
+    speed = found.params.rot.speed * float(warmth(found.params.rot, found.params.temperature)) / found._radius
+    assert -slope == pytest.approx(speed, rel=0.1)
 
 
 def test_the_rot_without_mould_is_the_rot_with_it():

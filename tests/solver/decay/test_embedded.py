@@ -114,7 +114,8 @@ def test_the_fruit_s_own_mesh_settles_as_the_fruit_does() -> None:
     fresh = lay(DecayParams.model_validate({"stone": (0, 0)}), 24)
     soft = {"stone": (0, 0), "firmness": 4.0, "wounds": [], "humidity": 20.0}
     own = run(trimesh.Trimesh(fresh.points, fresh.faces, process=False), (15.0,), **soft)
-    params = SOLVER.parse({"body": "quasi-static", "radii": (1.0,) * 8, **soft}, preset="apple")
+    own_skin = {"radii": (1.0,) * 8, "exocarp_thickness": 0.04}
+    params = SOLVER.parse({"body": "quasi-static", **own_skin, **soft}, preset="apple")
     fruit = SOLVER.solve(params, Need(fields=BODY, stages=(15.0,), quality="preview"))
     for name in ("volume", "mass", "water_lost", "density"):
         assert float(own[name][0]) == pytest.approx(float(fruit[name][0]), rel=0.01), name

@@ -113,14 +113,15 @@ def test_planes_are_pushed_alike_from_both_sides():
 def test_the_lower_fruits_carry_the_upper_one():
     """What the floor pushes up is the weight of all three."""
     from solver.decay.heap import bodies as of
+    from solver.decay.heap.kinds import sorted_out
     from solver.decay.heap.lying import lie
-    from solver.decay.surfaces.surface import lay
 
     params = heap(firmness=8)
     settings = choose(params, "preview")
-    surface = lay(params, settings.cells)
-    heaped = of.Bodies(params, lie(params), surface, settings)
-    fresh = heaped.state(0.0, np.zeros(len(surface.points)))
+    lot = sorted_out(params, params.model_copy(update={"heap": None}), settings.cells)
+    surface = lot.surfaces[0]
+    heaped = of.Bodies(params, lie(params, lot), lot, settings)
+    fresh = heaped.state(0, 0.0, np.zeros(len(surface.points)))
     found = heaped.settled([fresh] * 3, None).found
     assert found is not None
     single = Body(params.model_copy(update={"heap": None}), surface, settings.cells, settings.layers, settings.balance)

@@ -55,6 +55,17 @@ def test_rot_has_the_colour_and_the_gloss_of_its_species() -> None:
         assert painted(preset, rot=1.0, mould=1.0).roughness[0] == 1.0
 
 
+def test_a_spot_of_bulls_eye_rot_is_dark_about_a_paler_middle_in_rings() -> None:
+    """Brown to dark brown with a lighter brown to tan centre (WSU Tree Fruit)."""
+    rim, middle = (painted("apple-neofabraea", rot=1.0, rot_age=days).colour[0] for days in (0.5, 16.0))
+    assert middle.sum() > 2.5 * rim.sum()
+    assert middle[0] > middle[1] > middle[2]
+    light, dark = (painted("apple-neofabraea", rot=1.0, rot_age=days).colour[0].sum() for days in (16.0, 18.0))
+    assert dark < 0.9 * light
+    young, old = (painted("apple", rot=1.0, rot_age=days).colour[0] for days in (0.5, 16.0))
+    assert np.array_equal(young, old)  # blue mould's has no such middle
+
+
 def test_ripe_green_mould_is_olive_and_its_margin_white() -> None:
     ripe = painted("orange", rot=1.0, mould=1.0).colour[0]
     assert ripe[1] > 0.95 * ripe[0] > 1.5 * ripe[2]

@@ -5,19 +5,20 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from solver.contract import InvalidGeometry, Need
+from solver.contract import Context, InvalidGeometry, Need
 from solver.decay import SOLVER, DecayParams
 from solver.decay.body.flesh import Flesh, softened
 from solver.decay.environment import reference_radius, saturation
 from solver.decay.fields.diffusion import linked, rkl2, stages_for
 from solver.decay.fields.layer import Layer
+from solver.decay.fields.stepping import march
 from solver.decay.fields.system import System
 from solver.decay.surfaces.surface import Surface, extent, lay, triangulated
 from solver.decay.within import water
 from solver.decay.within.given import Within
 from solver.decay.within.joint import joined
 from solver.fruit import Fruit
-from solver.geometry.stuffing import stuffed
+from solver.geometry.stuffing import boundary, stuffed
 from solver.geometry.tetrahedra import edges, within
 
 NO_ROT = np.empty(0)
@@ -129,7 +130,7 @@ def test_a_ball_dries_as_the_series_says(monkeypatch):
     On the first days what dries is thinner than the lattice's edge; the error falls with it and with the edge.
     """
     air = {"transpiration": 3.0, "temperature": 20.0, "open_transpiration": 0.0}
-    coarse, params = ball_of_water(monkeypatch, **air)
+    coarse, params = ball_of_water(monkeypatch, 3000, **air)
     fine, _ = ball_of_water(monkeypatch, 24000, **air)
     radius = (params.weight * 1e-6 / (4 / 3 * np.pi)) ** (1 / 3)
     speed = 3.0 * 1e-6 * float(saturation(20.0)) / (1e6 * 0.8)
@@ -145,8 +146,8 @@ def test_a_ball_dries_as_the_series_says(monkeypatch):
             left = sum(6 * biot**2 * np.exp(-b * b * fo) / (b * b * (b * b + biot * (biot - 1))) for b in roots)
             errors.append(abs(found.lost(wet) / (0.8 * (1 - left)) - 1))
     # days 5 to 30 of both
-    assert max(errors[:6]) < 0.035
-    assert max(errors[8:]) < 0.012
+    assert max(errors[:6]) < 0.03
+    assert max(errors[8:]) < 0.007
     assert all(b < 0.8 * a for a, b in zip(errors[:6], errors[6:], strict=True))
 
 
@@ -210,6 +211,38 @@ def test_a_lesion_is_as_deep_as_it_is_wide_and_its_budget_is_closed():
     # within the lattice's own edge
     assert deep == pytest.approx(wide, abs=0.1)
     assert system.rot.budget_error(state.rot) < 1e-12
+
+
+def test_how_much_rots_does_not_hang_on_the_mesh():
+    """A vertex of the skin that were tied to three points of the flesh would carry rot from one to the other, below it.
+
+    So tied, coarse flesh rotted by a fifth more than four times as many points did, and each finer mesh by less.
+    """
+    found = []
+    for count in (3000, 12000):
+        even = {"stone": (0, 0), "noise": 0.0, "unevenness": 0.0, "spawning": 0.0, "rot_spawning": 0.0}
+        params = DecayParams.parse({**even, "wounds": ({"colatitude": 37, "radius": 0.3},), "within": {}})
+        system = System(params, 32, False, None, count)
+        *_, last = march(system, (6.0,), 1e-4, 0.2, Context())
+        assert system.joint is not None
+        found.append(system.joint.mean(system.rot.share(last.state.rot)))
+    assert found[0] == pytest.approx(found[1], rel=0.03)
+
+
+def test_all_of_the_skin_lies_over_flesh_and_all_of_its_surface_below_skin():
+    """Where the skin is finer, a vertex lies over one point; where it is coarser, its area is shared among several."""
+    for cells, count in ((32, 3000), (8, 12000)):
+        ball = joined(lay(Fruit(stone=(0, 0)), cells), count, 0.01)
+        above = len(ball.cover.points)
+        rows = np.repeat(np.arange(len(ball.area)), np.diff(ball.start))
+        across = (rows < above) & (ball.near >= above)
+        through = np.bincount(rows[across], ball.weight[across], above)
+        np.testing.assert_allclose(through, 2 / 0.01 * ball.cover.area, rtol=1e-12)
+        outside = above + np.unique(boundary(ball.tets))
+        met = set(ball.near[across].tolist())
+        assert met == set(outside.tolist())
+        several = np.bincount(rows[across], minlength=above) > 1
+        assert several.mean() < 0.02 if cells == 32 else several.mean() > 0.98
 
 
 def test_rot_that_starts_inside_comes_to_the_skin_and_takes_nothing_from_nowhere():
