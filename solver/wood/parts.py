@@ -12,6 +12,7 @@ __all__ = [
     "Body",
     "Corner",
     "Cut",
+    "Fork",
     "Grain",
     "Grip",
     "GripPoint",
@@ -89,6 +90,17 @@ class Grain(_Part):
             if knot.radius > 0.5 * math.hypot(knot.at[1] - self.pith[0], knot.at[2] - self.pith[1]):
                 raise ValueError("a knot is wider than half its distance from the pith: take a smaller radius")
         return self
+
+
+class Fork(_Part):
+    """Where some of the stem's rods bend away, upwards, into a branch. Boxes of grips and cuts see both unforked."""
+
+    at: float = Field(gt=0, le=10, description="Where on the bundle its limbs part [m]")
+    angle: float = Field(0.5, ge=0.1, le=1.6, description="Angle of the branch to the stem below [radian]")
+    lean: float = Field(
+        0.2, ge=0, le=1.6, description="Angle of the stem above to the stem below, away from it [radian]"
+    )
+    share: float = Field(0.4, ge=0.1, le=0.9, description="Share of the stem's section that goes into the branch [1]")
 
 
 class Notch(_Part):

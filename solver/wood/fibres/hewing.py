@@ -16,6 +16,7 @@ from ..model.joining import stretched
 from ..model.outline import corners, inside
 from ..model.state import Wood
 from ..params import WoodParams
+from ..shape.taper import thickness
 from .timber import hews
 
 __all__ = ["hewn"]
@@ -24,6 +25,12 @@ __all__ = ["hewn"]
 _HALVINGS = 40
 #: Rods of no more vertices, or of fewer bonds, are chips; rounds in which what hung on chips goes with them.
 _VERTICES, _BONDS, _ROUNDS = 2, 6, 8
+
+
+def _even(wood: Wood, params: WoodParams) -> np.ndarray:
+    """Return where vertices (v, 2) [m] are in the section, as if it did not taper."""
+    found: np.ndarray = wood.straight[:, 1:] / thickness(wood.straight[:, 0], params)[:, None]
+    return found
 
 
 def _passes(outline: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -36,13 +43,13 @@ def _passes(outline: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return low
 
 
-def _kept(wood: Wood, outline: np.ndarray) -> np.ndarray:
+def _kept(wood: Wood, outline: np.ndarray, section: np.ndarray) -> np.ndarray:
     """Return which vertices (v,) are left: those within, but for chips that next to nothing holds, which would dangle.
 
     Ghosts count with the rods that they clamp.
     """
     rods, bonds = wood.rods, wood.bonds
-    within = inside(outline, wood.straight[:, 1:]).reshape(len(wood.grid), -1)
+    within = inside(outline, section).reshape(len(wood.grid), -1)
     for _ in range(_ROUNDS):
         starts = within & ~np.column_stack([np.zeros(len(within), bool), within[:, :-1]])
         run = np.cumsum(starts.ravel()).reshape(within.shape) * within
@@ -65,8 +72,8 @@ def hewn(wood: Wood, params: WoodParams) -> Wood:
     if not hews(params):
         return wood
     rods, bonds = wood.rods, wood.bonds
-    outline, section = corners(params), wood.straight[:, 1:]
-    within = _kept(wood, outline)
+    outline, section = corners(params), _even(wood, params)
+    within = _kept(wood, outline, section)
     a, b = within[rods.a], within[rods.b]
     before, slope = stretched(wood.motion.x, rods, bonds)
     out = np.flatnonzero(~a & ~b)
