@@ -55,6 +55,7 @@ _NUMBERS = (
     "grip_impulse",
     "grip_moment",
     "fracture_energy",
+    "crushing_energy",
     "crack_area",
     "tip_position",
     "body_force",
@@ -71,7 +72,7 @@ _NUMBERS = (
 )
 
 #: On request: they are as large as the rods' places.
-_STRESSES = ("rod_strain", "rod_stress", "bond_position", "bond_tension", "bond_shear", "bond_damage")
+_STRESSES = ("rod_strain", "rod_stress", "rod_crushed", "bond_position", "bond_tension", "bond_shear", "bond_damage")
 
 SOLVER = Solver(
     name="wood",

@@ -125,7 +125,9 @@ def _strained(params: WoodParams) -> float:
     spans = {"none": 8.0, "start": 2.0, "both": 12.0}[params.clamp]
     moment = across * params.length + weight * params.length / spans
     strain = moment * params.wide / (section * params.wide**2 / 4 * params.stiffness)
-    return (strain + abs(params.tip_load[0]) / (section * params.stiffness)) / params.strain_limit
+    return (strain + abs(params.tip_load[0]) / (section * params.stiffness)) / min(
+        params.strain_limit, params.crush_strain
+    )
 
 
 def error_at(params: WoodParams, scaling: float) -> float:

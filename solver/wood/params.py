@@ -120,6 +120,14 @@ class WoodParams(Params):
     strain_limit: float = Field(
         0.01, gt=0, le=10, description="Tensile strain at which a rod breaks", json_schema_extra={"units": "1"}
     )
+    compressive_strength: float | None = Field(
+        None,
+        gt=0,
+        le=1e12,
+        description="Compressive stress along the rods at which they crush: they bear no more, and stay as short as "
+        "they were pressed; by default they bear any",
+        json_schema_extra={"units": "Pa"},
+    )
     toughness: float = Field(
         250.0,
         gt=0,
@@ -241,6 +249,11 @@ class WoodParams(Params):
     def wide(self) -> float:
         """Radius of the disk of the section's area [m]."""
         return (abs(polygon_area(self.outline)) / math.pi) ** 0.5 if self.outline else self.radius
+
+    @property
+    def crush_strain(self) -> float:
+        """Compressive strain at which rods crush; inf: at none."""
+        return math.inf if self.compressive_strength is None else self.compressive_strength / self.stiffness
 
     @property
     def bent(self) -> bool:

@@ -136,6 +136,7 @@ def _rods(at: _Layout, grain: Field, params: WoodParams) -> Rods:
         params.stiffness * _hinges(at) ** 2 / (4 * np.pi) * _stiff(at, grain, params),
         np.ones(len(before), np.uint8),
         np.sqrt(section / np.pi),
+        np.ones(len(a)),
     )
 
 
