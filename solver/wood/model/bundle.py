@@ -8,7 +8,7 @@ import numpy as np
 
 from ...contract import Context
 from ..fibres.paths import crowded, placed
-from ..fibres.timber import hews, timber
+from ..fibres.timber import LEAST, hews, timber
 from ..params import WoodParams
 from ..shape.taper import tapered, thickness
 from .arrays import Rods, Turns
@@ -18,7 +18,7 @@ from .gripping import courses, pins_of
 from .joining import bodied, bonded
 from .motion import Motion
 from .outline import area as outlined
-from .outline import corners, inside, stand
+from .outline import corners, covered, stand
 from .sawing import sawn
 from .state import Wood
 
@@ -100,7 +100,7 @@ def _layout(points: np.ndarray, area: np.ndarray, s: np.ndarray, params: WoodPar
 
 
 def _filled(straight: np.ndarray, area: np.ndarray, params: WoodParams) -> float:
-    """Return by what sections are to be multiplied so that rods fill what is hewn: a rod is inside or not, as a whole.
+    """Return by what sections are to be multiplied so that what is left of rods fills what is hewn.
 
     straight (k, n, 3) [m], area (k,) [m2].
     """
@@ -108,8 +108,10 @@ def _filled(straight: np.ndarray, area: np.ndarray, params: WoodParams) -> float
         return 1.0
     outline, ends = corners(params), np.clip(straight[..., 0], 0, params.length)
     middle = (straight[:, 1:, 1:] + straight[:, :-1, 1:]) / 2
-    within = inside(outline, middle.reshape(-1, 2)).reshape(middle.shape[:2])
-    filled = float((area[:, None] * np.diff(ends, axis=1) * within).sum())
+    cell = np.repeat(np.sqrt(area), middle.shape[1])
+    left = covered(outline, middle.reshape(-1, 2), cell).reshape(middle.shape[:2])
+    left = np.where(left > LEAST, left, 0.0)
+    filled = float((area[:, None] * np.diff(ends, axis=1) * left).sum())
     return outlined(outline) * params.length / filled if filled > 0 else 1.0
 
 

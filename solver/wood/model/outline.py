@@ -11,7 +11,7 @@ from ...contract import InvalidGeometry
 from ..params import WoodParams
 from .section import areas, balanced, place
 
-__all__ = ["Standing", "area", "chords", "corners", "inside", "sawn_through", "stand"]
+__all__ = ["Standing", "area", "chords", "corners", "covered", "inside", "sawn_through", "stand"]
 
 #: Corners of the polygon that stands for a disk, of the disk's area.
 _DISK = 96
@@ -57,6 +57,21 @@ def inside(outline: np.ndarray, points: np.ndarray) -> np.ndarray:
         if z0 != z1:
             odd ^= ((z0 > z) != (z1 > z)) & (y < y0 + (z - z0) * (y1 - y0) / (z1 - z0))
     return odd
+
+
+def covered(outline: np.ndarray, points: np.ndarray, wide: np.ndarray) -> np.ndarray:
+    """Return the share (n,) of square cells wide (n,) [m] about points (n, 2) [m] that lies within a polygon (m, 2).
+
+    The side nearest to a point cuts its cell straight: what corners and further sides cut off is left out.
+    """
+    nearest = np.full(len(points), np.inf)
+    for first, second in zip(outline, np.roll(outline, -1, 0), strict=True):
+        way = second - first
+        along = np.clip((points - first) @ way / max(float(way @ way), 1e-300), 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(points - first - along[:, None] * way, axis=1))
+    depth = np.where(inside(outline, points), nearest, -nearest)
+    found: np.ndarray = np.clip(0.5 + depth / wide, 0, 1)
+    return found
 
 
 def chords(outline: np.ndarray, normal: np.ndarray, offset: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...contract import Context
 from ...meshes import Frame
+from ..fibres.timber import hews
 from ..model.grain import Field
 from ..model.state import Wood
 from ..params import WoodParams
@@ -41,6 +42,7 @@ class Skin:
         width = self.section.radius
         self._grain = Field(4 * width, width / 2, generator)
         self._params = params
+        self._wide = _wide(wood, self.section.radius) if hews(params) else None
         self._grown = _grown(self.section, self._pairs, bonded(wood, self._span, self._pairs), params)
 
     def frame(self, wood: Wood, covered: bool = False) -> Frame:
@@ -50,7 +52,11 @@ class Skin:
         holds = bonded(wood, self._span, self._pairs)
         found = found._replace(across=turned(found, section, self._pairs, holds))
         begin, row, number = corners(found, section)
-        thin = thickness(found.place, self._params)[row, None]
+        thin = thickness(found.place, self._params)
+        if self._wide is not None:
+            part = found.place / self._span.length * (self._wide.shape[1] - 1)
+            thin = thin * self._wide[found.rod, np.clip(np.rint(part).astype(int), 0, self._wide.shape[1] - 1)]
+        thin = thin[row, None]
         away = thin * (section.places[section.corner] - section.points[section.owner])[number]
         single = self._set_off(found, row, away)
         group, places = aligned(single, begin, found, section, self._pairs, holds)
@@ -119,6 +125,13 @@ class Skin:
         last = np.append(found.piece[1:] != found.piece[:-1], True)[row[mine]]
         faces[~last] = faces[~last][:, :, ::-1]
         return [(points, faces.reshape(-1, 3) + count)]
+
+
+def _wide(wood: Wood, radius: float) -> np.ndarray:
+    """Return how wide rods (k, edges) of mean `radius` [m] are over what they are where all of them is within."""
+    own = wood.rods.radius.reshape(len(wood.grid), -1)
+    found: np.ndarray = own / np.maximum(own.max(1, keepdims=True), 0.9 * radius)
+    return found
 
 
 def _grown(section: Section, pairs: Pairs, holds: np.ndarray, params: WoodParams) -> np.ndarray:

@@ -11,6 +11,7 @@ from solver.wood.fibres.hewing import hewn
 from solver.wood.fibres.paths import crowded, named, placed
 from solver.wood.forces.hessian import Stiffness
 from solver.wood.model.bundle import lay
+from solver.wood.model.outline import covered
 from solver.wood.model.state import Wood, scratch_for
 from solver.wood.stepping.explicit import forces
 
@@ -120,11 +121,12 @@ def test_what_is_hewn_has_its_outline_its_weight_and_its_load(way):
     asked = params(WAYS[way], gravity=9.81, tip_load=(0.0, 3.0, 0.0), rods=100)
     wood = hewn(lay(asked, 16), asked)
     whole, free = (wood.rods.alive == 1) & (wood.rods.k > 0), wood.motion.held == 0
+    # less than .15 of a rod is within where its middle is farther out than .35 of its width
     for end in (wood.rods.a[whole], wood.rods.b[whole]):
-        assert np.hypot(*wood.straight[end, 1:].T).max() < RADIUS
+        assert np.hypot(*wood.straight[end, 1:].T).max() < RADIUS + 0.4 * (np.pi * RADIUS**2 / 100) ** 0.5
     full = np.pi * RADIUS**2 * LENGTH * 600
-    # half an edge of it is the clamp's
-    assert wood.motion.mass[free].sum() == pytest.approx(full * (1 - 0.5 / 15), rel=0.03)
+    # half an edge of it is the clamp's; chips are left out, more of them since rods have part of their section at the rim
+    assert wood.motion.mass[free].sum() == pytest.approx(full * (1 - 0.5 / 15), rel=0.04)
     assert wood.motion.load[free, 1].sum() == pytest.approx(3.0)
     assert wood.motion.load[free, 2].sum() == pytest.approx(-9.81 * wood.motion.mass[free].sum())
     on = wood.bonds.on > 0
@@ -157,8 +159,8 @@ def test_sloped_grain_is_softer_and_knots_are_too():
     loads: dict[str, object] = {"tip_load": (0.0, 0.0, -1.0), "length": 0.3, "vertices": 31}
     straight = sag(params({}, **loads))
     slope = straight / sag(params({"spiral": TEN, "pith": (0.0, 1.0)}, **loads))
-    # the beam of oblique fibres has 0.73; rods that run out bear nothing near their ends (docs/wood.md)
-    assert 0.5 < slope < 0.73
+    # the beam of oblique fibres has 0.73
+    assert 0.64 < slope < 0.76
     assert straight / sag(params({"spiral": TEN / 2, "pith": (0.0, 1.0)}, **loads)) > slope + 0.1
     knot = {"at": (0.03, 0.0, 0.01), "radius": 0.004}
     assert 0.8 < straight / sag(params({"knots": [knot]}, **loads)) < 0.99
@@ -184,3 +186,19 @@ def test_a_hewn_stick_stays_at_rest_until_it_is_loaded_and_has_a_surface():
     mesh = found.mesh_position.values[0]
     mesh = mesh[np.isfinite(mesh).all(-1)] if mesh.ndim == 2 else mesh
     assert np.abs(mesh[..., 1:]).max() < 1.6 * RADIUS
+
+
+def test_cells_are_covered_as_far_as_the_outline_reaches():
+    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    points = np.array([(0.0, 0.0), (1.0, 0.0), (0.9, 0.2), (1.1, 0.2), (1.3, 0.0), (0.0, -1.05)])
+    wanted = [1.0, 0.5, 0.75, 0.25, 0.0, 0.375]
+    assert covered(square, points, np.full(6, 0.4)) == pytest.approx(wanted)
+
+
+def test_a_little_slope_changes_little():
+    """What runs out is cut obliquely: sticks of a twentieth of slope are as stiff as the beam, within a tenth."""
+    loads: dict[str, object] = {"tip_load": (0.0, 0.0, -1.0), "length": 0.3, "vertices": 61}
+    straight = sag(params({}, **loads))
+    for slope, wanted in ((0.005, 1.0), (0.05, 1 / (1 + 0.05**2 * 10e9 / 0.7e9))):
+        for pith in ((1.0, 0.0), (0.0, 1.0)):
+            assert straight / sag(params({"spiral": slope, "pith": pith}, **loads)) == pytest.approx(wanted, rel=0.1)

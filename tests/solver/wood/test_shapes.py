@@ -10,6 +10,7 @@ from solver.wood import SOLVER, WoodParams
 from solver.wood.forces.hessian import Stiffness
 from solver.wood.model.bundle import lay
 from solver.wood.model.state import Wood, scratch_for
+from solver.wood.shape.curve import Curve
 from solver.wood.stepping.explicit import forces
 
 E, G, RADIUS = 10e9, 0.7e9, 0.01
@@ -86,6 +87,17 @@ def test_a_circle_by_points_is_a_curvature(clamp):
     assert by_points.motion.x[free] == pytest.approx(by_number.motion.x[free], abs=1e-7)
     assert by_points.rods.rest[real] == pytest.approx(by_number.rods.rest[real], abs=1e-7)
     assert by_points.bonds.rest == pytest.approx(by_number.bonds.rest, abs=1e-7)
+
+
+def test_sections_are_carried_along_without_spin():
+    """The change of one axis of the section has no part along the other, and the curve is passed evenly."""
+    curve = Curve(HELIX)
+    s = np.linspace(0, curve.length, 4001)
+    place, tangent, first, second = curve.frame(s)
+    spin = (np.diff(first, axis=0) * (second[1:] + second[:-1]) / 2).sum(1) / np.diff(s)
+    assert np.abs(spin).max() < 1e-3 / curve.length
+    assert np.abs((tangent * first).sum(1)).max() < 1e-12
+    assert np.linalg.norm(np.diff(place, axis=0), axis=1) == pytest.approx(np.diff(s), rel=1e-5)
 
 
 def torques(wood: Wood) -> np.ndarray:
