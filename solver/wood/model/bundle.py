@@ -18,7 +18,7 @@ from .gripping import courses, pins_of
 from .joining import bodied, bonded
 from .motion import Motion
 from .outline import area as outlined
-from .outline import corners, covered, stand
+from .outline import corners, covered, drawn_in, stand
 from .sawing import sawn
 from .state import Wood
 
@@ -83,7 +83,7 @@ def _layout(points: np.ndarray, area: np.ndarray, s: np.ndarray, params: WoodPar
     fibre = np.concatenate([row[:, :, None], np.repeat(points[:, None, :], count, 1)], -1)
     straight, section = fibre, np.repeat(area[:, None], count - 1, 1)
     if params.grain.deviates or params.taper != 1:
-        even = placed(fibre, params)
+        even = _within(placed(fibre, params), area, params)
         straight = tapered(even, params)
         edge, middle = straight[:, 1:] - straight[:, :-1], (fibre[:, 1:] + fibre[:, :-1]) / 2
         # what is cut by a section stands oblique in it, and is squeezed where fibres crowd round a knot
@@ -97,6 +97,15 @@ def _layout(points: np.ndarray, area: np.ndarray, s: np.ndarray, params: WoodPar
     number = np.arange(rods * count, dtype=np.int32).reshape(rods, count)
     grid = number[:, int(ghosts[0]) : count - int(ghosts[1])]
     return _Layout(area, fibre, straight, laid(straight, points, params), number, grid, ghosts, section)
+
+
+def _within(even: np.ndarray, area: np.ndarray, params: WoodParams) -> np.ndarray:
+    """Return fibres (k, n, 3) [m] that run out of the wood where what is left of them is; area (k,) [m2]."""
+    if not hews(params):
+        return even
+    cell = np.repeat(np.sqrt(area), even.shape[1])
+    section = drawn_in(corners(params), even[..., 1:].reshape(-1, 2), cell).reshape(*even.shape[:2], 2)
+    return np.concatenate([even[..., :1], section], -1)
 
 
 def _filled(straight: np.ndarray, area: np.ndarray, params: WoodParams) -> float:

@@ -11,7 +11,7 @@ from solver.wood.fibres.hewing import hewn
 from solver.wood.fibres.paths import crowded, named, placed
 from solver.wood.forces.hessian import Stiffness
 from solver.wood.model.bundle import lay
-from solver.wood.model.outline import covered
+from solver.wood.model.outline import covered, drawn_in
 from solver.wood.model.state import Wood, scratch_for
 from solver.wood.stepping.explicit import forces
 
@@ -121,11 +121,10 @@ def test_what_is_hewn_has_its_outline_its_weight_and_its_load(way):
     asked = params(WAYS[way], gravity=9.81, tip_load=(0.0, 3.0, 0.0), rods=100)
     wood = hewn(lay(asked, 16), asked)
     whole, free = (wood.rods.alive == 1) & (wood.rods.k > 0), wood.motion.held == 0
-    # less than .15 of a rod is within where its middle is farther out than .35 of its width
     for end in (wood.rods.a[whole], wood.rods.b[whole]):
-        assert np.hypot(*wood.straight[end, 1:].T).max() < RADIUS + 0.4 * (np.pi * RADIUS**2 / 100) ** 0.5
+        assert np.hypot(*wood.straight[end, 1:].T).max() < RADIUS
     full = np.pi * RADIUS**2 * LENGTH * 600
-    # half an edge of it is the clamp's; chips are left out, more of them since rods have part of their section at the rim
+    # half an edge of it is the clamp's; chips are left out, the more as rods have only part of a section at the rim
     assert wood.motion.mass[free].sum() == pytest.approx(full * (1 - 0.5 / 15), rel=0.04)
     assert wood.motion.load[free, 1].sum() == pytest.approx(3.0)
     assert wood.motion.load[free, 2].sum() == pytest.approx(-9.81 * wood.motion.mass[free].sum())
@@ -189,10 +188,14 @@ def test_a_hewn_stick_stays_at_rest_until_it_is_loaded_and_has_a_surface():
 
 
 def test_cells_are_covered_as_far_as_the_outline_reaches():
+    """And stand for what is left of them at its centroid."""
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    points = np.array([(0.0, 0.0), (1.0, 0.0), (0.9, 0.2), (1.1, 0.2), (1.3, 0.0), (0.0, -1.05)])
-    wanted = [1.0, 0.5, 0.75, 0.25, 0.0, 0.375]
-    assert covered(square, points, np.full(6, 0.4)) == pytest.approx(wanted)
+    points, wide = np.array([(0.0, 0.0), (1.0, 0.0), (0.9, 0.2), (1.1, 0.2), (1.3, 0.0), (0.0, -1.05)]), np.full(6, 0.4)
+    there = drawn_in(square, points, wide)
+    assert covered(square, there, wide) == pytest.approx([1.0, 0.5, 0.75, 0.25, 0.0, 0.375])
+    # from 0.8, 0.7 and 0.9 to the side
+    assert there[1:4, 0] == pytest.approx([0.9, 0.85, 0.95])
+    assert there[0] == pytest.approx(points[0])
 
 
 def test_a_little_slope_changes_little():
