@@ -219,6 +219,7 @@ register(
         "m", "lengths of the 32 heaviest fragments where they are longest; 0 where there is none", "l_f"
     ),
     fracture_energy=Quantity("J", "energy that breaks of rods and bonds took since the start", "E_f"),
+    crushing_energy=Quantity("J", "energy that crushing of rods took since the start", "E_c"),
     crack_area=Quantity(
         "m2", "area of the cracks along the grain, what is damaged by the share of its energy that is spent", "A_c"
     ),
@@ -226,6 +227,7 @@ register(
     rod_position=Quantity("m", "positions of both ends of every edge of the rods", "x"),
     rod_cut=Quantity("1", "where an edge is cut, 0 to 1 from its first end; -1 where it is not", "c"),
     rod_strain=Quantity("1", "strain along every edge; 0 where it is severed", "eps"),
+    rod_crushed=Quantity("1", "by how much every edge stays shorter, over its length, where it was crushed", "eps_p"),
     rod_stress=Quantity("Pa", "tensile stress of every edge where its outer fibre is drawn out most", "sigma"),
     bond_position=Quantity("m", "middles of the bonds between rods", "x_b"),
     bond_tension=Quantity("Pa", "stress along every bond, across the grain; negative under pressure", "sigma_b"),

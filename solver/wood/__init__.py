@@ -35,6 +35,9 @@ def _extent(params: WoodParams) -> Extent:
 
     corners = np.array(params.outline or [(-params.radius,) * 2, (params.radius,) * 2])
     across, up = np.ptp(corners, axis=0)
+    if params.spine:
+        along, side, rise = np.ptp(np.array(params.spine), axis=0)
+        return Extent(np.array([along + up, rise + up, side + across]), 1.0)
     sag = abs(params.curvature) * params.length**2 / 8 + abs(params.bend) * params.length
     return Extent(np.array([params.length, up + sag, across]), 1.0)
 
@@ -52,6 +55,7 @@ _NUMBERS = (
     "grip_impulse",
     "grip_moment",
     "fracture_energy",
+    "crushing_energy",
     "crack_area",
     "tip_position",
     "body_force",
@@ -72,7 +76,7 @@ _NUMBERS = (
 )
 
 #: On request: they are as large as the rods' places.
-_STRESSES = ("rod_strain", "rod_stress", "bond_position", "bond_tension", "bond_shear", "bond_damage")
+_STRESSES = ("rod_strain", "rod_stress", "rod_crushed", "bond_position", "bond_tension", "bond_shear", "bond_damage")
 
 SOLVER = Solver(
     name="wood",

@@ -30,7 +30,8 @@ def _refusal(params: WoodParams) -> str:
     known = WoodParams()
     checks = (
         (params.fracture != "none" and params.mode != "static", "what breaks"),
-        (bool(params.outline or params.curvature or params.cuts), "outlines, curved axes and cuts"),
+        (bool(params.outline or params.bent or params.cuts), "outlines, curved axes, forks and cuts"),
+        (params.taper != 1, "tapered bundles"),
         (params.clamp != "start" or bool(params.grips), "other holds than one clamped end"),
         (bool(params.bodies), "bodies"),
         (params.mass_scaling != 1 or params.mode == "auto", "scaled masses"),

@@ -10,10 +10,12 @@ Dunkerley's sum: bending and shear. The error is of forces before anything break
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 from .params import Body, Waypoint, WoodParams
+from .shape.curve import Curve
 
 __all__ = ["Choice", "decide", "error_at"]
 
@@ -57,10 +59,16 @@ class _Held(NamedTuple):
         return max(here, self.length - here)
 
 
+def _along(position: Sequence[float]) -> float:
+    return position[0]
+
+
 def _held(params: WoodParams, moving: bool = True) -> _Held:
     """Return what holds; without what moves, if not `moving`."""
     places = {"none": [], "start": [0.0], "both": [0.0, params.length]}[params.clamp]
-    places = places + [b.path[0].position[0] for b in params.bodies if moving or (len(b.path) == 1 and b.mass is None)]
+    at = Curve(params.spine).nearest if params.spine else _along
+    held = [b for b in params.bodies if moving or (len(b.path) == 1 and b.mass is None)]
+    places = places + [at(b.path[0].position) for b in held]
     grips = [g for g in params.grips if moving or len(g.path) <= 1]
     places += [(max(g.low[0], 0.0) + min(g.high[0], params.length)) / 2 for g in grips]
     inside = sorted({round(min(max(p, 0.0), params.length), 9) for p in places})
@@ -69,7 +77,8 @@ def _held(params: WoodParams, moving: bool = True) -> _Held:
 
 def _frequency(params: WoodParams, held: _Held) -> float:
     """Return the lowest angular frequency [1/s] of what is between, and juts out of, what holds."""
-    bends = params.wide / 2 * (params.stiffness / params.density) ** 0.5
+    # the thinnest part swings slowest
+    bends = min(params.taper, 1.0) * params.wide / 2 * (params.stiffness / params.density) ** 0.5
     shears = (_SECTION * max(params.shear, 1e-9) / params.density) ** 0.5
     ends = (held.places[0], held.length - held.places[-1]) if held.places else (0.0, 0.0)
     spans = [b - a for a, b in pairwise(held.places)] if len(held.places) > 1 else []
@@ -124,7 +133,9 @@ def _strained(params: WoodParams) -> float:
     spans = {"none": 8.0, "start": 2.0, "both": 12.0}[params.clamp]
     moment = across * params.length + weight * params.length / spans
     strain = moment * params.wide / (section * params.wide**2 / 4 * params.stiffness)
-    return (strain + abs(params.tip_load[0]) / (section * params.stiffness)) / params.strain_limit
+    return (strain + abs(params.tip_load[0]) / (section * params.stiffness)) / min(
+        params.strain_limit, params.crush_strain
+    )
 
 
 def error_at(params: WoodParams, scaling: float) -> float:
@@ -150,8 +161,7 @@ def _missed(params: WoodParams, omega: float, time: float, scaling: float) -> fl
 def _at_rest(params: WoodParams) -> bool:
     """Return whether only dead loads act, on what the static mode can hold."""
     moves = params.bodies or params.grips or any(params.pull) or params.bend
-    turned = params.twist or params.curvature or params.grain.deviates
-    knows = turned or params.rod_contact or params.clamp == "none"
+    knows = params.turning or params.rod_contact or params.clamp == "none"
     return not (moves or knows) and (any(params.tip_load) or params.gravity != 0)
 
 

@@ -97,7 +97,7 @@ def overstress(
     for e in range(count):
         if rods.alive[e] == 0 or rods.k[e] == 0.0:
             continue
-        own = 1.0 / (inverse[e] * rods.rest[e]) - 1.0
+        own = 1.0 / (inverse[e] * rods.rest[e]) - rods.free[e]
         r = rods.radius[e]
         h = left[e]
         g = right[e]
@@ -113,20 +113,21 @@ def overstress(
             c0 = bent[h, 0]
             w0 = bent[h, 1]
             if rods.k[p] > 0.0:
-                other = 1.0 / (inverse[p] * rods.rest[p]) - 1.0
+                other = 1.0 / (inverse[p] * rods.rest[p]) - rods.free[p]
                 s0 = (own * rods.rest[p] + other * rods.rest[e]) / (rods.rest[p] + rods.rest[e])
         if g >= 0:
             q = rods.after[g]
             c1 = bent[g, 0]
             w1 = bent[g, 1]
             if rods.k[q] > 0.0:
-                other = 1.0 / (inverse[q] * rods.rest[q]) - 1.0
+                other = 1.0 / (inverse[q] * rods.rest[q]) - rods.free[q]
                 s1 = (own * rods.rest[q] + other * rods.rest[e]) / (rods.rest[q] + rods.rest[e])
         if not anywhere:
             if h < 0 or rods.k[rods.before[h]] == 0.0:
                 continue
             # the mean of the two edges' ratios, as the thesis takes it, whatever their lengths
-            mean = 0.5 * (own + 1.0 / (inverse[rods.before[h]] * rods.rest[rods.before[h]]) - 1.0)
+            p = rods.before[h]
+            mean = 0.5 * (own + 1.0 / (inverse[p] * rods.rest[p]) - rods.free[p])
             long = (1.0 + mean) * (1.0 + r * c0) * np.sqrt(1.0 + (r * w0) ** 2) - 1.0
             ratio[e] = long / strength[e, 0]
             top = max(top, ratio[e])

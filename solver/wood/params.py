@@ -9,11 +9,12 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ..contract import Params
-from .bodies import Body, Newtons, Rate, Waypoint
+from .bodies import Body, Newtons, Rate, Vector, Waypoint
 from .outlines import check_outline, polygon_area
-from .parts import Corner, Cut, Grain, Grip, GripPoint, Knot, Notch
+from .parts import Corner, Cut, Fork, Grain, Grip, GripPoint, Knot, Notch
+from .shape.checks import check_shape, length_of
 
-__all__ = ["Body", "Cut", "Grain", "Grip", "GripPoint", "Knot", "Notch", "Waypoint", "WoodParams"]
+__all__ = ["Body", "Cut", "Fork", "Grain", "Grip", "GripPoint", "Knot", "Notch", "Waypoint", "WoodParams"]
 
 #: The steepest slope of spiral grain: 27 degrees; rods stand for fibres along the bundle.
 _STEEPEST = 0.5
@@ -76,6 +77,23 @@ class WoodParams(Params):
         description="Curvature of the unloaded axis, in the x-z plane",
         json_schema_extra={"units": "1/m"},
     )
+    spine: tuple[Vector, ...] = Field(
+        (),
+        max_length=64,
+        description="Points in space through which the unloaded axis passes, the start first; `length` is then its "
+        "own, and sections have y and z as near to those of space as the start allows",
+        json_schema_extra={"units": "m"},
+    )
+    taper: float = Field(
+        1.0,
+        ge=0.05,
+        le=2,
+        description="Radius (or size of the outline) at the end over that at the start; fibres run along the surface",
+        json_schema_extra={"units": "1"},
+    )
+    fork: Fork | None = Field(
+        None, description="Where it forks into a branch and the stem", json_schema_extra={"units": "1"}
+    )
     stiffness: float = Field(
         10e9, ge=1e3, le=1e12, description="Young's modulus along the rods", json_schema_extra={"units": "Pa"}
     )
@@ -102,6 +120,14 @@ class WoodParams(Params):
     )
     strain_limit: float = Field(
         0.01, gt=0, le=10, description="Tensile strain at which a rod breaks", json_schema_extra={"units": "1"}
+    )
+    compressive_strength: float | None = Field(
+        None,
+        gt=0,
+        le=1e12,
+        description="Compressive stress along the rods at which they crush: they bear no more, and stay as short as "
+        "they were pressed; by default they bear any",
+        json_schema_extra={"units": "Pa"},
     )
     toughness: float = Field(
         250.0,
@@ -226,10 +252,33 @@ class WoodParams(Params):
         return (abs(polygon_area(self.outline)) / math.pi) ** 0.5 if self.outline else self.radius
 
     @property
+    def crush_strain(self) -> float:
+        """Compressive strain at which rods crush; inf: at none."""
+        return math.inf if self.compressive_strength is None else self.compressive_strength / self.stiffness
+
+    @property
+    def bent(self) -> bool:
+        """Whether it is curved where nothing loads it."""
+        return self.curvature != 0 or bool(self.spine) or self.fork is not None
+
+    @property
+    def turning(self) -> bool:
+        """Whether rods resist twist: where they are curved unloaded, their frames know in which plane."""
+        return self.twist or self.bent or self.grain.deviates
+
+    @property
     def touching(self) -> bool:
         """Whether rods touch each other."""
         chosen = self.rod_contact
         return chosen if chosen is not None else self.mode != "static" and self.fracture != "none" and self.rods > 1
+
+    @model_validator(mode="before")
+    @classmethod
+    def _measured(cls, values: object) -> object:
+        """Take the axis' own length where none is given."""
+        if isinstance(values, dict) and values.get("spine") and "length" not in values:
+            return {**values, "length": length_of(values["spine"])}
+        return values
 
     @field_validator("mode", mode="before")
     @classmethod
@@ -244,12 +293,15 @@ class WoodParams(Params):
             check_outline(self.outline)
         if self.wide > self.length:
             raise ValueError("the bundle is wider than long: take a smaller radius or outline, or a longer length")
+        check_shape(self)
         if abs(self.curvature) * self.wide > 0.5:
             raise ValueError("the axis is curved more sharply than the bundle is thick: take a smaller curvature")
         if abs(self.curvature) * self.length > 6.28:
             raise ValueError("the axis is curved into more than a full circle: take a smaller curvature or length")
-        if self.mode == "static" and (self.twist or self.curvature or self.grain.deviates):
-            raise ValueError("twist, curved axes, spiral grain and knots need the explicit mode: set mode explicit")
+        if self.mode == "static" and self.turning:
+            raise ValueError(
+                "twist, curved axes, forks, spiral grain and knots need the explicit mode: set mode explicit"
+            )
         if any(not 0 <= k.at[0] <= self.length for k in self.grain.knots):
             raise ValueError("a knot lies beyond an end: its x is between 0 and the length")
         away = math.hypot(*self.grain.pith) + self.wide
@@ -275,8 +327,8 @@ class WoodParams(Params):
             raise ValueError(
                 "cracks that slide cost less than those that open: give toughness_sliding at least toughness"
             )
-        if self.bend and self.curvature:
-            raise ValueError("a bent start of a curved bundle is not defined: set one of them to 0")
+        if self.bend and self.bent:
+            raise ValueError("a bent start of a curved bundle is not defined: set bend to 0, or leave the curve out")
         if any(n.position > self.length for n in self.notches):
             raise ValueError("a notch lies beyond the end: its position is at most the length")
         return self

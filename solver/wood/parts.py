@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from .bodies import Part, Turn, Vector
 
-__all__ = ["Corner", "Cut", "Grain", "Grip", "GripPoint", "Knot", "Notch"]
+__all__ = ["Corner", "Cut", "Fork", "Grain", "Grip", "GripPoint", "Knot", "Notch"]
 
 Corner = tuple[Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)]]
 
@@ -65,6 +65,17 @@ class Grain(Part):
             if knot.radius > 0.5 * math.hypot(knot.at[1] - self.pith[0], knot.at[2] - self.pith[1]):
                 raise ValueError("a knot is wider than half its distance from the pith: take a smaller radius")
         return self
+
+
+class Fork(Part):
+    """Where some of the stem's rods bend away, upwards, into a branch. Boxes of grips and cuts see both unforked."""
+
+    at: float = Field(gt=0, le=10, description="Where on the bundle its limbs part [m]")
+    angle: float = Field(0.5, ge=0.1, le=1.6, description="Angle of the branch to the stem below [radian]")
+    lean: float = Field(
+        0.2, ge=0, le=1.6, description="Angle of the stem above to the stem below, away from it [radian]"
+    )
+    share: float = Field(0.4, ge=0.1, le=0.9, description="Share of the stem's section that goes into the branch [1]")
 
 
 class Notch(Part):

@@ -156,6 +156,7 @@ def _row(reached: Reached, laid: Wood, params: WoodParams, need: Need, seconds: 
         "broken_bonds": state.bonds,
         "impulse": state.impulse[:, :3].sum(0),
         "fracture_energy": state.spent,
+        "crushing_energy": state.crushed,
         "crack_area": float(wood.bonds.area @ wood.bonds.parted),
         "body_impulse": state.impulse[:, :3].copy(),
         "body_moment": state.impulse[:, 3:].copy(),

@@ -13,12 +13,14 @@ from .params import WoodParams
 
 __all__ = ["BOND", "ROD", "Stresses"]
 
-ROD = ("rod_strain", "rod_stress")
+ROD = ("rod_strain", "rod_stress", "rod_crushed")
 BOND = ("bond_position", "bond_tension", "bond_shear", "bond_damage")
 
 
 def _along(state: State) -> tuple[np.ndarray, np.ndarray]:
     """Return strain along every edge and stress [Pa] where its outer fibre is drawn out most, each (e,); 0 if severed.
+
+    What was crushed is strained, and bears what it is strained beyond that.
 
     Bending is that of the sharper of the hinges at both ends; a broken hinge bends nothing.
     """
@@ -33,7 +35,7 @@ def _along(state: State) -> tuple[np.ndarray, np.ndarray]:
     np.maximum.at(sharp, rods.before, bow)
     np.maximum.at(sharp, rods.after, bow)
     stiff = rods.k / (np.pi * rods.radius**2)
-    return strain, np.where(bears, stiff * (strain + rods.radius * sharp), 0.0)
+    return strain, np.where(bears, stiff * (strain + 1 - rods.free + rods.radius * sharp), 0.0)
 
 
 class Stresses:
@@ -68,5 +70,7 @@ class Stresses:
         if not self._wanted:
             return {}
         strain, stress = _along(state)
-        found = {"rod_strain": strain[self._real], "rod_stress": stress[self._real], **self._bonds(state)}
+        crushed = 1 - state.wood.rods.free[self._real]
+        found = {"rod_strain": strain[self._real], "rod_stress": stress[self._real], "rod_crushed": crushed}
+        found |= self._bonds(state)
         return {name: found[name].astype(self._dtype) for name in self._wanted}

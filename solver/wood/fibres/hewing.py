@@ -1,5 +1,6 @@
 """Hewing: of wood whose fibres run out of the bundle, what lies outside is taken away, and rods end where they run out.
 
+They run out over some length, as the surface cuts them obliquely: each edge has as much of its section as lies within.
 What is left of an edge that the surface passes is a stub, which the edge beside it carries, as beside a break. Edges
 outside count as ghosts: they have no stiffness, and their vertices rest. So rods keep their numbers of vertices.
 """
@@ -13,36 +14,44 @@ import numpy as np
 from ..fracture import sever
 from ..model.gripping import courses, pins_of
 from ..model.joining import stretched
-from ..model.outline import corners, inside
+from ..model.outline import corners, covered
 from ..model.state import Wood
 from ..params import WoodParams
-from .timber import hews
+from ..shape.taper import thickness
+from .timber import LEAST, hews
 
 __all__ = ["hewn"]
 
-#: Halvings by which the place where a rod runs out is found.
-_HALVINGS = 40
 #: Rods of no more vertices, or of fewer bonds, are chips; rounds in which what hung on chips goes with them.
 _VERTICES, _BONDS, _ROUNDS = 2, 6, 8
 
 
-def _passes(outline: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return where (n,) on the way from a (n, 2), inside, to b (n, 2), outside, the outline is passed."""
-    low, high = np.zeros(len(a)), np.ones(len(a))
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        within = inside(outline, a + middle[:, None] * (b - a))
-        low, high = np.where(within, middle, low), np.where(within, high, middle)
-    return low
+def _even(wood: Wood, params: WoodParams) -> np.ndarray:
+    """Return where vertices (v, 2) [m] are in the section, as if it did not taper."""
+    found: np.ndarray = wood.straight[:, 1:] / thickness(wood.straight[:, 0], params)[:, None]
+    return found
 
 
-def _kept(wood: Wood, outline: np.ndarray) -> np.ndarray:
+def _left(wood: Wood, outline: np.ndarray, section: np.ndarray) -> np.ndarray:
+    """Return the share (v,) of their rods' sections that is within the outline where vertices are in the section."""
+    count = section.shape[0] // len(wood.grid)
+    cell = np.sqrt(np.pi) * wood.rods.radius.reshape(len(wood.grid), -1).mean(1)
+    return covered(outline, section, np.repeat(cell, count))
+
+
+def _passes(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return where (n,) rods end between vertices of which the shares first (n,) and second (n,) are left."""
+    found: np.ndarray = np.clip((first - LEAST) / np.maximum(first - second, 1e-300), 0.0, 1.0)
+    return found
+
+
+def _kept(wood: Wood, share: np.ndarray) -> np.ndarray:
     """Return which vertices (v,) are left: those within, but for chips that next to nothing holds, which would dangle.
 
-    Ghosts count with the rods that they clamp.
+    Ghosts count with the rods that they clamp. share (v,): of sections that is left.
     """
     rods, bonds = wood.rods, wood.bonds
-    within = inside(outline, wood.straight[:, 1:]).reshape(len(wood.grid), -1)
+    within = (share > LEAST).reshape(len(wood.grid), -1)
     for _ in range(_ROUNDS):
         starts = within & ~np.column_stack([np.zeros(len(within), bool), within[:, :-1]])
         run = np.cumsum(starts.ravel()).reshape(within.shape) * within
@@ -65,8 +74,8 @@ def hewn(wood: Wood, params: WoodParams) -> Wood:
     if not hews(params):
         return wood
     rods, bonds = wood.rods, wood.bonds
-    outline, section = corners(params), wood.straight[:, 1:]
-    within = _kept(wood, outline)
+    share = _left(wood, corners(params), _even(wood, params))
+    within = _kept(wood, share)
     a, b = within[rods.a], within[rods.b]
     before, slope = stretched(wood.motion.x, rods, bonds)
     out = np.flatnonzero(~a & ~b)
@@ -75,11 +84,12 @@ def hewn(wood: Wood, params: WoodParams) -> Wood:
     cut = np.where(a & b, 2.0, np.nan)
     leaves = np.flatnonzero((a != b) & (rods.k > 0))
     ends = np.where(a[leaves], rods.a[leaves], rods.b[leaves]), np.where(a[leaves], rods.b[leaves], rods.a[leaves])
-    way = _passes(outline, section[ends[0]], section[ends[1]])
+    way = _passes(share[ends[0]], share[ends[1]])
     cut[leaves] = np.where(a[leaves], way, 1 - way)
-    for edge, share in ((bonds.i, bonds.at), (bonds.j, bonds.share)):
+    for edge, at in ((bonds.i, bonds.at), (bonds.j, bonds.share)):
         # what sits beyond the surface goes with it
-        bonds.on[~np.where(a[edge], share < cut[edge], share > cut[edge])] = 0
+        bonds.on[~np.where(a[edge], at < cut[edge], at > cut[edge])] = 0
+    _thinned(wood, np.maximum((share[rods.a] + share[rods.b]) / 2, LEAST))
     for e in leaves.tolist():
         sever(wood, e, float(cut[e]))
     rods.k[rods.alive == 0] = 0.0
@@ -88,6 +98,20 @@ def hewn(wood: Wood, params: WoodParams) -> Wood:
     left = np.where(rods.alive == 1, np.where(rods.k > 0, 1.0, 0.0), 0.0)
     left[leaves] = way
     return _weighed(wood, params, left, a)
+
+
+def _thinned(wood: Wood, share: np.ndarray) -> None:
+    """Leave edges, hinges and bonds the share (e,) of their edges' sections; bonds, of both rods'."""
+    rods, bonds, turns = wood.rods, wood.bonds, wood.turns
+    rods.k[:] *= share
+    rods.radius[:] *= np.sqrt(share)
+    bent = (share[rods.before] + share[rods.after]) ** 2 / 4
+    rods.alpha[:] *= bent
+    turns.beta[:] *= bent
+    turns.inertia[:] *= share**2
+    both = np.sqrt(share[bonds.i] * share[bonds.j])
+    for values in (bonds.k, bonds.s, bonds.opens, bonds.slides, bonds.torn, bonds.shorn, bonds.area):
+        values[:] *= both
 
 
 def _laid_again(wood: Wood, before: np.ndarray, slope: np.ndarray) -> None:

@@ -9,7 +9,10 @@ from ..model.outline import area, corners
 from ..params import WoodParams
 from .paths import named
 
-__all__ = ["hews", "timber"]
+__all__ = ["LEAST", "hews", "timber"]
+
+#: Share of a rod's section within the outline with which it ends.
+LEAST = 0.15
 
 #: Sections along, and places on each side of the outline, at which fibres are asked for.
 _SECTIONS, _PLACES = 65, 8
@@ -27,6 +30,8 @@ def timber(params: WoodParams) -> WoodParams:
     own = corners(params)
     part = np.arange(_PLACES)[:, None, None] / _PLACES
     rim = ((1 - part) * own + part * np.roll(own, -1, 0)).reshape(-1, 2)
+    # what is left of rods whose middle is outside
+    rim *= 1 + 0.5 * (area(own) / params.rods) ** 0.5 / np.linalg.norm(rim, axis=1).min()
     x = np.linspace(0, params.length, _SECTIONS)
     through = np.concatenate([np.repeat(x, len(rim))[:, None], np.tile(rim, (len(x), 1))], 1)
     found = named(through, params)[:, 1:]

@@ -74,7 +74,7 @@ def _rods(x: np.ndarray, rods: Rods, vertex: np.ndarray, h: np.ndarray, weight: 
         if rods.alive[n] == 0 or rods.k[n] == 0.0:
             continue
         length = _unit(x, vertex[n], weight[n, 0], u)
-        pull = rods.k[n] * (length / rods.rest[n] - 1.0) / length
+        pull = rods.k[n] * (length / rods.rest[n] - rods.free[n]) / length
         for r in range(3):
             for c in range(3):
                 h[n, r, c] = (rods.k[n] / rods.rest[n] - pull) * u[r] * u[c] + (pull if r == c else 0.0)

@@ -1,9 +1,9 @@
 """Forces of stretching and bending, straight rest shapes: discrete elastic rods (Bergou et al. 2008).
 
-Stretching: E = k/2 (|e|/rest - 1)^2 rest (Sutherland 2012, Eq. 3.9). Bending: E = alpha |kb|^2 / span with the
-curvature binormal of unit tangents, |kb|^2 = 4 tan^2(phi/2); Eq. 3.3 has rest lengths in it, which is right only
-for rods that do not stretch. Written with c = t0.t1 and 1 - c = |t1 - t0|^2 / 2, the forces need no cross product and
-keep their digits at small angles.
+Stretching: E = k/2 (|e|/rest - free)^2 rest (Sutherland 2012, Eq. 3.9; free is 1 but for what was crushed). Bending:
+E = alpha |kb|^2 / span with the curvature binormal of unit tangents, |kb|^2 = 4 tan^2(phi/2); Eq. 3.3 has rest lengths
+in it, which is right only for rods that do not stretch. Written with c = t0.t1 and 1 - c = |t1 - t0|^2 / 2, the forces
+need no cross product and keep their digits at small angles.
 
 Both are forces between the ends of edges, so they are summed by edges. A part's edges are rows of numbers: loops over
 rows are vectorised, where loops over vertices (v, 3) are not. Measured (ns of CPU per vertex, 200 rods): both together
@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..model.plan import BOW, RADIUS, REST, STIFF, TENSION, WEAK
+from ..model.plan import BOW, FREE, RADIUS, REST, STIFF, TENSION, WEAK
 
 __all__ = ["bend", "bending", "place", "strain", "stretch", "stretching"]
 
@@ -43,7 +43,7 @@ def place(x: np.ndarray, a: np.ndarray, b: np.ndarray, row: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def stretch(count: int, law: np.ndarray, row: np.ndarray) -> None:
-    """Fill tangents, lengths and forces of `count` edges from their ends; law (6, m) as `Plan.edge` has it."""
+    """Fill tangents, lengths and forces of `count` edges from their ends; law (15, m) as `Plan.edge` has it."""
     for q in range(count):
         ex = row[3, q] - row[0, q]
         ey = row[4, q] - row[1, q]
@@ -56,7 +56,7 @@ def stretch(count: int, law: np.ndarray, row: np.ndarray) -> None:
         ex *= il
         ey *= il
         ez *= il
-        pull = law[TENSION, q] * (length / law[REST, q] - 1.0)
+        pull = law[TENSION, q] * (length / law[REST, q] - law[FREE, q])
         row[6, q] = ex
         row[7, q] = ey
         row[8, q] = ez
@@ -69,7 +69,7 @@ def stretch(count: int, law: np.ndarray, row: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def bend(count: int, law: np.ndarray, row: np.ndarray) -> None:
-    """Add the forces of the hinges between neighbours of `count` edges; law (6, m) as `Plan.edge` has it."""
+    """Add the forces of the hinges between neighbours of `count` edges; law (15, m) as `Plan.edge` has it."""
     for c in range(3):
         row[14 + c, count - 1] = 0.0
         row[17 + c, 0] = 0.0
@@ -105,7 +105,7 @@ def stretching(count: int, law: np.ndarray, row: np.ndarray) -> float:
     """Return the energy [J] of stretching."""
     energy = 0.0
     for q in range(count):
-        strain = row[9, q] / law[REST, q] - 1.0
+        strain = row[9, q] / law[REST, q] - law[FREE, q]
         energy += 0.5 * law[TENSION, q] * strain * strain * law[REST, q]
     return energy
 
@@ -132,14 +132,14 @@ def strain(count: int, law: np.ndarray, row: np.ndarray) -> float:
     top = 0.0
     before = -1.0  # the larger strain and the curvature at the joint before
     bow = 0.0
-    own = row[9, 0] / law[REST, 0] - 1.0 if law[TENSION, 0] > 0.0 else -1.0
+    own = row[9, 0] / law[REST, 0] - law[FREE, 0] if law[TENSION, 0] > 0.0 else -1.0
     for q in range(count):
         after = -1.0
         curved = 0.0
         following = -1.0
         if q + 1 < count:
             if law[TENSION, q + 1] > 0.0:
-                following = row[9, q + 1] / law[REST, q + 1] - 1.0
+                following = row[9, q + 1] / law[REST, q + 1] - law[FREE, q + 1]
             if law[BOW, q] > 0.0:
                 dx = row[6, q + 1] - row[6, q]
                 dy = row[7, q + 1] - row[7, q]

@@ -48,6 +48,7 @@ class Rods(NamedTuple):
     alpha: np.ndarray  # (h,) bending stiffness E I [N m2]
     whole: np.ndarray  # (h,) uint8
     radius: np.ndarray  # (e,) of the round rod of the same area [m]
+    free: np.ndarray  # (e,) length at which it bears nothing over that at rest; below 1 where it was crushed
 
 
 class Bonds(NamedTuple):

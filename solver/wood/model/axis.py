@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..params import WoodParams
+from ..shape.curve import Curve
+from ..shape.fork import forked
 
-__all__ = ["along", "curved", "started"]
+__all__ = ["along", "curved", "laid", "started"]
 
 
 def along(rods: int, vertices: int, params: WoodParams, generator: np.random.Generator) -> np.ndarray:
@@ -26,12 +28,25 @@ def along(rods: int, vertices: int, params: WoodParams, generator: np.random.Gen
 
 
 def curved(straight: np.ndarray, curvature: float) -> np.ndarray:
-    """Return points (..., 3) of the straight bundle bent to an arc in the x-z plane, towards +z."""
+    """Return points (..., 3) of the straight bundle bent to an arc in the x-z plane, towards +z.
+
+    Before its start at x = 0 it goes straight on: a clamp has the direction of the arc there, not of a chord.
+    """
     if curvature == 0:
         return straight.copy()
     s, y, z = np.moveaxis(straight, -1, 0)
     r = 1 / curvature
-    return np.stack([(r - z) * np.sin(s / r), y, r - (r - z) * np.cos(s / r)], -1)
+    s, before = np.maximum(s, 0.0), np.minimum(s, 0.0)
+    return np.stack([(r - z) * np.sin(s / r) + before, y, r - (r - z) * np.cos(s / r)], -1)
+
+
+def laid(straight: np.ndarray, names: np.ndarray, params: WoodParams) -> np.ndarray:
+    """Return points (k, n, 3) [m] of the straight bundle where they are unloaded; names (k, 2) [m] of rods."""
+    if params.fork is not None:
+        return forked(straight, names, params)
+    if params.spine:
+        return Curve(params.spine).laid(straight)
+    return curved(straight, params.curvature)
 
 
 def started(rest: np.ndarray, params: WoodParams) -> np.ndarray:

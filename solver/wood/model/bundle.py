@@ -8,17 +8,18 @@ import numpy as np
 
 from ...contract import Context
 from ..fibres.paths import crowded, placed
-from ..fibres.timber import hews, timber
+from ..fibres.timber import LEAST, hews, timber
 from ..params import WoodParams
+from ..shape.taper import tapered, thickness
 from .arrays import Rods, Turns
-from .axis import along, curved, started
+from .axis import along, laid, started
 from .bodies.building import bodied
 from .grain import Field, ringed
 from .gripping import courses, pins_of
 from .joining import bonded
 from .motion import Motion
 from .outline import area as outlined
-from .outline import corners, inside, stand
+from .outline import corners, covered, drawn_in, stand
 from .sawing import sawn
 from .state import Wood
 
@@ -37,7 +38,7 @@ class _Layout(NamedTuple):
 
     area: np.ndarray  # (k,) [m2]
     fibre: np.ndarray  # (k, n, 3) by the names of fibres, which `fibres` explains [m]
-    straight: np.ndarray  # (k, n, 3) of the straight bundle: `fibre`, but where grain deviates [m]
+    straight: np.ndarray  # (k, n, 3) of the straight bundle: `fibre`, but where grain deviates or the bundle tapers [m]
     rest: np.ndarray  # (k, n, 3) of the unloaded one [m]
     number: np.ndarray  # (k, n) int32
     grid: np.ndarray  # (k, vertices) int32 without ghosts
@@ -82,19 +83,34 @@ def _layout(points: np.ndarray, area: np.ndarray, s: np.ndarray, params: WoodPar
     rods, count = row.shape
     fibre = np.concatenate([row[:, :, None], np.repeat(points[:, None, :], count, 1)], -1)
     straight, section = fibre, np.repeat(area[:, None], count - 1, 1)
-    if params.grain.deviates:
-        straight = placed(fibre, params)
+    if params.grain.deviates or params.taper != 1:
+        even = _within(placed(fibre, params), area, params)
+        straight = tapered(even, params)
         edge, middle = straight[:, 1:] - straight[:, :-1], (fibre[:, 1:] + fibre[:, :-1]) / 2
         # what is cut by a section stands oblique in it, and is squeezed where fibres crowd round a knot
-        section *= crowded(middle, params) * edge[..., 0] / np.linalg.norm(edge, axis=-1)
-        section *= _filled(straight, area, params)
+        section *= (
+            crowded(middle, params)
+            * thickness(middle[..., 0], params) ** 2
+            * edge[..., 0]
+            / np.linalg.norm(edge, axis=-1)
+        )
+        section *= _filled(even, area, params)
     number = np.arange(rods * count, dtype=np.int32).reshape(rods, count)
     grid = number[:, int(ghosts[0]) : count - int(ghosts[1])]
-    return _Layout(area, fibre, straight, curved(straight, params.curvature), number, grid, ghosts, section)
+    return _Layout(area, fibre, straight, laid(straight, points, params), number, grid, ghosts, section)
+
+
+def _within(even: np.ndarray, area: np.ndarray, params: WoodParams) -> np.ndarray:
+    """Return fibres (k, n, 3) [m] that run out of the wood where what is left of them is; area (k,) [m2]."""
+    if not hews(params):
+        return even
+    cell = np.repeat(np.sqrt(area), even.shape[1])
+    section = drawn_in(corners(params), even[..., 1:].reshape(-1, 2), cell).reshape(*even.shape[:2], 2)
+    return np.concatenate([even[..., :1], section], -1)
 
 
 def _filled(straight: np.ndarray, area: np.ndarray, params: WoodParams) -> float:
-    """Return by what sections are to be multiplied so that rods fill what is hewn: a rod is inside or not, as a whole.
+    """Return by what sections are to be multiplied so that what is left of rods fills what is hewn.
 
     straight (k, n, 3) [m], area (k,) [m2].
     """
@@ -102,8 +118,10 @@ def _filled(straight: np.ndarray, area: np.ndarray, params: WoodParams) -> float
         return 1.0
     outline, ends = corners(params), np.clip(straight[..., 0], 0, params.length)
     middle = (straight[:, 1:, 1:] + straight[:, :-1, 1:]) / 2
-    within = inside(outline, middle.reshape(-1, 2)).reshape(middle.shape[:2])
-    filled = float((area[:, None] * np.diff(ends, axis=1) * within).sum())
+    cell = np.repeat(np.sqrt(area), middle.shape[1])
+    left = covered(outline, middle.reshape(-1, 2), cell).reshape(middle.shape[:2])
+    left = np.where(left > LEAST, left, 0.0)
+    filled = float((area[:, None] * np.diff(ends, axis=1) * left).sum())
     return outlined(outline) * params.length / filled if filled > 0 else 1.0
 
 
@@ -130,6 +148,7 @@ def _rods(at: _Layout, grain: Field, params: WoodParams) -> Rods:
         params.stiffness * _hinges(at) ** 2 / (4 * np.pi) * _stiff(at, grain, params),
         np.ones(len(before), np.uint8),
         np.sqrt(section / np.pi),
+        np.ones(len(a)),
     )
 
 
@@ -190,15 +209,18 @@ def _motion(at: _Layout, rods: Rods, params: WoodParams) -> Motion:
 def _frames(at: _Layout, rods: Rods, x: np.ndarray, params: WoodParams) -> tuple[np.ndarray, np.ndarray]:
     """Return the directors (e, 3) and the tangents (e, 3) that they belong to; x (v, 3): places at time 0 [m].
 
-    Along a fibre that deviates they are carried from edge to edge without spin, so that at rest nothing is twisted.
+    Along a fibre that leaves the x-z plane they are carried from edge to edge without spin, so that at rest nothing is
+    twisted.
     """
-    if not params.grain.deviates:
+    if not (params.grain.deviates or params.spine or params.fork or params.taper != 1):
         way = x[rods.b] - x[rods.a]
         return np.tile([0.0, 1.0, 0.0], (len(rods.a), 1)), way / np.linalg.norm(way, axis=1)[:, None]
     way = at.rest[:, 1:] - at.rest[:, :-1]
     t = way / np.linalg.norm(way, axis=-1, keepdims=True)
     d = np.zeros(t.shape)
-    own = np.array([0.0, 1.0, 0.0]) - t[:, 0, 1:2] * t[:, 0]
+    # as near to y as it may be; along y, to z
+    first = np.where(np.abs(t[:, 0, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]])
+    own = first - (first * t[:, 0]).sum(1, keepdims=True) * t[:, 0]
     for n in range(t.shape[1]):
         if n:
             u, w = t[:, n - 1], t[:, n]
@@ -258,7 +280,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     edge = np.arange(len(real), dtype=np.int32).reshape(len(points), -1)
     # where straight grain is laid, the middles' closest points are at the same places along
     inner = slice(int(at.ghosts[0]), at.number.shape[1] - int(at.ghosts[1]))
-    course = at.straight[:, inner] if params.grain.deviates else None
+    course = at.straight[:, inner] if params.grain.deviates or params.taper != 1 else None
     bonds = bonded(params, log, points, s, course, edge[:, inner.start :], at.rest.reshape(-1, 3), rods, grain, strong)
     straight = at.straight.reshape(-1, 3)
     motion = _motion(at, rods, params)
@@ -270,7 +292,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         _turns(at, rods, motion.d, grain, params),
         bodied(params, k, _EASE * float(np.median(rods.radius)), rods),
         pins_of(params, grips := courses(params, straight, motion.x, motion.held == 0)),
-        params.twist or params.curvature != 0 or params.grain.deviates,
+        params.turning,
         _strengths(at, strong, params),
         np.repeat(np.arange(len(points), dtype=np.int32), at.number.shape[1] - 1),
         at.grid,

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from ...contract import InvalidGeometry
 from ..params import WoodParams
+from ..shape.taper import thickness
 from .arrays import Bonds, Rods
 from .cracks import widths
 from .curves import held
@@ -26,6 +27,8 @@ _ZONE = 4.0, 5.5
 _LEAST = 0.25
 #: Strain and slope at which a bond must have given way, however coarse rods are.
 _MOST_GIVEN = 0.4
+#: How many times as far apart as in the stem rods of a fork's limbs no longer hold together.
+_PARTED = 1.4
 #: Rounds in which the place beside is found where fibres deviate; a round leaves an error of slope squared.
 _TURNS = 4
 
@@ -61,7 +64,9 @@ def moduli(
     straight (v, 3) [m]: places in the straight bundle; log: what the bundle is hewn from.
     """
     part = straight[rods.b[bonds.i], 0] - straight[rods.a[bonds.i], 0]
-    volume = area(corners(log)) * params.length * part / max(float(part.sum()), 1e-300)
+    middle = (straight[rods.b[bonds.i], 0] + straight[rods.a[bonds.i], 0]) / 2
+    section = area(corners(log)) * thickness(middle, params) ** 2
+    volume = section * params.length * part / max(float(part.sum()), 1e-300)
     return bonds.k * bonds.rest / (_NET * volume), bonds.s / volume
 
 
@@ -165,22 +170,27 @@ def bonded(
     pairs[1::2] = pairs[1::2, ::-1]
     i, e, u, part = _closest(pairs, s, course, edge)
     at = np.full(len(i), 0.5)
-    middle, length, cosine = lying(rest, rods, i, at, e, u)
-    way = (held(rest, rods, i, at)[0] - held(rest, rods, e, u)[0])[:, 1:]
+    _, length, cosine = lying(rest, rods, i, at, e, u)
+    # the grain is that of the straight, even bundle
+    along = ((s[:, 1:] + s[:, :-1]) / 2)[pairs[:, 0]].ravel()
+    centre, way = (np.repeat(f, n - 1, 0) for f in (points[pairs].mean(1), np.diff(points[pairs], axis=1)[:, 0]))
+    middle = np.column_stack([along, centre])
     if len(i) and not length.min() > 0:
         raise InvalidGeometry("two rods stand at the same place.", advice="Take fewer rods or a wider bundle.")
-    volume = area(outline) * params.length * part / max(float(part.sum()), 1e-300)
+    thin = thickness(along, params)
+    volume = area(outline) * thin**2 * params.length * part / max(float(part.sum()), 1e-300)
     stiff = grain.factor(middle, params.grain.stiffness)
     # early wood comes apart as much more easily as it is softer; toughness goes with the square of this
     early = ringed(params.grain, middle[:, 1:], length / 2) ** 0.5
     strength = strong.strength(middle, params.grain.strength) * early * rayed(params.grain, middle[:, 1:], way)
     springs = _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff
     sheared = params.shear * volume * stiff
+    crack = crack * thin
     torn, shorn = (g * crack * part * strength**2 for g in (params.toughness, params.toughness_sliding))
     per_opening = _NET / 2 / max(params.transverse, _NONE) * volume * strength**2
     per_shear = volume / max(params.shear, _NONE) * strength**2
     cleavage, shear_strength = resolved(params, params.length / (n - 1), corners(params))
-    return Bonds(
+    found = Bonds(
         i.astype(np.int32),
         at,
         e.astype(np.int32),
@@ -198,3 +208,8 @@ def bonded(
         np.zeros(len(i)),
         np.ones(len(i), np.uint8),
     )
+    if params.fork is None:
+        return found
+    # in the crotch limbs hold together as far as they have not parted
+    near = length < _PARTED * thin * np.hypot(*way.T)
+    return Bonds(*(a[near] for a in found))

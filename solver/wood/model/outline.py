@@ -11,7 +11,7 @@ from ...contract import InvalidGeometry
 from ..params import WoodParams
 from .section import areas, balanced, place
 
-__all__ = ["Standing", "area", "chords", "corners", "inside", "sawn_through", "stand"]
+__all__ = ["Standing", "area", "chords", "corners", "covered", "drawn_in", "inside", "sawn_through", "stand"]
 
 #: Corners of the polygon that stands for a disk, of the disk's area.
 _DISK = 96
@@ -57,6 +57,35 @@ def inside(outline: np.ndarray, points: np.ndarray) -> np.ndarray:
         if z0 != z1:
             odd ^= ((z0 > z) != (z1 > z)) & (y < y0 + (z - z0) * (y1 - y0) / (z1 - z0))
     return odd
+
+
+def _depths(outline: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how deep (n,) [m] points (n, 2) are in a polygon (m, 2), and the nearest side's inner normal (n, 2)."""
+    nearest, normal = np.full(len(points), np.inf), np.zeros((len(points), 2))
+    for first, second in zip(outline, np.roll(outline, -1, 0), strict=True):
+        way = second - first
+        size = max(float(np.hypot(*way)), 1e-300)
+        along = np.clip((points - first) @ way / size**2, 0, 1)
+        away = np.linalg.norm(points - first - along[:, None] * way, axis=1)
+        closer = away < nearest
+        nearest[closer], normal[closer] = away[closer], np.array([-way[1], way[0]]) / size
+    return np.where(inside(outline, points), nearest, -nearest), normal
+
+
+def drawn_in(outline: np.ndarray, points: np.ndarray, wide: np.ndarray) -> np.ndarray:
+    """Return points (n, 2) moved to the centroids of what of their cells, wide (n,) [m], lies within a polygon (m, 2).
+
+    The side nearest to a point cuts its cell straight: what corners and further sides cut off is left out.
+    """
+    depth, normal = _depths(outline, points)
+    moved: np.ndarray = points + np.clip(wide / 4 - depth / 2, 0, wide / 2)[:, None] * normal
+    return moved
+
+
+def covered(outline: np.ndarray, points: np.ndarray, wide: np.ndarray) -> np.ndarray:
+    """Return the share (n,) of cells wide (n,) [m] that lies within a polygon (m, 2), of points (n, 2) as drawn in."""
+    found: np.ndarray = np.clip(2 * _depths(outline, points)[0] / wide, 0, 1)
+    return found
 
 
 def chords(outline: np.ndarray, normal: np.ndarray, offset: np.ndarray) -> np.ndarray:

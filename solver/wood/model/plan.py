@@ -19,6 +19,7 @@ __all__ = [
     "BOW",
     "COSINE",
     "CURVE",
+    "FREE",
     "KEEP",
     "LONG",
     "RADIUS",
@@ -36,8 +37,9 @@ __all__ = [
 ]
 
 #: Rows of a part's edges: rest length [m]; k [N], 0 if it is dead; 4 alpha / span [N m] and 4 / span [1/m] of the hinge
-#: behind an edge, 0 where none is whole; radius [m]; 1 / the least strain that it bears; the eight of `curves.slopes`.
-REST, TENSION, STIFF, BOW, RADIUS, WEAK, CURVE = range(7)
+#: behind an edge, 0 where none is whole; radius [m]; 1 / the least strain that it bears; length over REST at which it
+#: bears nothing; the eight of `curves.slopes`.
+REST, TENSION, STIFF, BOW, RADIUS, WEAK, FREE, CURVE = range(8)
 _EDGE = CURVE + 8
 
 #: Rows of a part's bonds: share; 1 / rest [1/m]; spring k [N]; -2 S over the square of twice the length of the bond's
@@ -59,7 +61,7 @@ class Plan(NamedTuple):
     part: np.ndarray  # (p + 1,) uint32 first edge
     a: np.ndarray  # (e,) uint32 first vertex
     b: np.ndarray  # (e,) uint32 second vertex
-    edge: np.ndarray  # (p, 14, m) what an edge is made of, in the rows above
+    edge: np.ndarray  # (p, 15, m) what an edge is made of, in the rows above
     lane: np.ndarray  # (e + p,) uint32 first lane of an edge's bonds; a part has one entry more, its end
     seat: np.ndarray  # (p, w) uint32 seat of a bond
     law: np.ndarray  # (p, 7, w) what a bond is made of, in the rows above
@@ -105,6 +107,7 @@ def _edges(rods: Rods, strength: np.ndarray, part: np.ndarray, first: np.ndarray
             m = e - part[p]
             edge[p, REST, m] = rods.rest[e]
             edge[p, RADIUS, m] = rods.radius[e]
+            edge[p, FREE, m] = rods.free[e]
             edge[p, CURVE:, m] = curve[:, e]
             if rods.alive[e] == 1 and rods.k[e] > 0.0:
                 edge[p, TENSION, m] = rods.k[e]

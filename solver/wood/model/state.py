@@ -82,7 +82,7 @@ class State(NamedTuple):
     moments of it about their pivots [N m s]; steps taken.
 
     gripped (g, 6): impulse [N s] and moment of it about the pivot [N m s] that each grip put in; spent [J]: energy that
-    breaks took so far.
+    breaks took so far; crushed [J]: that crushing of rods did.
     """
 
     wood: Wood
@@ -94,6 +94,7 @@ class State(NamedTuple):
     rods: int
     bonds: int
     steps: int
+    crushed: float = 0.0
 
 
 def _again(scratch: Scratch) -> Scratch:

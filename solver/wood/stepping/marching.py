@@ -10,6 +10,7 @@ from ...contract import Context, InvalidGeometry, Unstable
 from ..cohesion import soften
 from ..contact.bodies import deepest
 from ..contact.listing import Listing
+from ..crushing import crush
 from ..fracture import break_worst, overstress
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH
 from ..model.state import State, Wood, copied, scratch_for
@@ -18,7 +19,7 @@ from .explicit import forces, march
 from .gripping import steer, take
 from .moment import Reached, balanced, begin, floor, largest, real
 
-__all__ = ["broken", "explicit"]
+__all__ = ["broken", "explicit", "pressed"]
 
 #: Steps between looks for breaks, so many that they cost little and a wave passes few edges meanwhile.
 _LOOK, _FEWEST, _MOST = 6000, 4, 32
@@ -70,6 +71,18 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     released = float(before - books[: CONTACT + 1].sum() - real(found))
     books[LOST] += released
     return found._replace(spent=state.spent + released)
+
+
+def pressed(state: State, params: WoodParams, time: float, dt: float) -> State:
+    """Return the state with what is pressed too hard crushed; what this takes is booked as lost."""
+    wood, scratch, books = state.wood, state.scratch, state.books
+    if not crush(scratch.plan, wood.rods, scratch.inverse, params.crush_strain):
+        return state
+    before = float(books[: CONTACT + 1].sum())
+    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
+    taken = before - float(books[: CONTACT + 1].sum())
+    books[LOST] += taken
+    return state._replace(crushed=state.crushed + taken)
 
 
 def _advance(state: State, params: WoodParams, time: float, dt: float, steps: int) -> State:
@@ -153,9 +166,9 @@ def explicit(
     _clear(state)
     start = real(state) + float(state.books[: CONTACT + 1].sum())
     look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
-    breaking = params.fracture != "none"
+    breaking, crushing = params.fracture != "none", params.compressive_strength is not None
     # scaled masses follow what touches, at times that do not depend on which are wanted
-    often = breaking or params.touching or bool(wood.grips) or wood.scaling > 1
+    often = breaking or crushing or params.touching or bool(wood.grips) or wood.scaling > 1
     chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
     scale, since, listing = floor(wood, params), 0, Listing(wood, params)
     for wanted in times:
@@ -165,6 +178,8 @@ def explicit(
             time = state.steps * dt
             state = _refreshed(listing, state, steps * dt, time, dt)
             state = _advance(state, params, time, dt, steps)
+            if crushing:
+                state = pressed(state, params, time + steps * dt, dt)
             if breaking:
                 state = broken(state, params, time + steps * dt, dt)
             since += steps * len(wood.motion.x)

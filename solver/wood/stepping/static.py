@@ -75,6 +75,25 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
     return state, norm / max(float(np.linalg.norm(m.load)), least / _TOLERANCE)
 
 
+def _unhurt(state: State, params: WoodParams, time: float) -> None:
+    """Refuse a state at rest in which something would have crushed.
+
+    Raises:
+        NotConverged: see above.
+
+    """
+    rods = state.wood.rods
+    strain = 1 / (state.scratch.inverse * rods.rest) - rods.free
+    over = float(-strain[(rods.alive == 1) & (rods.k > 0)].min(initial=0.0)) / params.crush_strain
+    if over > 1:
+        raise NotConverged(
+            f"at {time:.3g} times the loads a rod is pressed to {over:.2g} times what crushes it, and equilibria crush "
+            "nothing.",
+            advice="Apply smaller loads, leave compressive_strength out, or let it crush in mode explicit.",
+            residual=over - 1,
+        )
+
+
 def _bears(state: State, params: WoodParams, time: float) -> None:
     """Refuse a state at rest in which something would have broken: an equilibrium breaks nothing.
 
@@ -127,6 +146,7 @@ def static(wood: Wood, params: WoodParams, times: Sequence[float], context: Cont
         context.check_cancelled()
         before, load = state.wood.motion.x.copy(), state.wood.motion.load.copy()
         state, error = equilibrium(state, params, wanted, full)
+        _unhurt(state, params, wanted)
         if params.fracture != "none":
             _bears(state, params, wanted)
         way = state.wood.motion.x - before

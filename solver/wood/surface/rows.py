@@ -40,17 +40,10 @@ class Rows(NamedTuple):
     at: np.ndarray  # (rods, stations) row, -1: none
 
 
-def spans(wood: Wood, length: float, deviates: bool = False) -> Spans:
-    """Return the edges' places in the bundle of `length` [m] as laid; where fibres deviate they are longer than it."""
-    if deviates:
-        x = wood.straight[:, 0]
-        return Spans(x[wood.rods.a], x[wood.rods.b], length, wood.grid.shape[1])
-    rest = wood.rods.rest.reshape(len(wood.grid), -1)
-    real = (wood.rods.k > 0).reshape(rest.shape)
-    before = np.where(real[:, :1], 0.0, rest[:, :1])
-    scale = length / np.where(real, rest, 0.0).sum(1, keepdims=True)
-    end = (np.cumsum(rest, 1) - before) * scale
-    return Spans((end - rest * scale).ravel(), end.ravel(), length, wood.grid.shape[1])
+def spans(wood: Wood, length: float) -> Spans:
+    """Return the edges' places in the straight bundle of `length` [m] as laid; fibres may be longer than it."""
+    x = wood.straight[:, 0]
+    return Spans(x[wood.rods.a], x[wood.rods.b], length, wood.grid.shape[1])
 
 
 class _Pieces(NamedTuple):

@@ -11,10 +11,13 @@ import numpy as np
 
 from ...contract import Context
 from ...meshes import Frame
+from ..fibres.timber import hews
 from ..model.grain import Field
 from ..model.state import Wood
 from ..params import WoodParams
-from .align import aligned, bonded, corners, meeting, turned
+from ..shape.fork import limbs
+from ..shape.taper import thickness
+from .align import Pairs, aligned, bonded, corners, meeting, turned
 from .cells import Section, section
 from .rows import Rows, rows, spans
 
@@ -32,12 +35,15 @@ class Skin:
 
     def __init__(self, wood: Wood, params: WoodParams) -> None:
         self.section = section(params)
-        self._span = spans(wood, params.length, params.grain.deviates)
+        self._span = spans(wood, params.length)
         self._pairs = meeting(self.section)
         # a child of the run's seed: the bundle's own draws stay what they are without a mesh
         generator = Context.generator(params.seed).spawn(1)[0]
         width = self.section.radius
         self._grain = Field(4 * width, width / 2, generator)
+        self._params = params
+        self._wide = _wide(wood, self.section.radius) if hews(params) else None
+        self._grown = _grown(self.section, self._pairs, bonded(wood, self._span, self._pairs), params)
 
     def frame(self, wood: Wood, covered: bool = False) -> Frame:
         """Return the mesh of a moment, with the field `inside`; with `covered`, walls that hide each other too."""
@@ -46,11 +52,16 @@ class Skin:
         holds = bonded(wood, self._span, self._pairs)
         found = found._replace(across=turned(found, section, self._pairs, holds))
         begin, row, number = corners(found, section)
-        away = (section.places[section.corner] - section.points[section.owner])[number]
+        thin = thickness(found.place, self._params)
+        if self._wide is not None:
+            part = found.place / self._span.length * (self._wide.shape[1] - 1)
+            thin = thin * self._wide[found.rod, np.clip(np.rint(part).astype(int), 0, self._wide.shape[1] - 1)]
+        thin = thin[row, None]
+        away = thin * (section.places[section.corner] - section.points[section.owner])[number]
         single = self._set_off(found, row, away)
         group, places = aligned(single, begin, found, section, self._pairs, holds)
         sheets = _Sheets(len(places))
-        _walls(sheets, found, section, begin, row, number, group, covered)
+        _walls(sheets, found, section, begin, row, number, group, covered, self._bark(found, row, number))
         _ends(sheets, found, section, begin, row, group)
         vertices, inside = sheets.vertices(places)
         faces = self._broken_faces(sheets, found, begin, row, number, away, single, len(vertices))
@@ -58,6 +69,15 @@ class Skin:
         triangles = np.concatenate([sheets.triangles(), *(t for _, t in faces)])
         inside = np.concatenate([inside, np.ones(len(rough) - len(inside))])
         return Frame(rough, triangles.astype(np.int32), {"inside": inside})
+
+    def _bark(self, found: Rows, row: np.ndarray, number: np.ndarray) -> np.ndarray:
+        """Return whether the sides (c,) that begin at corners lie on bark, as far as the next row."""
+        following = np.minimum(np.arange(1, len(found.place) + 1), len(found.place) - 1)
+        middle = (found.place + found.place[following]) / 2 / self._span.length
+        # between two stations lies what is grown at the second
+        station = np.ceil(np.clip(middle, 0, 1) * (self._grown.shape[1] - 1)).astype(int)
+        found_: np.ndarray = (self.section.mate[number] < 0) | self._grown[number, station[row]]
+        return found_
 
     def _set_off(self, found: Rows, row: np.ndarray, away: np.ndarray) -> np.ndarray:
         """Return points (n, 3) at `away` (n, 2) [m] in the section from the centre lines; broken ends are rough."""
@@ -107,6 +127,31 @@ class Skin:
         return [(points, faces.reshape(-1, 3) + count)]
 
 
+def _wide(wood: Wood, radius: float) -> np.ndarray:
+    """Return how wide rods (k, edges) of mean `radius` [m] are over what they are where all of them is within."""
+    own = wood.rods.radius.reshape(len(wood.grid), -1)
+    found: np.ndarray = own / np.maximum(own.max(1, keepdims=True), 0.9 * radius)
+    return found
+
+
+def _grown(section: Section, pairs: Pairs, holds: np.ndarray, params: WoodParams) -> np.ndarray:
+    """Return where along (n, stations) sides of cells are bark that have a neighbour: where a fork's limbs have parted.
+
+    holds (p, stations): whether pairs hold together as laid.
+    """
+    out = np.zeros((len(section.owner), holds.shape[1]), bool)
+    inner = np.flatnonzero(section.mate >= 0)
+    if params.fork is None or not len(inner):
+        return out
+    one, other = section.owner[inner], section.owner[section.mate[inner]]
+    branch, count = limbs(section.points, params), len(section.points)
+    key = np.minimum(one, other) * count + np.maximum(one, other)
+    pair = np.searchsorted(pairs.p * count + pairs.q, key)
+    beyond = np.linspace(0, params.length, holds.shape[1]) > params.fork.at
+    out[inner] = (branch[one] != branch[other])[:, None] & ~holds[pair] & beyond
+    return out
+
+
 class _Sheets:
     """Triangles whose vertices are groups of corners, apart by sheet, and middles of ends."""
 
@@ -145,8 +190,12 @@ def _walls(
     number: np.ndarray,
     group: np.ndarray,
     covered: bool,
+    bark: np.ndarray,
 ) -> None:
-    """Add bark and uncovered walls: two triangles per side between two rows of a piece, all cut the same way."""
+    """Add bark and uncovered walls: two triangles per side between two rows of a piece, all cut the same way.
+
+    bark (c,): whether a corner's side, as far as the next row, never had a neighbour.
+    """
     goes_on = np.append(found.piece[1:] == found.piece[:-1], False)
     low = np.flatnonzero(goes_on[row])
     side, here = number[low], row[low]
@@ -174,7 +223,7 @@ def _walls(
             & (d[n] == group[begin[under + 1] + first])
             & (c[n] == group[begin[under + 1] + second])
         )
-    for sheet, of in ((_BARK, mate < 0), (_WALL, (mate >= 0) & ~hidden)):
+    for sheet, of in ((_BARK, bark[low] & ~hidden), (_WALL, ~bark[low] & ~hidden)):
         sheets.add(sheet, np.concatenate([np.stack([a, b, c], 1)[of], np.stack([a, c, d], 1)[of]]))
 
 

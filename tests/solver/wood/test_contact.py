@@ -120,7 +120,18 @@ def one(kind: int, k: float = 1e3) -> tuple[Rods, Bodies]:
     zero, flag = np.zeros(1), np.ones(1, np.uint8)
     none = np.zeros(0)
     rods = Rods(
-        np.zeros(1, np.int32), np.ones(1, np.int32), zero + 0.1, zero + 1, flag, none, none, none, none, none, zero
+        np.zeros(1, np.int32),
+        np.ones(1, np.int32),
+        zero + 0.1,
+        zero + 1,
+        flag,
+        none,
+        none,
+        none,
+        none,
+        none,
+        zero,
+        zero + 1,
     )
     shape = {"size": (2.0, 2.0, 2.0)} if kind == 0 else {"shape": "cylinder", "size": (2.0, 2.0, 0)}
     body = {**shape, "friction": 0.4, "path": [{"time": 0, "position": (0, 0, 0)}]}

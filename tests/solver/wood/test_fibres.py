@@ -11,6 +11,7 @@ from solver.wood.fibres.hewing import hewn
 from solver.wood.fibres.paths import crowded, named, placed
 from solver.wood.forces.hessian import Stiffness
 from solver.wood.model.bundle import lay
+from solver.wood.model.outline import covered, drawn_in
 from solver.wood.model.state import Wood, scratch_for
 from solver.wood.stepping.explicit import forces
 
@@ -123,8 +124,8 @@ def test_what_is_hewn_has_its_outline_its_weight_and_its_load(way):
     for end in (wood.rods.a[whole], wood.rods.b[whole]):
         assert np.hypot(*wood.straight[end, 1:].T).max() < RADIUS
     full = np.pi * RADIUS**2 * LENGTH * 600
-    # half an edge of it is the clamp's
-    assert wood.motion.mass[free].sum() == pytest.approx(full * (1 - 0.5 / 15), rel=0.03)
+    # half an edge of it is the clamp's; chips are left out, the more as rods have only part of a section at the rim
+    assert wood.motion.mass[free].sum() == pytest.approx(full * (1 - 0.5 / 15), rel=0.04)
     assert wood.motion.load[free, 1].sum() == pytest.approx(3.0)
     assert wood.motion.load[free, 2].sum() == pytest.approx(-9.81 * wood.motion.mass[free].sum())
     on = wood.bonds.on > 0
@@ -157,8 +158,8 @@ def test_sloped_grain_is_softer_and_knots_are_too():
     loads: dict[str, object] = {"tip_load": (0.0, 0.0, -1.0), "length": 0.3, "vertices": 31}
     straight = sag(params({}, **loads))
     slope = straight / sag(params({"spiral": TEN, "pith": (0.0, 1.0)}, **loads))
-    # the beam of oblique fibres has 0.73; rods that run out bear nothing near their ends (docs/wood.md)
-    assert 0.5 < slope < 0.73
+    # the beam of oblique fibres has 0.73
+    assert 0.64 < slope < 0.76
     assert straight / sag(params({"spiral": TEN / 2, "pith": (0.0, 1.0)}, **loads)) > slope + 0.1
     knot = {"at": (0.03, 0.0, 0.01), "radius": 0.004}
     assert 0.8 < straight / sag(params({"knots": [knot]}, **loads)) < 0.99
@@ -184,3 +185,23 @@ def test_a_hewn_stick_stays_at_rest_until_it_is_loaded_and_has_a_surface():
     mesh = found.mesh_position.values[0]
     mesh = mesh[np.isfinite(mesh).all(-1)] if mesh.ndim == 2 else mesh
     assert np.abs(mesh[..., 1:]).max() < 1.6 * RADIUS
+
+
+def test_cells_are_covered_as_far_as_the_outline_reaches():
+    """And stand for what is left of them at its centroid."""
+    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    points, wide = np.array([(0.0, 0.0), (1.0, 0.0), (0.9, 0.2), (1.1, 0.2), (1.3, 0.0), (0.0, -1.05)]), np.full(6, 0.4)
+    there = drawn_in(square, points, wide)
+    assert covered(square, there, wide) == pytest.approx([1.0, 0.5, 0.75, 0.25, 0.0, 0.375])
+    # from 0.8, 0.7 and 0.9 to the side
+    assert there[1:4, 0] == pytest.approx([0.9, 0.85, 0.95])
+    assert there[0] == pytest.approx(points[0])
+
+
+def test_a_little_slope_changes_little():
+    """What runs out is cut obliquely: sticks of a twentieth of slope are as stiff as the beam, within a tenth."""
+    loads: dict[str, object] = {"tip_load": (0.0, 0.0, -1.0), "length": 0.3, "vertices": 61}
+    straight = sag(params({}, **loads))
+    for slope, wanted in ((0.005, 1.0), (0.05, 1 / (1 + 0.05**2 * 10e9 / 0.7e9))):
+        for pith in ((1.0, 0.0), (0.0, 1.0)):
+            assert straight / sag(params({"spiral": slope, "pith": pith}, **loads)) == pytest.approx(wanted, rel=0.1)

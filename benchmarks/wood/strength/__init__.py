@@ -1,0 +1,1 @@
+"""What weakens wood, against what is published: compression along the grain, knots."""
