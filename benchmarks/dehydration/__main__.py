@@ -26,10 +26,8 @@ PLAN = (
     *((0.04, 10.0, "", quality, seeds) for quality, seeds in (("preview", 3), ("default", 2), ("fine", 2))),
 )
 THIN = (
-    (0.02, 10.0, "xyz", "preview", 2),
-    (0.02, 10.0, "xyz", "default", 2),
+    *((0.02, 10.0, "xyz", quality, 2) for quality in ("preview", "default", "fine")),
     (0.01, 10.0, "xyz", "preview", 1),
-    (0.02, 10.0, "xyz", "fine", 1),
     (0.01, 10.0, "xyz", "default", 1),
 )
 #: Meshes of the short form.
