@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from functools import lru_cache
 from typing import Any
 
@@ -25,6 +26,7 @@ __all__ = ["listed", "router"]
 
 #: Other pictures of the same tables have other addresses and tags: browsers keep them for a day.
 _DRAWN = "-2"
+_LISTING = threading.Lock()
 router = APIRouter(tags=["catalogue"])
 
 _PNG, _TOML = problems.files(["image/png"]), problems.files(["application/toml"])
@@ -45,24 +47,27 @@ def listed(live: LiveTables) -> list[dict[str, Any]]:
         MissingStore: there is no store.
 
     """
-    found: list[dict[str, Any]] = []
-    for name in live.names():
-        try:
-            info, solver, families = _known(live, name)
-            said = covering.covered(live.store, families, info, solver)
-        except (CorruptTable, FileNotFoundError) as error:
-            found.append({"name": name, "complaint": str(error)})
-            continue
-        point, stage = covering.portrait(live.store, families, info)
-        links: dict[str, str] = {
-            "self": link(f"/v1/tables/{name}"),
-            "shapes": link(f"/v1/shapes/{info.solver}?table={name}"),
-            "thumbnail": link(f"/v1/maps/{name}/thumbnail.png?v={info.digest[:12]}{_DRAWN}"),
-        }
-        if info.plan:
-            links["plan"] = link(f"/v1/maps/{name}/plan.toml")
-        found.append({**said, "portrait": {**point, solver.stages.symbol: stage}, "links": links})
-    return found
+    # what begins aside and who asks meanwhile would read the same families twice
+    with _LISTING:
+        return [_said(live, name) for name in live.names()]
+
+
+def _said(live: LiveTables, name: str) -> dict[str, Any]:
+    """Return what one table covers, or its `complaint`."""
+    try:
+        info, solver, families = _known(live, name)
+        said = covering.covered(live.store, families, info, solver)
+    except (CorruptTable, FileNotFoundError) as error:
+        return {"name": name, "complaint": str(error)}
+    point, stage = covering.portrait(live.store, families, info)
+    links: dict[str, str] = {
+        "self": link(f"/v1/tables/{name}"),
+        "shapes": link(f"/v1/shapes/{info.solver}?table={name}"),
+        "thumbnail": link(f"/v1/maps/{name}/thumbnail.png?v={info.digest[:12]}{_DRAWN}"),
+    }
+    if info.plan:
+        links["plan"] = link(f"/v1/maps/{name}/plan.toml")
+    return {**said, "portrait": {**point, solver.stages.symbol: stage}, "links": links}
 
 
 @router.get(

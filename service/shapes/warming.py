@@ -28,7 +28,7 @@ _FIRST = ("default", "sphere")
 
 
 def warm(tables: LiveTables, then: Callable[[LiveTables], object]) -> threading.Thread:
-    """Begin to load what a service's first questions need, and do what comes `then`; return the thread that does it.
+    """Begin to load what a service's first questions need, and what comes `then`; return the thread that does it.
 
     A store that is missing or damaged, or a table without a shape in its middle, is left to those who ask: they are
     told what is wrong.

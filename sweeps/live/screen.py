@@ -15,7 +15,7 @@ __all__ = ["Screen"]
 #: Frames that a client may have without having said that it took them in.
 _WINDOW = 2
 #: Seconds between two frames at rest, and from the last frame, or the step's begin, to one of a shape on its way.
-_BETWEEN, _UNDERWAY = 1 / 45, 1 / 45
+_BETWEEN, _UNDERWAY = 1 / 45, 1 / 80
 
 
 class _Waiting(NamedTuple):
