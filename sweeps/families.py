@@ -82,8 +82,8 @@ class _Kept(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _kept(path: Path) -> _Kept:
-    # a generation's file never changes, and opening all its columns takes longer than a shape
-    opened = generation.read(path)
+    # a generation's file never changes, and opening its columns takes longer than a shape
+    opened = generation.read(path, ("converged", "neighbour_correlation", *generation.left_out_names()))
     judged, likeness = generation.left_out(opened), opened.get("neighbour_correlation")
     return _Kept(
         opened["converged"].values.astype(bool).sum(axis=0).tolist() if "converged" in opened else None,

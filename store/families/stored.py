@@ -72,7 +72,7 @@ def values(store: Store, info: TableInfo) -> dict[str, list[float]]:
 def _samples(path: Path, axes: tuple[str, ...]) -> Array | None:
     if not axes:
         return None
-    opened = generation.read(path)  # a generation's file never changes
+    opened = generation.read(path, axes)  # a generation's file never changes
     return np.stack([opened[name].values for name in axes], axis=-1)
 
 

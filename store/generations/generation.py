@@ -34,6 +34,7 @@ __all__ = [
     "digest",
     "judged",
     "left_out",
+    "left_out_names",
     "map_spectra",
     "open",
     "read",
@@ -115,7 +116,7 @@ def judged(path: Path) -> Judged:
         CorruptTable: it cannot be read.
 
     """
-    first = _left_out_names()[0]
+    first = left_out_names()[0]
     opened = read(path, (first, "neighbour_correlation"))
     found, likeness = opened.get(first), opened.get("neighbour_correlation")
     method = str(found.attrs["method"]) if found else None
@@ -167,13 +168,14 @@ def left_out(opened: Mapping[str, Column]) -> tuple[Array, str] | None:
 
     None for a table that holds none: of one sample, or of no fruits.
     """
-    names = _left_out_names()
+    names = left_out_names()
     if names[0] not in opened:
         return None
     return np.stack([opened[name].values for name in names], axis=-1), str(opened[names[0]].attrs["method"])
 
 
-def _left_out_names() -> list[str]:
+def left_out_names() -> list[str]:
+    """Return the columns that say how far samples are from what the others predict."""
     return [f"left_out_{name}" for name in Measures._fields]
 
 
