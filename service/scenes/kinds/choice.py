@@ -50,18 +50,7 @@ def distinct(
         values: object = tuple(sorted(item.parameters.items()))
         of_run = item.run, item.source, item.quality, item.full
         unlike = (item.differ, item.shapes, item.seed) if item.differ else None
-        key = (
-            item.solver,
-            item.preset,
-            values,
-            item.stage,
-            item.curve,
-            item.shade,
-            of_run,
-            unlike,
-            item.variants,
-            item.full,
-        )
+        key = (item.solver, item.preset, values, item.stage, item.curve, item.shade, of_run, unlike, item.variants)
         try:
             number = numbers.get(key)
         except TypeError:  # lists among the parameters; rare, where items are many
