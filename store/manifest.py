@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from solver.contract import Quality
+
 from . import seal
 from .canonical import canonical
 from .errors import CorruptTable, UnknownTable
@@ -55,6 +57,12 @@ class TableInfo:
         if not self.tied:
             return dict(values)
         return {**values, **{name: tie(values[tie.leader]) for name, tie in self.tied.items() if tie.leader in values}}
+
+    @property
+    def quality(self) -> Quality:
+        """Quality of the runs that it holds."""
+        found: Quality = self.need["quality"]
+        return found
 
     @property
     def reach(self) -> tuple[float, float]:

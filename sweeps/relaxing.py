@@ -22,10 +22,12 @@ __all__ = ["relaxed", "starts"]
 
 
 def relaxed(
-    solver: Solver, table: ShapeTable, shape: Shape, quality: Quality = "preview", context: Context | None = None
+    solver: Solver, table: ShapeTable, shape: Shape, quality: Quality | None = None, context: Context | None = None
 ) -> tuple[Shape, Mapping[str, Any]]:
     """Return the equilibrium next to a shape that was looked up with its positions, on the same lattice, and what
     relaxing said of it: `residual`, `moved` (rms of the radial motion over the roughness), `iterations`, `seconds`.
+
+    Without a quality it is that of the table's runs: on another mesh their shapes are no equilibria, and slide away.
 
     Raises:
         InvalidInput: the solver relaxes nothing, or refuses the parameters.
@@ -37,7 +39,7 @@ def relaxed(
     told = tuple(name for name in table.info.descriptors if name in solver.fields)
     need = Need(
         fields=("displacement", "lattice_crossings", "position", *told),
-        quality=quality,
+        quality=quality or table.info.quality,
         resolution=len(shape.position),
         dtype="float64" if table.info.dtype == "float64" else "float32",
     )

@@ -62,7 +62,7 @@ def _add(sheet: Sheet, name: str, info: TableInfo, package: Store, found: list[M
     residual, least = max(row["residual"] for row in found), min(row["least_jacobian"] for row in found)
     pairs, size = sum(row["pairs"] for row in found), path.stat().st_size / 1e6
     part = {"": "whole", "xz": "quarter", "xyz": "eighth"}[str(info.fixed.get("mirrors", ""))]
-    quality = str(dict(info.need)["quality"])
+    quality = info.quality
     settled = f"{met} of {asked}", f"{residual:.1e}"
     shape = pairs, f"{least:.2f}", f"{evened:.3f}"
     sheet.add(

@@ -84,7 +84,8 @@ def redirect(request: Request, asked: Asked) -> Response:
 def relax(request: Request, asked: Asked) -> Response:
     """Ask for what the table gives, relaxed by its solver, in the name of the request's token; send its asker there.
 
-    The quality is `preview`. The same shape of the same table is the same job: what was relaxed once is kept.
+    The quality is that of the table's runs: on another mesh they are no equilibria, and slide away. The same shape of
+    the same table is the same job: what was relaxed once is kept.
 
     Raises:
         Unauthorized, Forbidden: the request has no token for it.
@@ -96,7 +97,7 @@ def relax(request: Request, asked: Asked) -> Response:
     table, query = asked.table, asked.query
     need = Need(
         stages=(query.stage,),
-        quality="preview",
+        quality=table.info.quality,
         resolution=asked.resolution,
         start=Start(table=asked.found.name, digest=table.digest, method=query.method),
     )

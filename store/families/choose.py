@@ -129,7 +129,7 @@ class Families:
         return self._count == 1 or info.name in ("default", self._base.solver)
 
     def _rank(self, fit: Fit, values: Mapping[str, Any]) -> tuple[float, int, int, bool, str]:
-        quality = fit.info.need.get("quality", "")
+        quality = fit.info.quality
         place = _QUALITIES.index(quality) if quality in _QUALITIES else len(_QUALITIES)
         info = fit.info
         return round(self._nearest_sample(info, values), 9), place, -info.resolution, not self._is_own(info), info.name

@@ -58,7 +58,7 @@ def between(table: ShapeTable, count: int, seed: int = 0) -> list[dict[str, floa
 
 
 def distance(solver: Solver, table: ShapeTable, values: dict[str, float], stage: float, method: str) -> Distance | None:
-    """Relax what a method looks up for `STEPS` steps at preview; None where the solver cannot.
+    """Relax what a method looks up for `STEPS` steps on the mesh of its runs; None where the solver cannot.
 
     Raises:
         InvalidInput: it relaxes nothing.
@@ -67,7 +67,7 @@ def distance(solver: Solver, table: ShapeTable, values: dict[str, float], stage:
     shape = table.at(values, stage, resolution=LATTICE, fields=("position", "displacement"), method=method)
     assert shape.position is not None
     assert shape.displacement is not None
-    need = Need(fields=("displacement", "position"), quality="preview", resolution=LATTICE)
+    need = Need(fields=("displacement", "position"), quality=table.info.quality, resolution=LATTICE)
     params = solver.parse(table.at_parameters(values))
     try:
         found = solver.relaxed(params, np.asarray(shape.position, float), stage, need, steps=STEPS).isel(stage=0)

@@ -67,7 +67,7 @@ def test_what_is_looked_up_is_relaxed_once_and_says_so(
     sent = ask(client, headers, exact="relax", format="npz")
     assert (sent.status_code, sent.headers["cache-control"]) == (303, "no-store")
     job = client.get(sent.headers["location"]).json()
-    assert (job["state"], job["need"]["stages"], job["need"]["quality"]) == ("wanted", [0.2], "preview")
+    assert (job["state"], job["need"]["stages"], job["need"]["quality"]) == ("wanted", [0.2], "default")
     assert job["need"]["start"]["table"] == "stone-radius"
     assert ask(client, headers, exact="relax", format="glb").headers["location"] == sent.headers["location"]
 

@@ -51,9 +51,11 @@ def test_a_ridged_surface_comes_to_balance() -> None:
 @pytest.mark.parametrize(
     ("te", "gamma", "alike"),
     [
-        (0.0325, 13.0, 0.9),
-        # the nearest balance of this blend lies farther away: it slides there for two thousand steps
-        (0.0375, 22.0, 0.6),
+        (0.0325, 13.0, 0.97),
+        # the nearest balance of this blend lies farther away
+        (0.0375, 22.0, 0.9),
+        # a run of the table itself, which on a coarser mesh slides away for thousands of steps
+        (0.03, 10.0, 0.99),
     ],
 )
 def test_a_looked_up_shape_comes_to_balance_and_keeps_its_pattern(te: float, gamma: float, alike: float) -> None:

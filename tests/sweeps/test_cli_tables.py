@@ -30,6 +30,19 @@ def test_table_commands(table: Path, tmp_path: Path) -> None:
     assert wizen("table", "verify", "--store", copy).exit_code == 0
 
 
+def test_a_list_of_tables_has_one_line_for_each_and_cuts_no_word(table: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = wizen("table", "list", "--store", table).stdout
+    (row,) = [line.split() for line in listed.splitlines() if line.split()[:1] == ["default"]]
+    assert row[1:4] == ["te", "0.02..0.04", "(3);"]
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal
+    monkeypatch.setenv("COLUMNS", "40")
+    narrow = wizen("table", "list", "--store", table).stdout
+    assert len(narrow.splitlines()) > len(listed.splitlines())
+    words = [word for word in listed.split() if "─" not in word]
+    assert "converged" in words
+    assert all(word in narrow for word in words)
+
+
 def test_runs_of_a_table_solved_again(table: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(table, tmp_path / "copy")
     result = wizen("table", "verify", "--store", copy, "--recompute", 2, "--json")

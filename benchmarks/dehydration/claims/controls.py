@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def _need(table_: ShapeTable) -> Need:
-    return SOLVER.settle(Need(stages=table_.stages, quality=table_.info.need["quality"], fields=_COMPARED))
+    return SOLVER.settle(Need(stages=table_.stages, quality=table_.info.quality, fields=_COMPARED))
 
 
 def _cheapest(store: Store, name: str) -> tuple[float, str, int]:
@@ -75,7 +75,7 @@ def _controlled(table_: ShapeTable, i: int) -> Row:
     return {
         "sample": sample,
         "stages": list(table_.stages),
-        "quality": table_.info.need["quality"],
+        "quality": table_.info.quality,
         "seed": 0,
         "stored": {name: [one[name] for one in stored] for name in _COMPARED},
         "cold": {name: cold[name].values.tolist() for name in _COMPARED},

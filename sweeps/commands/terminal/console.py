@@ -35,15 +35,21 @@ def emit(document: Any, as_json: bool, show: Callable[[Console], None]) -> None:
 
 
 def grid(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> None:
-    """Print a table for people."""
+    """Print a table for people: no word is cut, and what goes to a file or a pipe has one line for each row."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table
 
     table = Table(*head, title=title or None, title_justify="left", box=box.SIMPLE_HEAD)
     table.columns[0].no_wrap = True  # names are typed again: no terminal is too narrow for them
+    for name, column in zip(head, table.columns, strict=True):
+        column.min_width = len(name)
     for row in rows:
+        for column, cell in zip(table.columns, row, strict=True):
+            column.min_width = max(column.min_width or 0, *map(len, cell.split()), 0)
         table.add_row(*(escape(cell) for cell in row))
+    needed = console.measure(table, options=console.options.update(max_width=10_000))
+    console.width = max(console.width, needed.minimum) if console.is_terminal else needed.maximum
     console.print(table)
 
 
