@@ -218,3 +218,17 @@ def test_compression_pushes_a_sheet_out_of_its_plane_on_the_asked_side(pushing):
         for last in settled(state, engine.script, 1e-6, 0.0):
             again = last
         assert np.linalg.norm(again.x - state.x, axis=1).max() < 0.01 * state.length
+
+
+def test_a_strong_push_does_not_swing_to_and_fro():
+    """It takes away the compression that it comes from: all of it at once, and every other step would have none."""
+    spot = {"kind": "spot", "at": (0, 0, 1), "radius": 0.6, "stretch": (1.3, 1.3)}
+    engine = Engine(GrowthParams.parse({"shape": "sphere", "tools": [spot], "normal_force": 10.0}), 600)
+    heights = []
+    for step in range(10):
+        engine.advance(1e9, until=(step + 1) * engine.params.step)
+        heights.append(np.ptp(engine.state.x[:, 2]))
+    assert (np.diff(heights) > 0).all()
+    state = engine.reach(1.0, Context())
+    assert state.minimum
+    assert residual(state, engine.script) < 1e-3
