@@ -126,7 +126,9 @@ def main() -> None:
         sheet.add(cells, part=part, share=share, **(found if part == "forces" else {}))
     shared = sum(parts.values())
     bound = 1 / (1 - shared + shared / faster)
-    sheet.add(("a step, if all of them went so", f"{shared:.2f}", f"{bound:.2f}"), part="all", share=shared, bound=bound)
+    sheet.add(
+        ("a step, if all of them went so", f"{shared:.2f}", f"{bound:.2f}"), part="all", share=shared, bound=bound
+    )
     sheet.keep(vertices=asked.vertices)
 
 

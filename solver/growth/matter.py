@@ -39,7 +39,7 @@ class Rib(_Model):
 
 
 class Bed(_Model):
-    """An elastic bed that the sheet lies on: springs along the start shape's normals, on ground as uneven as the sheet.
+    """An elastic bed: springs along the start shape's normals, on ground as uneven as the sheet.
 
     A plate of stiffness D on springs K per area folds, where it is compressed one way, at N = 2 (K D)^(1/2) with the
     wavelength 2 pi (D / K)^(1/4) (Hetenyi 1946; of films on soft ground Bowden et al. 1998).
@@ -54,7 +54,7 @@ class Bed(_Model):
         1.0,
         ge=0,
         le=1,
-        description="1 less how much the wavelength differs from place to place: the standard deviation of its logarithm",
+        description="1 less the standard deviation, from place to place, of the logarithm of the wavelength",
     )
     where: Place = Field(default_factory=Everywhere, description="Share of each vertex, of the springs' stiffness")
 

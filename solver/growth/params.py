@@ -216,7 +216,7 @@ class GrowthParams(Params):
         0.0,
         ge=-10,
         le=10,
-        description="Share of the sheet's compression that pushes along the normal (the paper's F_N), frozen in each step",
+        description="How much of its compression pushes a sheet along its normal (the paper's F_N), frozen in a step",
         json_schema_extra=_units("1/start shape's unit"),
     )
     gravity: tuple[float, float, float] = Field(

@@ -43,4 +43,5 @@ class Bed:
         """Return how motions (3n, k) go against the springs (n, k), by the root of their share of the stiffest."""
         n = len(self.stiff)
         along = np.einsum("nc,nck->nk", self.normals, motions.reshape(n, 3, -1))
-        return np.sqrt(self.stiff / max(float(self.stiff.max()), 1e-300))[:, None] * along
+        found: Floats = np.sqrt(self.stiff / max(float(self.stiff.max()), 1e-300))[:, None] * along
+        return found

@@ -1,7 +1,8 @@
 """The energy of one growth step: membrane, bending, pressure, solids as penalties, a bed, held vertices.
 
-Pressure, and what compression pushes, are dead loads, laid anew along the normals from time to time. What it does to a closed surface is the work on
-the volume inside, -p V(x), so there it may follow every move (`following`): then its second derivative is at hand too.
+Pressure, and what compression pushes, are dead loads, laid anew along the normals from time to time. What pressure does
+to a closed surface is the work on the volume inside, -p V(x), so there it may follow every move (`following`): then its
+second derivative is at hand too.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ class StepEnergy:
         self.follow(state.x)
 
     def follow(self, x: Floats) -> None:
-        """Lay pressure and what compression pushes along the normals at x (n, 3): dead loads until they are laid again."""
+        """Lay pressure, and what compression pushes, along the normals at x (n, 3): dead loads until the next time."""
         self._last, self._fixed = None, None
         if self._pressure and not self.following:
             self._fixed = self._pressure * area_vectors(x, self.state.mesh.triangles)

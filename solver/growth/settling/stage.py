@@ -49,8 +49,9 @@ def settled(state: State, params: GrowthParams, tolerance: float, distance: floa
     And until nothing moves any more: Newton's own step, which is the distance that is left, is below 0.03 % of an edge,
     and the energy bends up along every way. A shape in balance on a saddle is nudged off it.
     Pressure follows the normals, which were frozen on the way here: within each step where the surface is closed, else
-    it is laid again until nothing changes, and so is what compression pushes. The last value is the result, `forces` of which is what is left, and
-    `minimum` whether it is one. distance: that parts keep from each other, 0 where none come near.
+    it is laid again until nothing changes, and so is what compression pushes. The last value is the result, `forces` of
+    which is what is left, and `minimum` whether it is one. distance: that parts keep from each other, 0 where none come
+    near.
 
     Raises:
         Unstable: the shape left the finite.

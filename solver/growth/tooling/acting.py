@@ -118,8 +118,7 @@ def spots(state: State, tool: HotSpot, number: int, time: float) -> Acting:
 
 def _slope(p: Floats, normal: Floats, values: Floats) -> Floats:
     """Return the ways (m, 3) in which linear values (m, 3) of triangles (m, 3, 3) rise; 0 where one is not known."""
-    known = np.isfinite(values).all(axis=1)
-    v = np.where(known[:, None], values, 0.0)
+    v = np.where(np.isfinite(values).all(axis=1, keepdims=True), values, 0.0)
     edges = np.stack([p[:, 2] - p[:, 1], p[:, 0] - p[:, 2], p[:, 1] - p[:, 0]], 1)
     return np.asarray(np.einsum("mk,mkc->mc", v, np.cross(normal[:, None], edges)))
 

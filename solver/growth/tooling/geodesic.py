@@ -1,9 +1,9 @@
 """Distances along a surface: from triangle to triangle, by the place from which a distance seems to come.
 
-Each triangle tells a corner's distance from those of the other two: laid flat, they give the place where a point source
-would be (Novotni and Klein 2002), or, of a line, the way in which a straight front goes (Kimmel and Sethian 1998). A way
-to a corner enters through the edge opposite to it in one of its triangles, or along an edge, so on what can be laid flat
-distances from a point are exact, whatever the triangles; elsewhere they are as good as the mesh.
+Each triangle tells a corner's distance from those of the other two: laid flat, they give the place where a point
+source would be (Novotni and Klein 2002), or, of a line, the way in which a straight front goes (Kimmel and Sethian
+1998). A way to a corner enters through the edge opposite to it in one of its triangles, or along an edge, so on what
+can be laid flat distances from a point are exact, whatever the triangles; elsewhere they are as good as the mesh.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ _GAIN = 1e-12
 
 
 class Distances(NamedTuple):
-    """Distances (n,), infinite beyond the limit; the two vertices (n, 2) between which the way to each comes, and where
-    between them (n,), 0 at the first. Seeds come from themselves."""
+    """Distances (n,), infinite beyond the limit, and where the way to each vertex comes from.
+
+    parents: the two vertices (n, 2) between which it comes, seeds themselves. between: where (n,), 0 at the first.
+    """
 
     away: Floats
     parents: Ints

@@ -1,8 +1,8 @@
 """Tensors of growth that are painted by strokes and spread between them (the paper's 4.3).
 
 Rates and directions are found on the shape at the tool's start. From then on they ride on the material: kept are the
-directions' tensors, which have no sign that neighbours could disagree on, and the places where they were found, by which
-each triangle carries its direction to what it has become.
+directions' tensors, which have no sign that neighbours could disagree on, and the places where they were found, by
+which each triangle carries its direction to what it has become.
 """
 
 from __future__ import annotations
@@ -93,7 +93,9 @@ def carried_ways(ridden: Floats, triangles: Ints) -> Floats:
     other = b - lean[:, None] * first
     height = np.maximum(np.linalg.norm(other, axis=1), 1e-300)
     second = other / height[:, None]
-    t11, t12, t22 = (np.einsum("mi,mij,mj->m", u, tensor, v) for u, v in ((first, first), (first, second), (second, second)))
+    t11, t12, t22 = (
+        np.einsum("mi,mij,mj->m", u, tensor, v) for u, v in ((first, first), (first, second), (second, second))
+    )
     angle = np.arctan2(2 * t12, t11 - t22) / 2
     t = np.sin(angle) / height
     return np.stack([(np.cos(angle) - t * lean) / size, t], -1)

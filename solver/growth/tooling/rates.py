@@ -63,7 +63,9 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
     return Rates(edges.mean(axis=1), edges, curving)
 
 
-def _acting(state: State, tool: HotSpot | HotCurve | HotSurface | HotStroke, number: int, time: float, since: float) -> Acting:
+def _acting(
+    state: State, tool: HotSpot | HotCurve | HotSurface | HotStroke, number: int, time: float, since: float
+) -> Acting:
     if isinstance(tool, HotSurface):
         return surface(state, tool, number, time)
     if isinstance(tool, HotCurve):

@@ -216,7 +216,8 @@ class PaintedStroke(BaseModel):
     width: float = Field(0.0, ge=0, le=100, description="Half width; 0: the nearest vertices [start shape's unit]")
     stretch: tuple[Stretch, Stretch] = Field((1.0, 1.0), description="Along and across the frame [1]")
     frame: Point | Literal["along", "around"] = Field(
-        "along", description="Direction of the first stretch: 'along' the stroke, 'around' the z axis, or a direction [1]"
+        "along",
+        description="Direction of the first stretch: 'along' the stroke, 'around' the z axis, or a direction [1]",
     )
 
 

@@ -1,6 +1,7 @@
-"""Folds as long as asked for, and compression that pushes along the normal, against plates on springs and under load."""
+"""Folds as long as asked for, and compression that pushes along the normal, against plates on springs, under load."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,9 +18,7 @@ from solver.growth.settling.tangent import Tangent
 from solver.shell import Material
 
 THICKNESS, WAVELENGTH = 0.04, 1.0
-ENDS = [
-    {"where": {"kind": "band", "along": "x", "low": s * 3.9, "high": s * 4.0}, "axes": ("x", "z")} for s in (-1, 1)
-]
+ENDS = [{"where": {"kind": "band", "along": "x", "low": s * 3.9, "high": s * 4.0}, "axes": ("x", "z")} for s in (-1, 1)]
 
 
 def film(regularity, seed):
@@ -94,7 +93,7 @@ def test_less_regular_folds_are_as_long_as_each_place_asks_for(seed):
     stiff = np.exp(state.matter["stiff"][on]) * Material(THICKNESS).flexural
     wanted = 2 * np.pi * (stiff / state.matter["bed"][on, 0]) ** 0.25
     x = state.x[on, 0]
-    asked = np.array([wanted[(x > a) & (x < b)].mean() for a, b in zip(at[:-1], at[1:], strict=True)])
+    asked = np.array([wanted[(x > a) & (x < b)].mean() for a, b in pairwise(at)])
     long = 2 * np.diff(at)
     assert asked.std() > 0.05 * WAVELENGTH
     assert long.std() == pytest.approx(asked.std(), rel=0.25)

@@ -82,7 +82,7 @@ TOOLS = {
     "polar": {"kind": "spot", "at": (0.3, 0.1, 0), "radius": 0.6, "stretch": (1.5, 1.1), "polar": True},
     "curve": {
         "kind": "curve",
-        "points": [(0.35, -0.5, 0), (0.35, 0.5, 0)],
+        "points": [(0.2, -0.4, 0), (0.5, 0.4, 0)],
         "radius": 0.5,
         "stretch": (1.1, 1.4),
         "intensities": [0.2, 1.0],
@@ -117,5 +117,6 @@ def test_a_sheet_that_is_bent_grows_where_the_flat_one_does(name):
             state = replace(started(state, [made], 0.1, 0), x=shape(state.x))
             found.append(rates(state, {0: made}, 0.05).strain)
         off.append(np.abs(found[1] - found[0]).max() / np.abs(found[0]).max())
+    print(off)
     assert off[0] < 0.04
     assert off[1] > 0.15

@@ -19,7 +19,9 @@ def ring(radius, height=0.0, count=120):
 
 def painted(strokes, vertices=900, **values):
     tool = {"kind": "tensors", "strokes": strokes}
-    made = Engine(GrowthParams.parse({"tools": [tool], "imperfection": 0, "remesh": 0, "contact": 0} | values), vertices)
+    made = Engine(
+        GrowthParams.parse({"tools": [tool], "imperfection": 0, "remesh": 0, "contact": 0} | values), vertices
+    )
     return started(made.state, made.params.tools, 0.1, 0), made.params.tools
 
 

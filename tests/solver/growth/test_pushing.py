@@ -19,10 +19,10 @@ THICKNESS, DISTANCE, GAP = 0.1, 0.01, 0.012
 
 
 def two_spheres(count):
-    """Return a mesh of two spheres whose poles are a gap apart along x, and which of its points are the second's."""
-    mesh = start("sphere", count, 1.0)
+    """Return points, triangles of two spheres whose poles are a gap apart, and which points are the second's."""
+    mesh, aside = start("sphere", count, 1.0), np.array([1 + GAP / 2, 0, 0])
     x = mesh.x[:, [2, 0, 1]]
-    points = np.concatenate([x - [1 + GAP / 2, 0, 0], x + [1 + GAP / 2, 0, 0]])
+    points = np.concatenate([x - aside, x + aside])
     faces = np.concatenate([mesh.triangles, mesh.triangles + len(x)])
     return points, faces, np.arange(len(points)) >= len(x)
 
@@ -30,10 +30,10 @@ def two_spheres(count):
 def test_a_sphere_that_grows_dents_its_neighbour_as_a_shell_is_dented():
     """Both are held about their middles: what one does to the other arrives at what holds it.
 
-    The dent is what that force makes of a shallow shell: w(r) = -P l^2 kei(r / l) / (2 pi D), l^2 = R (D / Y)^(1/2) (Reissner 1946), with
-    forces where they act. Y = 2 (1 + nu) mu, D as in bending: nu in bending has no part in it. Measured: 1.12 of that
-    with 2000 vertices on each sphere, 1.096 with 4000; of the rest 5 % are what the membrane gives way further off,
-    (1 + nu) P / (2 pi Y), which the shallow shell leaves out.
+    The dent is what that force makes of a shallow shell: w(r) = -P l^2 kei(r / l) / (2 pi D), l^2 = R (D / Y)^(1/2)
+    (Reissner 1946), with forces where they act. Y = 2 (1 + nu) mu, D as in bending: nu in bending has no part in it.
+    Measured: 1.12 of that with 2000 vertices on each sphere, 1.096 with 4000; of the rest 5 % are what the membrane
+    gives way further off, (1 + nu) P / (2 pi Y), which the shallow shell leaves out.
     """
     points, faces, second = two_spheres(2000)
     middle = np.where(second, 1, -1) * (1 + GAP / 2)

@@ -122,7 +122,7 @@ def test_ripples_of_a_growing_edge_come_when_a_plates_do_and_are_as_long(border)
 
 
 def plates_modes(low, material, ratio=-1 / 3):
-    """Return thresholds and wave numbers of the edge (6, 2) of a finite strip that is clamped at y = low, by scikit-fem.
+    """Return thresholds and wave numbers of the edge (6, 2) of a finite strip that is clamped at low, by scikit-fem.
 
     The first two are the strip's ends, where nothing holds it, the next two its waves with a crest or a node amid.
     """
@@ -145,7 +145,10 @@ def plates_modes(low, material, ratio=-1 / 3):
     values, ways = eigsh(load.assemble(basis)[free][:, free], 6, bent.assemble(basis)[free][:, free])
     edge, whole = np.isclose(mesh.p[1], 0.5), np.zeros((basis.N, 6))
     whole[free] = ways
-    found = [(1 / v, waves_of(mesh.p[0][edge], w[basis.nodal_dofs[0]][edge])[0]) for v, w in zip(values, whole.T, strict=True)]
+    found = [
+        (1 / v, waves_of(mesh.p[0][edge], w[basis.nodal_dofs[0]][edge])[0])
+        for v, w in zip(values, whole.T, strict=True)
+    ]
     return np.array(sorted(found))
 
 

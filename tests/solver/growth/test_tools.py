@@ -225,12 +225,13 @@ def test_normalised_outgrowth_stays_flat():
     assert energies[1] < 0.25 * min(energies[0], energies[2])
 
 
-def test_a_polar_spot_grows_away_from_itself_and_around():
+@pytest.mark.parametrize("distance", ["space", "surface"])
+def test_a_polar_spot_grows_away_from_itself_and_around(distance):
     """Whichever way a triangle lies from the spot, turned by an angle as well."""
     for angle in (0.0, 30.0):
         spot = {"kind": "spot", "at": (0.2, 0.1, 0), "radius": 0.5, "kernel": "flat", "stretch": (1.5, 1.1)}
-        state = engine(spot | {"polar": True, "angle": angle}, shape="disc").state
-        tool = engine(spot | {"polar": True, "angle": angle}, shape="disc").params.tools[0]
+        made = engine(spot | {"polar": True, "angle": angle, "distance": distance}, shape="disc")
+        state, tool = made.state, made.params.tools[0]
         state = started(state, [tool], 0.1, 0)
         found = rates(state, {0: tool}, 0.05).strain
         p = state.x[state.mesh.triangles]
@@ -248,7 +249,8 @@ def test_a_polar_spot_grows_away_from_itself_and_around():
         v = np.stack([(outward * first).sum(-1), outward[:, 1] * first[:, 0] - outward[:, 0] * first[:, 1]], -1)
         e11, e12, e22 = found.T
         along = e11 * v[:, 0] ** 2 + 2 * e12 * v[:, 0] * v[:, 1] + e22 * v[:, 1] ** 2
-        assert along[whole] == pytest.approx(np.log(1.5), abs=1e-9)
+        # the slope of distances that are linear within a triangle is not quite the way to its middle
+        assert along[whole] == pytest.approx(np.log(1.5), abs=1e-9 if distance == "space" else 2e-3)
         assert (e11 + e22)[whole] == pytest.approx(np.log(1.5) + np.log(1.1), abs=1e-9)
 
 
