@@ -11,7 +11,7 @@ from ...arrays import Floats, Ints
 from ..state import Spot, State
 from .geodesic import Distances, carried, distances
 from .reach import within
-from .tools import HotCurve, HotSpot, HotStroke, HotSurface, intensities
+from .tools import HotCurve, HotSpot, HotStroke, HotSurface, clocked, intensities
 
 __all__ = ["Acting", "curve", "spots", "stretches", "stroke", "surface", "tips"]
 
@@ -60,8 +60,9 @@ def _turning(line: Floats, closed: bool) -> float:
 def surface(state: State, tool: HotSurface, number: int, time: float) -> Acting:
     """Return where a part of the surface acts."""
     values = state.shares[number]
-    if tool.later is not None:
-        values = values[:, 0] * intensities(tool, time - tool.start - tool.offset * values[:, 1])
+    if clocked(tool):
+        own = (time - tool.start - tool.offset * values[:, 1]) * tool.pace ** values[:, 2]
+        values = values[:, 0] * intensities(tool, own)
     some, share = tips(state, values)
     if tool.frame == "around":
         middle = state.x[state.mesh.triangles[some]].mean(axis=1)

@@ -13,7 +13,7 @@ from ..state import State
 from .acting import Acting, curve, spots, stretches, stroke, surface, tips
 from .agreeing import agreed
 from .painted import carried_ways, logs_of
-from .tools import HotCurve, HotSpot, HotStroke, HotSurface, HotTensors, Tool, intensities
+from .tools import HotCurve, HotSpot, HotStroke, HotSurface, HotTensors, Tool, clocked, intensities
 
 __all__ = ["Rates", "grown", "rates"]
 
@@ -35,9 +35,7 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
     edges, curving = np.zeros((count, 3, 3)), np.zeros((count, 3))
     for number, tool in tools.items():
         # places with clocks of their own have their intensity in their share
-        own = (isinstance(tool, HotCurve) and bool(tool.offsets or tool.paces)) or (
-            isinstance(tool, HotSurface) and tool.later is not None
-        )
+        own = clocked(tool)
         since = time - tool.start - (tool.delay if isinstance(tool, HotCurve) else 0.0)
         strength = (1.0 if since >= 0 else 0.0) if own else float(intensities(tool, np.array([since]))[0])
         if strength == 0:

@@ -28,6 +28,7 @@ __all__ = [
     "Point",
     "Stretch",
     "Tool",
+    "clocked",
     "intensities",
     "intensity",
 ]
@@ -167,6 +168,8 @@ class HotSurface(_Tool):
     )
     offset: float = Field(0.0, ge=0, le=1000, description="Later start where `later` is 1 [time]")
     later: Place | None = Field(None, description="Share of `offset` of each vertex")
+    pace: float = Field(1.0, gt=0, le=100, description="Pace of the activation where `paced` is 1 [1]")
+    paced: Place | None = Field(None, description="How much of `pace` each vertex has, of its logarithm")
     curl: tuple[float, float] = Field(
         (0.0, 0.0), description="Rest curvature added along and across, in unit time [1/start shape's unit]"
     )
@@ -229,6 +232,13 @@ class HotTensors(_Tool):
         min_length=1, max_length=200, description="What is painted; where strokes meet, the last holds"
     )
     where: Place = Field(default_factory=Everywhere, description="Share of each vertex")
+
+
+def clocked(tool: Tool) -> bool:
+    """Return whether places of a tool have clocks of their own."""
+    if isinstance(tool, HotCurve):
+        return bool(tool.offsets or tool.paces)
+    return isinstance(tool, HotSurface) and (tool.later is not None or tool.paced is not None)
 
 
 Tool = Annotated[HotSpot | HotCurve | HotSurface | HotStroke | HotTensors, Field(discriminator="kind")]

@@ -114,6 +114,26 @@ def test_a_surface_that_starts_later_further_out():
     assert (late > 0).all()
 
 
+def test_a_surface_goes_at_its_own_pace_further_out():
+    """While (t - t0) pace < 1, the paper's 4.3: four times as fast outside it is over after a quarter of the time."""
+    tool = {
+        "kind": "surface",
+        "where": {"kind": "everywhere"},
+        "later": {"kind": "band", "along": "radius", "low": 0.49, "high": 0.51},
+        "offset": 0.2,
+        "paced": {"kind": "band", "along": "radius", "low": 0.49, "high": 0.51},
+        "pace": 4.0,
+        "activation": [(0, 1), (1, 1), (1.0001, 0)],
+    }
+    made = engine(tool, shape="disc")
+    state = started(made.state, made.script.tools, 0.05, 0)
+    out = np.linalg.norm(state.x[state.mesh.triangles].mean(axis=1), axis=1)
+    for time, within, beyond in ((0.1, True, False), (0.4, True, True), (0.5, True, False), (1.1, False, False)):
+        acts = np.abs(rates(state, {0: made.script.tools[0]}, time).strain).sum(axis=1) > 0
+        assert (acts[out < 0.4] == within).all()
+        assert (acts[out > 0.6] == beyond).all()
+
+
 def test_a_curve_is_made_about_the_apex_where_it_is_then():
     """The ring follows a hot spot that has moved, at its distance, and rides on the surface afterwards."""
     spot = {"kind": "spot", "at": (0, 0, 1), "radius": 0.5, "stretch": (4, 4)}
