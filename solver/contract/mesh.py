@@ -12,6 +12,8 @@ __all__ = ["MOST_GROUPS", "GivenMesh", "check_groups", "check_textures", "named_
 
 #: Groups of a mesh, and letters of the name of one, at most.
 MOST_GROUPS, _LETTERS = 64, 64
+#: What a weight may be at most: files hold single precision.
+_HEAVIEST = 1e30
 
 
 class GivenMesh(BaseModel):
@@ -51,7 +53,8 @@ def check_groups(points: int, groups: Mapping[str, Sequence[float]]) -> None:
     """Refuse groups that do not belong to a mesh of so many points, or whose names files could not tell apart.
 
     Raises:
-        ValueError: too many, too few weights, a name that is empty, long, or another's but for signs and capitals.
+        ValueError: too many, too few weights or such as are no numbers of single precision, a name that is empty, long,
+            or another's but for signs and capitals.
 
     """
     if len(groups) > MOST_GROUPS:
@@ -60,6 +63,12 @@ def check_groups(points: int, groups: Mapping[str, Sequence[float]]) -> None:
     for name, weights in groups.items():
         if len(weights) != points:
             raise ValueError(f"the group {name[:40]!r} has {len(weights)} weights for {points} points")
+        heavy = next((k for k, weight in enumerate(weights) if not abs(weight) <= _HEAVIEST), None)
+        if heavy is not None:
+            raise ValueError(
+                f"the group {name[:40]!r} has the weight {weights[heavy]:g} at point {heavy}; give numbers up to "
+                f"{_HEAVIEST:g}, as files hold single precision"
+            )
         plain = re.sub(r"\W", "_", name, flags=re.ASCII).upper()
         if not plain.strip("_") or len(name) > _LETTERS:
             raise ValueError(f"the group {name[:40]!r} needs a name of letters and digits, at most {_LETTERS}")

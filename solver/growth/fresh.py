@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import shell
 from ..contract import Context
-from .matter import matter
+from .matter import matter, springs
 from .own.textured import corners_of, faces_of, groups_of
 from .params import GrowthParams
 from .shapes import Mesh
@@ -25,6 +25,17 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
     np.add.at(normals, mesh.triangles, np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, None, :])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
+    x = mesh.x + offset[:, None] * normals
+    material = matter(params.ribs, params.colours, mesh, border(top), params.seed) | groups_of(params.mesh)
+    if params.bed:
+        flexural = shell.Material(params.thickness, params.poisson).flexural
+        below, stiffer = springs(params.bed, flexural, mesh, border(top), params.seed)
+        # the ground is uneven: a sheet that is uneven alone would be pressed flat long before it folds
+        material["bed"] = np.concatenate([below[:, None], x, normals], axis=1)
+        if stiffer.any():
+            material["stiff"] = material.get("stiff", 0.0) + stiffer
+    if params.normal_force:
+        material["pushed"] = np.zeros_like(x)
     held, led = np.zeros(mesh.x.shape, bool), np.zeros(mesh.x.shape)
     for attachment in params.attached:
         inside = share(attachment.where, mesh, border(top), params.seed) >= 0.5
@@ -33,7 +44,7 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         if any(attachment.velocity):
             led[inside] = attachment.velocity
     angles = shell.angles(mesh.x, top.hinges)
-    x = mesh.x + np.where(held, 0.0, offset[:, None] * normals)
+    x = np.where(held, mesh.x, x)
     return State(
         time=0.0,
         x=x,
@@ -44,9 +55,7 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         held=held,
         spots={},
         curves={},
-        matter=matter(params.ribs, params.colours, mesh, border(top), params.seed)
-        | groups_of(params.mesh)
-        | ({"led": led} if led.any() else {}),
+        matter=material | ({"led": led} if led.any() else {}),
         corners=corners_of(params.mesh),
         faces=faces_of(params.mesh),
     )

@@ -9,13 +9,17 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..arrays import Floats, Ints
+from ..contract import Context, InvalidInput
 from .shapes import Mesh
 from .tooling.places import Everywhere, Place, share
 
 if TYPE_CHECKING:
     from .state import State
 
-__all__ = ["BARE", "Colour", "Rib", "coloured", "grown_further", "matter"]
+__all__ = ["BARE", "Bed", "Colour", "Rib", "coloured", "grown_further", "matter", "springs"]
+
+#: Mean edges of a mesh to a wavelength of its folds at least.
+_SHOWN = 5.0
 
 Channel = Annotated[float, Field(ge=0, le=1)]
 
@@ -32,6 +36,27 @@ class Rib(_Model):
 
     where: Place = Field(description="Share of each vertex of the start shape, of the logarithm of `stiffness`")
     stiffness: float = Field(30.0, ge=1e-3, le=1e4, description="Bending stiffness over that of the sheet [1]")
+
+
+class Bed(_Model):
+    """An elastic bed: springs along the start shape's normals, on ground as uneven as the sheet.
+
+    A plate of stiffness D on springs K per area folds, where it is compressed one way, at N = 2 (K D)^(1/2) with the
+    wavelength 2 pi (D / K)^(1/4) (Hetenyi 1946; of films on soft ground Bowden et al. 1998).
+    """
+
+    wavelength: float = Field(
+        gt=0,
+        le=100,
+        description="How long folds are that compression one way makes, 2 pi (D / K)^(1/4) [start shape's unit]",
+    )
+    regularity: float = Field(
+        1.0,
+        ge=0,
+        le=1,
+        description="1 less the standard deviation, from place to place, of the logarithm of the wavelength",
+    )
+    where: Place = Field(default_factory=Everywhere, description="Share of each vertex, of the springs' stiffness")
 
 
 class Colour(_Model):
@@ -66,6 +91,32 @@ def matter(ribs: Sequence[Rib], colours: Sequence[Colour], mesh: Mesh, border: I
         if any(c.grown > 1 for c in colours):
             found["grown"] = np.zeros(len(mesh.x))
     return found
+
+
+def springs(bed: Bed, flexural: float, mesh: Mesh, border: Ints, seed: int) -> tuple[Floats, Floats]:
+    """Return the stiffness K [mu / l^2] (n,) of springs by which a plate of flexural rigidity D folds as asked.
+
+    And the logarithm (n,) of what its rigidity is over D: where the wavelength differs from place to place both change,
+    so that all places begin to fold at the same compression.
+
+    Raises:
+        InvalidInput: folds too short for the mesh to show, a place that the shape does not have.
+
+    """
+    x, (i, j) = mesh.x, mesh.triangles[:, :2].T
+    length = float(np.linalg.norm(x[i] - x[j], axis=1).mean())
+    if bed.wavelength < _SHOWN * length:
+        raise InvalidInput(
+            f"bed: folds of wavelength {bed.wavelength:g} are too short for edges of {length:.3g}.",
+            advice=f"Ask for {1.01 * _SHOWN * length:.2g} or more, for a finer quality, or give a finer mesh.",
+        )
+    # waves about twice as long as the folds, in all directions, of variance 1 together
+    generator = Context.generator(seed)
+    waves = generator.normal(size=(64, 3)) * (np.pi / bed.wavelength)
+    noise = np.cos(x @ waves.T + generator.uniform(0, 2 * np.pi, 64)).sum(axis=1) / np.sqrt(32)
+    longer = (1 - bed.regularity) * noise
+    stiff = flexural * (2 * np.pi / bed.wavelength) ** 4 * np.exp(-2 * longer)
+    return share(bed.where, mesh, border, seed) * stiff, 2 * longer
 
 
 def grown_further(state: State, g: Floats) -> dict[str, Floats]:

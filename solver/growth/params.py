@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
 from ..contract import Params
-from .matter import Colour, Rib
+from .matter import Bed, Colour, Rib
 from .own.imported import OwnMesh
 from .shapes import Shape
 from .tooling.places import Place
@@ -212,6 +212,13 @@ class GrowthParams(Params):
         description="Pressure along the normal, frozen in each step, over mu per unit length",
         json_schema_extra=_units("1"),
     )
+    normal_force: float = Field(
+        0.0,
+        ge=-10,
+        le=10,
+        description="How much of its compression pushes a sheet along its normal (the paper's F_N), frozen in a step",
+        json_schema_extra=_units("1/start shape's unit"),
+    )
     gravity: tuple[float, float, float] = Field(
         (0.0, 0.0, 0.0),
         description="Weight of the sheet per rest area, a dead load, over mu; up to 1 each way",
@@ -226,6 +233,11 @@ class GrowthParams(Params):
     )
     yield_strain: float = Field(
         0.05, ge=0, le=1, description="Strain alpha below which nothing is forgotten", json_schema_extra=_units("1")
+    )
+    bed: Bed | None = Field(
+        None,
+        description="What the sheet lies on, which makes its folds as long and as regular as asked for",
+        json_schema_extra=_units("1"),
     )
     ribs: tuple[Rib, ...] = Field(
         (),

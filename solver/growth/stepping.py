@@ -36,6 +36,9 @@ __all__ = ["Carried", "Pieces", "Steps"]
 #: How much finer the way is settled of a shape without imperfection, of which only rounding says how it comes to its
 #: residual: what steps leave over goes into the rest state where a tool's reach is measured on the bent shape.
 _PERFECT = 0.01
+#: How much of what compression pushes now is laid in a step, the rest being that of the step before: it takes away what
+#: it comes from, and all of it at once would swing to and fro.
+_GRADUALLY = 0.25
 
 
 class Carried(NamedTuple):
@@ -109,9 +112,11 @@ class Steps:
         if "led" in state.matter:
             state = replace(state, x=state.x + np.where(state.held, dt * state.matter["led"], 0.0))
         there = present(solids, state.time)
-        energy = StepEnergy(state, self._material, p.pressure, there, carried.tangent, p.gravity, distance, p.bending)
+        loads = p.pressure, there, carried.tangent, p.gravity, distance, p.bending
+        energy = StepEnergy(state, self._material, *loads, pushing=p.normal_force)
+        energy.lay(state.matter.get("pushed"), _GRADUALLY)
         goal = self.tolerance * state.length * (1.0 if p.imperfection else _PERFECT)
-        if not there:
+        if not there and not energy.bed:
             # whatever the shape, nothing will take up what pulls now
             check_held(energy, state, goal, before.time)
         yield None
@@ -120,6 +125,8 @@ class Steps:
         point, spent = yield from _seen(way, state)
         forces = point.gradient / state.length
         drift = (point.x - state.x) / dt if dt else None
+        if energy.pushed is not None:
+            state = replace(state, matter=state.matter | {"pushed": energy.pushed})
         state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
         # where rounding ends the search, more may be left than was asked for
         check_held(energy, state, max(goal, point.gradient), before.time)

@@ -160,6 +160,8 @@ def test_groups_that_do_not_fit_are_refused():
         ({"rim": [1.0]}, "1 weights for 49 points"),
         ({"rim": [1.0] * 49, "RIM": [1.0] * 49}, "rename one"),
         ({"?": [1.0] * 49}, "letters and digits"),
+        ({"rim": [1.0] * 48 + [np.nan]}, "finite number"),
+        ({"rim": [1.0] * 48 + [-1e31]}, "weight -1e[+]31 at point 48; give numbers up to"),
     ):
         with pytest.raises(InvalidInput, match=said):
             SOLVER.parse({"mesh": mesh | {"groups": groups}, "tools": []})
@@ -195,3 +197,28 @@ def test_a_file_of_more_groups_than_a_mesh_may_have_is_refused_and_none_is_left_
     with pytest.raises(InvalidOption, match="65 vertex groups, more than 64") as caught:
         read(written(65))
     assert "at most" in caught.value.advice
+
+
+@pytest.mark.parametrize("kind", ["glb", "ply"])
+@pytest.mark.parametrize("weight", [np.nan, -np.inf])
+def test_a_weight_that_is_no_number_is_refused_with_its_group_and_point(kind, weight, tmp_path: Path):
+    """It was dropped with its whole group, and without a word."""
+    weights = slope(*POINTS.T[:2]).astype("<f4")
+    path = tmp_path / f"square.{kind}"
+    if kind == "glb":
+        as_glb(path)
+        data = path.read_bytes()
+        assert data.count(weights.tobytes()) == 1
+        broken = weights.copy()
+        broken[[5, 17]] = weight
+        path.write_bytes(data.replace(weights.tobytes(), broken.tobytes()))
+    else:
+        lines = ["ply", "format ascii 1.0", f"element vertex {len(POINTS)}"]
+        lines += [f"property float {name}" for name in ("x", "y", "z", "PACE")]
+        lines += [f"element face {len(FACES)}", "property list uchar int vertex_indices", "end_header"]
+        for k, point in enumerate(POINTS):
+            lines += [" ".join(f"{v:.6f}" for v in point) + f" {weight if k in (5, 17) else weights[k]}"]
+        path.write_text("\n".join(lines + ["3 " + " ".join(map(str, face)) for face in FACES]) + "\n", encoding="utf-8")
+    with pytest.raises(InvalidOption, match="'PACE' has no finite weight at 2 of 49 points") as caught:
+        read(path)
+    assert "Give every point a number" in caught.value.advice

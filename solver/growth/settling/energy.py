@@ -1,7 +1,8 @@
-"""The energy of one growth step: membrane, bending, pressure, solids as penalties, held vertices.
+"""The energy of one growth step: membrane, bending, pressure, solids as penalties, a bed, held vertices.
 
-Pressure is a dead load, laid anew along the normals from time to time. What it does to a closed surface is the work on
-the volume inside, -p V(x), so there it may follow every move (`following`): then its second derivative is at hand too.
+Pressure, and what compression pushes, are dead loads, laid anew along the normals from time to time. What pressure does
+to a closed surface is the work on the volume inside, -p V(x), so there it may follow every move (`following`): then its
+second derivative is at hand too.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from ...shell.inverse import fronts_of, inverse_of
 from ...shell.normals import normals
 from ..params import Bending, Solid
 from ..state import State
-from .loads import area_vectors, depth_in, half_way
+from .bed import Bed
+from .loads import area_vectors, balanced, compressed, depth_in, half_way
 from .minimise import longest
 from .tangent import LEAF, Tangent
 from .touching import Touching
@@ -67,18 +69,21 @@ class StepEnergy:
         distance: float = 0.0,
         bending: Bending = "hinges",
         following: bool = False,
+        pushing: float = 0.0,
     ) -> None:
         #: Whether the pressure does its work on the volume: it cannot where the surface has a border.
         self.following = following and bool(pressure) and not len(state.mesh.border)
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
-        self._pressure, self._gravity, self._bending = pressure, gravity, bending
+        self._pressure, self._gravity, self._bending, self._pushing = pressure, gravity, bending, pushing
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         if "stiff" in state.matter:
             stiff = state.matter["stiff"]
             self.stiffness *= np.exp(stiff[state.mesh.hinges[:, :2]].mean(axis=1))
             self._mean = None if self._mean is None else (self._mean[0], self._mean[1] * np.exp(stiff))
-        self.load: Floats | None = None
+        self._fixed: Floats | None = None
+        #: What compression pushes (n, 3), None where it does not.
+        self.pushed: Floats | None = None
         self.free = ~state.held
         #: Which blocks of the last `hessian` are on the diagonal (n,).
         self.diagonal: Ints = np.empty(0, np.int64)
@@ -88,18 +93,34 @@ class StepEnergy:
         #: Whether the last step asked for was not allowed whole.
         self.cut = False
         self.areas = vertex_areas(state)
+        self.bed = Bed.under(state, self.areas)
         unit = state.length * min(1.0, material.flexural / state.length**2)
         self.touching = Touching(state, distance, unit, self.areas) if distance else None
         self.follow(state.x)
 
     def follow(self, x: Floats) -> None:
-        """Lay the pressure along the normals at x (n, 3); it is a dead load until it is laid again."""
-        self._last, self.load = None, None
+        """Lay pressure, and what compression pushes, along the normals at x (n, 3): dead loads until the next time."""
+        self._last, self._fixed = None, None
         if self._pressure and not self.following:
-            self.load = self._pressure * area_vectors(x, self.state.mesh.triangles)
+            self._fixed = self._pressure * area_vectors(x, self.state.mesh.triangles)
         if any(self._gravity):
             weight = self.areas[:, None] * np.array(self._gravity)
-            self.load = weight if self.load is None else self.load + weight
+            self._fixed = weight if self._fixed is None else self._fixed + weight
+        if self._pushing:
+            pushed = self._pushing * compressed(x, self.state.mesh.triangles, self.state.g, self.material.lame)
+            self.pushed = balanced(pushed, self.areas, self.rigid(x))
+
+    def lay(self, before: Floats | None, share: float) -> None:
+        """Go only a share of the way from what compression pushed before (n, 3) to what it pushes now."""
+        if before is not None and self.pushed is not None:
+            self._last, self.pushed = None, before + share * (self.pushed - before)
+
+    @property
+    def load(self) -> Floats | None:
+        """All dead loads (n, 3), None where there are none."""
+        if self.pushed is None:
+            return self._fixed
+        return self.pushed if self._fixed is None else self._fixed + self.pushed
 
     def __call__(self, x: Floats) -> tuple[float, Floats]:
         """Return energy and gradient; the gradient of held directions is 0. What was asked last is remembered."""
@@ -114,15 +135,18 @@ class StepEnergy:
             energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
         else:
             energy += shell.mean_bending(x, state.mesh.hinges, state.rest, *self._mean, gradient)
-        if self.load is not None:
-            energy -= float(np.vdot(self.load, x - state.x))
-            gradient -= self.load
+        load = self.load
+        if load is not None:
+            energy -= float(np.vdot(load, x - state.x))
+            gradient -= load
         if self.following:
             outward = area_vectors(x, state.mesh.triangles)
             energy -= self._pressure * float(np.vdot(outward, x)) / 3
             gradient -= self._pressure * outward
         if self.touching:
             energy += self.touching.energy(x, gradient)
+        if self.bed:
+            energy += self.bed.energy(x, gradient)
         for solid in self.solids:
             depth, normal = depth_in(solid, x)
             energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
@@ -133,7 +157,7 @@ class StepEnergy:
     def part(self, state: State, tangent: Tangent) -> StepEnergy:
         """Return the same energy, without contact, of a part of the state."""
         rest = tangent, self._gravity, 0.0, self._bending
-        return StepEnergy(state, self.material, self._pressure, self.solids, *rest)
+        return StepEnergy(state, self.material, self._pressure, self.solids, *rest, pushing=self._pushing)
 
     def rounding(self, x: Floats) -> float:
         """Return the largest force that is rounding: what it changes by where x moves by last digits.
@@ -182,7 +206,7 @@ class StepEnergy:
         shell.bending_hessian(x, mesh.hinges, angles, state.rest, self.stiffness, pattern.of_hinges, blocks)
         if self.following:
             shell.volume_hessian(x, mesh.triangles, -self._pressure, pattern.of_triangles, blocks)
-        self._add_solids(x, pattern.diagonal, blocks)
+        self._add_ground(x, pattern.diagonal, blocks)
         if self.touching and coupled:
             self.touching.add_hessian(x, pattern, blocks)
         free = ~state.held
@@ -200,7 +224,7 @@ class StepEnergy:
     def rigid(self, x: Floats) -> Floats:
         """Return motions (3n, k), orthonormal, that no force is felt along: turns and shifts that no held vertex stops.
 
-        None where solids or weight tell one place from another.
+        None where solids or weight tell one place from another; a bed does along its normals.
         """
         if self.solids or any(self._gravity):
             return np.empty((x.size, 0))
@@ -209,15 +233,20 @@ class StepEnergy:
         motions = np.stack([*(np.broadcast_to(axis, x.shape) for axis in np.eye(3)), *turns]).reshape(6, -1)
         motions = (motions / np.linalg.norm(motions, axis=1)[:, None]).T
         stopped = motions[self.state.held.ravel()]
+        if self.bed:
+            stopped = np.concatenate([stopped, self.bed.felt(motions)])
         if len(stopped):
-            _, sizes, ways = np.linalg.svd(stopped, full_matrices=True)
+            # of as many rows as are held the left vectors would fill the memory
+            _, sizes, ways = np.linalg.svd(stopped, full_matrices=len(stopped) < len(motions.T))
             size = np.zeros(6)
             size[: len(sizes)] = sizes
             motions = motions @ ways[size < 1e-9].T
         return np.linalg.qr(motions)[0]
 
-    def _add_solids(self, x: Floats, diagonal: Ints, blocks: Floats) -> None:
-        """Add the stiffness of solids at each vertex to the diagonal of `blocks` (nnz, 3, 3)."""
+    def _add_ground(self, x: Floats, diagonal: Ints, blocks: Floats) -> None:
+        """Add the stiffness of bed and solids at each vertex to the diagonal of `blocks` (nnz, 3, 3)."""
+        if self.bed:
+            self.bed.add_hessian(diagonal, blocks)
         for solid in self.solids:
             depth, normal = depth_in(solid, x)
             weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
@@ -236,7 +265,7 @@ class StepEnergy:
         shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
         shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
         blocks[pattern.diagonal] += _SHIFT * np.eye(3)
-        self._add_solids(x, pattern.diagonal, blocks)
+        self._add_ground(x, pattern.diagonal, blocks)
         if self.touching:
             self.touching.add_diagonal(x, pattern.diagonal, blocks)
         yield

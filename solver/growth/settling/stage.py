@@ -29,6 +29,8 @@ __all__ = ["force_unit", "residual", "settled"]
 _NEAR = 3e-6
 #: Times that pressure is laid along the present normals, and steps to an equilibrium after each.
 _TURNS, _MOST = 30, 400
+#: What is left after a turn, over what was before, above which the next goes half as far to new loads; the least share.
+_NEARER, _LEAST_SHARE = 0.7, 0.02
 
 
 def force_unit(state: State, material: shell.Material) -> float:
@@ -47,8 +49,9 @@ def settled(state: State, params: GrowthParams, tolerance: float, distance: floa
     And until nothing moves any more: Newton's own step, which is the distance that is left, is below 0.03 % of an edge,
     and the energy bends up along every way. A shape in balance on a saddle is nudged off it.
     Pressure follows the normals, which were frozen on the way here: within each step where the surface is closed, else
-    it is laid again until nothing changes. The last value is the result, `forces` of which is what is left, and
-    `minimum` whether it is one. distance: that parts keep from each other, 0 where none come near.
+    it is laid again until nothing changes, and so is what compression pushes. The last value is the result, `forces` of
+    which is what is left, and `minimum` whether it is one. distance: that parts keep from each other, 0 where none come
+    near.
 
     Raises:
         Unstable: the shape left the finite.
@@ -65,20 +68,28 @@ def settled(state: State, params: GrowthParams, tolerance: float, distance: floa
         distance,
         params.bending,
         following=params.bending == "hinges",
+        pushing=params.normal_force,
     )
     goal = tolerance * force_unit(state, material)
     way = _rested if energy.curved else _balanced
-    x, steps = state.x, 0
-    for _ in range(_TURNS):
+    laid = bool(params.normal_force or (params.pressure and not energy.following))
+    x, steps, share, before = state.x, 0, 1.0, np.inf
+    for turn in range(_TURNS):
         for found in way(energy, x, goal, params.seed):
             if not np.isfinite(found.point.gradient):
                 raise Unstable("the shape left the finite.", advice="Take a shorter step.", last_stage=state.time)
             yield replace(state, x=found.point.x)
         x, steps = found.point.x, steps + found.steps
+        was = energy.pushed
         energy.follow(x)
         left = _measured(energy, replace(state, x=x))
-        if left <= goal or energy.following or not params.pressure:
+        if left <= goal or not laid or turn == _TURNS - 1:
             break
+        if params.normal_force:
+            # what compression pushes takes it away: all at once it would swing to and fro
+            share = share if left < _NEARER * before else max(share / 2, _LEAST_SHARE)
+            before = left
+            energy.lay(was, share)
     iterations = state.iterations + steps
     yield replace(state, x=x, forces=left / state.length, iterations=iterations, minimum=found.minimum)
 

@@ -13,8 +13,9 @@ from ...contract import Context, InvalidInput
 from ..anchors import Anchors, place
 from ..shapes import Mesh
 from ..state import Spot, State
+from .painted import laid_tensors
 from .places import share
-from .tools import Apex, HotCurve, HotSpot, HotStroke, HotSurface, Tool
+from .tools import Apex, HotCurve, HotSpot, HotStroke, HotSurface, HotTensors, Tool, clocked
 
 __all__ = ["border", "branched", "started"]
 
@@ -51,8 +52,13 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
         if isinstance(tool, HotSurface):
             shares[number] = share(tool.where, mesh, rim, seed + number)
             _check_direction(number, tool, shares[number], mesh)
-            if tool.later is not None:
-                shares[number] = np.stack([shares[number], share(tool.later, mesh, rim, seed + number)], -1)
+            if clocked(tool):
+                clocks = (
+                    share(p, mesh, rim, seed + number) if p else np.zeros(len(mesh.x)) for p in (tool.later, tool.paced)
+                )
+                shares[number] = np.stack([shares[number], *clocks], -1)
+        elif isinstance(tool, HotTensors):
+            shares[number] = laid_tensors(number, tool, mesh, rim, seed + number)
         elif isinstance(tool, HotCurve):
             if tool.apex is None:
                 curves[number] = _on(number, "a point", np.array(tool.points), tool.radius, mesh, later)

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..state import State
+from .acting import Acting, curve, spots, stretches, stroke, surface, tips
 from .agreeing import agreed
-from .reach import within
-from .tools import HotCurve, HotSpot, HotStroke, HotSurface, Tool, intensities
+from .painted import carried_ways, logs_of
+from .tools import HotCurve, HotSpot, HotStroke, HotSurface, HotTensors, Tool, clocked, intensities
 
 __all__ = ["Rates", "grown", "rates"]
 
@@ -35,22 +35,18 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
     edges, curving = np.zeros((count, 3, 3)), np.zeros((count, 3))
     for number, tool in tools.items():
         # places with clocks of their own have their intensity in their share
-        own = (isinstance(tool, HotCurve) and bool(tool.offsets or tool.paces)) or (
-            isinstance(tool, HotSurface) and tool.later is not None
-        )
+        own = clocked(tool)
         since = time - tool.start - (tool.delay if isinstance(tool, HotCurve) else 0.0)
         strength = (1.0 if since >= 0 else 0.0) if own else float(intensities(tool, np.array([since]))[0])
         if strength == 0:
             continue
-        if isinstance(tool, HotSurface):
-            some, share, along = _surface(state, tool, number, time)
-        elif isinstance(tool, HotCurve):
-            some, share, along = _curve(state, tool, state.curves[number].at(state.x, state.mesh.triangles), since)
-        elif isinstance(tool, HotStroke):
-            some, share, along = _stroke(state, tool, number, time)
-        else:
-            some, share, along = _spots(state, tool, number, time)
-        first, second = np.log(_stretches(state, tool, number))
+        if isinstance(tool, HotTensors):
+            some, logs, v = _tensors(state, number)
+            for k in range(3):
+                edges[some, k] += strength * _tensor(logs[:, k, 0], logs[:, k, 1], v)
+            continue
+        some, share, along = _acting(state, tool, number, time, since)
+        first, second = np.log(stretches(state, tool, number))
         if isinstance(tool, HotStroke) or (isinstance(tool, HotSpot) and tool.polar):
             # a brush that goes nowhere grows the same area, all round, and so does the middle of a spot
             still = ~along.any(axis=1)
@@ -63,6 +59,28 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
             mean = share.mean(axis=1)
             curving[some] += _tensor(mean * tool.curl[0], mean * tool.curl[1], v)
     return Rates(edges.mean(axis=1), edges, curving)
+
+
+def _acting(
+    state: State, tool: HotSpot | HotCurve | HotSurface | HotStroke, number: int, time: float, since: float
+) -> Acting:
+    if isinstance(tool, HotSurface):
+        return surface(state, tool, number, time)
+    if isinstance(tool, HotCurve):
+        return curve(state, tool, number, since)
+    if isinstance(tool, HotStroke):
+        return stroke(state, tool, number, time)
+    return spots(state, tool, number, time)
+
+
+def _tensors(state: State, number: int) -> tuple[Ints, Floats, Floats]:
+    """Return triangles (m,), logarithmic rates (m, 3, 2) of their edges, and first directions (m, 2) in rest frames."""
+    ridden = state.shares[number]
+    some, logs = tips(state, logs_of(ridden))
+    s, t = carried_ways(ridden, state.mesh.triangles[some]).T
+    l11, l12, l22 = _frames(state.g[some])
+    v = np.stack([l11 * s + l12 * t, l22 * t], -1)
+    return some, logs, v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-300)
 
 
 def grown(state: State, found: Rates, dt: float) -> tuple[Floats, Floats]:
@@ -147,130 +165,3 @@ def _tensor(first: Floats, second: Floats, v: Floats) -> Floats:
     """Return first v v^T + second (1 - v v^T), (f, 3)."""
     c, s = v.T
     return np.stack([first * c * c + second * s * s, (first - second) * c * s, first * s * s + second * c * c], -1)
-
-
-def _tips(state: State, share: Floats) -> tuple[Ints, Floats]:
-    """Return triangles (m,) and the means of their edges' tips' shares (m, 3), as the paper has it, where not 0."""
-    i, j, k = (share[corner] for corner in state.mesh.triangles.T)
-    some = np.flatnonzero((i != 0) | (j != 0) | (k != 0))
-    i, j, k = i[some], j[some], k[some]
-    return some, np.stack([(j + k) / 2, (k + i) / 2, (i + j) / 2], -1)
-
-
-def _stretches(state: State, tool: Tool, number: int) -> Floats:
-    first, second = tool.stretch
-    if isinstance(tool, HotCurve) and tool.normalised:
-        # the paper's D_T = 1 + lambda (D_N - 1) r_e gamma for small steps, where D - 1 is log D: what grows out moves
-        # the curve by log(D_N) r_e; r_e: radius times the kernel's integral, 8/15; gamma: mean curvature
-        line = state.curves[number].at(state.x, state.mesh.triangles)
-        share = tool.normalised * tool.radius * 8 / 15 * _turning(line, tool.closed)
-        first *= second**share
-    return np.array([np.clip(first, 0.1, 10.0), second])
-
-
-def _turning(line: Floats, closed: bool) -> float:
-    """Return the total turning of a polyline over its length."""
-    ways = np.diff(np.concatenate([line, line[:2]]) if closed else line, axis=0)
-    lengths = np.linalg.norm(ways, axis=1)
-    ways = ways / np.maximum(lengths[:, None], 1e-300)
-    turns = np.arccos(np.clip((ways[1:] * ways[:-1]).sum(-1), -1, 1))
-    return float(turns.sum() / (lengths[:-1] if closed else lengths).sum())
-
-
-def _surface(state: State, tool: HotSurface, number: int, time: float) -> tuple[Ints, Floats, Floats]:
-    values = state.shares[number]
-    if tool.later is not None:
-        values = values[:, 0] * intensities(tool, time - tool.start - tool.offset * values[:, 1])
-    some, share = _tips(state, values)
-    if tool.frame == "around":
-        middle = state.x[state.mesh.triangles[some]].mean(axis=1)
-        return some, share, np.stack([-middle[:, 1], middle[:, 0], np.zeros(len(middle))], -1)
-    return some, share, np.broadcast_to(np.array(tool.frame), (len(share), 3))
-
-
-def _spots(state: State, tool: HotSpot, number: int, time: float) -> tuple[Ints, Floats, Floats]:
-    triangles, x = state.mesh.triangles, state.x
-    whole, middle = np.zeros(len(x)), np.zeros((len(x), 3))
-    for spot in state.spots[number]:
-        if spot.letter and spot.letter in tool.resting:
-            continue
-        there = spot.anchor.at(x, triangles)[0]
-        away = np.linalg.norm(x - there, axis=1)
-        near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
-        value = _kernel(tool.kernel, away[near] / spot.radius)
-        middle[near[value > whole[near]]] = there
-        whole[near] = np.maximum(whole[near], value)
-    some, share = _tips(state, whole)
-    p = x[triangles[some]]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    if tool.polar:
-        # away from the spot that acts most at the corner where any does
-        strongest = np.take_along_axis(triangles[some], whole[triangles[some]].argmax(axis=1)[:, None], 1)[:, 0]
-        axis = p.mean(axis=1) - middle[strongest]
-        axis = axis - (normal * axis).sum(axis=1)[:, None] * normal
-    else:
-        axis = np.array(tool.frame)
-        axis = axis - (normal @ axis)[:, None] * normal
-    turn = np.radians(tool.angle + tool.turning * (time - tool.start))
-    return some, share, np.cos(turn) * axis + np.sin(turn) * np.cross(normal, axis)
-
-
-def _stroke(state: State, tool: HotStroke, number: int, time: float) -> tuple[Ints, Floats, Floats]:
-    """Return where a stroke acts, how much, and along which way: that of the dab that acts most."""
-    triangles, x = state.mesh.triangles, state.x
-    whole, ways = np.zeros(len(x)), np.zeros((len(x), 3))
-    for spot in state.spots[number]:
-        if not 0 <= time - tool.laid(spot.dab) < tool.hold:
-            continue
-        away = np.linalg.norm(x - spot.anchor.at(x, triangles)[0], axis=1)
-        near = within(state, triangles[spot.anchor.faces[0]], spot.radius, away)
-        value = _kernel(tool.kernel, away[near] / spot.radius)
-        stronger = value > whole[near]
-        whole[near[stronger]] = value[stronger]
-        ways[near[stronger]] = tool.ways[spot.dab] if tool.ways else 0.0
-    some, share = _tips(state, whole)
-    return some, share, ways[triangles[some]].mean(axis=1)
-
-
-def _kernel(name: str, r: Floats) -> Floats:
-    inside = r < 1
-    if name == "flat":
-        return inside.astype(float)
-    near = np.where(inside, r, 1.0)
-    return 1 - near if name == "cone" else (1 - near * near) ** 2
-
-
-def _curve(state: State, tool: HotCurve, line: Floats, since: float) -> tuple[Ints, Floats, Floats]:
-    x, triangles = state.x, state.mesh.triangles
-    tails, heads = line, np.roll(line, -1, axis=0)
-    if not tool.closed:
-        tails, heads = tails[:-1], heads[:-1]
-    painted = (
-        tool.intensities or (1.0,) * len(line),
-        tool.offsets or (0.0,) * len(line),
-        tool.paces or (1.0,) * len(line),
-    )
-    points = np.array(painted).T
-    local, along = np.zeros((len(x), 3)), np.zeros((len(x), 3))
-    best = np.full(len(x), np.inf)
-    for k, (tail, head) in enumerate(zip(tails, heads, strict=True)):
-        way = head - tail
-        u = np.clip((x - tail) @ way / max(way @ way, 1e-300), 0, 1)
-        gap = np.linalg.norm(x - tail - u[:, None] * way, axis=1)
-        nearer = gap < best
-        best = np.where(nearer, gap, best)
-        value = (1 - u)[:, None] * points[k] + u[:, None] * points[(k + 1) % len(line)]
-        local = np.where(nearer[:, None], value, local)
-        along[nearer] = way
-    share = local[:, 0]
-    if tool.offsets or tool.paces:
-        share = share * intensities(tool, (since - local[:, 1]) * local[:, 2])
-    # a curve is near all along, and not only where its control points are
-    pieces = max(2, int(np.linalg.norm(heads - tails, axis=1).max(initial=0) / (0.5 * tool.radius)) + 1)
-    path = (tails[:, None] + np.linspace(0, 1, min(pieces, 200))[:, None] * (heads - tails)[:, None]).reshape(-1, 3)
-    near = within(state, np.unique(KDTree(x).query(path)[1]), tool.radius, best)
-    whole = np.zeros(len(x))
-    whole[near] = share[near] * _kernel("smooth", best[near] / tool.radius)
-    some, mean = _tips(state, whole)
-    return some, mean, along[triangles[some]].mean(axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ...arrays import Floats
-from .places import Place
+from .places import Everywhere, Place
 
 __all__ = [
     "Apex",
@@ -22,10 +22,13 @@ __all__ = [
     "HotSpot",
     "HotStroke",
     "HotSurface",
+    "HotTensors",
     "Kernel",
+    "PaintedStroke",
     "Point",
     "Stretch",
     "Tool",
+    "clocked",
     "intensities",
     "intensity",
 ]
@@ -36,6 +39,8 @@ _AROUND = 24
 Stretch = Annotated[float, Field(ge=0.1, le=10)]
 Point = tuple[float, float, float]
 Kernel = Literal["smooth", "flat", "cone"]
+Way = Literal["space", "surface"]
+_HOW_FAR = "How far is measured: through space, as far as the surface leads there, or along the surface"
 
 
 class _Tool(BaseModel):
@@ -65,6 +70,7 @@ class HotSpot(_Tool):
     at: Point = Field(description="Where, the nearest point of the surface [start shape's unit]")
     radius: float = Field(0.4, gt=0, le=100, description="Radius of influence [start shape's unit]")
     kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
+    distance: Way = Field("space", description=_HOW_FAR)
     stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the frame [1]")
     frame: Point = Field((1.0, 0.0, 0.0), description="Direction of the first stretch, as projected on the surface [1]")
     polar: bool = Field(
@@ -130,6 +136,7 @@ class HotCurve(_Tool):
     apex: Apex | None = Field(None, description="In place of control points: made about an apex when it starts")
     closed: bool = Field(False, description="Whether the last point meets the first")
     radius: float = Field(0.2, gt=0, le=100, description="Radius of influence [start shape's unit]")
+    distance: Way = Field("space", description=_HOW_FAR)
     stretch: tuple[Stretch, Stretch] = Field((1.0, 1.3), description="Tangential and normal to the curve [1]")
     normalised: float = Field(
         0.0, ge=-5, le=5, description="Share lambda of the tangential growth that keeps the outgrowth flat (1: a plane)"
@@ -161,6 +168,8 @@ class HotSurface(_Tool):
     )
     offset: float = Field(0.0, ge=0, le=1000, description="Later start where `later` is 1 [time]")
     later: Place | None = Field(None, description="Share of `offset` of each vertex")
+    pace: float = Field(1.0, gt=0, le=100, description="Pace of the activation where `paced` is 1 [1]")
+    paced: Place | None = Field(None, description="How much of `pace` each vertex has, of its logarithm")
     curl: tuple[float, float] = Field(
         (0.0, 0.0), description="Rest curvature added along and across, in unit time [1/start shape's unit]"
     )
@@ -182,6 +191,7 @@ class HotStroke(_Tool):
     hold: float = Field(1000.0, gt=0, le=1000, description="How long each dab acts; half a step at least [growth time]")
     radius: float = Field(0.3, gt=0, le=100, description="Radius of influence [start shape's unit]")
     kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
+    distance: Way = Field("space", description=_HOW_FAR)
     stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the way of the brush [1]")
 
     @model_validator(mode="after")
@@ -198,7 +208,40 @@ class HotStroke(_Tool):
         return self.start + (self.times[dab] if self.times else 0.0)
 
 
-Tool = Annotated[HotSpot | HotCurve | HotSurface | HotStroke, Field(discriminator="kind")]
+class PaintedStroke(BaseModel):
+    """A stroke that says how what lies under it grows."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    points: tuple[Point, ...] = Field(
+        min_length=1, max_length=500, description="Its way, straight between; the nearest vertices [start shape's unit]"
+    )
+    width: float = Field(0.0, ge=0, le=100, description="Half width; 0: the nearest vertices [start shape's unit]")
+    stretch: tuple[Stretch, Stretch] = Field((1.0, 1.0), description="Along and across the frame [1]")
+    frame: Point | Literal["along", "around"] = Field(
+        "along",
+        description="Direction of the first stretch: 'along' the stroke, 'around' the z axis, or a direction [1]",
+    )
+
+
+class HotTensors(_Tool):
+    """A surface whose growth is painted by strokes, and spread between them by Laplace's equation, as tensors."""
+
+    kind: Literal["tensors"] = "tensors"
+    strokes: tuple[PaintedStroke, ...] = Field(
+        min_length=1, max_length=200, description="What is painted; where strokes meet, the last holds"
+    )
+    where: Place = Field(default_factory=Everywhere, description="Share of each vertex")
+
+
+def clocked(tool: Tool) -> bool:
+    """Return whether places of a tool have clocks of their own."""
+    if isinstance(tool, HotCurve):
+        return bool(tool.offsets or tool.paces)
+    return isinstance(tool, HotSurface) and (tool.later is not None or tool.paced is not None)
+
+
+Tool = Annotated[HotSpot | HotCurve | HotSurface | HotStroke | HotTensors, Field(discriminator="kind")]
 
 
 def intensity(tool: Tool, time: float) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from solver.arrays import Floats, Ints
 
 from ... import foreign
 from ...errors import InvalidOption, SweepError
@@ -27,8 +30,8 @@ def read(path: Path) -> dict[str, Any]:
     those of the file's corners.
 
     Raises:
-        InvalidOption: no such kind of file, nothing that can be read in it, more groups than a mesh may have, or
-            trimesh is not installed.
+        InvalidOption: no such kind of file, nothing that can be read in it, more groups than a mesh may have, a group
+            with a weight that is not finite, or trimesh is not installed.
 
     """
     try:
@@ -87,9 +90,26 @@ def _merged(parts: Parts) -> dict[str, Any]:
         found |= {"uv": parts.uv.tolist(), "uv_faces": parts.corners[~flat].tolist()}
     if parts.materials:
         found |= {"materials": list(parts.materials), "face_materials": parts.material[~flat].tolist()}
+    check_count(len(parts.groups))
     groups = {name: weights[chosen] for name, weights in parts.groups.items()}
-    groups = {name: weights.tolist() for name, weights in groups.items() if np.isfinite(weights).all()}
-    check_count(len(groups))
+    _check_weights(groups, chosen)
     if groups:
-        found["groups"] = groups
+        found["groups"] = {name: weights.tolist() for name, weights in groups.items()}
     return found
+
+
+def _check_weights(groups: Mapping[str, Floats], points: Ints) -> None:
+    """Refuse groups with weights that are no numbers; points: the file's numbers of what weights (p,) belong to.
+
+    Raises:
+        InvalidOption: a weight is not finite.
+
+    """
+    for name, weights in groups.items():
+        wrong = np.flatnonzero(~np.isfinite(weights))
+        if len(wrong):
+            raise InvalidOption(
+                f"the group {name[:40]!r} has no finite weight at {len(wrong)} of {len(weights)} points, "
+                f"the first of which is point {points[wrong[0]]} of the file.",
+                "Give every point a number, 0 where it does not belong to the group, or delete the group.",
+            )

@@ -114,6 +114,26 @@ def test_a_surface_that_starts_later_further_out():
     assert (late > 0).all()
 
 
+def test_a_surface_goes_at_its_own_pace_further_out():
+    """While (t - t0) pace < 1, the paper's 4.3: four times as fast outside it is over after a quarter of the time."""
+    tool = {
+        "kind": "surface",
+        "where": {"kind": "everywhere"},
+        "later": {"kind": "band", "along": "radius", "low": 0.49, "high": 0.51},
+        "offset": 0.2,
+        "paced": {"kind": "band", "along": "radius", "low": 0.49, "high": 0.51},
+        "pace": 4.0,
+        "activation": [(0, 1), (1, 1), (1.0001, 0)],
+    }
+    made = engine(tool, shape="disc")
+    state = started(made.state, made.script.tools, 0.05, 0)
+    out = np.linalg.norm(state.x[state.mesh.triangles].mean(axis=1), axis=1)
+    for time, within, beyond in ((0.1, True, False), (0.4, True, True), (0.5, True, False), (1.1, False, False)):
+        acts = np.abs(rates(state, {0: made.script.tools[0]}, time).strain).sum(axis=1) > 0
+        assert (acts[out < 0.4] == within).all()
+        assert (acts[out > 0.6] == beyond).all()
+
+
 def test_a_curve_is_made_about_the_apex_where_it_is_then():
     """The ring follows a hot spot that has moved, at its distance, and rides on the surface afterwards."""
     spot = {"kind": "spot", "at": (0, 0, 1), "radius": 0.5, "stretch": (4, 4)}
@@ -225,12 +245,13 @@ def test_normalised_outgrowth_stays_flat():
     assert energies[1] < 0.25 * min(energies[0], energies[2])
 
 
-def test_a_polar_spot_grows_away_from_itself_and_around():
+@pytest.mark.parametrize("distance", ["space", "surface"])
+def test_a_polar_spot_grows_away_from_itself_and_around(distance):
     """Whichever way a triangle lies from the spot, turned by an angle as well."""
     for angle in (0.0, 30.0):
         spot = {"kind": "spot", "at": (0.2, 0.1, 0), "radius": 0.5, "kernel": "flat", "stretch": (1.5, 1.1)}
-        state = engine(spot | {"polar": True, "angle": angle}, shape="disc").state
-        tool = engine(spot | {"polar": True, "angle": angle}, shape="disc").params.tools[0]
+        made = engine(spot | {"polar": True, "angle": angle, "distance": distance}, shape="disc")
+        state, tool = made.state, made.params.tools[0]
         state = started(state, [tool], 0.1, 0)
         found = rates(state, {0: tool}, 0.05).strain
         p = state.x[state.mesh.triangles]
@@ -248,7 +269,8 @@ def test_a_polar_spot_grows_away_from_itself_and_around():
         v = np.stack([(outward * first).sum(-1), outward[:, 1] * first[:, 0] - outward[:, 0] * first[:, 1]], -1)
         e11, e12, e22 = found.T
         along = e11 * v[:, 0] ** 2 + 2 * e12 * v[:, 0] * v[:, 1] + e22 * v[:, 1] ** 2
-        assert along[whole] == pytest.approx(np.log(1.5), abs=1e-9)
+        # the slope of distances that are linear within a triangle is not quite the way to its middle
+        assert along[whole] == pytest.approx(np.log(1.5), abs=1e-9 if distance == "space" else 0.02)
         assert (e11 + e22)[whole] == pytest.approx(np.log(1.5) + np.log(1.1), abs=1e-9)
 
 
