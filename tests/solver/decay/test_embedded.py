@@ -192,3 +192,45 @@ def test_an_open_mesh_gets_a_rind_of_flesh_on_the_side_that_it_faces_from() -> N
     assert lying.mesh_position.values[0, :, 1].min() > float(mesh.vertices[:, 1].min()) - 1e-3
     assert np.abs(lying.mesh_position.values[0] - mesh.vertices).max() > 0.1
     assert float(lying.least_jacobian[0]) > 0
+
+
+def test_a_body_shrinks_where_it_was_drawn() -> None:
+    """Moved by a vector the same run is moved by that vector: nothing is drawn to the middle of the world."""
+    away = np.array([9.0, 4.0, -6.0])
+    ring, moved = torus(32, 16), torus(32, 16)
+    moved.vertices = moved.vertices + away
+    here, there = (run(mesh, wounds=[], flesh=STILL) for mesh in (ring, moved))
+    gap = np.abs(there.mesh_position.values - here.mesh_position.values - away)
+    assert float(here.water_lost[-1]) > 0.01
+    assert gap.max() < 2e-4
+    middle = here.mesh_position.values.mean(axis=1)
+    assert np.abs(middle[-1, [0, 2]] - middle[0, [0, 2]]).max() < 2e-4
+
+
+def test_a_tip_too_sharp_for_any_lattice_goes_along() -> None:
+    """A chili: the cone's end is thinner than each lattice's edge, and not longer than one of the quality's."""
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    points = np.asarray(ball.vertices).copy()
+    top = points[:, 1] > 0.92
+    points[top, 1] = 0.92 + (points[top, 1] - 0.92) * 6
+    points[top][:, [0, 2]] *= 0.6
+    ball.vertices = points
+    found = run(ball, wounds=[], flesh=STILL)
+    tip = int(np.argmax(points[:, 1]))
+    shrunk = float(np.cbrt(found.volume[-1] / found.volume[0]))
+    high = found.mesh_position.values[:, tip, 1] - found.mesh_position.values[:, :, 1].min(axis=1)
+    assert high[-1] / high[0] == pytest.approx(shrunk, rel=0.02)
+    # a spike as long as the ball is wide is no detail
+    points[top, 1] = 0.92 + (points[top, 1] - 0.92) * 4
+    points[points[:, 1] > 1.0] *= [0.05, 1, 0.05]
+    ball.vertices = points
+    with pytest.raises(InvalidGeometry, match="too thin"):
+        run(ball, wounds=[], flesh=STILL)
+
+
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_a_mesh_in_other_units_is_refused_with_the_factor(scale: float) -> None:
+    ring = torus(16, 8)
+    ring.vertices = ring.vertices * scale
+    with pytest.raises(InvalidInput, match=f"multiply its points by {1 / 1.4 / scale:.3g}"):
+        SOLVER.parse({"mesh": given(ring)}, preset="apple")
