@@ -208,24 +208,27 @@ def test_a_body_shrinks_where_it_was_drawn() -> None:
 
 
 def test_a_tip_too_sharp_for_any_lattice_goes_along() -> None:
-    """A chili: the cone's end is thinner than each lattice's edge, and not longer than one of the quality's."""
-    ball = trimesh.creation.icosphere(subdivisions=4)
-    points = np.asarray(ball.vertices).copy()
-    top = points[:, 1] > 0.92
-    points[top, 1] = 0.92 + (points[top, 1] - 0.92) * 6
-    points[top][:, [0, 2]] *= 0.6
-    ball.vertices = points
-    found = run(ball, wounds=[], flesh=STILL)
-    tip = int(np.argmax(points[:, 1]))
+    """A cone on a ball: the first lattices miss more than its tip, and none has so small an edge as a tip."""
+
+    def horned(radius: float) -> trimesh.Trimesh:
+        ball = trimesh.creation.icosphere(subdivisions=5)
+        points = np.asarray(ball.vertices).copy()
+        out = np.hypot(points[:, 0], points[:, 2])
+        horn = (points[:, 1] > 0) & (out < radius)
+        points[horn, 1] += 1 - out[horn] / radius
+        ball.vertices = points
+        return ball
+
+    mesh = horned(0.35)
+    found = run(mesh, wounds=[], flesh=STILL)
+    tip = int(np.argmax(np.asarray(mesh.vertices)[:, 1]))
     shrunk = float(np.cbrt(found.volume[-1] / found.volume[0]))
     high = found.mesh_position.values[:, tip, 1] - found.mesh_position.values[:, :, 1].min(axis=1)
+    assert high[0] == pytest.approx(3, rel=0.02)
     assert high[-1] / high[0] == pytest.approx(shrunk, rel=0.02)
-    # a spike as long as the ball is wide is no detail
-    points[top, 1] = 0.92 + (points[top, 1] - 0.92) * 4
-    points[points[:, 1] > 1.0] *= [0.05, 1, 0.05]
-    ball.vertices = points
-    with pytest.raises(InvalidGeometry, match="too thin"):
-        run(ball, wounds=[], flesh=STILL)
+    # a needle as long as the ball is wide is no detail
+    with pytest.raises(InvalidGeometry, match="too thin at"):
+        run(horned(0.04), wounds=[], flesh=STILL)
 
 
 @pytest.mark.parametrize("scale", [0.01, 100.0])
