@@ -4,6 +4,10 @@
 
 One wound on the equator, no spores. Radii are those of a cap of the area where the rot map is at least 0.1, on a sphere
 of the fruit's area; speeds are slopes of a line between 6 and 20 mm. The lag is where that line meets the wound.
+
+`GRAPES` is the model of Judet-Correia, Bollaert, Duquenne, Charpentier, Bensoussan and Dantigny 2010, Int. J. Food
+Microbiol. 142, 106-113 (P. expansum on berries of Red Globe, fitted on agar for its cardinal values and on berries for
+its rate), with the constants that GroPIN's entries 170 and 171 give. No constant of `ROTS` was taken from it.
 """
 
 from __future__ import annotations
@@ -31,6 +35,10 @@ SPECIES = {
 }
 TEMPERATURES = (-10.0, -5.0, 0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 24.0, 27.0, 30.0, 33.0, 36.0, 40.0, 45.0)
 HUMIDITIES = (0.0, 15.0, 35.0, 50.0, 65.0, 75.0, 85.0, 90.0, 95.0, 100.0)
+#: Cardinal temperatures [degC] and the rate at the best one [mm/day] of P. expansum on grapes.
+GRAPES = (-4.4, 23.9, 32.5, 4.19)
+#: At which temperatures [degC] Baert et al. 2007 grew it.
+_BAERT = (2.0, 4.0, 10.0, 16.0, 25.0, 30.0)
 _CELLS, _TOLERANCE = 32, 1e-4
 #: Radii [mm] between which a speed is measured, days of a share, and the longest run [day].
 _BETWEEN, _DAYS, _LONGEST = (6.0, 20.0), 7.0, 120.0
@@ -130,9 +138,35 @@ def published() -> None:
     sheet.keep()
 
 
+def on_grapes(celsius: float) -> float:
+    """Return how fast P. expansum grows on grapes by the published model [mm/day]."""
+    low, best, high, rate = GRAPES
+    if not low < celsius < high:
+        return 0.0
+    above = (celsius - high) * (celsius - low) ** 2
+    below = (best - low) * ((best - low) * (celsius - best) - (best - high) * (best + low - 2 * celsius))
+    return rate * above / below
+
+
+def rates() -> None:
+    """Print lesions on apples beside the published model of the same species on grapes: bias and accuracy factor."""
+    sheet = Sheet("decay-rates", ("degC", "lesion on an apple, mm/day", "colony on grapes, mm/day", "ratio"), "decay")
+    ratios = []
+    for celsius in _BAERT:
+        here, there = measured("penicillium-expansum", celsius)["mm_per_day"], on_grapes(celsius)
+        ratios.append(here / there)
+        cells = (f"{celsius:g}", f"{here:.2f}", f"{there:.2f}", f"{here / there:.2f}")
+        sheet.add(cells, celsius=celsius, humidity=90.0, here=here, published=there)
+    logs = np.log10(ratios)
+    bias, accuracy = float(10 ** logs.mean()), float(10 ** np.abs(logs).mean())
+    sheet.add(("bias and accuracy factor", "", "", f"{bias:.2f}, {accuracy:.2f}"), bias=bias, accuracy=accuracy)
+    sheet.keep()
+
+
 def main() -> None:
-    """Run all three."""
+    """Run all four."""
     published()
+    rates()
     humidities()
     temperatures()
 

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from .params import DecayParams
 
 __all__ = ["contradiction"]
 
+#: Halves of a mesh's longest side [r1] within which wounds, spores and depths, which are lengths in r1, mean something.
+_HALF = (0.2, 20.0)
+
 
 def contradiction(params: DecayParams) -> str:
     """Return what of the parameters contradicts what else, and what to change; nothing if they go together."""
     return _of_mesh(params) or _of_heap(params) or _of_cuts(params) or _of_oven(params)
+
+
+def _half(params: DecayParams) -> float:
+    """Return half of the longest side of the mesh [r1], 0 without one or where it is all in one place."""
+    if params.mesh is None:
+        return 0.0
+    points = np.array(params.mesh.points)
+    return float((points.max(axis=0) - points.min(axis=0)).max()) / 2
 
 
 def _of_mesh(params: DecayParams) -> str:
@@ -23,6 +36,12 @@ def _of_mesh(params: DecayParams) -> str:
                 f"the mesh has vertices 0 to {count - 1}" if count else "only an imported mesh has numbered vertices"
             )
             return f"a wound names vertex {wound.vertex}: {where}"
+    half = _half(params)
+    if half and not _HALF[0] <= half <= _HALF[1]:
+        return (
+            f"half of the mesh's longest side is {half:.3g}, and lengths are in r1, a fruit's radius, which weight and "
+            f"volume make so many millimetres: multiply its points by {1 / half:.3g}"
+        )
     if params.mesh is not None and params.body == "table":
         return "the table of dried fruits knows no imported mesh: take body=quasi-static, not table"
     if params.mesh is not None and params.seeds == "contacts":

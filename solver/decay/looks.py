@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..contract import Fur, Label, Looks, Matter, Skin
 from .dress import mixed
-from .dress.grain import grain
+from .dress.grain import creases, grain
 from .dress.stem import parts
 
 __all__ = ["LOOKS"]
@@ -35,8 +35,8 @@ _DRIED = 0.6
 _BROWN = np.array([0.60, 0.29, 0.11])
 #: Wax as dust; what it hides and how rough it is where a peel says 1.
 _DUST, _DUSTY, _POWDER = np.array([0.62, 0.64, 0.70]), 0.4, 0.4
-#: Heights [r1] of felt, of its tufts, and of fine wrinkles in skin that is quite dry.
-_MAT, _TUFT, _SHRIVEL = 0.006, 0.004, 0.006
+#: Heights [r1] of felt and of its tufts.
+_MAT, _TUFT = 0.006, 0.004
 #: How far light goes below a fruit's skin, red, green and blue [r1].
 _REACH = (0.08, 0.035, 0.015)
 
@@ -73,7 +73,12 @@ def _paint(fields: Mapping[str, Array], params: Mapping[str, Any]) -> Skin | Non
     height = None
     if "edge" in fields:
         spots = peel.get("spot_height", 0.0) * layer("spot") * (1 - rotten)
-        height = spots + _SHRIVEL * dry * layer("shrivel") + felted * (_MAT + _TUFT * fluff)
+        fine = (
+            creases(layer("shrivel"), np.asarray(fields.get("water_lost", 0.0)), params)
+            * (1 - rotten)
+            * (1 - layer(_FLESH))
+        )
+        height = spots + fine + felted * (_MAT + _TUFT * fluff)
     return Skin(np.clip(colour, 0, 1), roughness, height)
 
 

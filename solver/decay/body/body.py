@@ -104,11 +104,13 @@ class Body:
         solid, fresh = self.solid, self._params.flesh.unit * self._params.firmness
         rest = rested(solid.points, solid.tets, state.shrinkage, state.young, self._params.flesh.poisson)
         even = float(np.cbrt(np.average(state.shrinkage**3, weights=solid.volume)))
-        start = even * solid.points
+        middle = self._filling.middle
+        start = middle + even * (solid.points - middle)
         loads = self._loads(state, start, fresh)
         if near is not None:
-            start = near.points * even / near.even
-            ahead = start if earlier is None else 2 * start - earlier.points * even / earlier.even
+            start = middle + (near.points - middle) * even / near.even
+            before = start if earlier is None else middle + (earlier.points - middle) * even / earlier.even
+            ahead = 2 * start - before
             start = ahead if np.isfinite(energy(ahead, *rest)) else start
         if self._params.body == "paper":
             network = knit(solid, state, self._inertia)

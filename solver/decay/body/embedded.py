@@ -24,7 +24,8 @@ __all__ = ["Embedded"]
 
 #: Tetrahedra of a cube of the lattice, and of a round fruit in k shells over k^3: a mesh gets about as many.
 _PER_CUBE, _PER_SHELLS = 12.0, 20.0
-#: No vertex may lie farther from the flesh than this share of the lattice's edge: there it would be missing.
+#: No vertex may lie farther from the flesh than this share of the lattice's edge: there it would be missing. Where no
+#: lattice comes so near, at sharp tips, it is a share of the edge that the quality asked for.
 _FAR = 0.75
 #: The same where the borders of a rind are ridges, which the lattice cuts off.
 _RIDGE = 1.25
@@ -71,6 +72,8 @@ class Embedded:
         held = nearest(surface.points, filled.points[skin], self.solid.faces)
         self._onto = _matrix(held, self.solid.faces, len(skin))
         self.core = depth >= np.median(depth)
+        # wherever it was drawn, it shrinks in its place
+        self.middle = np.average(filled.points[filled.tets].mean(axis=1), weights=self.solid.volume, axis=0)
         self.carried = False
         self.floor = float(points[:, 1].min())
         self.hanging = np.zeros(len(filled.points))
@@ -101,23 +104,32 @@ def _filled(points: Floats, faces: Ints, layers: int, far: float) -> Stuffed:
     """Return flesh in a closed surface (v, 3), (f, 3) that hangs together, so many edges from vertices at most."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     volume = abs(float(np.sum(a * np.cross(b, c)))) / 6
-    edge = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
-    why = ""
+    edge = asked = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
+    why, tipped = "", None
     for _ in range(_TRIES):
         found = stuffed(points, faces, edge)
-        why = _lacking(found, points, far * edge)
+        why = _lacking(found)
         if not why:
-            return found
+            away = _away(found, points)
+            worst = int(np.argmax(away))
+            if away[worst] <= far * edge:
+                return found
+            why = f"it is too thin at {_place(points[worst])}"
+            # a tip is too sharp for every lattice: what is no longer than an edge of the one asked for goes along
+            if tipped is None and away[worst] <= far * asked:
+                tipped = found
         edge /= _FINER
         if len(found.tets) * _FINER**3 > _MOST:
             break
+    if tipped is not None:
+        return tipped
     raise InvalidGeometry(
         f"the mesh cannot be filled with flesh: {why}.",
         advice="Thicken it there, close what is open, or take body=none.",
     )
 
 
-def _lacking(found: Stuffed, points: Floats, far: float) -> str:
+def _lacking(found: Stuffed) -> str:
     """Return what is wrong with flesh, and where; nothing if it is whole."""
     if not len(found.tets):
         return "it is thinner than the lattice everywhere"
@@ -125,12 +137,13 @@ def _lacking(found: Stuffed, points: Floats, far: float) -> str:
     if count > 1:
         least = int(np.argmin(np.bincount(of)))
         return f"a part about {_place(found.points[of == least].mean(axis=0))} does not hang together with the rest"
-    skin, faces = np.unique(boundary(found.tets), return_inverse=True)
-    away = nearest(points, found.points[skin], faces.reshape(-1, 3)).distance
-    worst = int(np.argmax(away))
-    if away[worst] > far:
-        return f"it is too thin at {_place(points[worst])}"
     return ""
+
+
+def _away(found: Stuffed, points: Floats) -> Floats:
+    """Return how far points (v, 3) are from the skin of flesh (v)."""
+    skin, faces = np.unique(boundary(found.tets), return_inverse=True)
+    return nearest(points, found.points[skin], faces.reshape(-1, 3)).distance
 
 
 def _place(point: Floats) -> str:

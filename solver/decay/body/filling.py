@@ -28,6 +28,7 @@ class Filling(Protocol):
     inwards (p, v): takes a field of the surface to the body's points. core (p): what is kept from sliding. extent: area
     and volume of the surface. carried: whether it lies on a neighbour. floor: height of the surface's lowest point
     [r1]; hanging (p): how far what it stands for reaches below each point, negative where it does [r1].
+    middle (3): about what it shrinks [r1].
     """
 
     solid: Solid
@@ -37,6 +38,7 @@ class Filling(Protocol):
     carried: bool
     floor: float
     hanging: Floats
+    middle: Floats
 
     def onto(self, cells: int) -> sparse.csr_array:
         """Return the matrix that takes a field of the body's skin (s) to the surface of so many cells."""
@@ -58,7 +60,7 @@ class Round:
         self.core = np.linalg.norm(self.solid.points, axis=1) < _CORE
         self.extent, self.carried = extent(params), carried(params)
         self.floor = float(self.solid.points[:, 1].min())
-        self.hanging = np.zeros(len(self.solid.points))
+        self.hanging, self.middle = np.zeros(len(self.solid.points)), np.zeros(3)
 
     def onto(self, cells: int) -> sparse.csr_array:
         """See `Filling`."""

@@ -14,10 +14,15 @@ import numpy as np
 from ...arrays import Array, Floats, Ints
 from ..fields.noise import patches
 
-__all__ = ["grain", "spotted"]
+__all__ = ["creases", "grain", "spotted"]
 
 #: Size of felt's tufts and of its ragged edge, of fine wrinkles, of blush's patches and of its streaks [r1].
-_FLUFF, _EDGE, _SHRIVEL, _BLUSH, _STREAK = 0.016, 0.09, 0.05, 0.5, 0.045
+_FLUFF, _EDGE, _SHRIVEL, _BLUSH, _STREAK = 0.016, 0.09, 0.03, 0.5, 0.045
+#: Mean square slope of `patches` on a surface, times its size squared: 2 from the waves, 2 / (pi sqrt 3) from the map.
+_STEEP = 4 / (np.pi * np.sqrt(3))
+#: Surplus of lengths from which skin creases finely, and beyond which it folds as a whole, which its shell shows; what
+#: of the flesh's shrinkage a skin joins where none was solved. The first two are choices, looked at.
+_SOUND, _FOLDED, _JOINED = 0.003, 0.035, 0.5
 
 
 def grain(points: Array, spacing: float, params: Mapping[str, Any]) -> dict[str, Array]:
@@ -38,6 +43,21 @@ def grain(points: Array, spacing: float, params: Mapping[str, Any]) -> dict[str,
     radius = float(peel["spot_radius"])
     if peel["spots"] > 0 and spacing <= radius:
         found["spot"] = spotted(places, float(peel["spots"]), radius, seed)
+    return found
+
+
+def creases(shrivel: Array, lost: Array, params: Mapping[str, Any]) -> Array:
+    """Return the height (v) [r1] of skin that is too wide for flesh which lost a share of the weight (v) as water.
+
+    shrivel (v): from `grain`. The skin lies in smooth hills between creases, as high as hold just the area that is too
+    much: the mean square slope is twice the surplus of area, four times that of lengths.
+    """
+    skin = params.get("skin") or {}
+    flesh = params.get("flesh") or {}
+    gone = np.clip(np.asarray(lost, float) * flesh.get("shrinkage", 1.0), 0, 0.99)
+    surplus = (1 - skin.get("shrinkage", _JOINED)) * (1 - np.cbrt(1 - gone))
+    held = np.clip(surplus, _SOUND, _FOLDED) - _SOUND
+    found: Array = _SHRIVEL * np.sqrt(4 * held / _STEEP) * (np.abs(shrivel) - 0.5)
     return found
 
 

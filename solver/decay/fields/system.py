@@ -16,7 +16,7 @@ from scipy.spatial import KDTree
 from ...arrays import Floats, Ints
 from ...contract import Context
 from ...fruit import directions
-from ..climate import Germination, flesh_activity, moisture, surface_activity, warmth
+from ..climate import flesh_activity, moisture, surface_activity, warmth
 from ..environment import air, evaporated, opened, reference_radius
 from ..params import DecayParams
 from ..surfaces.cut import bare
@@ -26,14 +26,15 @@ from ..surfaces.surface import Surface, extent, geodesic, lay, triangulated
 from ..within.joint import Joint, joined
 from ..within.roast import Roasted
 from ..within.water import Water, activity
+from .arriving import Arrivals
 from .colony import Colony
 from .drawn import fed, opened_skin, seen
 from .gate import SHUT, gates
 from .layer import Layer, State
 from .noise import patches
 from .rates import Rates, daily
-from .spawning import Landing, Spawner
-from .waiting import Seed, Waiting
+from .spawning import Landing
+from .waiting import Seed
 
 __all__ = ["ROTTEN", "Both", "System", "laid"]
 
@@ -105,16 +106,10 @@ class System:
         self.extent = closed or extent(params)
         self._radius = 1e3 * reference_radius(params, self.extent)
         self._cardinal = params.climate == "cardinal"
-        for_rot, for_mould, rot_clocks, mould_clocks = Context.generator(params.seed).spawn(4)
-        chance = params.spawning / (10 - params.propagation_rate)
+        for_rot, for_mould, *clocks = Context.generator(params.seed).spawn(4)
         self.rot = self._layer(params, "rot", for_rot, self.joint)
-        self._rot_spawner = Spawner(chance, 0.0, params.spawn_reach, rot_clocks)
         self.mould = self._layer(params, "mould", for_mould) if with_mould else None
-        strays = params.rot_spawning if with_mould else 0.0
-        self._mould_spawner = Spawner(chance, strays, params.spawn_reach, mould_clocks)
-        self._waits = {True: Germination(params.rot, params), False: Germination(params.mould, params)}
-        self._waiting = Waiting()
-        self._due: tuple[float, Seed] | None = None
+        self.arrivals = Arrivals(params, with_mould, clocks)
         self._wounds = self._opened()
         self._water = None
         if params.within is not None and self.joint is not None:
@@ -123,7 +118,7 @@ class System:
         self.start = Both(self.rot.fresh, self.mould.fresh if self.mould else None, 0.0, wet)
         for seed in self._wounding():
             if self._cardinal:
-                self._waiting.add(self._waits[seed.rots].day(0.0), seed)
+                self.arrivals.land(0.0, seed)
             else:
                 self.start = self._seeded(self.start, 0.0, seed)
 
@@ -177,7 +172,7 @@ class System:
             map_ = share * self._painted
             grown = layer.painted(here, map_ if gate is None else map_ * gate)
         else:
-            (self._rot_spawner if seed.rots else self._mould_spawner).settle(seed.ray, day)
+            self.arrivals.settle(seed.rots, seed.ray, day)
             grown = layer.seeded(here, seed.place, seed.radius, gate, share)
         return state._replace(rot=grown) if seed.rots else state._replace(mould=grown)
 
@@ -270,13 +265,9 @@ class System:
 
     def caught(self, day: float, ray: Floats, radius: float) -> None:
         """Let rot, and the mould if there is one, land on a day at a unit direction: a fruit that touches there."""
-        if self._due is not None:
-            # what was next may not be any more
-            self._waiting.add(*self._due)
-            self._due = None
+        self.arrivals.again()
         for rots in (True, False) if self.mould is not None else (True,):
-            starts = self._waits[rots].day(day) if self._cardinal else day
-            self._waiting.add(starts, Seed(rots, ray, self._place(ray), radius))
+            self.arrivals.land(day, Seed(rots, ray, self._place(ray), radius))
 
     def taken_by(self, rot: Colony, mould: Colony) -> None:
         """Let another species live on a fruit that is sound until now."""
@@ -284,7 +275,7 @@ class System:
         for layer, colony in ((self.rot, rot), (self.mould, mould)):
             if layer is not None:
                 layer.taken_by(daily(colony, self.params, self._radius))
-        self._waits = {True: Germination(rot, self.params), False: Germination(mould, self.params)}
+        self.arrivals.live_on(self.params)
 
     def near(self, ray: Floats, radius: float) -> Ints:
         """Return the vertices within a distance on the unit sphere of a direction, the nearest one among them."""
@@ -310,27 +301,17 @@ class System:
         Whether a spore will is judged on the state at the start of the step it lands in, so that the many that land on
         barren or taken ground cost no step.
         """
-        while self._due is None:
-            first = self._rot_spawner if self._rot_spawner.next <= self._mould_spawner.next else self._mould_spawner
-            if min(first.next, self._waiting.next) > until:
-                return np.inf
-            if self._waiting.next <= first.next:
-                self._due = self._waiting.next, self._waiting.pop()
-                break
-            landing = first.land()
-            rots = first is self._rot_spawner
-            site = int(self._tree.query(landing.direction)[1])
-            if self._roots(state, landing, site, rots):
-                seed = Seed(rots, landing.direction, self._place(landing.direction), _SPORE)
-                self._waiting.add(self._waits[rots].day(landing.day) if self._cardinal else landing.day, seed)
-        return self._due[0]
+
+        def rooted(landing: Landing, rots: bool) -> Seed | None:
+            if not self._roots(state, landing, int(self._tree.query(landing.direction)[1]), rots):
+                return None
+            return Seed(rots, landing.direction, self._place(landing.direction), _SPORE)
+
+        return self.arrivals.next(until, rooted)
 
     def root(self, state: Both) -> Both:
         """Return the state with the colony that is due."""
-        assert self._due is not None
-        day, seed = self._due
-        self._due = None
-        return self._seeded(state, day, seed)
+        return self._seeded(state, *self.arrivals.pop())
 
     def _place(self, ray: Floats) -> Floats:
         """Return the point (3) of the skin in a unit direction; of an imported mesh the vertex nearest to it."""

@@ -153,7 +153,7 @@ def test_budgets_close_to_round_off_with_every_colony_that_lands():
         assert whole.rot.budget_error(reached.state.rot) < 1e-13
         assert whole.mould.budget_error(reached.state.mould) < 1e-13
     assert reached.state.rot.n.min() >= 0
-    assert len(whole._mould_spawner._parents) > 2
+    assert len(whole.arrivals.mould._parents) > 2
 
 
 def test_halving_the_tolerated_error_lands_on_the_same_rot():

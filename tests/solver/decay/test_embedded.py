@@ -192,3 +192,48 @@ def test_an_open_mesh_gets_a_rind_of_flesh_on_the_side_that_it_faces_from() -> N
     assert lying.mesh_position.values[0, :, 1].min() > float(mesh.vertices[:, 1].min()) - 1e-3
     assert np.abs(lying.mesh_position.values[0] - mesh.vertices).max() > 0.1
     assert float(lying.least_jacobian[0]) > 0
+
+
+def test_a_body_shrinks_where_it_was_drawn() -> None:
+    """Moved by a vector the same run is moved by that vector: nothing is drawn to the middle of the world."""
+    away = np.array([9.0, 4.0, -6.0])
+    ring, moved = torus(32, 16), torus(32, 16)
+    moved.vertices = moved.vertices + away
+    here, there = (run(mesh, wounds=[], flesh=STILL) for mesh in (ring, moved))
+    gap = np.abs(there.mesh_position.values - here.mesh_position.values - away)
+    assert float(here.water_lost[-1]) > 0.01
+    assert gap.max() < 2e-4
+    middle = here.mesh_position.values.mean(axis=1)
+    assert np.abs(middle[-1, [0, 2]] - middle[0, [0, 2]]).max() < 2e-4
+
+
+def test_a_tip_too_sharp_for_any_lattice_goes_along() -> None:
+    """A cone on a ball: the first lattices miss more than its tip, and none has so small an edge as a tip."""
+
+    def horned(radius: float) -> trimesh.Trimesh:
+        ball = trimesh.creation.icosphere(subdivisions=5)
+        points = np.asarray(ball.vertices).copy()
+        out = np.hypot(points[:, 0], points[:, 2])
+        horn = (points[:, 1] > 0) & (out < radius)
+        points[horn, 1] += 1 - out[horn] / radius
+        ball.vertices = points
+        return ball
+
+    mesh = horned(0.35)
+    found = run(mesh, wounds=[], flesh=STILL)
+    tip = int(np.argmax(np.asarray(mesh.vertices)[:, 1]))
+    shrunk = float(np.cbrt(found.volume[-1] / found.volume[0]))
+    high = found.mesh_position.values[:, tip, 1] - found.mesh_position.values[:, :, 1].min(axis=1)
+    assert high[0] == pytest.approx(3, rel=0.02)
+    assert high[-1] / high[0] == pytest.approx(shrunk, rel=0.02)
+    # a needle as long as the ball is wide is no detail
+    with pytest.raises(InvalidGeometry, match="too thin at"):
+        run(horned(0.04), wounds=[], flesh=STILL)
+
+
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_a_mesh_in_other_units_is_refused_with_the_factor(scale: float) -> None:
+    ring = torus(16, 8)
+    ring.vertices = ring.vertices * scale
+    with pytest.raises(InvalidInput, match=f"multiply its points by {1 / 1.4 / scale:.3g}"):
+        SOLVER.parse({"mesh": given(ring)}, preset="apple")

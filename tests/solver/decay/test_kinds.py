@@ -143,6 +143,30 @@ def test_each_kind_is_painted_as_it_is_alone(run):
     assert not np.allclose(skin.colour[run["fruit"].values == 2].mean(axis=0), skin.colour.mean(axis=0), atol=0.05)
 
 
+def test_what_lives_on_a_fruit_gives_its_lesion_and_felt():
+    """Skin is the kind's; an apple that took bull's eye rot from another is as dark as that one where it rots."""
+    paint, fur = SOLVER.looks.paint, SOLVER.looks.fur
+    mixed = [{"preset": "apple", "fruits": 1}, {"preset": "apple-neofabraea", "fruits": 1}]
+    told = SOLVER.parse({"body": "quasi-static", "heap": {"kinds": mixed}}, "apple").model_dump()
+    both, none = np.ones(2), np.zeros(2)
+    fields = {
+        "rot": both,
+        "mould": none,
+        "mould_active": none,
+        "kind": none,
+        "living": np.array([0.0, 1.0]),
+        "lost": none,
+    }
+    found, standing = paint(fields, told).colour, fur({**fields, "mould": both}, told)
+    for place, name in enumerate(("apple", "apple-neofabraea")):
+        alone = SOLVER.parse({}, name).model_dump() | {"skin_colour": FRUITS["apple"]["skin_colour"]}
+        alone["peel"] = FRUITS["apple"]["peel"]
+        one = {"rot": both, "mould": none, "mould_active": none, "water_lost": 0.0}
+        np.testing.assert_allclose(found[place], paint(one, alone).colour[0], rtol=1e-12)
+        np.testing.assert_allclose(standing.length[place], fur({**one, "mould": both}, alone).length[0], rtol=1e-12)
+    assert found[1].sum() < 0.6 * found[0].sum()
+
+
 def test_stems_stand_on_their_fruits_and_end_before_the_next_one(run):
     parts = registry.get("decay").looks.parts
     params = row(ROW).model_dump(mode="json")

@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from solver import registry
-from solver.decay.dress.grain import grain, spotted
+from solver.decay.dress.grain import creases, grain, spotted
 from solver.decay.dress.peel import LESIONS, PEELS
 
 
@@ -114,3 +114,20 @@ def test_a_mesh_of_one_s_own_and_a_heap_have_no_stem() -> None:
     assert parts is not None
     assert parts({}, params("apple") | {"mesh": {"points": []}}) == []
     assert parts({}, params("apple") | {"heap": {"fruits": 3}}) == []
+
+
+@pytest.mark.parametrize(("lost", "joined"), [(0.05, 0.5), (0.10, 0.0), (0.12, 0.8)])
+def test_fine_creases_hold_the_area_that_is_too_much(lost: float, joined: float) -> None:
+    """A sheet's area with its heights on, by triangles, against the surplus of the skin over the flesh below it."""
+    side = np.arange(0, 2, 0.004)
+    x, z = np.meshgrid(side, side, indexing="ij")
+    flat = np.stack([x.ravel(), np.full(x.size, 0.3), z.ravel()], axis=1)
+    said = {**params("apple"), "skin": {"shrinkage": joined}}
+    high = creases(grain(flat, 0.004, said)["shrivel"], np.array(lost), said)
+    lifted = (flat + high[:, None] * [0, 1, 0]).reshape(*x.shape, 3)
+    right, down = lifted[1:, :-1] - lifted[:-1, :-1], lifted[:-1, 1:] - lifted[:-1, :-1]
+    area = np.linalg.norm(np.cross(right, down), axis=-1).sum() / 0.004**2 / right[..., 0].size
+    surplus = (1 - joined) * (1 - (1 - lost) ** (1 / 3))
+    # less what a sound skin takes up, and the next order of the slope
+    assert area - 1 == pytest.approx(2 * (min(surplus, 0.035) - 0.003), rel=0.12)
+    assert np.ptp(creases(np.linspace(-1, 1, 9), np.array(0.005), said)) == 0

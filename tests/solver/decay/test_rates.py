@@ -88,7 +88,7 @@ def test_a_colony_spawns_with_the_paper_s_chance(rate):
     system = System(SOLVER.parse({"climate": "paper", "propagation_rate": rate, "spawning": 12.0}), 4, True)
     expected = 2000
     until = expected / (2 * 12.0 / (10 - rate))
-    for spawner, strays in ((system._rot_spawner, 0.0), (system._mould_spawner, 2.0)):
+    for spawner, strays in ((system.arrivals.rot, 0.0), (system.arrivals.mould, 2.0)):
         count = 0
         while spawner.next < until:
             count += not spawner.land().stray
