@@ -170,9 +170,7 @@ def test_more_meetings_than_there_is_room_for_are_gone_through_in_rounds(batches
     tight = tight._replace(met=tight.met[:room].copy(), near=tight.near[:room].copy())
     find_pairs(tight, state(folded))
     assert ample.met_by_part.sum() > 5 * BATCH
-    assert (
-        room // len(ample.met_by_part) < ample.met_by_part.max() < 4 * BATCH
-    )
+    assert room // len(ample.met_by_part) < ample.met_by_part.max() < 4 * BATCH
     assert ample.met_by_part.max() <= len(ample.met) // len(ample.met_by_part)
     count = ample.counts[PAIRS]
     assert count == tight.counts[PAIRS] > 100
