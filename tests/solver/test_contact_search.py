@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.dehydration.contact.contact import SLACK, push_apart
-from solver.dehydration.contact.data import ACTIVE, HITS, LIVE, PAIRS, SEARCHES, grow, make_contact
+from solver.dehydration.contact.contact import SLACK, measure, prepare, push_apart, resolve
+from solver.dehydration.contact.data import ACTIVE, BATCH, HELD, HITS, LIVE, PAIRS, SEARCHES, grow, make_contact
 from solver.dehydration.contact.search import find_pairs
 from solver.geometry.crossings import crossings, split_quads
 
@@ -158,6 +158,47 @@ def test_neighbours_that_need_no_look_had_nothing_in_reach():
     assert most > 100
     assert min(trusted[1:]) > 0.5
     assert len(set(measured)) < 30
+
+
+@pytest.mark.parametrize("batches", [1, 4])
+def test_more_meetings_than_there_is_room_for_are_gone_through_in_rounds(batches):
+    points, quads = cubed_sphere(16)
+    folded = wrinkled(grooved(points, 0.05), 0.05)
+    ample = touching(folded, quads, 0.01)
+    tight = make_contact(np.arange(len(points)), quads, ample.rest, 0.01)
+    room = batches * BATCH
+    tight = tight._replace(met=tight.met[:room].copy(), near=tight.near[:room].copy())
+    find_pairs(tight, state(folded))
+    assert ample.met_by_part.sum() > 5 * BATCH
+    assert room // len(ample.met_by_part) < ample.met_by_part.max() < 4 * BATCH
+    assert ample.met_by_part.max() <= len(ample.met) // len(ample.met_by_part)
+    count = ample.counts[PAIRS]
+    assert count == tight.counts[PAIRS] > 100
+    for name in ("pairs", "apart", "limits"):
+        assert getattr(ample, name)[:count].tobytes() == getattr(tight, name)[:count].tobytes()
+
+
+@pytest.mark.parametrize(("gap", "speed", "held"), [(0.09, 1e-4, False), (0.09, 0.2, True), (0.001, 1e-4, True)])
+def test_ways_are_looked_at_wherever_one_may_be_cut_short(gap, speed, held):
+    """Slow ones that are hardly pushed go their ways, fast and hard pushed ones do not: as if all were looked at."""
+    points, quads, minv, _ = two_plates(gap, np.random.default_rng(4))
+    results, looked = [], []
+    for every in (False, True):
+        contact = touching(points, quads, 0.1)
+        x, v = state(points), np.full((len(points), 4), speed, SINGLE)
+        for i in range(prepare(contact, x, v)):
+            measure(
+                contact.before, contact.searched, contact.pairs, contact.apart, contact.values, contact.weights,
+                contact.limits, SINGLE(SLACK * contact.margin), contact.clearance, i,
+            )  # fmt: skip
+        if every:
+            contact.moved[1] = np.inf
+        resolve(contact, x, v, minv)
+        assert contact.counts[ACTIVE] > 0
+        results.append(x.tobytes() + v.tobytes())
+        looked.append(bool(contact.counts[HELD]))
+    assert results[0] == results[1]
+    assert looked == [held, True]
 
 
 def test_full_list_is_reported_and_can_grow():

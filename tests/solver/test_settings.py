@@ -7,6 +7,7 @@ import pytest
 
 from solver import registry
 from solver.contract import InvalidInput
+from solver.dehydration.fresh.mesh import build_mesh
 from solver.dehydration.settings import choose
 
 SOLVER = registry.get("dehydration")
@@ -43,3 +44,19 @@ def test_a_stage_that_is_still_smooth_needs_no_waves():
     with pytest.raises(InvalidInput, match=r"te = 0\.002 .* elements") as refused:
         choose(params, "preview", 0.3)
     assert "mirrors" in refused.value.advice
+
+
+@pytest.mark.parametrize(("quality", "width"), [("preview", 2.1), ("default", 1.46), ("fine", 1.0)])
+def test_elements_of_the_skin_are_as_wide_as_it_is_thick_at_fine(quality, width):
+    """Liu et al. 2014 mesh with elements of the exocarp of about te, that grow inwards: at gamma = 10 fine does."""
+    params = SOLVER.parse({"te": 0.04, "gamma": 10.0})
+    settings = choose(params, quality, 0.3)
+    mesh = build_mesh(params, settings.n, settings.core)
+    columns = mesh.positions.reshape(len(mesh.rays), mesh.levels, 3)
+    corners = columns[:, -1][mesh.sphere.quads]
+    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    assert edges.mean() == pytest.approx(width * 0.04, rel=0.03)
+    heights = np.linalg.norm(np.diff(columns, axis=1), axis=2)
+    assert heights[:, -2:] == pytest.approx(0.02, rel=1e-6)
+    assert heights[:, :-3] == pytest.approx(1.3 * heights[:, 1:-2], rel=1e-6)
+    assert 0.02 < heights[0, -3] < 0.04

@@ -7,12 +7,12 @@ A skin's triangles are all about one size, which suits a grid: it meets the same
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from ...arrays import Ints, Ints32, Singles
-from .data import INLINE, OPTIONS, Long, Single
+from .data import AT_ONCE, INLINE, OPTIONS, Long, Single
 
-__all__ = ["overlapping", "sort_into_cells", "spread"]
+__all__ = ["first_of", "overlapping", "sort_into_cells", "spread"]
 
 WORLD = np.float32(2**20)
 """Cells counted from the origin in each direction; what lies farther out (or is not finite) touches nothing."""
@@ -86,16 +86,17 @@ def sort_into_cells(boxes: Singles, grown: Single, cell: Single, keys: Ints, ord
     return cell
 
 
-@njit(**OPTIONS)
+@njit(parallel=True, **OPTIONS)
 def spread(
     boxes: Singles, reach: Single, grown: Single, cell: Single, keys: Ints, order: Ints32, entries: int,
-    low: Singles, high: Singles, marks: Ints32,
+    sides: Singles, marks: Ints32,
 ) -> None:  # fmt: skip
-    """Write what two entries are held against side by side: boxes, the upper corner moved by `reach`, and marks.
+    """Write what two entries are held against, number by number, so that many can be looked at at once.
 
-    Bit i of a mark: the entry's cell is the first that its triangle overlaps in direction i.
+    sides (6, entries + AT_ONCE): lower corner of the triangle's box, and the upper one moved by `reach`. marks (3, as
+    many): both halves of the cell, and bits i: the cell is the first that its triangle overlaps in direction i.
     """
-    for entry in range(entries):
+    for entry in prange(entries):
         t, mark = order[entry], 0
         first = cell_key(
             _cells(boxes, t, 0, grown, cell)[0],
@@ -103,22 +104,40 @@ def spread(
             _cells(boxes, t, 2, grown, cell)[0],
         )
         for i in range(3):
-            low[entry, i], high[entry, i] = boxes[t, i], boxes[t, 3 + i] + reach
+            sides[i, entry], sides[3 + i, entry] = boxes[t, i], boxes[t, 3 + i] + reach
             bits = 0x1FFFFF << (21 * i)
             mark |= int((keys[entry] & bits) == (first & bits)) << i
-        marks[entry] = mark
+        marks[0, entry], marks[1, entry] = keys[entry] & 0xFFFFFFFF, keys[entry] >> 32
+        marks[2, entry] = mark
 
 
 @njit(**INLINE)
-def overlapping(keys: Ints, low: Singles, high: Singles, marks: Ints32, i: int, j: int) -> bool:
-    """Whether the triangles of entries i and j come nearer than the reach in every direction, and are met here.
+def overlapping(sides: Singles, marks: Ints32, i: int, j: int, last: int) -> int:
+    """Bits k of the entries j + k below `last`, AT_ONCE at most, whose triangles are met by that of entry i: they come
+    nearer to it than the reach in every direction, and it is here that the two are met.
 
     Two boxes share a least corner, in a cell that in each direction is the first of one of the two: there alone the
-    pair is met. No branches: most pairs fail somewhere, nobody knows where.
+    pair is met. No branches, and places without a sign, which need no look whether they count from the end: so that
+    the compiler makes vectors of it.
     """
-    return bool(
-        (keys[i] == keys[j]) & ((marks[i] | marks[j]) == 7)
-        & (low[i, 0] <= high[j, 0]) & (low[j, 0] <= high[i, 0])
-        & (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
-        & (low[i, 2] <= high[j, 2]) & (low[j, 2] <= high[i, 2])
-    )  # fmt: skip
+    low0, low1, low2 = sides[0, i], sides[1, i], sides[2, i]
+    high0, high1, high2 = sides[3, i], sides[4, i], sides[5, i]
+    key0, key1, mark = marks[0, i], marks[1, i], marks[2, i]
+    bits = np.int32(0)
+    for k in range(np.uint64(AT_ONCE)):
+        e = np.uint64(j) + np.uint64(k)
+        met = (
+            (marks[0, e] == key0) & (marks[1, e] == key1) & ((marks[2, e] | mark) == 7)
+            & (low0 <= sides[3, e]) & (sides[0, e] <= high0)
+            & (low1 <= sides[4, e]) & (sides[1, e] <= high1)
+            & (low2 <= sides[5, e]) & (sides[2, e] <= high2)
+        )  # fmt: skip
+        bits |= np.int32(met) << np.int32(k)
+    return int(bits) & ((1 << min(last - j, AT_ONCE)) - 1)
+
+
+@njit(**INLINE)
+def first_of(bits: int) -> int:
+    """Number of the lowest bit set, of those of `overlapping`: the exponent of its value."""
+    lowest = np.float32(bits & -bits)
+    return int(lowest.view(np.int32) >> 23) - 127

@@ -35,7 +35,7 @@ import numpy as np
 from numba import njit
 
 from ...arrays import Ints32, Singles
-from .data import ACTIVE, BINS, HITS, INLINE, LIVE, OPTIONS, PAIRS, READS, Contact, Single
+from .data import ACTIVE, BINS, HELD, HITS, INLINE, LIVE, OPTIONS, PAIRS, READS, Contact, Single
 from .distance import edge_edge, gone, node_triangle
 
 __all__ = ["measure", "prepare", "push_apart", "resolve"]
@@ -49,6 +49,8 @@ SLACK = np.float32(0.08)
 but do not touch made those that do so soft that walls pulled together came together by a quarter of an edge."""
 SAFE = np.float32(0.45)
 """Share of a distance that each side of a pair may go in a step: both together do not meet, nor do they by rounding."""
+UNHELD = np.float32(0.99)
+"""Share of a square that is believed: the rest is for rounding."""
 SURE = np.float32(0.98)
 """Share of what a pair may come nearer by without counting that is believed: the rest is for rounding."""
 
@@ -58,18 +60,19 @@ def prepare(contact: Contact, x: Singles, v: Singles) -> int:
     """Positions at the beginning of the step, before x moved by v, and the number of pairs near enough to `measure`."""
     before, rows, counts = contact.before, contact.surface_nodes, contact.counts
     reads, searched = contact.reads, contact.searched
-    counts[LIVE] = counts[ACTIVE] = counts[HITS] = 0
+    counts[LIVE] = counts[ACTIVE] = counts[HITS] = counts[HELD] = 0
     if counts[PAIRS] == 0:
         return 0
-    farthest = np.float32(0)
+    farthest = fastest = np.float32(0)
     for place in range(counts[READS]):
         i = reads[place]
-        square = np.float32(0)
+        square = speed = np.float32(0)
         for k in range(3):
             before[i, k] = x[rows[i], k] - v[rows[i], k]
             square += (before[i, k] - searched[i, k]) ** 2
-        farthest = max(farthest, square)
-    contact.moved[0] = np.sqrt(farthest)
+            speed += v[rows[i], k] ** 2
+        farthest, fastest = max(farthest, square), max(fastest, speed)
+    contact.moved[0], contact.moved[1] = np.sqrt(farthest), fastest
     # two nodes of a pair may both have come this far
     near = contact.clearance + SLACK * contact.margin + np.float32(2) * contact.moved[0]
     last = np.int64(near * np.float32(BINS) / (contact.clearance + contact.margin)) + 1
@@ -114,7 +117,10 @@ def _share_load(contact: Contact, minv: Singles) -> None:
     rows, source, weights, limits = contact.surface_nodes, contact.source, contact.weights, contact.limits
     stiffness = contact.hit_values
     one, slack, count = np.float32(1), SLACK * contact.margin, contact.counts[HITS]
-    load[:] = np.float32(0)
+    for h in range(count):
+        for k in range(4):
+            node = pairs[hits[h], k]
+            load[node] = load[source[node]] = np.float32(0)
     for h in range(count):
         i = hits[h]
         share = weights[i] * min(one, (limits[i] + slack - values[i, 7]) / slack)
@@ -167,6 +173,20 @@ def _hold(contact: Contact, x: Singles, v: Singles) -> None:
 
 
 @njit(**OPTIONS)
+def _hasty(contact: Contact, v: Singles, square: Single) -> bool:
+    """Whether a node that was pushed has more than this square of a speed."""
+    pairs, hits, forces, rows = contact.pairs, contact.hits, contact.hit_values, contact.surface_nodes
+    fastest = np.float32(0)
+    for h in range(contact.counts[HITS]):
+        if forces[h, 1] == 0:
+            continue
+        for k in range(4):
+            row = rows[pairs[hits[h], k]]
+            fastest = max(fastest, v[row, 0] * v[row, 0] + v[row, 1] * v[row, 1] + v[row, 2] * v[row, 2])
+    return bool(fastest > square)
+
+
+@njit(**OPTIONS)
 def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
     """Push what `measure` found too near; see `push_apart`. Where nothing may touch all go as they like."""
     counts, pairs, values, hits, forces = (
@@ -177,13 +197,18 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
     found = active = 0
     if counts[PAIRS] == 0:
         return energy
+    nearest = clearance
     for i in range(counts[LIVE]):
-        if weights[i] > 0:
-            hits[found] = i
-            found += 1
+        nearest = min(nearest, values[i, 7])
+        hits[found] = i
+        found += weights[i] > 0
     counts[HITS] = found
-    _look_around(contact)
-    _hold(contact, x, v)  # so that no push answers to where nothing can be
+    # where the fastest is slow beside the least room, nobody's way is cut short
+    square = UNHELD * (SAFE * nearest) ** 2
+    if contact.moved[1] > square:
+        counts[HELD] = 1
+        _look_around(contact)
+        _hold(contact, x, v)  # so that no push answers to where nothing can be
     _share_load(contact, minv)
     for h in range(found):
         i = hits[h]
@@ -213,7 +238,11 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
             for m in range(3):
                 x[row, m] += push * values[i, 4 + m]
                 v[row, m] += push * values[i, 4 + m]
-    _hold(contact, x, v)
+    if counts[HELD] == 0 and _hasty(contact, v, square):
+        counts[HELD] = 1
+        _look_around(contact)
+    if counts[HELD] != 0:
+        _hold(contact, x, v)
     return energy
 
 

@@ -18,12 +18,16 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz"
 INLINE: dict[str, Any] = OPTIONS | {"forceinline": True}
 """For what is done pair by pair: a call hands over arrays whole and counts their references, more work than a pair."""
 
-PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS = 0, 1, 2, 3, 4, 5, 6
-"""Entries of `Contact.counts`; LIVE: pairs near enough to be looked at in this step, READS: nodes that they need."""
+PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS, HELD = 0, 1, 2, 3, 4, 5, 6, 7
+"""Entries of `Contact.counts`; LIVE: pairs near enough to be looked at in this step, READS: nodes that they need, HELD:
+whether ways may have been cut short, of nodes that no pair pushed, too."""
 ENTRIES = 16
 """Room for cell entries per triangle; one grown by half the reach overlaps about 6 cells."""
-BATCH, ROUND = 1024, 65536
-"""Pairs of triangles whose nodes are entered before their edges, and those that are looked at side by side."""
+BATCH, MEETINGS, PARTS = 1024, 16, 16
+"""Pairs of triangles whose nodes are entered before their edges; room for pairs that a search meets, per triangle (a
+skin meets 8 of each); and parts of the cells that are gone through side by side."""
+AT_ONCE = 16
+"""Entries of a cell that the search holds against another one at once."""
 BINS = 16
 """Classes of distance that pairs are sorted into at a search, so that a step looks at the near ones alone."""
 
@@ -57,11 +61,11 @@ class Contact(NamedTuple):
     keys: Ints  # (ENTRIES nt,) cell of each entry
     order: Ints32  # (ENTRIES nt,) triangle of each entry, sorted by bucket
     starts: Ints32  # (buckets + 1,) first of each bucket in `order`; buckets is a power of two
-    low: Singles  # (ENTRIES nt, 3) least coordinates of each entry's triangle
-    high: Singles  # (ENTRIES nt, 3) largest ones, and the reach
-    marks: Ints32  # (ENTRIES nt,) bit i: the entry's cell is the first that its triangle overlaps in direction i
-    met: Ints32  # (ROUND, 2) pairs of triangles that the search has met and not yet looked at
-    near: Ints32  # (ROUND,) bits of their features that are in reach
+    sides: Singles  # (6, ENTRIES nt + AT_ONCE) both corners of the box of each entry, see `cells.spread`
+    marks: Ints32  # (3, ENTRIES nt + AT_ONCE) its cell, and in which directions that is the triangle's first
+    met: Ints32  # (a multiple of BATCH, 2) pairs of triangles that the search has met and not yet looked at
+    met_by_part: Ints  # (PARTS,) how many each part of the cells has
+    near: Ints32  # (as many,) bits of their features that are in reach
     found: Ints32  # (capacity, 5) as the search meets them: four nodes, kind
     away: Singles  # (capacity, 2) their distance and clearance
     pairs: Ints32  # (capacity, 5) the same in classes of distance: four nodes, kind (0: node and triangle)
@@ -74,9 +78,9 @@ class Contact(NamedTuple):
     weights: Singles  # (capacity,) how much it counts
     hits: Ints32  # (capacity,) live pairs that count
     hit_values: Singles  # (capacity, 2) stiffness and impulse
-    moved: Singles  # (1,) farthest that a node has moved since the last search
+    moved: Singles  # (2,) farthest that a node has moved since the last search, and the square of the fastest speed
     reads: Ints32  # (ns,) nodes that a step looks at: own ones and those in pairs
-    counts: Ints  # (7,) PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS
+    counts: Ints  # (8,) PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS, HELD
 
 
 def make_contact(
@@ -104,7 +108,7 @@ def make_contact(
     triangles = np.ascontiguousarray(split_quads(faces), np.int32)
     own_nodes, own_edges = features(triangles, len(nodes))
     ns, nt = len(nodes), len(triangles)
-    pairs = capacity or 16 * ns
+    pairs, meetings = capacity or 16 * ns, -(-MEETINGS * nt // BATCH) * BATCH
     single, integer = np.float32, np.int32
     origin = np.arange(ns, dtype=integer) if source is None else np.ascontiguousarray(source, integer)
     return Contact(
@@ -121,20 +125,20 @@ def make_contact(
         searched=np.full((ns, 3), 1e15, single),
         before=np.zeros((ns, 3), single),
         boxes=np.zeros((nt, 6), single),
-        low=np.zeros((ENTRIES * nt, 3), single),
-        high=np.zeros((ENTRIES * nt, 3), single),
-        marks=np.zeros(ENTRIES * nt, integer),
-        met=np.zeros((ROUND, 2), integer),
-        near=np.zeros(ROUND, integer),
+        sides=np.zeros((6, ENTRIES * nt + AT_ONCE), single),
+        marks=np.zeros((3, ENTRIES * nt + AT_ONCE), integer),
+        met=np.zeros((meetings, 2), integer),
+        met_by_part=np.zeros(PARTS, np.int64),
+        near=np.zeros(meetings, integer),
         keys=np.zeros(ENTRIES * nt, np.int64),
         order=np.zeros(ENTRIES * nt, integer),
         starts=np.zeros((1 << int(2 * nt - 1).bit_length()) + 1, integer),
         bins=np.zeros(BINS + 1, np.int64),
         load=np.zeros(ns, single),
         room=np.zeros(ns, single),
-        moved=np.zeros(1, single),
+        moved=np.zeros(2, single),
         reads=np.zeros(ns, integer),
-        counts=np.zeros(7, np.int64),
+        counts=np.zeros(8, np.int64),
         **_trusted(triangles, own_nodes, own_edges, origin),
         **_room(pairs),
     )

@@ -13,9 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from ...arrays import Bools, Ints32, Singles
-from .cells import overlapping, sort_into_cells, spread
+from ...arrays import Bools, Ints, Ints32, Singles
+from .cells import first_of, overlapping, sort_into_cells, spread
 from .data import (
+    AT_ONCE,
     BATCH,
     BINS,
     HITS,
@@ -24,8 +25,8 @@ from .data import (
     NEEDED,
     OPTIONS,
     PAIRS,
+    PARTS,
     READS,
-    ROUND,
     SEARCHES,
     Contact,
     Single,
@@ -35,6 +36,8 @@ from .sure import share_a_node, trust
 
 GENTLE = np.float32(0.7071)
 """Cosine to the ellipsoid's normal above which nothing faces anything: two such normals are within 90 degrees."""
+SURE = np.float32(0.98)
+"""Share of a gap that is believed: the rest is for rounding."""
 OPENING = np.float32(0.3)
 """Largest clearance of a pair, as a share of its distance in the fresh fruit."""
 
@@ -124,6 +127,36 @@ def _enter(
 
 
 @njit(**INLINE)
+def _clear_of(x: Singles, triangles: Ints32, t: int, u: int, reach: Single) -> bool:
+    """Whether triangles t and u (corners in rows of x) are farther apart than the reach along the way between their
+    middles, and so everywhere; most that are met are.
+    """
+    a, b, c, d, e, f = (
+        triangles[t, 0],
+        triangles[t, 1],
+        triangles[t, 2],
+        triangles[u, 0],
+        triangles[u, 1],
+        triangles[u, 2],
+    )
+    way0 = x[d, 0] + x[e, 0] + x[f, 0] - x[a, 0] - x[b, 0] - x[c, 0]
+    way1 = x[d, 1] + x[e, 1] + x[f, 1] - x[a, 1] - x[b, 1] - x[c, 1]
+    way2 = x[d, 2] + x[e, 2] + x[f, 2] - x[a, 2] - x[b, 2] - x[c, 2]
+    last = max(
+        x[a, 0] * way0 + x[a, 1] * way1 + x[a, 2] * way2,
+        x[b, 0] * way0 + x[b, 1] * way1 + x[b, 2] * way2,
+        x[c, 0] * way0 + x[c, 1] * way1 + x[c, 2] * way2,
+    )
+    first = min(
+        x[d, 0] * way0 + x[d, 1] * way1 + x[d, 2] * way2,
+        x[e, 0] * way0 + x[e, 1] * way1 + x[e, 2] * way2,
+        x[f, 0] * way0 + x[f, 1] * way1 + x[f, 2] * way2,
+    )
+    spare = (first - last) * SURE
+    return bool((spare > 0) & (spare * spare > reach * reach * (way0 * way0 + way1 * way1 + way2 * way2)))
+
+
+@njit(**INLINE)
 def _nodes_near(
     triangles: Ints32, own: Ints32, boxes: Singles, x: Singles, source: Ints32, mine: int, theirs: int, reach: Single,
     out: Singles,
@@ -192,6 +225,9 @@ def _look(
             if (sure[t] | sure[u]) and share_a_node(triangles, t, u):
                 near[m] = 0
                 continue
+            if _clear_of(x, triangles, t, u, reach):
+                near[m] = 0
+                continue
             found = _nodes_near(triangles, own_nodes, boxes, x, source, t, u, reach, out)
             found |= _nodes_near(triangles, own_nodes, boxes, x, source, u, t, reach, out) << 3
             near[m] = found | _edges_near(own_edges, boxes, x, source, t, u, reach, out) << 6
@@ -232,22 +268,57 @@ def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
     contact.counts[NEEDED] = place
 
 
+@njit(parallel=True, **OPTIONS)
+def _meet(order: Ints32, starts: Ints32, sides: Singles, marks: Ints32, met: Ints32, counts: Ints) -> None:
+    """Pairs of triangles in reach, side by side: each part of the cells fills its own share of `met`, if it can.
+
+    counts: (PARTS,) pairs of each part.
+    """
+    buckets, room = starts.size - 1, met.shape[0] // PARTS
+    for part in prange(PARTS):
+        count = 0
+        for bucket in range(part * buckets // PARTS, (part + 1) * buckets // PARTS):
+            last = starts[bucket + 1]
+            for i in range(starts[bucket], last - 1):
+                for j in range(i + 1, last, AT_ONCE):
+                    bits = overlapping(sides, marks, i, j, last)
+                    while bits:
+                        if count < room:
+                            place = part * room + count
+                            met[place, 0], met[place, 1] = order[i], order[j + first_of(bits)]
+                        bits &= bits - 1
+                        count += 1
+        counts[part] = count
+
+
 @njit(**OPTIONS)
 def _visit(contact: Contact, reach: Single, cell: Single) -> None:
-    """Go through all pairs of triangles in reach and take in their features."""
-    keys, order, starts, met = contact.keys, contact.order, contact.starts, contact.met
-    low, high, marks = contact.low, contact.high, contact.marks
-    count, out = 0, np.zeros(8, np.float32)
-    half, entries = np.float32(0.5) * reach, starts[starts.size - 1]
-    spread(contact.boxes, reach, half, cell, keys, order, entries, low, high, marks)
-    for bucket in range(starts.size - 1):
-        for i in range(starts[bucket], starts[bucket + 1]):
-            for j in range(i + 1, starts[bucket + 1]):
-                met[count, 0], met[count, 1] = order[i], order[j]
-                count += overlapping(keys, low, high, marks, i, j)
-                if count == ROUND:
-                    _take_in(contact, count, reach, out)
-                    count = 0
+    """Go through all pairs of triangles in reach and take in their features, in the order of the cells."""
+    order, starts, met, counts = contact.order, contact.starts, contact.met, contact.met_by_part
+    sides, marks, room = contact.sides, contact.marks, contact.met.shape[0]
+    out, half, entries = np.zeros(8, np.float32), np.float32(0.5) * reach, starts[starts.size - 1]
+    spread(contact.boxes, reach, half, cell, contact.keys, order, entries, sides, marks)
+    _meet(order, starts, sides, marks, met, counts)
+    count = 0
+    if counts.max() <= room // PARTS:
+        for part in range(PARTS):
+            for m in range(part * (room // PARTS), part * (room // PARTS) + counts[part]):
+                met[count, 0], met[count, 1] = met[m, 0], met[m, 1]
+                count += 1
+    else:
+        # more than a part has room for: round by round
+        for bucket in range(starts.size - 1):
+            last = starts[bucket + 1]
+            for i in range(starts[bucket], last - 1):
+                for j in range(i + 1, last, AT_ONCE):
+                    bits = overlapping(sides, marks, i, j, last)
+                    while bits:
+                        met[count, 0], met[count, 1] = order[i], order[j + first_of(bits)]
+                        bits &= bits - 1
+                        count += 1
+                        if count == room:
+                            _take_in(contact, count, reach, out)
+                            count = 0
     _take_in(contact, count, reach, out)
 
 

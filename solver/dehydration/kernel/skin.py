@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from solver.dehydration.contact.contact import prepare, resolve
-from solver.dehydration.contact.data import PAIRS, READS, Contact, grow, make_contact
+from solver.dehydration.contact.data import HELD, HITS, PAIRS, READS, Contact, grow, make_contact
 from solver.dehydration.contact.search import find_pairs
 from solver.dehydration.kernel.fixed_point import QUANTUM, positions
 from solver.dehydration.kernel.layout import Layout
@@ -128,18 +128,31 @@ def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
     return int(prepare(contact, skin.position, skin.velocity))
 
 
+@njit(**OPTIONS, forceinline=True)
+def _write_node(rows: Ints32, own: Bools, speed: Singles, state: Ints32, velocity: Singles, i: int) -> None:
+    """Give the fruit what contact has changed of a node that is no image; a second time there is nothing to give."""
+    if not own[i]:
+        return
+    first = 4 * np.int64(rows[i])
+    for k in range(3):
+        push = speed[i, k] - velocity[first + k]
+        if push != 0:
+            velocity[first + k] = speed[i, k]
+            state[first + k] += np.int32(np.rint(push * QUANTA))
+
+
 @njit(**OPTIONS)
 def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> None:
     """Push touching skin apart in the step just made."""
-    resolve(skin.contact, skin.position, skin.velocity, skin.inverse_mass)
-    rows, own, speed, reads = skin.rows, skin.own, skin.velocity, skin.contact.reads
-    for place in range(skin.contact.counts[READS]):
-        i = reads[place]
-        if not own[i]:
-            continue
-        first = 4 * np.int64(rows[i])
-        for k in range(3):
-            push = speed[i, k] - velocity[first + k]
-            if push != 0:
-                velocity[first + k] = speed[i, k]
-                state[first + k] += np.int32(np.rint(push * QUANTA))
+    contact = skin.contact
+    resolve(contact, skin.position, skin.velocity, skin.inverse_mass)
+    rows, own, speed, reads, counts = skin.rows, skin.own, skin.velocity, contact.reads, contact.counts
+    pairs, hits, forces = contact.pairs, contact.hits, contact.hit_values
+    if counts[HELD] != 0:
+        for place in range(counts[READS]):
+            _write_node(rows, own, speed, state, velocity, reads[place])
+        return
+    for h in range(counts[HITS]):
+        if forces[h, 1] != 0:
+            for k in range(4):
+                _write_node(rows, own, speed, state, velocity, pairs[hits[h], k])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.dehydration.contact.cells import overlapping, sort_into_cells, spread
+from solver.dehydration.contact.cells import first_of, overlapping, sort_into_cells, spread
+from solver.dehydration.contact.data import AT_ONCE
 from solver.geometry.boxes import touching
 from solver.geometry.crossings import split_quads
 
@@ -15,14 +16,18 @@ from .._skins import cubed_sphere
 @njit(error_model="numpy")
 def _met(boxes, reach, cell, keys, order, starts, found):
     entries, count = starts[-1], 0
-    low, high = np.zeros((entries, 3), np.float32), np.zeros((entries, 3), np.float32)
-    marks = np.zeros(entries, np.int32)
-    spread(boxes, reach, np.float32(0.5) * reach, cell, keys, order, entries, low, high, marks)
+    sides = np.zeros((6, entries + AT_ONCE), np.float32)
+    marks = np.zeros((3, entries + AT_ONCE), np.int32)
+    spread(boxes, reach, np.float32(0.5) * reach, cell, keys, order, entries, sides, marks)
     for bucket in range(starts.size - 1):
-        for i in range(starts[bucket], starts[bucket + 1]):
-            for j in range(i + 1, starts[bucket + 1]):
-                if overlapping(keys, low, high, marks, i, j):
-                    found[count, 0], found[count, 1] = min(order[i], order[j]), max(order[i], order[j])
+        last = starts[bucket + 1]
+        for i in range(starts[bucket], last):
+            for j in range(i + 1, last, AT_ONCE):
+                bits = overlapping(sides, marks, i, j, last)
+                while bits:
+                    k = j + first_of(bits)
+                    found[count, 0], found[count, 1] = min(order[i], order[k]), max(order[i], order[k])
+                    bits &= bits - 1
                     count += 1
     return count
 
