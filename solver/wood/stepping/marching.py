@@ -9,7 +9,7 @@ import numpy as np
 from ...contract import Context, InvalidGeometry, Unstable
 from ..cohesion import soften
 from ..contact.bodies import deepest
-from ..contact.listing import Listing
+from ..contact.listing import Listing, law
 from ..crushing import crush
 from ..fracture import break_worst, overstress
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH
@@ -18,6 +18,7 @@ from ..params import WoodParams
 from .explicit import forces, march
 from .gripping import steer, take
 from .moment import Reached, balanced, begin, floor, largest, real
+from .stability import FEW, longest_step
 
 __all__ = ["broken", "explicit", "pressed"]
 
@@ -25,6 +26,8 @@ __all__ = ["broken", "explicit", "pressed"]
 _LOOK, _FEWEST, _MOST = 6000, 4, 32
 #: Seconds of wall time between looks at the context, about, as steps times vertices.
 _BATCH = 500_000
+#: Steps per evaluation of forces that a new step is worth, and how many are granted at the start.
+_RARELY, _AT_ONCE = 10, 1000
 #: Of the bound of strain over strength, below which nothing breaks: it is rounded otherwise than what it bounds.
 _BELOW = 0.999
 
@@ -151,10 +154,49 @@ def _clear(state: State) -> None:
         )
 
 
+class _Pace:
+    """The step, and the time that has come with it."""
+
+    def __init__(self, state: State, params: WoodParams, dt: float, courant: float) -> None:
+        """Begin at time 0 with a step of dt [s]; courant: the most that it may be of the longest stable one."""
+        self.dt, self._courant, self._asked = dt, courant, 0
+        self._time, self._from, self._plan = 0.0, 0, state.scratch.plan
+        self._contact = float(law(state.wood, params)[1]) if params.touching else 0.0
+
+    def at(self, steps: int) -> float:
+        """Return the time [s] after so many steps."""
+        return self._time + (steps - self._from) * self.dt
+
+    def within(self, time: float) -> int:
+        """Return after how many steps `time` [s] is reached, or would be with the next one."""
+        return self._from + int(np.floor((time - self._time) / self.dt * (1 + 1e-12)))
+
+    def fit(self, state: State) -> None:
+        """Shorten the step where what broke has left something stiffer, or lighter, than it bears.
+
+        A vertex that splits has two halves of its mass, and bonds beside a new end hold on to a curve that goes on
+        straight. The step may be two thirds then of what it was. It is asked for as often as costs a tenth of the run.
+        """
+        if self._plan is state.scratch.plan or self._asked * FEW * 2 * _RARELY > state.steps + _AT_ONCE:
+            return
+        self._plan, self._asked = state.scratch.plan, self._asked + 1
+        longest = self._courant * longest_step(state.wood, self._contact, FEW)
+        if longest < self.dt:
+            self._time, self._from, self.dt = self.at(state.steps), state.steps, longest
+
+
 def explicit(
-    wood: Wood, params: WoodParams, times: Sequence[float], dt: float, tolerance: float, context: Context
+    wood: Wood,
+    params: WoodParams,
+    times: Sequence[float],
+    dt: float,
+    tolerance: float,
+    context: Context,
+    courant: float = np.inf,
 ) -> Iterator[Reached]:
     """Yield the state at each wanted time [s]; what is between does not depend on which times are wanted.
+
+    dt [s]: step at the start; courant: the most that it may be of the longest stable one once something broke.
 
     Raises:
         InvalidGeometry: a body begins in the wood.
@@ -170,30 +212,31 @@ def explicit(
     # scaled masses follow what touches, at times that do not depend on which are wanted
     often = breaking or crushing or params.touching or bool(wood.grips) or wood.scaling > 1
     chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
-    scale, since, listing = floor(wood, params), 0, Listing(wood, params)
+    scale, since, listing, pace = floor(wood, params), 0, Listing(wood, params), _Pace(state, params, dt, courant)
     for wanted in times:
-        ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
-        while state.steps + look <= ahead:
+        while state.steps + look <= (ahead := pace.within(wanted)):
             steps = min(chunk, (ahead - state.steps) // look * look)
-            time = state.steps * dt
+            time, dt = pace.at(state.steps), pace.dt
             state = _refreshed(listing, state, steps * dt, time, dt)
             state = _advance(state, params, time, dt, steps)
             if crushing:
                 state = pressed(state, params, time + steps * dt, dt)
             if breaking:
                 state = broken(state, params, time + steps * dt, dt)
+                pace.fit(state)
             since += steps * len(wood.motion.x)
             if since > _BATCH:
                 since = 0
                 context.check_cancelled()
-                found = balanced(state, state.steps * dt, start, scale, tolerance)
+                found = balanced(state, pace.at(state.steps), start, scale, tolerance)
                 scale = largest(found.energy, scale)
-                context.report(state.steps * dt / times[-1], f"t = {state.steps * dt:.4g} s")
-        rest = ahead - state.steps
-        state = _refreshed(listing, state, look * dt, state.steps * dt, dt)
+                context.report(pace.at(state.steps) / times[-1], f"t = {pace.at(state.steps):.4g} s")
+        time, dt, rest = pace.at(state.steps), pace.dt, ahead - state.steps
+        state = _refreshed(listing, state, look * dt, time, dt)
         shown = copied(state)
         if rest:
-            shown = _advance(shown, params, state.steps * dt, dt, rest)
-        if wanted - ahead * dt > 1e-9 * dt:
-            shown = _advance(shown, params, ahead * dt, wanted - ahead * dt, 1)
+            shown = _advance(shown, params, time, dt, rest)
+            time = pace.at(ahead)
+        if wanted - time > 1e-9 * dt:
+            shown = _advance(shown, params, time, wanted - time, 1)
         yield balanced(shown, wanted, start, scale, tolerance)
