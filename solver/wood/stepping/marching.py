@@ -9,16 +9,16 @@ import numpy as np
 from ...contract import Context, InvalidGeometry, Unstable
 from ..cohesion import soften
 from ..contact.bodies import deepest
-from ..contact.listing import Listing, law
+from ..contact.listing import Listing
 from ..crushing import crush
-from ..fracture import break_worst, overstress
+from ..fracture import break_worst, strained
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH
 from ..model.state import State, Wood, copied, scratch_for
 from ..params import WoodParams
 from .explicit import forces, march
 from .gripping import steer, take
 from .moment import Reached, balanced, begin, floor, largest, real
-from .stability import FEW, longest_step
+from .pacing import Pace
 
 __all__ = ["broken", "explicit", "pressed"]
 
@@ -26,8 +26,6 @@ __all__ = ["broken", "explicit", "pressed"]
 _LOOK, _FEWEST, _MOST = 6000, 4, 32
 #: Seconds of wall time between looks at the context, about, as steps times vertices.
 _BATCH = 500_000
-#: Steps per evaluation of forces that a new step is worth, and how many are granted at the start.
-_RARELY, _AT_ONCE = 10, 1000
 #: Of the bound of strain over strength, below which nothing breaks: it is rounded otherwise than what it bounds.
 _BELOW = 0.999
 
@@ -36,37 +34,22 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost."""
     wood, scratch = state.wood, state.scratch
     anywhere = params.fracture == "stress"
-    damaged, parted, gone = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
+    taken, parted, gone = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
     # most looks find nothing: a bound says so for less
     bound = float(scratch.found[:, 3].max()) if anywhere and not wood.turning else 1.0
-    if not (damaged or gone) and bound < _BELOW:
-        return state
-    ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
-    m, top = wood.motion, 0.0
-    if bound >= _BELOW:
-        top = overstress(
-            wood.rods,
-            scratch.t,
-            scratch.inverse,
-            wood.strength,
-            m.theta,
-            m.reference,
-            scratch.bent,
-            wood.turning,
-            anywhere,
-            ratio,
-            place,
-        )
-    if top <= 1 and not (damaged or gone):
-        return state
+    top, ratio, place = strained(wood, scratch, anywhere) if bound >= _BELOW else (0.0, np.zeros(0), np.zeros(0))
+    if top <= 1 and not (parted or gone):
+        # the next half step is still taken with the forces of what is damaged now
+        state.books[BONDS] -= taken
+        state.books[LOST] += taken
+        return state._replace(spent=state.spent + taken) if taken else state
     before = state.books[: CONTACT + 1].sum() + real(state)
     allowed = params.cascade * float(state.books[[STRETCH, BENDING, BONDS]].sum())
     rods = bonds = 0
     if top > 1:
         wood, rods, bonds = break_worst(wood, ratio, place, allowed)
-    # damage stands in the plan already; what falls apart needs another, and other fragments
-    if rods or parted or gone:
-        scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
+    # damage stood in the plan already; what falls apart needs another, and other fragments
+    scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
     found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds + parted)
@@ -154,37 +137,6 @@ def _clear(state: State) -> None:
         )
 
 
-class _Pace:
-    """The step, and the time that has come with it."""
-
-    def __init__(self, state: State, params: WoodParams, dt: float, courant: float) -> None:
-        """Begin at time 0 with a step of dt [s]; courant: the most that it may be of the longest stable one."""
-        self.dt, self._courant, self._asked = dt, courant, 0
-        self._time, self._from, self._plan = 0.0, 0, state.scratch.plan
-        self._contact = float(law(state.wood, params)[1]) if params.touching else 0.0
-
-    def at(self, steps: int) -> float:
-        """Return the time [s] after so many steps."""
-        return self._time + (steps - self._from) * self.dt
-
-    def within(self, time: float) -> int:
-        """Return after how many steps `time` [s] is reached, or would be with the next one."""
-        return self._from + int(np.floor((time - self._time) / self.dt * (1 + 1e-12)))
-
-    def fit(self, state: State) -> None:
-        """Shorten the step where what broke has left something stiffer, or lighter, than it bears.
-
-        A vertex that splits has two halves of its mass, and bonds beside a new end hold on to a curve that goes on
-        straight. The step may be two thirds then of what it was. It is asked for as often as costs a tenth of the run.
-        """
-        if self._plan is state.scratch.plan or self._asked * FEW * 2 * _RARELY > state.steps + _AT_ONCE:
-            return
-        self._plan, self._asked = state.scratch.plan, self._asked + 1
-        longest = self._courant * longest_step(state.wood, self._contact, FEW)
-        if longest < self.dt:
-            self._time, self._from, self.dt = self.at(state.steps), state.steps, longest
-
-
 def explicit(
     wood: Wood,
     params: WoodParams,
@@ -207,12 +159,13 @@ def explicit(
     state = begin(wood)
     _clear(state)
     start = real(state) + float(state.books[: CONTACT + 1].sum())
-    look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking, crushing = params.fracture != "none", params.compressive_strength is not None
+    # where nothing breaks there is little to look for
+    look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST)) if breaking or crushing else _MOST
     # scaled masses follow what touches, at times that do not depend on which are wanted
     often = breaking or crushing or params.touching or bool(wood.grips) or wood.scaling > 1
     chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
-    scale, since, listing, pace = floor(wood, params), 0, Listing(wood, params), _Pace(state, params, dt, courant)
+    scale, since, listing, pace = floor(wood, params), 0, Listing(wood, params), Pace(state, params, dt, courant)
     for wanted in times:
         while state.steps + look <= (ahead := pace.within(wanted)):
             steps = min(chunk, (ahead - state.steps) // look * look)

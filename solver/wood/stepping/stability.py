@@ -30,7 +30,8 @@ def _highest(wood: Wood, scratch: Scratch, iterations: int) -> float:
     h = 1e-6 * float(wood.rods.rest.min())
     p = np.where(free, np.random.default_rng(0).normal(size=x.shape), 0.0)
     last, off = np.zeros_like(p), 0.0
-    along, beside = [], []
+    along: list[float] = []
+    beside: list[float] = []
     for _ in range(iterations):
         size = float(np.linalg.norm(p))
         # nothing is left that forces could move
