@@ -11,7 +11,7 @@ from ...contract import InvalidGeometry
 from ..params import WoodParams
 from .section import areas, balanced, place
 
-__all__ = ["Standing", "area", "chords", "corners", "covered", "drawn_in", "inside", "sawn_through", "stand"]
+__all__ = ["Standing", "area", "chords", "corners", "covered", "drawn_in", "facing", "inside", "sawn_through", "stand"]
 
 #: Corners of the polygon that stands for a disk, of the disk's area.
 _DISK = 96
@@ -88,6 +88,11 @@ def covered(outline: np.ndarray, points: np.ndarray, wide: np.ndarray) -> np.nda
     """Return the share (n,) of cells wide (n,) [m] that lies within a polygon (m, 2), of points (n, 2) as drawn in."""
     found: np.ndarray = np.clip(2 * _depths(outline, points)[0] / wide, 0, 1)
     return found
+
+
+def facing(outline: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the inner normal (n, 2) of the side of a polygon (m, 2) that is nearest to points (n, 2)."""
+    return _depths(outline, points)[1]
 
 
 def chords(outline: np.ndarray, normal: np.ndarray, offset: np.ndarray) -> np.ndarray:
