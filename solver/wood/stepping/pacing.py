@@ -35,7 +35,7 @@ class Pace:
         return self._from + int(np.floor((time - self._time) / self.dt * (1 + 1e-12)))
 
     def fit(self, state: State) -> None:
-        """Choose the step anew, no longer than the first one, where what broke has left something stiffer, or lighter, than it bears.
+        """Choose the step anew, no longer than the first one, where what broke is stiffer or lighter than it bears.
 
         A vertex that splits has two halves of its mass, and bonds beside a new end hold on to a curve that goes on
         straight. The step may be two thirds then of what it was. It is asked for as often as costs a twentieth of the
