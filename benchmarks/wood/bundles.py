@@ -2,7 +2,9 @@
 
 A bundle is clamped at one end and loaded at the other. Stiffness: the beam's tip deflection over the bundle's, under a
 load that bends it by a thousandth of the length over a third. Frequency: the bundle's first over the beam's, by the
-linear equations of rest.
+linear equations of rest. Torsion: the moment that turns its end, over that of Saint-Venant's bar; and over that of a
+bar which is shorter by sqrt(E I / G A) of a rod, over which the clamp, which holds the rods' directions, keeps them
+from turning.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import Any, get_args
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import eigsh, splu
 
 from benchmarks.figures import Sheet
 from solver.contract import Need, Quality
@@ -73,6 +75,33 @@ def frequency(length: float, quality: Quality, **values: Any) -> float:
     return float(np.sqrt(lowest.min())) / beam_frequency(length)
 
 
+def layer(rods: int) -> float:
+    """Return the length [m] over which a clamp keeps rods from turning where the bundle is sheared."""
+    return float(np.sqrt(_E / (4 * np.pi * _G) * _AREA / rods))
+
+
+def moment(params: WoodParams, vertices: int) -> float:
+    """Return the moment [N m] that turns the end of a clamped bundle by 1; its rods' ends may move along."""
+    wood = lay(params, vertices)
+    m, free = wood.motion, wood.motion.held == 0
+    k = Stiffness(m.x, wood.rods, wood.bonds, free).matrix(m.x, wood.rods, wood.bonds).tocsc()
+    number = np.full((len(m.x), 3), -1)
+    number[free] = np.arange(3 * free.sum()).reshape(-1, 3)
+    ends = wood.grid[:, -1]
+    turned, moved = number[ends, 1:].ravel(), np.zeros(k.shape[0])
+    moved[turned] = np.column_stack([-m.x[ends, 2], m.x[ends, 1]]).ravel()
+    rest = np.setdiff1d(np.arange(k.shape[0]), turned)
+    moved[rest] = splu(k[rest][:, rest].tocsc()).solve(-(k @ moved)[rest])
+    return float(moved @ (k @ moved))
+
+
+def torsion(length: float, quality: Quality, **values: Any) -> float:
+    """Return the bundle's stiffness in torsion over the bar's, G J / L."""
+    params = SOLVER.parse({**_PLAIN, "length": length, **values})
+    assert isinstance(params, WoodParams)
+    return moment(params, choose(params, quality).vertices) * length / (_G * 2 * _SECOND)
+
+
 def main(slenders: list[float], counts: list[int], seeds: list[int], most: int) -> None:
     """Print a row for each bundle and keep all runs; fine runs and frequencies of no more than `most` rods."""
     qualities = get_args(Quality)
@@ -84,6 +113,8 @@ def main(slenders: list[float], counts: list[int], seeds: list[int], most: int) 
             "unevenness",
             *(f"stiffness over the beam's: {q}" for q in qualities),
             "first frequency: preview",
+            "torsion: default",
+            "less the clamp's layer",
         ),
         "wood",
     )
@@ -96,13 +127,20 @@ def main(slenders: list[float], counts: list[int], seeds: list[int], most: int) 
         asked = [q for q in qualities if rods <= most or q != "fine"]
         found = {q: stiffness(length, q, **values) for q in asked}
         swing = frequency(length, "preview", **values) if rods <= most else None
+        twist = torsion(length, "default", **values) if rods <= most else None
+        inner = twist * (1 - layer(rods) / length) if twist else None
         cells = [f"{found[q]:.3f}" if q in found else "" for q in qualities]
         sheet.add(
-            (f"{slender:g}", rods, unevenness, *cells, f"{swing:.3f}" if swing else ""),
+            (f"{slender:g}", rods, unevenness, *cells, *(f"{v:.3f}" if v else "" for v in (swing, twist, inner))),
             slender=slender, seed=seed, rods=rods, unevenness=unevenness, stiffness=found, frequency=swing,
+            torsion=twist, torsion_inner=inner,
             cpu_s=time.process_time() - begun,
         )  # fmt: skip
-    off = [abs(v - 1) for run in sheet.runs for v in (*run["stiffness"].values(), run["frequency"] or 1.0)]
+    off = [
+        abs(v - 1)
+        for run in sheet.runs
+        for v in (*run["stiffness"].values(), run["frequency"] or 1.0, run["torsion_inner"] or 1.0)
+    ]
     print(f"worst: {100 * max(off):.2f} %")
     sheet.keep(worst=max(off))
 

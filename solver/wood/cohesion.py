@@ -41,12 +41,12 @@ def separation(
 
 
 @njit(cache=True, error_model="numpy")
-def soften(plan: Plan, bonds: Bonds, each: np.ndarray, mixing: float) -> tuple[int, int, int]:
+def soften(plan: Plan, bonds: Bonds, each: np.ndarray, mixing: float) -> tuple[float, int, int]:
     """Damage bonds by the energies each (2, b) [J] that they would have if whole, in `bonds` and in the plan's law.
 
-    Returns how many were damaged further, how many of them broke, and how many broken ones got out of the way.
+    Returns the energy [J] that this takes, how many broke, and how many broken ones got out of the way.
     """
-    damaged = 0
+    taken = 0.0
     broken = 0
     gone = 0
     for p in range(len(plan.part) - 1):
@@ -73,12 +73,12 @@ def soften(plan: Plan, bonds: Bonds, each: np.ndarray, mixing: float) -> tuple[i
             damage = 1.0 if now >= end else end * (now - begin) / (now * (end - begin))
             if damage <= bonds.damage[b]:
                 continue
+            taken += (damage - bonds.damage[b]) * (opening + shear)
             bonds.damage[b] = damage
             # of its cost, what was spent: stress falls evenly, so this is how far separation has come
             bonds.parted[b] = max(bonds.parted[b], min((now - begin) / (end - begin), 1.0))
             plan.law[p, KEEP, m] = 1.0 - damage
-            damaged += 1
             if damage >= 1.0:
                 bonds.on[b] = 2
                 broken += 1
-    return damaged, broken, gone
+    return taken, broken, gone

@@ -18,12 +18,12 @@ from numba import njit
 from .model.arrays import Bonds, Rods
 from .model.bundle import SAMPLES
 from .model.joining import stretched
-from .model.motion import Motion
+from .model.motion import Motion, Scratch
 from .model.sawing import crossed
 from .model.state import Wood
 from .params import WoodParams
 
-__all__ = ["Breaks", "bows", "break_worst", "overstress", "sawed", "sever"]
+__all__ = ["Breaks", "bows", "break_worst", "overstress", "sawed", "sever", "strained"]
 
 #: A break closer to a vertex than this, over the edge, is one at the vertex.
 _NEAR = 0.25
@@ -143,6 +143,28 @@ def overstress(
                 place[e] = u
         top = max(top, ratio[e])
     return top
+
+
+def strained(wood: Wood, scratch: Scratch, anywhere: bool) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return the highest strain over strength, that of every edge (e,), and where on each it is (e,).
+
+    scratch must hold the forces of the moment; anywhere: as `overstress` has it.
+    """
+    m, ratio, place = wood.motion, np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
+    top = overstress(
+        wood.rods,
+        scratch.t,
+        scratch.inverse,
+        wood.strength,
+        m.theta,
+        m.reference,
+        scratch.bent,
+        wood.turning,
+        anywhere,
+        ratio,
+        place,
+    )
+    return top, ratio, place
 
 
 def _split(wood: Wood, h: int) -> Wood:

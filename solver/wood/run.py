@@ -71,7 +71,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         dt = min(settings.courant * longest, params.step or np.inf)
         wood = touchable(wood, dt, contact)
         attrs |= {"step": dt, "longest_stable_step": longest}
-        marching = explicit(wood, params, need.stages, dt, balance, context)
+        marching = explicit(wood, params, need.stages, dt, balance, context, settings.courant)
     else:
         from .stepping.static import static
 

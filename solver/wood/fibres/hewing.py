@@ -14,7 +14,7 @@ import numpy as np
 from ..fracture import sever
 from ..model.gripping import courses, pins_of
 from ..model.joining import stretched
-from ..model.outline import corners, covered
+from ..model.outline import corners, covered, facing
 from ..model.state import Wood
 from ..params import WoodParams
 from ..shape.taper import thickness
@@ -74,7 +74,8 @@ def hewn(wood: Wood, params: WoodParams) -> Wood:
     if not hews(params):
         return wood
     rods, bonds = wood.rods, wood.bonds
-    share = _left(wood, corners(params), _even(wood, params))
+    outline, section = corners(params), _even(wood, params)
+    share = _left(wood, outline, section)
     within = _kept(wood, share)
     a, b = within[rods.a], within[rods.b]
     before, slope = stretched(wood.motion.x, rods, bonds)
@@ -89,7 +90,7 @@ def hewn(wood: Wood, params: WoodParams) -> Wood:
     for edge, at in ((bonds.i, bonds.at), (bonds.j, bonds.share)):
         # what sits beyond the surface goes with it
         bonds.on[~np.where(a[edge], at < cut[edge], at > cut[edge])] = 0
-    _thinned(wood, np.maximum((share[rods.a] + share[rods.b]) / 2, LEAST))
+    _thinned(wood, np.maximum((share[rods.a] + share[rods.b]) / 2, LEAST), outline, section)
     for e in leaves.tolist():
         sever(wood, e, float(cut[e]))
     rods.k[rods.alive == 0] = 0.0
@@ -100,8 +101,8 @@ def hewn(wood: Wood, params: WoodParams) -> Wood:
     return _weighed(wood, params, left, a)
 
 
-def _thinned(wood: Wood, share: np.ndarray) -> None:
-    """Leave edges, hinges and bonds the share (e,) of their edges' sections; bonds, of both rods'."""
+def _thinned(wood: Wood, share: np.ndarray, outline: np.ndarray, section: np.ndarray) -> None:
+    """Leave edges, hinges and bonds the share (e,) of their edges' sections; section (v, 2): where vertices are."""
     rods, bonds, turns = wood.rods, wood.bonds, wood.turns
     rods.k[:] *= share
     rods.radius[:] *= np.sqrt(share)
@@ -109,9 +110,26 @@ def _thinned(wood: Wood, share: np.ndarray) -> None:
     rods.alpha[:] *= bent
     turns.beta[:] *= bent
     turns.inertia[:] *= share**2
-    both = np.sqrt(share[bonds.i] * share[bonds.j])
-    for values in (bonds.k, bonds.s, bonds.opens, bonds.slides, bonds.torn, bonds.shorn, bonds.area):
-        values[:] *= both
+    faces, between = _joined(wood, share, outline, section)
+    for values in (bonds.torn, bonds.shorn, bonds.area):
+        values[:] *= faces
+    for values in (bonds.k, bonds.s, bonds.opens, bonds.slides):
+        values[:] *= faces * between
+
+
+def _joined(wood: Wood, share: np.ndarray, outline: np.ndarray, section: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is left of the faces (b,) by which rods are joined, and of the wood between their middles (b,).
+
+    share (e,), section (v, 2): as in `_thinned`. A surface that cuts off the back of a rod leaves the face with what
+    lies before it whole, down to the end; of the faces with rods beside it, as much is left as of the rods.
+    """
+    rods, bonds = wood.rods, wood.bonds
+    one, other = ((section[rods.a[e]] + section[rods.b[e]]) / 2 for e in (bonds.i, bonds.j))
+    normal, way = facing(outline, (one + other) / 2), other - one
+    square = np.maximum((way**2).sum(1), 1e-300)
+    inward = (way * normal).sum(1) ** 2 / square
+    i, j = share[bonds.i], share[bonds.j]
+    return inward + (1 - inward) * np.sqrt(i * j), (i + j) / (2 * np.maximum(i, j))
 
 
 def _laid_again(wood: Wood, before: np.ndarray, slope: np.ndarray) -> None:

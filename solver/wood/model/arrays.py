@@ -61,6 +61,7 @@ class Bonds(NamedTuple):
     rest: np.ndarray  # (b,) rest distance [m]
     k: np.ndarray  # (b,) transverse stiffness [N]: energy k s^2 rest / 2
     s: np.ndarray  # (b,) shear stiffness S of Eq. 3.12 [J]
+    size: np.ndarray  # (b,) volume whose shear it bears as laid [m3]: S over the shear modulus
     cosine: np.ndarray  # (b,) slope along the bond's unit vector, by arc length, at rest
     opens: np.ndarray  # (b,) energy of pure opening at which it begins to give way [J]
     slides: np.ndarray  # (b,) energy of pure shear at which it does [J]

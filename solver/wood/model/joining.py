@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...contract import InvalidGeometry
+from ..net.shares import shares
 from ..params import WoodParams
 from ..shape.taper import thickness
 from .arrays import Bonds, Rods
@@ -67,7 +68,7 @@ def moduli(
     middle = (straight[rods.b[bonds.i], 0] + straight[rods.a[bonds.i], 0]) / 2
     section = area(corners(log)) * thickness(middle, params) ** 2
     volume = section * params.length * part / max(float(part.sum()), 1e-300)
-    return bonds.k * bonds.rest / (_NET * volume), bonds.s / volume
+    return bonds.k * bonds.rest / (_NET * volume), bonds.s / bonds.size
 
 
 def resolved(params: WoodParams, edge: float, outline: np.ndarray) -> tuple[float, float]:
@@ -166,6 +167,8 @@ def bonded(
     pairs = pairs[np.lexsort(pairs.T)] if len(pairs) else np.zeros((0, 2), int)
     n = s.shape[1]
     crack = np.repeat(widths(points, pairs, outline, sawn_through(log)), n - 1)
+    section = np.pi * rods.radius[edge].max(1) ** 2
+    bears = shares(points, pairs, section, outline, params.turning)
     # by turns from the one rod and from the other
     pairs[1::2] = pairs[1::2, ::-1]
     i, e, u, part = _closest(pairs, s, course, edge)
@@ -184,11 +187,12 @@ def bonded(
     early = ringed(params.grain, middle[:, 1:], length / 2) ** 0.5
     strength = strong.strength(middle, params.grain.strength) * early * rayed(params.grain, middle[:, 1:], way)
     springs = _NET * params.transverse * volume / np.maximum(length, 1e-300) * stiff
-    sheared = params.shear * volume * stiff
+    size = volume * np.repeat(bears, n - 1)
+    sheared = params.shear * size * stiff
     crack = crack * thin
     torn, shorn = (g * crack * part * strength**2 for g in (params.toughness, params.toughness_sliding))
     per_opening = _NET / 2 / max(params.transverse, _NONE) * volume * strength**2
-    per_shear = volume / max(params.shear, _NONE) * strength**2
+    per_shear = size / max(params.shear, _NONE) * strength**2
     cleavage, shear_strength = resolved(params, params.length / (n - 1), corners(params))
     found = Bonds(
         i.astype(np.int32),
@@ -198,6 +202,7 @@ def bonded(
         length,
         springs,
         sheared,
+        size,
         cosine,
         _begins(per_opening * params.cleavage**2, per_opening * cleavage**2, torn, 0.5 * springs * length),
         _begins(per_shear * params.shear_strength**2, per_shear * shear_strength**2, shorn, sheared),

@@ -11,13 +11,14 @@ from ..cohesion import soften
 from ..contact.bodies import deepest
 from ..contact.listing import Listing
 from ..crushing import crush
-from ..fracture import break_worst, overstress
+from ..fracture import break_worst, strained
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH
 from ..model.state import State, Wood, copied, scratch_for
 from ..params import WoodParams
 from .explicit import forces, march
 from .gripping import steer, take
 from .moment import Reached, balanced, begin, floor, largest, real
+from .pacing import Pace
 
 __all__ = ["broken", "explicit", "pressed"]
 
@@ -33,37 +34,22 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     """Return the state after one pass of breaking at `time`; what the breaks release is booked as lost."""
     wood, scratch = state.wood, state.scratch
     anywhere = params.fracture == "stress"
-    damaged, parted, gone = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
+    taken, parted, gone = soften(scratch.plan, wood.bonds, scratch.each, params.mixing)
     # most looks find nothing: a bound says so for less
     bound = float(scratch.found[:, 3].max()) if anywhere and not wood.turning else 1.0
-    if not (damaged or gone) and bound < _BELOW:
-        return state
-    ratio, place = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a))
-    m, top = wood.motion, 0.0
-    if bound >= _BELOW:
-        top = overstress(
-            wood.rods,
-            scratch.t,
-            scratch.inverse,
-            wood.strength,
-            m.theta,
-            m.reference,
-            scratch.bent,
-            wood.turning,
-            anywhere,
-            ratio,
-            place,
-        )
-    if top <= 1 and not (damaged or gone):
-        return state
+    top, ratio, place = strained(wood, scratch, anywhere) if bound >= _BELOW else (0.0, np.zeros(0), np.zeros(0))
+    if top <= 1 and not (parted or gone):
+        # the next half step is still taken with the forces of what is damaged now
+        state.books[BONDS] -= taken
+        state.books[LOST] += taken
+        return state._replace(spent=state.spent + taken) if taken else state
     before = state.books[: CONTACT + 1].sum() + real(state)
     allowed = params.cascade * float(state.books[[STRETCH, BENDING, BONDS]].sum())
     rods = bonds = 0
     if top > 1:
         wood, rods, bonds = break_worst(wood, ratio, place, allowed)
-    # damage stands in the plan already; what falls apart needs another, and other fragments
-    if rods or parted or gone:
-        scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
+    # damage stood in the plan already; what falls apart needs another, and other fragments
+    scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
     forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
     found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds + parted)
@@ -152,9 +138,17 @@ def _clear(state: State) -> None:
 
 
 def explicit(
-    wood: Wood, params: WoodParams, times: Sequence[float], dt: float, tolerance: float, context: Context
+    wood: Wood,
+    params: WoodParams,
+    times: Sequence[float],
+    dt: float,
+    tolerance: float,
+    context: Context,
+    courant: float = np.inf,
 ) -> Iterator[Reached]:
     """Yield the state at each wanted time [s]; what is between does not depend on which times are wanted.
+
+    dt [s]: step at the start; courant: the most that it may be of the longest stable one once something broke.
 
     Raises:
         InvalidGeometry: a body begins in the wood.
@@ -165,35 +159,37 @@ def explicit(
     state = begin(wood)
     _clear(state)
     start = real(state) + float(state.books[: CONTACT + 1].sum())
-    look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST))
     breaking, crushing = params.fracture != "none", params.compressive_strength is not None
+    # where nothing breaks there is little to look for
+    look = int(np.clip(_LOOK // len(wood.rods.a), _FEWEST, _MOST)) if breaking or crushing else _MOST
     # scaled masses follow what touches, at times that do not depend on which are wanted
     often = breaking or crushing or params.touching or bool(wood.grips) or wood.scaling > 1
     chunk = look if often else max(_BATCH // len(wood.motion.x) // look, 1) * look
-    scale, since, listing = floor(wood, params), 0, Listing(wood, params)
+    scale, since, listing, pace = floor(wood, params), 0, Listing(wood, params), Pace(state, params, dt, courant)
     for wanted in times:
-        ahead = int(np.floor(wanted / dt * (1 + 1e-12)))
-        while state.steps + look <= ahead:
+        while state.steps + look <= (ahead := pace.within(wanted)):
             steps = min(chunk, (ahead - state.steps) // look * look)
-            time = state.steps * dt
+            time, dt = pace.at(state.steps), pace.dt
             state = _refreshed(listing, state, steps * dt, time, dt)
             state = _advance(state, params, time, dt, steps)
             if crushing:
                 state = pressed(state, params, time + steps * dt, dt)
             if breaking:
                 state = broken(state, params, time + steps * dt, dt)
+                pace.fit(state)
             since += steps * len(wood.motion.x)
             if since > _BATCH:
                 since = 0
                 context.check_cancelled()
-                found = balanced(state, state.steps * dt, start, scale, tolerance)
+                found = balanced(state, pace.at(state.steps), start, scale, tolerance)
                 scale = largest(found.energy, scale)
-                context.report(state.steps * dt / times[-1], f"t = {state.steps * dt:.4g} s")
-        rest = ahead - state.steps
-        state = _refreshed(listing, state, look * dt, state.steps * dt, dt)
+                context.report(pace.at(state.steps) / times[-1], f"t = {pace.at(state.steps):.4g} s")
+        time, dt, rest = pace.at(state.steps), pace.dt, ahead - state.steps
+        state = _refreshed(listing, state, look * dt, time, dt)
         shown = copied(state)
         if rest:
-            shown = _advance(shown, params, state.steps * dt, dt, rest)
-        if wanted - ahead * dt > 1e-9 * dt:
-            shown = _advance(shown, params, ahead * dt, wanted - ahead * dt, 1)
+            shown = _advance(shown, params, time, dt, rest)
+            time = pace.at(ahead)
+        if wanted - time > 1e-9 * dt:
+            shown = _advance(shown, params, time, wanted - time, 1)
         yield balanced(shown, wanted, start, scale, tolerance)

@@ -9,7 +9,7 @@ import numpy as np
 from ...contract import Context, NotConverged
 from ...linalg.multifrontal import analyse, factorise
 from ..forces.hessian import Stiffness
-from ..fracture import overstress
+from ..fracture import strained
 from ..model.motion import CONTACT, WORK
 from ..model.state import State, Wood, copied
 from ..params import WoodParams
@@ -102,20 +102,7 @@ def _bears(state: State, params: WoodParams, time: float) -> None:
 
     """
     wood, scratch = state.wood, state.scratch
-    ratio, place, m = np.zeros(len(wood.rods.a)), np.zeros(len(wood.rods.a)), wood.motion
-    rods = overstress(
-        wood.rods,
-        scratch.t,
-        scratch.inverse,
-        wood.strength,
-        m.theta,
-        m.reference,
-        scratch.bent,
-        False,
-        params.fracture == "stress",
-        ratio,
-        place,
-    )
+    rods, _, _ = strained(wood, scratch, params.fracture == "stress")
     b = wood.bonds
     loaded = scratch.each[0] / b.opens + scratch.each[1] / b.slides
     bonds = float(np.sqrt(loaded[b.on == 1].max(initial=0.0)))
