@@ -47,7 +47,8 @@ class _Rim:
 
         def summed(t: np.ndarray) -> np.ndarray:
             far = np.maximum(np.hypot(t, off), 1e-300)
-            return t * np.log(far) - t + off * np.arctan2(t, np.where(off == 0, 1e-300, off))
+            found: np.ndarray = t * np.log(far) - t + off * np.arctan2(t, np.where(off == 0, 1e-300, off))
+            return found
 
         single = summed(high) - summed(low)
         # a constant is harmonic, too: its mean is asked to be 0
