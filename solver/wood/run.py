@@ -53,6 +53,12 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     """
     if need.region is not None:
         raise InvalidInput("wood has no colatitude and azimuth.", advice="Leave the region out.")
+    # two threads take twice as long for fronts of some hundreds, and round otherwise: the net's shares as well as steps
+    with threadpool_limits(1, user_api="blas"):
+        return _run(params, need, context)
+
+
+def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     settings = choose(params, need.quality)
     begun = time.perf_counter()
     params, said = _settled(params, settings.vertices)
@@ -78,16 +84,12 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         marching = static(wood, params, need.stages, context)
     rows: list[dict[str, Any]] = []
     try:
-        # two threads take twice as long for fronts of some hundreds, and round otherwise
-        with threadpool_limits(1, user_api="blas"):
-            for reached in marching:
-                if skin is not None:
-                    frames.append(
-                        among(skin.frame(reached.state.wood), params, reached.time, reached.state.scratch.poses)
-                    )
-                rows.append(_row(reached, laid, params, need, time.perf_counter() - begun))
-                rows[-1] |= strained.read(reached.state)
-                context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
+        for reached in marching:
+            if skin is not None:
+                frames.append(among(skin.frame(reached.state.wood), params, reached.time, reached.state.scratch.poses))
+            rows.append(_row(reached, laid, params, need, time.perf_counter() - begun))
+            rows[-1] |= strained.read(reached.state)
+            context.report(reached.time / max(need.stages[-1], 1e-300), f"t = {reached.time:.4g} s settled")
     except SolverError as error:
         if rows:
             error.partial = _dataset(rows, frames, wood, params, need, attrs)
