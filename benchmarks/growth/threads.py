@@ -22,6 +22,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.figures import Sheet
 from benchmarks.growth.__main__ import CASES
 from solver import shell
+from solver.arrays import Floats, Ints
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.shapes import start
@@ -39,7 +40,9 @@ _PARTS = {
 
 
 @numba.njit(parallel=True)
-def _halves(x, triangles, g, hinges, rest, stiffness, lame, own):  # type: ignore[no-untyped-def]
+def _halves(
+    x: Floats, triangles: Ints, g: Floats, hinges: Ints, rest: Floats, stiffness: Floats, lame: float, own: Floats
+) -> float:
     """Return the energy of both halves and their gradients (2, n, 3) in `own`."""
     energies = np.zeros(2)
     for half in numba.prange(2):
@@ -47,11 +50,11 @@ def _halves(x, triangles, g, hinges, rest, stiffness, lame, own):  # type: ignor
         energies[half] = membrane(x, triangles[a:b], g[a:b], lame, own[half])
         a, b = half * len(hinges) // 2, (half + 1) * len(hinges) // 2
         energies[half] += bending(x, hinges[a:b], rest[a:b], stiffness[a:b], own[half])
-    return energies.sum()
+    return float(energies.sum())
 
 
 @numba.njit(parallel=True)
-def _together(own, gradient):  # type: ignore[no-untyped-def]
+def _together(own: Floats, gradient: Floats) -> None:
     """Add both gradients up, and leave none."""
     for half in numba.prange(2):
         for i in range(half * len(gradient) // 2, (half + 1) * len(gradient) // 2):

@@ -16,6 +16,8 @@ from .params import WoodParams
 
 __all__ = ["FEWEST", "LARGEST", "POWER", "expected_error"]
 
+#: The record's largest errors are .94, .62 and .44 % of 20, 50 and 200 rods; they were .83, .61 and .27 % in version 8,
+#: whose pairs all bore the same shear and whose bundles were 4 to 13 % too soft in torsion.
 LARGEST, FEWEST, POWER = 0.0095, 20, 0.33
 
 #: Where it was measured: length over radius, rods, unevenness, vertices at quality default, and rods at fine.

@@ -7,6 +7,15 @@ from typing import Any
 
 __all__ = ["PRESETS"]
 
+#: Of the cabbage leaf, where it is stiff and where it is pale.
+_VEINS = (
+    ((-1, 0, 0), (0.9, 0, 0)),
+    ((-0.7, 0, 0), (0.0, 0.8, 0)),
+    ((-0.7, 0, 0), (0.0, -0.8, 0)),
+    ((-0.3, 0, 0), (0.6, 0.6, 0)),
+    ((-0.3, 0, 0), (0.6, -0.6, 0)),
+)
+
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     # Fig. 2 (b): a leaf from a triangle: a curve along the midrib, its intensities from stalk to tip
     "leaf": {
@@ -118,13 +127,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
             {
                 "where": {
                     "kind": "lines",
-                    "lines": (
-                        ((-1, 0, 0), (0.9, 0, 0)),
-                        ((-0.7, 0, 0), (0.0, 0.8, 0)),
-                        ((-0.7, 0, 0), (0.0, -0.8, 0)),
-                        ((-0.3, 0, 0), (0.6, 0.6, 0)),
-                        ((-0.3, 0, 0), (0.6, -0.6, 0)),
-                    ),
+                    "lines": _VEINS,
                     "width": 0.08,
                 },
                 "stiffness": 20,
@@ -136,13 +139,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
                 "colour": (0.7, 0.78, 0.45),
                 "where": {
                     "kind": "lines",
-                    "lines": (
-                        ((-1, 0, 0), (0.9, 0, 0)),
-                        ((-0.7, 0, 0), (0.0, 0.8, 0)),
-                        ((-0.7, 0, 0), (0.0, -0.8, 0)),
-                        ((-0.3, 0, 0), (0.6, 0.6, 0)),
-                        ((-0.3, 0, 0), (0.6, -0.6, 0)),
-                    ),
+                    "lines": _VEINS,
                     "width": 0.1,
                 },
             },
