@@ -56,14 +56,14 @@ class Bed(_Model):
         le=1,
         description="1 less the standard deviation, from place to place, of the logarithm of the wavelength",
     )
-    where: Place = Field(default_factory=Everywhere, description="Share of each vertex, of the springs' stiffness")
+    where: Place = Field(Everywhere(), description="Share of each vertex, of the springs' stiffness")
 
 
 class Colour(_Model):
     """A coat of colour over those before it."""
 
     colour: tuple[Channel, Channel, Channel] = Field(description="Red, green and blue of linear light, 0 to 1 [1]")
-    where: Place = Field(default_factory=Everywhere, description="Share of each vertex of the start shape")
+    where: Place = Field(Everywhere(), description="Share of each vertex of the start shape")
     grown: float = Field(
         1.0,
         ge=1,

@@ -58,6 +58,14 @@ def test_schema_says_units_and_meaning_of_every_field(solver):
         assert field.get("units"), name
 
 
+def test_schema_says_every_default_however_deep(solver):
+    """A form made of the schema puts something else where it says none, which may want a number from its reader."""
+    schema = solver.params.model_json_schema()
+    for name, group in {**schema.get("$defs", {}), "": schema}.items():
+        optional = group.get("properties", {}).keys() - set(group.get("required", ()))
+        assert {field for field in optional if "default" not in group["properties"][field]} == set(), name
+
+
 def test_fields_and_defaults_are_known_quantities(solver):
     assert set(solver.default_fields) <= set(solver.fields) <= set(QUANTITIES)
     assert solver.stages.lowest <= min(solver.stages.default) <= max(solver.stages.default) <= solver.stages.highest

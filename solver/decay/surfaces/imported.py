@@ -36,7 +36,7 @@ class Mesh(GivenMesh):
     materials: tuple[str, ...] = Field((), max_length=256, description="Names of materials, for files made of it")
     face_materials: tuple[int, ...] = Field((), max_length=800_000, description="The material of each triangle, from 0")
     groups: dict[str, tuple[float, ...]] = Field(
-        default_factory=dict,
+        {},
         max_length=64,
         description="Vertex groups, or any numbers of points, by name: a weight for each point; files keep them [1]",
     )

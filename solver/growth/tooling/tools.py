@@ -231,7 +231,7 @@ class HotTensors(_Tool):
     strokes: tuple[PaintedStroke, ...] = Field(
         min_length=1, max_length=200, description="What is painted; where strokes meet, the last holds"
     )
-    where: Place = Field(default_factory=Everywhere, description="Share of each vertex")
+    where: Place = Field(Everywhere(), description="Share of each vertex")
 
 
 def clocked(tool: Tool) -> bool:

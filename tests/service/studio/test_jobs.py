@@ -75,6 +75,22 @@ def _words(command: str, out: Path) -> list[str]:
     return [*words[1:-1], str(out)]
 
 
+@pytest.mark.parametrize("room", ["decay", "growth", "wood"])
+def test_every_preset_can_be_run_as_it_is(browser: Browser, studio: str, room: str) -> None:
+    visit = Visit(browser, viewport={"width": 1200, "height": 800})
+    page = visit.page
+    page.goto(at(studio, f"room={room}"))
+    visit.shown()
+    presets = page.locator("#preset option").evaluate_all("all => all.map(one => one.value)")
+    assert len(presets) > 5
+    run = page.get_by_role("button", name="Run", exact=True)
+    for preset in presets:
+        page.locator("#preset").select_option(preset)
+        assert run.is_enabled(), preset
+    assert visit.complaints == []
+    page.close()
+
+
 def test_breaking_has_a_load_curve_in_newtons(browser: Browser, studio: str) -> None:
     visit = Visit(browser, viewport={"width": 1200, "height": 800})
     visit.page.goto(at(studio, "room=wood"))
