@@ -32,6 +32,8 @@ Json = dict[str, Any]
 _CORRECTION = "|".join(methods.CORRECTIONS)
 #: Keywords in the solvers' schemas that JSON Schema does not know, and those whose values are no schemas.
 _OWN, _VALUES = ("units", "axes", "along"), ("default", "const", "enum", "example", "examples", "required")
+#: Where one of several kinds may stand; generators of clients drop a schema whose default is one of these, made whole.
+_KINDS = ("oneOf", "anyOf")
 _METHOD = rf"^({'|'.join(methods.WEIGHTINGS)})([+ ]({_CORRECTION}))*$"
 
 
@@ -88,6 +90,8 @@ def _plain(schema: Any) -> Any:
     for key, value in schema.items():
         if key in _OWN and ("type" in schema or "anyOf" in schema or "$ref" in schema or "allOf" in schema):
             found[f"x-{key}"] = value
+        elif key == "default" and isinstance(value, dict) and any(kinds in schema for kinds in _KINDS):
+            found["x-default"] = value
         elif key == "properties":
             found[key] = {name: _plain(each) for name, each in value.items()}
         else:

@@ -148,6 +148,9 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     weather = schemas["JobRequest_decay"]["properties"]["params"]["properties"]["weather"]
     assert weather["x-along"] == "day"
     assert "along" not in weather
+    place = schemas["Colour"]["properties"]["where"]  # a default that is one of several kinds, made whole
+    assert place["x-default"] == {"kind": "everywhere"}
+    assert "default" not in place
 
 
 def test_nothing_at_an_address_is_said_without_the_openapi_page(built: Path) -> None:
