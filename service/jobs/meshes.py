@@ -17,19 +17,14 @@ from sweeps.errors import InvalidOption
 
 from .. import problems
 from ..errors import InvalidQuery, Wrong
+from ..formats import sent
 from ..security import requires
 
 __all__ = ["MeshPage", "router"]
 
 router = APIRouter(tags=["jobs"])
 
-_KINDS = {
-    ".obj": ("model/obj", "text/plain"),
-    ".glb": ("model/gltf-binary",),
-    ".stl": ("model/stl",),
-    ".ply": ("model/ply", "application/ply"),
-}
-_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_CONTENT = sent.contents([types[0] for types in sent.MESHES.values()])
 #: A length that can be divided by.
 _LEAST = 1e-30
 #: Digits that places are written with.
@@ -50,7 +45,7 @@ class MeshPage(BaseModel):
     "/v1/meshes",
     summary="Read a mesh of one's own",
     responses=problems.responses(400, 401, 403, 413, 422),
-    openapi_extra={"requestBody": {"required": True, "content": {kinds[0]: _BINARY for kinds in _KINDS.values()}}},
+    openapi_extra={"requestBody": {"required": True, "content": _CONTENT}},
 )
 async def mesh(
     request: Request,
@@ -59,7 +54,7 @@ async def mesh(
         bool, Query(description="Move its middle to the origin and make half its longest side 1, as of presets")
     ] = True,
 ) -> MeshPage:
-    """Answer with what a job's `mesh` is to be. OBJ, PLY, GLB or STL, as the content type says.
+    """Answer with what a job's `mesh` is to be. OBJ, PLY, GLB or STL, as the content type says, or the bytes.
 
     Points in one place become one and keep their order; texture coordinates and materials stay. What is no mesh, points
     elsewhere or promises more than it holds is refused before any reader sees it.
@@ -79,10 +74,7 @@ def _read(data: bytes, media: str, fit: bool) -> MeshPage:
     # what reads meshes is imported with the first of them
     from sweeps.commands.terminal import meshfile
 
-    suffix = next((suffix for suffix, types in _KINDS.items() if media in types), None)
-    if suffix is None:
-        known = ", ".join(types[0] for types in _KINDS.values())
-        raise InvalidQuery.of([Wrong("Content-Type", f"{media[:60] or 'nothing'!r} is no mesh", f"Send {known}.")])
+    suffix = sent.suffix_of(media, data, sent.MESHES, "mesh")
     with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
         path = Path(folder) / f"mesh{suffix}"
         path.write_bytes(data)

@@ -13,6 +13,7 @@ from fastapi import APIRouter, Query, Request
 
 from .. import problems
 from ..errors import InvalidQuery, Overloaded, TimedOut, Wrong
+from ..formats import sent
 from ..settings import Settings
 from ..shapes.live import LiveTables
 from ..views.addresses import link
@@ -22,8 +23,7 @@ __all__ = ["router"]
 
 router = APIRouter(tags=["match"])
 
-_TYPES = ("model/obj", "model/gltf-binary", "model/stl", "model/ply", "image/png")
-_BINARY: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_FILES = sent.contents([*(types[0] for types in sent.MESHES.values()), "image/png"])
 _NUMBERS: dict[str, Any] = {
     "schema": {
         "type": "object",
@@ -48,7 +48,7 @@ _PATIENCE = 0.9
     openapi_extra={
         "requestBody": {
             "required": True,
-            "content": {**dict.fromkeys(_TYPES, _BINARY), "application/json": _NUMBERS},
+            "content": {**_FILES, "application/json": _NUMBERS},
         }
     },
 )
@@ -116,7 +116,7 @@ def _matched(
     # what reads and searches takes a while to import; the service starts without
     from . import answer, targets
 
-    target = targets.read(body, targets.suffix_of(media), size)
+    target = targets.read(body, sent.suffix_of(media, body, targets.KINDS, "target"), size)
     end = time.monotonic() + _PATIENCE * timeout
 
     def progress(share: float, what: str) -> None:

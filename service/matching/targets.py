@@ -16,17 +16,15 @@ from solver.lattice import closed_lattice, lattice
 from store.lookup import ShapeTable
 
 from ..errors import InvalidQuery, Unavailable, Wrong
+from ..formats.sent import MESHES
 from . import outline
 from .signature import COARSE, FINE, Signature, Unreadable, signature
 
-__all__ = ["KINDS", "Target", "read", "suffix_of"]
+__all__ = ["KINDS", "Target", "read"]
 
 #: Suffix -> media types of what may be matched.
 KINDS: Mapping[str, tuple[str, ...]] = {
-    ".obj": ("model/obj", "text/plain"),
-    ".glb": ("model/gltf-binary",),
-    ".stl": ("model/stl",),
-    ".ply": ("model/ply", "application/ply"),
+    **MESHES,
     ".png": ("image/png",),
     ".json": ("application/json",),
 }
@@ -57,20 +55,6 @@ class Target(Protocol):
 
     def of(self, table: ShapeTable, point: Mapping[str, float], stage: float, coarse: bool) -> Look:
         """Return the same of a shape of a table."""
-
-
-def suffix_of(media_type: str) -> str:
-    """Return the suffix of a media type.
-
-    Raises:
-        InvalidQuery: nothing of that type is matched.
-
-    """
-    for suffix, types in KINDS.items():
-        if media_type in types:
-            return suffix
-    known = ", ".join(types[0] for types in KINDS.values())
-    raise InvalidQuery.of([Wrong("Content-Type", f"{media_type[:60] or 'nothing'!r} is not matched", f"Send {known}.")])
 
 
 def read(data: bytes, suffix: str, unit: float | None) -> Target:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -31,6 +32,8 @@ pytestmark = pytest.mark.slow
 
 CLIENTS = Path(__file__).parent / "clients"
 WANTED = {"value": 0.25, "state": "done", "dims": ["stage"], "refused": "Outside table"}
+#: What only the Python client asks for: a mesh's borders, and what the shape in a file is matched with.
+SENT = {"borders": 0, "matched": "dehydration"}
 
 
 def run(*words: str | Path, cwd: Path, may_skip: str = "", warnings: bool = False) -> str:
@@ -103,9 +106,9 @@ def test_a_python_client(service: tuple[httpx.Client, str], tmp_path: Path) -> N
         cwd=tmp_path,
         warnings=True,
     )
-    assert "Unable to process schema" not in made
+    assert not re.search("Unable to process schema|Endpoint will not be generated", made)
     shutil.copy(CLIENTS / "try_python.py", tmp_path)  # beside what it imports
-    assert json.loads(run(bins / "python", "try_python.py", str(client.base_url), token, cwd=tmp_path)) == WANTED
+    assert json.loads(run(bins / "python", "try_python.py", str(client.base_url), token, cwd=tmp_path)) == WANTED | SENT
     look(tmp_path, client)
 
 

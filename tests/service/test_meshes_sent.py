@@ -39,7 +39,9 @@ HOSTILE = {
     "no vertex": ("model/obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "corners"),
     "one place": ("model/obj", b"v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n", "no triangle"),
     "nothing": ("model/obj", b"", "triangles"),
-    "a program": ("application/x-msdownload", b"MZ" + bytes(60), "is no mesh"),
+    "a program": ("application/x-msdownload", b"MZ" + bytes(60), "is not read here"),
+    "bytes of a program": ("application/octet-stream", b"MZ" + bytes(60), "none of .obj, .glb, .stl, .ply"),
+    "bytes of a picture": ("application/octet-stream", b"\x89PNG\r\n\x1a\n" + bytes(60), "none of"),
 }
 
 
@@ -67,6 +69,17 @@ def test_a_mesh_becomes_a_jobs_parameter(queue_only: httpx.Client) -> None:
     whole = queue_only.get(f"/v1/jobs/{job.json()['id']}").json()
     assert whole["omitted"] == []
     assert whole["params"]["mesh"]["points"] == page["mesh"]["points"]
+
+
+@pytest.mark.parametrize("kind", ["obj", "glb", "stl", "ply", "stl_ascii"])
+def test_bytes_tell_which_kind_of_mesh_they_are(queue_only: httpx.Client, kind: str) -> None:
+    """Clients that are made from the OpenAPI page send every file as bytes."""
+    given = trimesh.creation.icosphere(subdivisions=1)
+    data = given.export(file_type=kind)
+    content = data.encode() if isinstance(data, str) else data
+    sent = queue_only.post("/v1/meshes", content=content, headers={"Content-Type": "application/octet-stream"})
+    assert sent.status_code == 200, sent.text
+    assert (sent.json()["points"], sent.json()["faces"], sent.json()["borders"]) == (42, 80, 0)
 
 
 def test_a_mesh_as_it_is_keeps_its_units(queue_only: httpx.Client) -> None:
