@@ -15,7 +15,7 @@ from solver.arrays import Array
 
 from . import harmonics, spectra, surface
 
-__all__ = ["UNITS", "Measures", "Surface", "compare", "mean"]
+__all__ = ["OF", "UNITS", "Measures", "Surface", "compare", "mean"]
 
 
 #: Lattice on which spectra are compared.
@@ -49,6 +49,14 @@ class Measures(NamedTuple):
     corr: float
 
 
+#: What the measures are of, for people.
+OF = dict(
+    zip(
+        Measures._fields,
+        ("roughness", "band powers", "slopes", "patchiness", "displacement", "normals", "correlation"),
+        strict=True,
+    )
+)
 UNITS = {"rgh": "1", "dB": "dB", "W1": "degree", "patch": "1", "L2nr": "1", "ang": "degree", "corr": "1"}
 
 

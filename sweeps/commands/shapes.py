@@ -165,7 +165,7 @@ def query(asked: _Asked) -> None:
     if asked.out is not None:
         title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
         outputs.save(asked.out, Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units()))
-    emit(document, asked.as_json, lambda console: _show(console, shapes, known.stages.symbol, asked.out))
+    emit(document, asked.as_json, lambda console: _show(console, name, shapes, known.stages.symbol, asked.out))
 
 
 def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, Any]]]:
@@ -200,17 +200,28 @@ def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, An
     return table, shapes, notes
 
 
-def _show(console: Any, shapes: list[Shape], symbol: str, out: Path | None) -> None:
+def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path | None) -> None:
+    from store.surfaces import measures
+
+    last = shapes[-1]
     rows = [
-        [key, *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
-        for key in shapes[-1].descriptors
+        [key, last.units.get(key, "1"), *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
+        for key in last.descriptors
     ]
     errors = [shape.expected_error for shape in shapes if shape.expected_error is not None]
     if len(errors) == len(shapes):
-        rows += [[f"expected error {name}", *(f"{said[name]:.3g}" for said in errors)] for name in errors[0]]
-    rows += [["exact", *(str(shape.exact) for shape in shapes)]]
-    rows += [["crossings", *("unknown" if one.crossings is None else str(one.crossings) for one in shapes)]]
-    grid(console, ["", *(f"{symbol} = {shape.stage:g}" for shape in shapes)], rows)
+        rows += [
+            [f"expected error of {measures.OF[key]} ({key})", measures.UNITS[key]]
+            + [f"{said[key]:.3g}" for said in errors]
+            for key in errors[0]
+        ]
+    rows += [["a stored run, as it is", "", *("yes" if shape.exact else "no" for shape in shapes)]]
+    if any(shape.crossings is not None for shape in shapes):
+        told = ("unknown" if shape.crossings is None else str(shape.crossings) for shape in shapes)
+        rows += [["crossing pairs as handed over", "1", *told]]
+    place = ", ".join(f"{axis} = {value:g}" for axis, value in last.parameters.items())
+    head = ["", "unit", *(f"{symbol} = {shape.stage:g}" for shape in shapes)]
+    grid(console, head, rows, title=f"{name}: {place}" if place else name)
     if out is not None:
         console.print(f"written to {out}", markup=False)
 
