@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
-import click
 import pytest
 import typer
 
@@ -16,7 +16,7 @@ from store.manifest import read_manifest
 
 from ._blocks import ROOT
 
-_COMMAND = re.compile(r"^#\s+(wizen (?!\.\.\.).*?)(?:\s+#.*)?$", re.MULTILINE)
+_COMMAND = re.compile(r"^#[ ]+(wizen (?!\.\.\.).*?)(?:[ ]+#.*)?$", re.MULTILINE)
 
 
 def _shown() -> list[tuple[str, str]]:
@@ -30,10 +30,9 @@ def _shown() -> list[tuple[str, str]]:
 @pytest.mark.parametrize(("name", "command"), _shown(), ids=lambda text: Path(text).name[:60])
 def test_an_examples_command_is_one_that_is_known(name: str, command: str) -> None:
     words = shlex.split(command)[1:]
-    known: click.Command = typer.main.get_command(app)
-    while isinstance(known, click.Group):
+    known: Any = typer.main.get_command(app)
+    while groups := getattr(known, "commands", None):
         word = words.pop(0)
-        assert word in known.commands, f"{name}: {command}"
-        known = known.commands[word]
-    context = click.Context(known, info_name=known.name)
-    known.make_parser(context).parse_args(words)
+        assert word in groups, f"{name}: {command}"
+        known = groups[word]
+    known.make_parser(known.context_class(known)).parse_args(words)
