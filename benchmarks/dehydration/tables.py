@@ -74,7 +74,7 @@ def _claims(record: Row) -> str:
     of = [sorted({run[name] for run in runs}) for name in ("quality", "seed")]
     qualities, seeds = (", ".join(map(str, values)) for values in of)
     said = (
-        f"{len(runs)} of {len(every)} {'whole fruits' if record['whole'] else 'parts of fruits'} at {qualities}, "
+        f"{len(runs)} of {len(every)} parts of fruits at {qualities}, "
         f"seeds {seeds}, came to s = {record['stage']}. "
         f"{sum(not run['converged'] for run in runs)} did not converge there (largest residual "
         f"{max(run['residual'] for run in runs):.1e}), the deepest penetration is "
