@@ -5,8 +5,9 @@
 Every sample of a family in the package is predicted from the others, and what the others' own errors, so found, let
 expect there stands beside the error that is made; a table says so many times as much as covers 90 % of them. This is
 what a question one spacing away from its samples is told, which is farther than any between them.
-With a store of runs between the samples of one family, the errors of these beside what the table says of them. Shares
-of errors covered, and the factor that covers 90 % (record dehydration-calibration).
+With a store of runs between the samples of one family, the errors of these beside what the table says of them; without,
+those in the record stay if they are of that very table (by its digest). Shares of errors covered, and the factor that
+covers 90 % (record dehydration-calibration).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import figures
 from benchmarks.figures import Sheet
 from solver import registry
 from store.blending import methods
@@ -27,6 +29,7 @@ from store.surfaces.measures import Measures, Surface, compare
 from store.tables import path_of
 from sweeps.refining import score as scores
 
+_HELD = "runs held out"
 _SHOWN = ("rgh", "dB", "W1", "corr")
 _HEAD = ("family", "errors of", "cases", *(f"{name} covered, factor" for name in _SHOWN))
 
@@ -38,16 +41,16 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="share covered over the factor on what is said")
     asked = parser.parse_args()
     store, sheet = Store.open(ROOT), Sheet("dehydration-calibration", _HEAD, "dehydration")
-    curves = {}
+    kept, curves = figures.load(sheet.name)["runs"], {}
     for name in store.table_names():
         table = ShapeTable.open(store, name, surfaces=registry.surface)
         if table.size > 2:
-            curves[name] = _add(sheet, name, "samples from the others", _left_out(store, table))
-    if asked.held_out is not None:
-        table = ShapeTable.open(store, asked.name, surfaces=registry.surface)
-        curves[f"{asked.name}, held out"] = _add(
-            sheet, asked.name, "runs held out", _held(store, table, asked.held_out)
-        )
+            curves[name] = _add(sheet, table, "samples from the others", _ratios(*_left_out(store, table)))
+        said = next((row for row in kept if (row["family"], row["of"]) == (name, _HELD)), None)
+        if asked.held_out is not None and name == asked.name:
+            curves[f"{name}, held out"] = _add(sheet, table, _HELD, _ratios(*_held(store, table, asked.held_out)))
+        elif said is not None and said["digest"] == table.info.digest:
+            curves[f"{name}, held out"] = _add(sheet, table, _HELD, np.array(said["ratios"]))
     if asked.picture is not None:
         _draw(curves, asked.picture)
     sheet.keep(share=trust.COVERED, measures=Measures._fields)
@@ -80,16 +83,22 @@ def _held(store: Store, table: ShapeTable, held: Path) -> np.ndarray:
     return np.stack([np.array(made), np.array(expected)])
 
 
-def _add(sheet: Sheet, name: str, of: str, both: np.ndarray) -> np.ndarray:
-    """Print and keep one row; return the ratios (case, measure) of errors made to those expected."""
-    made, expected = both
-    ratios: np.ndarray = made / np.maximum(expected, 1e-12)
+def _ratios(made: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """Return how many times the expected errors were made (case, measure)."""
+    found: np.ndarray = (made / np.maximum(expected, 1e-12)).round(4)
+    return found
+
+
+def _add(sheet: Sheet, table: ShapeTable, of: str, ratios: np.ndarray) -> np.ndarray:
+    """Print and keep one row; return the ratios."""
+    name = table.info.name
     covered, factor = (ratios <= 1).mean(axis=0), np.quantile(ratios, trust.COVERED, axis=0)
     places = [Measures._fields.index(shown) for shown in _SHOWN]
     sheet.add(
-        (name, of, len(made), *(f"{covered[k]:.0%}, {factor[k]:.1f}" for k in places)),
-        family=name, of=of, cases=len(made), covered=dict(zip(Measures._fields, covered.tolist(), strict=True)),
-        factor=dict(zip(Measures._fields, factor.tolist(), strict=True)), ratios=ratios.round(4).tolist(),
+        (name, of, len(ratios), *(f"{covered[k]:.0%}, {factor[k]:.1f}" for k in places)),
+        family=name, digest=table.info.digest, of=of, cases=len(ratios),
+        covered=dict(zip(Measures._fields, covered.tolist(), strict=True)),
+        factor=dict(zip(Measures._fields, factor.tolist(), strict=True)), ratios=ratios.tolist(),
     )  # fmt: skip
     return ratios
 
