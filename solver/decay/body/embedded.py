@@ -110,9 +110,10 @@ def _filled(points: Floats, faces: Ints, layers: int, far: float) -> tuple[Stuff
     a, b, c = (points[faces[:, k]] for k in range(3))
     volume = abs(float(np.sum(a * np.cross(b, c)))) / 6
     edge = asked = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
-    why, tipped, likely = "", dict[float, tuple[Stuffed, float]](), _PER_SHELLS * layers**3
+    why, tipped = "", dict[float, tuple[Stuffed, float]]()
     for _ in range(_TRIES):
         found = stuffed(points, faces, edge)
+        # a leaf holds nothing of a coarse lattice, and more of a finer one than a body can settle with
         if len(found.tets) > _MOST and edge < asked:
             break
         why = _lacking(found)
@@ -126,10 +127,8 @@ def _filled(points: Floats, faces: Ints, layers: int, far: float) -> tuple[Stuff
             for most in (far, _TIP):
                 if away[worst] <= most * asked:
                     tipped.setdefault(most, (found, far * edge))
-        # what a coarse lattice misses has more of a finer one than a body can settle with
-        likely = (len(found.tets) or likely) * _FINER**3
         edge /= _FINER
-        if likely > _MOST:
+        if len(found.tets) * _FINER**3 > _MOST:
             break
     if tipped:
         return tipped[min(tipped)]
