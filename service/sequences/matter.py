@@ -42,14 +42,29 @@ def dressed(stage: Any, mesh: Any, sequence: Sequence, pictures: Pictures | None
     # where triangles change from stage to stage none of them stays in its part
     parts = sequence.materials if sequence.kept else (("", np.empty(0, int)),)
     api = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
-    for number, (name, faces) in enumerate(parts):
-        material = _material(stage, mesh.GetPath().AppendChild(f"material{number}"), name, pictures, said)
+    for number, ((name, faces), prim) in enumerate(zip(parts, _prims([name for name, _ in parts]), strict=True)):
+        material = _material(stage, mesh.GetPath().AppendChild(prim), name, pictures, said)
         if len(parts) == 1:
             api.Bind(material)
             continue
         indices = Vt.IntArray.FromNumpy(faces.astype(np.int32))
         subset = api.CreateMaterialBindSubset(f"part{number}", indices, UsdGeom.Tokens.face)
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
+
+
+def _prims(names: list[str]) -> list[str]:
+    """Return what materials' prims are called: as the materials are, where USD lets them."""
+    from pxr import Tf
+
+    found: list[str] = []
+    taken = {f"part{number}" for number in range(len(names))}
+    for number, name in enumerate(names):
+        own = Tf.MakeValidIdentifier(name) if name else f"material{number}"
+        while own in taken:
+            own += "_"
+        taken.add(own)
+        found.append(own)
+    return found
 
 
 def bind(stage: Any, prim: Any, path: Any, roughness: float) -> None:

@@ -15,6 +15,7 @@ from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
 
 from service.sequences import EXPORTS, Options, of_run, prepared, write
+from service.sequences.matter import _prims
 from solver.contract import Need
 from solver.decay import SOLVER
 from sweeps.commands.terminal.meshfile import read
@@ -82,6 +83,9 @@ def test_glb_and_usd_hold_the_mesh_s_own_texture_coordinates(given: dict, rotten
     assert [len(subset.GetIndicesAttr().Get()) for subset in subsets] == [288, 288]
     bound = [UsdShade.MaterialBindingAPI(s).ComputeBoundMaterial()[0].GetPrim().GetDisplayName() for s in subsets]
     assert bound == ["peel", "other half"]
+    # Blender shows the prim's name, and no other
+    prims = [UsdShade.MaterialBindingAPI(s).ComputeBoundMaterial()[0].GetPrim().GetName() for s in subsets]
+    assert prims == ["peel", "other_half"]
     # written as glTF and read again, nothing has moved by a bit
     path = tmp_path / "ring.glb"
     path.write_bytes(write(prepared(rotten, Options(), 0.0), EXPORTS["animation"], Options()))
@@ -190,3 +194,7 @@ def _data(path: Path, info: zipfile.ZipInfo) -> int:
     """Return where a file's data begin in an archive: USDZ wants multiples of 64."""
     head = path.read_bytes()[info.header_offset : info.header_offset + 30]
     return info.header_offset + 30 + sum(struct.unpack("<HH", head[26:30]))
+
+
+def test_materials_of_one_name_and_of_none_have_prims_of_their_own() -> None:
+    assert _prims(["peel red", "peel_red", "", "part1"]) == ["peel_red", "peel_red_", "material2", "part1_"]

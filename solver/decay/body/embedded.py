@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import KDTree
 
-from ...arrays import Floats, Ints
+from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidGeometry
 from ...geometry.nearest import Nearest, nearest
 from ...geometry.stuffing import Stuffed, boundary, pieces, stuffed
@@ -25,8 +26,8 @@ __all__ = ["Embedded"]
 #: Tetrahedra of a cube of the lattice, and of a round fruit in k shells over k^3: a mesh gets about as many.
 _PER_CUBE, _PER_SHELLS = 12.0, 20.0
 #: No vertex may lie farther from the flesh than this share of the lattice's edge: there it would be missing. Where no
-#: lattice comes so near, at sharp tips, it is a share of the edge that the quality asked for.
-_FAR = 0.75
+#: lattice comes so near, at sharp tips, it is a share of the edge that the quality asked for, or else the second one.
+_FAR, _TIP = 0.75, 1.5
 #: The same where the borders of a rind are ridges, which the lattice cuts off.
 _RIDGE = 1.25
 #: Refinements of a lattice that is too coarse for a thin part, and the most tetrahedra that one may have.
@@ -51,7 +52,7 @@ class Embedded:
             raise InvalidGeometry("the mesh is flat: nothing is inside of it.", advice="Take body=none.")
         # what an open mesh weighs is what the fruit of the parameters does, as in its fields
         self._surface, self.extent = surface, closed or extent(params)
-        filled = _filled(points, faces, layers, _FAR if closed else _RIDGE)
+        filled, least = _filled(points, faces, layers, _FAR if closed else _RIDGE)
         skin_faces = boundary(filled.tets)
         skin, outside = np.unique(skin_faces, return_inverse=True)
         below = nearest(filled.points, surface.points, surface.faces)
@@ -70,6 +71,7 @@ class Embedded:
         )
         self.inwards = _matrix(below, surface.faces, len(surface.points))
         held = nearest(surface.points, filled.points[skin], self.solid.faces)
+        shown = ~_buried(filled, surface.points, held.distance, least)
         self._onto = _matrix(held, self.solid.faces, len(skin))
         self.core = depth >= np.median(depth)
         # wherever it was drawn, it shrinks in its place
@@ -78,8 +80,8 @@ class Embedded:
         self.floor = float(points[:, 1].min())
         self.hanging = np.zeros(len(filled.points))
         # each point of the skin stands for the vertices that go with it, down to the lowest
-        most = self.solid.faces[held.face, np.argmax(held.shares, axis=1)]
-        np.minimum.at(self.hanging, skin[most], surface.points[:, 1] - filled.points[skin[most], 1])
+        most = self.solid.faces[held.face, np.argmax(held.shares, axis=1)][shown]
+        np.minimum.at(self.hanging, skin[most], surface.points[shown, 1] - filled.points[skin[most], 1])
 
     def onto(self, cells: int) -> sparse.csr_array:
         """See `Filling`: the mesh has no cells, and its vertices are meant."""
@@ -100,29 +102,36 @@ class Embedded:
         return float(far.min()) - other.radius
 
 
-def _filled(points: Floats, faces: Ints, layers: int, far: float) -> Stuffed:
-    """Return flesh in a closed surface (v, 3), (f, 3) that hangs together, so many edges from vertices at most."""
+def _filled(points: Floats, faces: Ints, layers: int, far: float) -> tuple[Stuffed, float]:
+    """Return flesh in a closed surface (v, 3), (f, 3) that hangs together, so many edges from vertices at most.
+
+    And how far a vertex may be from it.
+    """
     a, b, c = (points[faces[:, k]] for k in range(3))
     volume = abs(float(np.sum(a * np.cross(b, c)))) / 6
     edge = asked = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
-    why, tipped = "", None
+    why, tipped = "", dict[float, tuple[Stuffed, float]]()
     for _ in range(_TRIES):
         found = stuffed(points, faces, edge)
+        # a leaf holds nothing of a coarse lattice, and more of a finer one than a body can settle with
+        if len(found.tets) > _MOST and edge < asked:
+            break
         why = _lacking(found)
         if not why:
-            away = _away(found, points)
+            away = _away(found, points, far * edge)
             worst = int(np.argmax(away))
             if away[worst] <= far * edge:
-                return found
+                return found, far * edge
             why = f"it is too thin at {_place(points[worst])}"
-            # a tip is too sharp for every lattice: what is no longer than an edge of the one asked for goes along
-            if tipped is None and away[worst] <= far * asked:
-                tipped = found
+            # a tip is too sharp for every lattice: what is hardly longer than an edge of the one asked for goes along
+            for most in (far, _TIP):
+                if away[worst] <= most * asked:
+                    tipped.setdefault(most, (found, far * edge))
         edge /= _FINER
         if len(found.tets) * _FINER**3 > _MOST:
             break
-    if tipped is not None:
-        return tipped
+    if tipped:
+        return tipped[min(tipped)]
     raise InvalidGeometry(
         f"the mesh cannot be filled with flesh: {why}.",
         advice="Thicken it there, close what is open, or take body=none.",
@@ -140,10 +149,22 @@ def _lacking(found: Stuffed) -> str:
     return ""
 
 
-def _away(found: Stuffed, points: Floats) -> Floats:
-    """Return how far points (v, 3) are from the skin of flesh (v)."""
+def _away(found: Stuffed, points: Floats, far: float) -> Floats:
+    """Return how far points (v, 3) are from the skin of flesh (v), 0 for those that are deeper in it than `far`."""
     skin, faces = np.unique(boundary(found.tets), return_inverse=True)
-    return nearest(points, found.points[skin], faces.reshape(-1, 3)).distance
+    away = nearest(points, found.points[skin], faces.reshape(-1, 3)).distance
+    return np.where(_buried(found, points, away, far), 0.0, away)
+
+
+def _buried(found: Stuffed, points: Floats, away: Floats, far: float) -> Bools:
+    """Return which points (v, 3), so far from the skin of flesh (v), lie deeper in it than `far`: where parts overlap.
+
+    Whoever is nearer to the middle of a tetrahedron than to the skin is inside: from outside the way goes through it.
+    """
+    deep = away > far
+    middles = KDTree(found.points[found.tets].mean(axis=1))
+    deep[deep] = middles.query(points[deep])[0] < away[deep]
+    return np.asarray(deep)
 
 
 def _place(point: Floats) -> str:

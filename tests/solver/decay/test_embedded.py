@@ -47,6 +47,10 @@ def cap(subdivisions: int = 3) -> trimesh.Trimesh:
     return ball.submesh([ball.triangles_center[:, 1] < 0.02], append=True)
 
 
+def lay_of(mesh: trimesh.Trimesh):
+    return laid(SOLVER.parse({"mesh": given(mesh)}, preset="apple"), 12)
+
+
 def run(mesh: trimesh.Trimesh, stages=(0.0, 10.0), fields=BODY, **values):
     params = SOLVER.parse({"mesh": given(mesh), "body": "quasi-static", **values}, preset="apple")
     return SOLVER.solve(params, Need(fields=fields, stages=stages, quality="preview"))
@@ -237,3 +241,37 @@ def test_a_mesh_in_other_units_is_refused_with_the_factor(scale: float) -> None:
     ring.vertices = ring.vertices * scale
     with pytest.raises(InvalidInput, match=f"multiply its points by {1 / 1.4 / scale:.3g}"):
         SOLVER.parse({"mesh": given(ring)}, preset="apple")
+
+
+def test_parts_that_overlap_are_one_body() -> None:
+    """Two balls that are in each other: what of one is in the other is deep in flesh."""
+    left = trimesh.creation.icosphere(subdivisions=3)
+    right = left.copy()
+    right.apply_translation([1.2, 0, 0])
+    both = trimesh.util.concatenate([left, right])
+    found = run(both, wounds=[], flesh={**STILL, "gravity": 0.0})
+    fresh, dry = found.mesh_position.values.astype(float)
+    assert np.abs(fresh - both.vertices).max() < 1e-6
+    scale = (1 - float(found.water_lost[1])) ** (1 / 3)
+    assert scale < 0.999
+    assert np.abs(dry - dry.mean(axis=0) - scale * (fresh - fresh.mean(axis=0))).max() < 1e-5
+    # what is buried in one ball does not hang from the other's skin down to a floor
+    flesh = embedded.Embedded(SOLVER.parse({"mesh": given(both)}, preset="apple"), lay_of(both), 8)
+    assert flesh.hanging.min() > -0.2
+    assert (flesh.solid.points[:, 1] + flesh.hanging).min() == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_a_carrot_is_a_body() -> None:
+    """A cone's tip is longer than an edge of its first lattice, and no finer one that can be had comes nearer."""
+    cone = trimesh.creation.cone(0.5, 2, sections=32).subdivide_to_size(0.1)
+    found = run(cone, wounds=[], flesh={**STILL, "gravity": 0.0})
+    fresh, dry = found.mesh_position.values.astype(float)
+    scale = (1 - float(found.water_lost[1])) ** (1 / 3)
+    assert np.abs(dry - dry.mean(axis=0) - scale * (fresh - fresh.mean(axis=0))).max() < 1e-3
+    assert float(found.least_jacobian.min()) > 0
+
+
+def test_a_leaf_that_only_a_huge_lattice_holds_is_refused() -> None:
+    leaf = trimesh.creation.box((2, 2, 0.01)).subdivide_to_size(0.2)
+    with pytest.raises(InvalidGeometry, match="thinner than the lattice"):
+        embedded._filled(np.asarray(leaf.vertices), np.asarray(leaf.faces), 6, embedded._FAR)
