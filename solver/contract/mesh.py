@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from typing import Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, model_validator
 
-__all__ = ["MOST_GROUPS", "GivenMesh", "check_groups", "check_textures", "named_groups"]
+__all__ = ["MOST_GROUPS", "ClosedMesh", "GivenMesh", "check_groups", "check_textures", "named_groups"]
 
 #: Groups of a mesh, and letters of the name of one, at most.
 MOST_GROUPS, _LETTERS = 64, 64
@@ -80,3 +82,42 @@ def check_groups(points: int, groups: Mapping[str, Sequence[float]]) -> None:
 def named_groups(groups: Mapping[str, object]) -> dict[str, str]:
     """Return the names of a mesh's groups, as an attribute of a result."""
     return {"groups": json.dumps(list(groups))} if groups else {}
+
+
+#: What mesh files hold besides.
+_DRESS = frozenset({"uv", "uv_faces", "materials", "face_materials", "groups"})
+
+
+class ClosedMesh(GivenMesh):
+    """A closed triangle mesh, convex or not. Of a file's textures, materials and groups nothing is kept."""
+
+    points: tuple[tuple[float, float, float], ...]
+    faces: tuple[tuple[int, int, int], ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, values: object) -> object:
+        if isinstance(values, dict):
+            return {name: values[name] for name in values if name in cls.model_fields or name not in _DRESS}
+        return values
+
+    @model_validator(mode="after")
+    def _closed(self) -> Self:
+        points, faces = np.array(self.points), np.array(self.faces, np.int64)
+        if faces.min() < 0 or faces.max() >= len(points):
+            raise ValueError(f"a triangle names a vertex that is not there: they are numbered 0 to {len(points) - 1}")
+        ways = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        key, back = ways[:, 0] * len(points) + ways[:, 1], ways[:, 1] * len(points) + ways[:, 0]
+        sides, times = np.unique(key, return_counts=True)
+        alone = int((~np.isin(key, back)).sum())
+        if alone:
+            raise ValueError(
+                f"the mesh is open: {alone} sides of triangles have no neighbour. Close it, or let all triangles look "
+                "outwards"
+            )
+        if (times > 1).any() or len(sides) != len(key):
+            raise ValueError("more than two triangles of the mesh share a side, or two look opposite ways: mend it")
+        a, b, c = (points[faces[:, k]] for k in range(3))
+        if float((a * np.cross(b, c)).sum()) <= 0:
+            raise ValueError("the mesh encloses nothing: let its triangles be counter-clockwise from outside")
+        return self

@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 
 from ..arrays import Array, Floats, Ints
-from .boxes import LEAF, sort_boxes
+from .boxes import LEAF, Boxes, sort_boxes
 from .closest import on_triangle
 
-__all__ = ["Nearest", "nearest"]
+__all__ = ["Nearest", "Tree", "nearest", "tree_of"]
 
 
 class Nearest(NamedTuple):
@@ -22,14 +22,30 @@ class Nearest(NamedTuple):
     distance: Floats
 
 
+class Tree(NamedTuple):
+    """A mesh's triangles, sorted: for those who ask again and again."""
+
+    corners: Floats
+    """(f, 3, 3) corners of the triangles"""
+    boxes: Boxes
+
+    def nearest(self, points: Array) -> Nearest:
+        """Return the nearest point of the mesh for every point (p, 3)."""
+        found = Nearest(np.zeros(len(points), np.int64), np.zeros((len(points), 3)), np.zeros(len(points)))
+        here = np.ascontiguousarray(points, dtype=np.float64)
+        _descend(here, self.corners, self.boxes.order, self.boxes.leaves, self.boxes.low, self.boxes.high, *found)
+        return found
+
+
+def tree_of(vertices: Array, faces: Array) -> Tree:
+    """Return the triangles (f, 3) of vertices (v, 3), sorted."""
+    corners = np.ascontiguousarray(vertices[faces], dtype=np.float64)
+    return Tree(corners, sort_boxes(corners.min(axis=1), corners.max(axis=1)))
+
+
 def nearest(points: Array, vertices: Array, faces: Array) -> Nearest:
     """Return the nearest point of a mesh (v, 3), (f, 3) for every point (p, 3)."""
-    corners = np.ascontiguousarray(vertices[faces], dtype=np.float64)
-    tree = sort_boxes(corners.min(axis=1), corners.max(axis=1))
-    found = Nearest(np.zeros(len(points), np.int64), np.zeros((len(points), 3)), np.zeros(len(points)))
-    here = np.ascontiguousarray(points, dtype=np.float64)
-    _descend(here, corners, tree.order, tree.leaves, tree.low, tree.high, *found)
-    return found
+    return tree_of(vertices, faces).nearest(points)
 
 
 @njit(cache=True, error_model="numpy")

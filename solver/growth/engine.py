@@ -17,7 +17,7 @@ from ..contract import Context, InvalidGeometry
 from ..geometry.crossings import crossings
 from .fresh import fresh
 from .living.history import History, Moment
-from .params import GrowthParams, Solid
+from .params import GrowthParams
 from .remeshing.remesh import MOST
 from .settling.active import Habit
 from .settling.impossible import check_outward, enclosed
@@ -25,6 +25,7 @@ from .settling.stage import settled
 from .settling.tangent import Tangent
 from .settling.watch import Watch
 from .shapes import start
+from .solids import Solid
 from .state import State
 from .stepping import Carried, Steps
 from .tooling.tools import Tool

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
@@ -12,14 +11,11 @@ from ..contract import Params
 from .matter import Bed, Colour, Rib
 from .own.imported import OwnMesh
 from .shapes import Shape
+from .solids import Solid, check_pace
 from .tooling.places import Place
 from .tooling.tools import HotSurface, Tool
 
-__all__ = ["Attachment", "Bending", "GrowthParams", "Plane", "Solid", "SolidBall", "SolidBox", "check_pace", "present"]
-
-
-Point = tuple[float, float, float]
-Side = Annotated[float, Field(gt=0, le=100)]
+__all__ = ["Attachment", "Bending", "GrowthParams"]
 
 
 class _Model(BaseModel):
@@ -44,107 +40,6 @@ class Attachment(_Model):
         if loose:
             raise ValueError(f"what is led along {', '.join(loose)} must be held there; add it to its axes")
         return self
-
-
-class _Solid(_Model):
-    start: float = Field(0.0, ge=0, le=1000, description="From when it is there [growth time]")
-    duration: float = Field(1000.0, gt=0, le=1000, description="How long it is there [growth time]")
-    velocity: tuple[Speed, Speed, Speed] = Field(
-        (0.0, 0.0, 0.0), description="How it moves from its start on [start shape's unit per growth time]"
-    )
-
-    def moved(self, time: float) -> tuple[float, float, float]:
-        """Return how far it has come by a growth time."""
-        x, y, z = ((time - self.start) * v for v in self.velocity)
-        return (x, y, z)
-
-
-class Plane(_Solid):
-    """A half-space that the surface cannot enter."""
-
-    kind: Literal["plane"] = "plane"
-    point: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="A point of the plane [start shape's unit]")
-    normal: tuple[float, float, float] = Field((0.0, 0.0, 1.0), description="Out of the solid [1]")
-
-    @property
-    def thick(self) -> float:
-        """How deep its middle lies at least: it has none."""
-        return math.inf
-
-    def at(self, time: float) -> Self:
-        """Return it where it is at a growth time."""
-        return self.model_copy(update={"point": _sum(self.point, self.moved(time))})
-
-
-class SolidBall(_Solid):
-    """A ball that the surface cannot enter."""
-
-    kind: Literal["ball"] = "ball"
-    centre: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
-    radius: float = Field(1.0, gt=0, le=100, description="Radius [start shape's unit]")
-
-    @property
-    def thick(self) -> float:
-        """How deep its middle lies at least."""
-        return self.radius
-
-    def at(self, time: float) -> Self:
-        """Return it where it is at a growth time."""
-        return self.model_copy(update={"centre": _sum(self.centre, self.moved(time))})
-
-
-class SolidBox(_Solid):
-    """A box with rounded edges, its sides along the axes, that the surface cannot enter."""
-
-    kind: Literal["box"] = "box"
-    centre: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
-    size: tuple[Side, Side, Side] = Field(
-        (1.0, 1.0, 1.0), description="Length along x, y and z, edges included [start shape's unit]"
-    )
-    edge: float = Field(0.1, ge=0, le=100, description="Radius of its edges, half a side at most [start shape's unit]")
-
-    @property
-    def thick(self) -> float:
-        """How deep its middle lies at least."""
-        return min(self.size) / 2
-
-    def at(self, time: float) -> Self:
-        """Return it where it is at a growth time."""
-        return self.model_copy(update={"centre": _sum(self.centre, self.moved(time))})
-
-    @model_validator(mode="after")
-    def _round(self) -> Self:
-        if 2 * self.edge > min(self.size):
-            raise ValueError(f"edges of radius {self.edge:g} do not fit a box of size {self.size}; half a side at most")
-        return self
-
-
-Solid = Annotated[Plane | SolidBall | SolidBox, Field(discriminator="kind")]
-
-
-def present(solids: Iterable[Solid], time: float) -> tuple[Solid, ...]:
-    """Return the solids that are there at the end of a step, where they are then; one that starts with the step is."""
-    there = (s for s in solids if (s.start < time - 1e-9 or not s.start) and time <= s.start + s.duration + 1e-9)
-    return tuple(s.at(time) if any(s.velocity) else s for s in there)
-
-
-def check_pace(solid: Solid, step: float) -> None:
-    """Refuse a solid that would pass through the sheet between two equilibria.
-
-    Raises:
-        ValueError: it moves by more than half the way to its middle.
-
-    """
-    way = step * math.hypot(*solid.velocity)
-    if way > solid.thick / 2:
-        raise ValueError(
-            f"a {solid.kind} moves by {way:.3g} in a step of {step:g}, and could pass through the sheet: its middle is "
-            f"{solid.thick:g} deep, and half of that is the most; take a shorter step, or let it move more slowly"
-        )
-
-
-def _sum(a: Point, b: Point) -> Point:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 Bending = Literal["hinges", "mean_curvature"]

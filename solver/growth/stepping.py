@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import shell
 from .matter import grown_further
-from .params import GrowthParams, Solid, present
+from .params import GrowthParams
 from .plastic import forgotten
 from .remeshing.remesh import remesh
 from .settling.active import Habit
@@ -25,6 +25,7 @@ from .settling.impossible import check_held, check_outward
 from .settling.minimise import Point
 from .settling.tangent import Tangent
 from .settling.watch import Watch
+from .solids import Solid, present
 from .state import State
 from .tooling.placing import branched, started
 from .tooling.rates import grown, rates

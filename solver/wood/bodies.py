@@ -6,10 +6,9 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..contract.mesh import GivenMesh
+from ..contract.mesh import ClosedMesh
 
 __all__ = ["Body", "Metres", "Newtons", "Part", "Rate", "Solid", "Turn", "Vector", "Waypoint", "half_width"]
 
@@ -44,45 +43,13 @@ class Waypoint(Part):
     )
 
 
-class Solid(GivenMesh):
-    """A closed triangle mesh, convex or not. Of a file's textures, materials and groups nothing is kept."""
+class Solid(ClosedMesh):
+    """A closed triangle mesh in a body's frame, convex or not."""
 
     points: tuple[Vector, ...] = Field(min_length=4, max_length=20_000, description="Vertices in the body's frame [m]")
     faces: tuple[tuple[int, int, int], ...] = Field(
         min_length=4, max_length=40_000, description="Triangles, counter-clockwise from outside, vertices from 0"
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, values: object) -> object:
-        if isinstance(values, dict):
-            return {name: values[name] for name in values if name in cls.model_fields or name not in _DRESS}
-        return values
-
-    @model_validator(mode="after")
-    def _closed(self) -> Self:
-        points, faces = np.array(self.points), np.array(self.faces, np.int64)
-        if faces.min() < 0 or faces.max() >= len(points):
-            raise ValueError(f"a triangle names a vertex that is not there: they are numbered 0 to {len(points) - 1}")
-        ways = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-        key, back = ways[:, 0] * len(points) + ways[:, 1], ways[:, 1] * len(points) + ways[:, 0]
-        sides, times = np.unique(key, return_counts=True)
-        alone = int((~np.isin(key, back)).sum())
-        if alone:
-            raise ValueError(
-                f"the mesh is open: {alone} sides of triangles have no neighbour. Close it, or let all triangles look "
-                "outwards"
-            )
-        if (times > 1).any() or len(sides) != len(key):
-            raise ValueError("more than two triangles of the mesh share a side, or two look opposite ways: mend it")
-        a, b, c = (points[faces[:, k]] for k in range(3))
-        if float((a * np.cross(b, c)).sum()) <= 0:
-            raise ValueError("the mesh encloses nothing: let its triangles be counter-clockwise from outside")
-        return self
-
-
-#: What mesh files hold besides.
-_DRESS = frozenset({"uv", "uv_faces", "materials", "face_materials", "groups"})
 
 
 def half_width(height: float, angle: float, edge: float) -> float:

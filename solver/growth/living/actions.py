@@ -8,7 +8,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..params import Solid
+from ..solids import Solid
 from ..tooling.tools import Kernel, Point, Stretch, Tool
 
 __all__ = ["ACTIONS", "Add", "Brush", "End", "Lift", "Put"]

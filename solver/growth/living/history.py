@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..params import Solid
+from ..solids import Solid
 from ..state import State
 from ..stepping import Carried
 from ..tooling.tools import Tool

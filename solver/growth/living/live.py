@@ -13,10 +13,11 @@ from ...contract import Glimpse, InvalidInput, Quality, SolverError
 from ...meshes import Frame
 from ..anchors import place
 from ..engine import Engine, Undone
-from ..params import GrowthParams, Solid, check_pace
+from ..params import GrowthParams
 from ..settings import choose
 from ..settling.stage import residual
 from ..shown import shown
+from ..solids import Solid, check_pace
 from ..state import State
 from ..tooling.tools import HotStroke, Point, Tool
 from .actions import Add, Brush, End, Lift, Put

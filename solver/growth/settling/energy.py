@@ -17,7 +17,8 @@ from ...arrays import Floats, Ints
 from ...linalg.multifrontal import Analysis
 from ...shell.inverse import fronts_of, inverse_of
 from ...shell.normals import normals
-from ..params import Bending, Solid
+from ..params import Bending
+from ..solids import Solid
 from ..state import State
 from .bed import Bed
 from .loads import area_vectors, balanced, compressed, depth_in, half_way

@@ -6,7 +6,7 @@ import numpy as np
 
 from ... import shell
 from ...arrays import Floats, Ints
-from ..params import Plane, Solid, SolidBox
+from ..solids import Plane, Solid, SolidBox, SolidMesh
 
 __all__ = ["area_vectors", "balanced", "compressed", "depth_in", "half_way"]
 
@@ -50,6 +50,8 @@ def depth_in(solid: Solid, x: Floats) -> tuple[Floats, Floats]:
         normal = np.array(solid.normal) / np.linalg.norm(solid.normal)
         return np.maximum((np.array(solid.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
     way = x - np.array(solid.centre)
+    if isinstance(solid, SolidMesh):
+        return _depth_in_mesh(solid, way)
     if isinstance(solid, SolidBox):
         return _depth_in_box(solid, way)
     distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
@@ -59,6 +61,17 @@ def depth_in(solid: Solid, x: Floats) -> tuple[Floats, Floats]:
 def half_way(solid: Solid) -> float:
     """Return half of what it is from a solid's surface to its middle at least."""
     return solid.thick / 2
+
+
+def _depth_in_mesh(solid: SolidMesh, way: Floats) -> tuple[Floats, Floats]:
+    """Return depths and ways out of a mesh, `way` (n, 3) being places from its origin."""
+    signed = solid.mesh.signed
+    # only what is in the box about it can be in it
+    near = ((way > signed.low) & (way < signed.high)).all(axis=1)
+    depth, out = np.zeros(len(way)), np.tile([0.0, 0.0, 1.0], (len(way), 1))
+    found, out[near] = signed.depth(way[near])
+    depth[near] = np.maximum(found, 0.0)
+    return depth, out
 
 
 def _depth_in_box(box: SolidBox, way: Floats) -> tuple[Floats, Floats]:

@@ -15,7 +15,8 @@ import numpy as np
 from ... import shell
 from ...arrays import Floats
 from ...contract import Unstable
-from ..params import GrowthParams, present
+from ..params import GrowthParams
+from ..solids import present
 from ..state import State
 from .energy import StepEnergy
 from .minimise import Point, longest, quasi_newton

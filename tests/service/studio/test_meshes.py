@@ -123,3 +123,25 @@ def test_fruits_stand_on_a_mesh_of_ones_own(browser: Browser, studio: str, tmp_p
     assert json.loads(said.stdout)["instances"] == 12
     assert visit.complaints == []
     page.close()
+
+
+def test_a_mesh_is_a_solid_that_a_cloth_falls_over(browser: Browser, studio: str, tmp_path: Path) -> None:
+    ring = tmp_path / "ring.stl"
+    trimesh.creation.torus(20.0, 8.0, major_sections=32, minor_sections=16).export(ring)
+    visit = Visit(browser, viewport={"width": 1200, "height": 900})
+    page = visit.page
+    page.goto(at(studio, "room=growth"))
+    visit.shown()
+    page.locator("#preset").select_option("cloth")
+    page.locator("summary", has_text=re.compile("^Solids")).click()
+    page.get_by_role("button", name="Add to Solids").click()
+    page.get_by_label("Solids 1: kind").select_option("mesh")
+    page.get_by_label(re.compile("Mesh: a file")).last.set_input_files(ring)
+    page.locator(".meshfile .note", has_text="512 points, 1024 triangles, closed").wait_for()
+    page.locator("#stages").fill("0.05")
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.locator("#controls .note", has_text="Done in").wait_for(timeout=180_000)
+    root = studio.split("/#")[0]
+    job = parse_qs(urlsplit(page.url).fragment)["job"][0]
+    [solid] = httpx.get(f"{root}/v1/jobs/{job}").json()["params"]["solids"]
+    assert (solid["kind"], len(solid["mesh"]["points"])) == ("mesh", 512)

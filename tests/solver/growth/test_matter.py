@@ -7,9 +7,10 @@ from solver.contract import Context, InvalidInput, Need
 from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.matter import BARE, coloured
-from solver.growth.params import GrowthParams, Plane, SolidBox, present
+from solver.growth.params import GrowthParams
 from solver.growth.settling.loads import depth_in
 from solver.growth.shapes import start
+from solver.growth.solids import Plane, SolidBox, present
 from solver.growth.tooling.places import Lines, share
 
 RGB = ("red", "green", "blue")

@@ -294,7 +294,7 @@ function editor(given: Schema, label: string, defs: Record<string, Schema>, chan
     if (rest.length) return either(words, editor({ ...given, anyOf: rest }, label, defs, changed), label, changed);
   }
   const { schema, optional: may } = resolved(given, defs);
-  if (may && hasMesh(schema)) return new MeshFile(label, changed);
+  if (hasMesh(schema)) return new MeshFile(label, changed);
   const made = plain(schema, label, defs, changed);
   return may ? optional(made, label, changed) : made;
 }
