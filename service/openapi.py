@@ -6,6 +6,7 @@ accept, and takes its examples from the tables that are there.
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from fastapi import FastAPI
@@ -34,6 +35,7 @@ _CORRECTION = "|".join(methods.CORRECTIONS)
 _OWN, _VALUES = ("units", "axes", "along"), ("default", "const", "enum", "example", "examples", "required")
 #: Where one of several kinds may stand; generators of clients drop a schema whose default is one of these, made whole.
 _KINDS = ("oneOf", "anyOf")
+_REFERENCE = "#/components/schemas/{model}"
 _METHOD = rf"^({'|'.join(methods.WEIGHTINGS)})([+ ]({_CORRECTION}))*$"
 
 
@@ -105,7 +107,7 @@ def _job_request(schemas: Json) -> Json:
     forms = {}
     for name in registry.names():
         solver = vocabulary.solver_named(name)
-        params = solver.params.model_json_schema(ref_template="#/components/schemas/{model}")
+        params = _apart(solver.params.model_json_schema(ref_template=_REFERENCE), schemas, name)
         schemas.update(params.pop("$defs", {}))
         axes = {axis.name: _axis(axis, {}) for axis in vocabulary.axes(name).values()}
         scalars = {axis: {**said["schema"], "description": said["description"]} for axis, said in axes.items()}
@@ -132,6 +134,22 @@ def _job_request(schemas: Json) -> Json:
         "oneOf": [{"$ref": form} for form in forms.values()],
         "discriminator": {"propertyName": "solver", "mapping": forms},
     }
+
+
+def _apart(params: Json, schemas: Json, solver: str) -> Json:
+    """Return parameters' schema whose definitions are called by their solver, too, where another's has the name."""
+    own = params.get("$defs", {})
+    called = {name: f"{name}_{solver}" if schemas.get(name, own[name]) != own[name] else name for name in own}
+    # generators of clients go by titles
+    apart = {
+        new: own[name] if new == name else {**own[name], "title": f"{own[name].get('title', name)} ({solver})"}
+        for name, new in called.items()
+    }
+    text = json.dumps({**params, "$defs": apart})
+    for name, new in called.items():
+        text = text.replace(json.dumps(_REFERENCE.format(model=name)), json.dumps(_REFERENCE.format(model=new)))
+    found: Json = json.loads(text)
+    return found
 
 
 def _need(general: Json, solver: Solver) -> Json:

@@ -24,8 +24,12 @@ _BYTES = "application/octet-stream"
 _BEGIN = {".glb": b"glTF", ".ply": b"ply", ".png": b"\x89PNG\r\n\x1a\n", ".json": b"{"}
 #: Header and length of a triangle of a binary STL [bytes].
 _STL, _TRIANGLE = 84, 50
-#: A vertex of an OBJ, which may follow comments of some length, and a triangle of an STL in words.
-_VERTEX, _FACET = re.compile(rb"^\s*v\s+[-+.\d]", re.MULTILINE), re.compile(rb"\A\s*solid\b.*?\bfacet\s", re.DOTALL)
+#: A vertex of an OBJ, which may follow comments of some length, and a triangle of an STL in words. Blanks go no further
+#: than their line: a body of line ends is read in one pass.
+_VERTEX, _FACET = (
+    re.compile(rb"^[ \t]*v[ \t]+[-+.\d]", re.MULTILINE),
+    re.compile(rb"\A\s*solid\b.*?\bfacet\s", re.DOTALL),
+)
 
 
 def contents(types: Sequence[str]) -> dict[str, Any]:

@@ -29,8 +29,11 @@ class GivenMesh(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _read(cls, values: object) -> object:
-        if isinstance(values, str):
-            raise ValueError("expected points and faces; on the command line, --set mesh=@FILE reads them from a file")
+        if isinstance(values, str) or values is None:
+            raise ValueError(
+                "expected points and faces; on the command line, --set mesh=@FILE reads them from a file, "
+                'in a params file mesh = "@FILE"'
+            )
         return values
 
 

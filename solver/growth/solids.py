@@ -104,7 +104,7 @@ class SolidBox(_Solid):
         return self
 
 
-class Body(ClosedMesh):
+class SolidShape(ClosedMesh):
     """A closed triangle mesh around the place that `centre` tells of."""
 
     points: tuple[tuple[Place, Place, Place], ...] = Field(
@@ -127,7 +127,7 @@ class SolidMesh(_Solid):
     """A closed triangle mesh that the surface's vertices cannot enter: what is finer than its edges pokes through."""
 
     kind: Literal["mesh"] = "mesh"
-    mesh: Body = Field(description="Points and triangles")
+    mesh: SolidShape = Field(description="Points and triangles")
     centre: tuple[float, float, float] = Field(
         (0.0, 0.0, 0.0), description="Where the mesh's origin is [start shape's unit]"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -10,7 +11,7 @@ from openapi_spec_validator import validate
 
 from service.app import create_app
 from service.settings import Settings
-from solver import __version__
+from solver import __version__, registry
 from solver.dehydration import SOLVER
 from store import tables
 from store.store import Store
@@ -151,6 +152,30 @@ def test_openapi_is_one_that_clients_are_made_from() -> None:
     place = schemas["Colour"]["properties"]["where"]  # a default that is one of several kinds, made whole
     assert place["x-default"] == {"kind": "everywhere"}
     assert "default" not in place
+
+
+@pytest.mark.parametrize("solver", registry.names())
+def test_definitions_of_solvers_are_each_ones_own(solver: str) -> None:
+    """Decay and wood both have a Cut, of other numbers."""
+    schemas = create_app().openapi()["components"]["schemas"]
+
+    def same(told: Any, own: Any, defs: dict[str, Any]) -> None:
+        while "$ref" in own:
+            told, own = schemas[told["$ref"].rsplit("/", 1)[1]], defs[own["$ref"].rsplit("/", 1)[1]]
+        assert set(told.get("properties", {})) == set(own.get("properties", {})), own.get("title")
+        for name, each in own.get("properties", {}).items():
+            same(told["properties"][name], each, defs)
+        for key in ("items", "additionalProperties"):
+            if isinstance(own.get(key), dict):
+                same(told[key], own[key], defs)
+        for key in ("anyOf", "oneOf", "prefixItems"):
+            for one, other in zip(told.get(key, ()), own.get(key, ()), strict=True):
+                same(one, other, defs)
+
+    own = registry.get(solver).params.model_json_schema()
+    told = schemas[f"JobRequest_{solver}"]["properties"]["params"]
+    axes = set(told["properties"]) - set(own["properties"])
+    same({**told, "properties": {k: v for k, v in told["properties"].items() if k not in axes}}, own, own["$defs"])
 
 
 def test_nothing_at_an_address_is_said_without_the_openapi_page(built: Path) -> None:

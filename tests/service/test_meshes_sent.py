@@ -41,6 +41,7 @@ HOSTILE = {
     "nothing": ("model/obj", b"", "triangles"),
     "a program": ("application/x-msdownload", b"MZ" + bytes(60), "is not read here"),
     "bytes of a program": ("application/octet-stream", b"MZ" + bytes(60), "none of .obj, .glb, .stl, .ply"),
+    "bytes of line ends alone": ("application/octet-stream", b"\n" * 1_000_000, "none of"),
     "bytes of a picture": ("application/octet-stream", b"\x89PNG\r\n\x1a\n" + bytes(60), "none of"),
 }
 
