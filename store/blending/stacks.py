@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import threading
-from collections import OrderedDict
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +10,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ..surfaces.packed import Stored
+from .kept import Kept
 
 __all__ = ["Stacks"]
 
@@ -19,6 +18,10 @@ __all__ = ["Stacks"]
 _ROOM = 64 << 20
 #: Share of waves that are not zero up to which the others are left out: putting them back takes its time, too.
 _SPARSE = 0.6
+
+
+#: Samples, stages and band of a stack.
+_Key = tuple[tuple[int, ...], tuple[int, ...], int]
 
 
 class _Stack(NamedTuple):
@@ -34,14 +37,13 @@ class Stacks:
 
     def __init__(self, stored: Stored) -> None:
         self._stored = stored
-        self._kept: OrderedDict[tuple[tuple[int, ...], tuple[int, ...], int], _Stack] = OrderedDict()
-        self._guard = threading.Lock()
+        self._kept: Kept[_Key, _Stack] = Kept(_ROOM, lambda stack: stack.waves.nbytes)
 
     def mean(self, samples: tuple[int, ...], stages: tuple[int, ...], parts: Array, band: int) -> Array:
         """Return the sum (component, m, k, part), m, k <= `band`, of all samples at all stages, samples first, times
         their `parts`; zero where there are none.
         """
-        stack = self._of(samples, stages, band)
+        stack = self._kept.get((samples, stages, band), lambda: self._stack(samples, stages, band))
         # not by BLAS: its threads would wait for each other in a busy server, for a sum of a tenth of a millisecond
         found: Array = np.einsum("t,tn->n", parts.astype(stack.waves.dtype), stack.waves)
         if stack.place is not None:
@@ -50,20 +52,6 @@ class Stacks:
             found = full
         whole: Array = found.reshape(stack.shape)
         return whole
-
-    def _of(self, samples: tuple[int, ...], stages: tuple[int, ...], band: int) -> _Stack:
-        key = samples, stages, band
-        with self._guard:
-            kept = self._kept.get(key)
-            if kept is not None:
-                self._kept.move_to_end(key)
-                return kept
-        made = self._stack(samples, stages, band)
-        with self._guard:
-            self._kept[key] = made
-            while len(self._kept) > 1 and sum(stack.waves.nbytes for stack in self._kept.values()) > _ROOM:
-                self._kept.popitem(last=False)
-        return made
 
     def _stack(self, samples: tuple[int, ...], stages: tuple[int, ...], band: int) -> _Stack:
         cut = slice(band + 1)

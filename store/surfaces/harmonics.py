@@ -52,10 +52,13 @@ def power(harmonics: Array, other: Array | None = None) -> Array:
     return found
 
 
-def without_low(spectrum: Array) -> Array:
-    """Return spectra (..., m, k) without their harmonics below `LOWEST`: what is left are the wrinkles."""
+def without_low(spectrum: Array, harmonics: Array | None = None) -> Array:
+    """Return spectra (..., m, k) without their harmonics below `LOWEST`: what is left are the wrinkles.
+
+    `harmonics` are those of the spectra, where they are known.
+    """
     band = spectrum.shape[-1] - 1
-    low = degrees(spectrum)[..., :LOWEST, :LOWEST]
+    low = (degrees(spectrum) if harmonics is None else harmonics)[..., :LOWEST, :LOWEST]
     rest = spectrum.copy()
     rest[..., :LOWEST, :] -= np.einsum("...ml,mlk->...mk", low, low_series(band)).astype(rest.dtype)
     return rest

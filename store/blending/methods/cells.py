@@ -16,6 +16,7 @@ from solver.arrays import Array
 
 from ...surfaces import harmonics, spectra
 from ...surfaces.packed import Stored
+from ..kept import Kept
 from .bands import Bands
 
 __all__ = ["COARSE", "Cell", "Cells"]
@@ -25,6 +26,9 @@ __all__ = ["COARSE", "Cell", "Cells"]
 COARSE = 12
 #: Degree up to which the envelope is resolved, and the width [radian] of the window in which amplitude is averaged.
 _SMOOTH, _WIDTH = 9, 0.35
+#: Bytes of cells that a table keeps. One takes .1 to 1 MB and some 10 ms to make, which is ten look-ups: a table of a
+#: hundred cells is to find all of them again.
+_ROOM = 96 << 20
 #: Lattice on which squares are taken; wrinkles beyond degree 48 are folded there, which moves no energy far.
 _SQUARES = 48
 
@@ -46,14 +50,17 @@ class Cells:
     def __init__(self, stored: Stored, bands: Bands) -> None:
         self._stored = stored
         self._bands = bands
-        self.of = lru_cache(maxsize=64)(self._of)
+        self._kept: Kept[tuple[tuple[int, ...], tuple[int, ...]], Cell] = Kept(_ROOM, _size)
 
-    def _of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> Cell:
+    def of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> Cell:
         """Return the products of all samples at all stages, samples first."""
+        return self._kept.get((samples, stages), lambda: self._make(samples, stages))
+
+    def _make(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> Cell:
         blocks = [self._stored[i, j] for i in samples for j in stages]
         waves = np.stack([b.view(np.result_type(b.dtype, np.complex64))[..., 0] for b in blocks])
         found = harmonics.degrees(waves)
-        local = _local(waves)
+        local = _local(waves, found)
         own = np.sqrt(np.maximum(local[np.diag_indices(len(local))], 0))
         low = found[..., : harmonics.LOWEST, : harmonics.LOWEST].copy()  # a view would keep all harmonics of the cell
         # single precision is enough for a smooth factor, and half to read at every query
@@ -73,9 +80,15 @@ def _power(found: Array, bands: Bands) -> Array:
     return np.stack(products, axis=-1)
 
 
-def _local(waves: Array) -> Array:
-    """Return smoothed local products (T, T, 12 * 24) of the wrinkles in spectra (T, 3, m, k)."""
-    fields = spectra.synthesize(harmonics.without_low(waves), _SQUARES)
+def _size(cell: Cell) -> int:
+    return sum(part.nbytes for part in cell)
+
+
+def _local(waves: Array, found: Array | None = None) -> Array:
+    """Return smoothed local products (T, T, 12 * 24) of the wrinkles in spectra (T, 3, m, k), of which the harmonics
+    may be `found` already.
+    """
+    fields = spectra.synthesize(harmonics.without_low(waves, found), _SQUARES)
     count = len(fields)
     project, spread = _window()
     found = np.empty((count, count, 2 * COARSE * COARSE))
