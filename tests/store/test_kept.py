@@ -6,9 +6,10 @@ import itertools
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pytest
 
 from store.blending.kept import Kept
-from store.blending.methods import bands, cells
+from store.blending.methods import bands, cells, poles
 
 
 def test_the_last_used_stay_and_no_more_than_there_is_room_for() -> None:
@@ -62,3 +63,22 @@ def test_a_table_of_a_hundred_cells_makes_each_of_them_once() -> None:
     for samples, stages in itertools.chain(corners, corners):
         known.of(samples, stages)
     assert made == len(corners) == 100
+
+
+def test_a_scene_of_all_fruits_at_three_levels_of_detail_makes_its_windows_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Eighteen tables have eighteen highest degrees, and windows take three look-ups to make."""
+    made, make = 0, poles._windows
+
+    def counted(band: int, degree: int, dtype: str) -> tuple[np.ndarray, np.ndarray]:
+        nonlocal made
+        made += 1
+        return make(band, degree, dtype)
+
+    monkeypatch.setattr(poles, "_windows", counted)
+    pairs = [(band, degree) for degree in range(41, 59) for band in (8, 16, 32)]
+    for band, degree in pairs + pairs:
+        waves = np.ones((3, band + 1, band + 1), np.complex64)
+        poles.multiply(waves, np.ones((band + 1, band + 1), np.float32), degree)
+    assert made == len(pairs)

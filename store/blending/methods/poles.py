@@ -7,12 +7,12 @@ gains add is faded out there.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array
+
+from ..kept import Kept
 
 __all__ = ["highest_degree", "multiply"]
 
@@ -21,6 +21,9 @@ __all__ = ["highest_degree", "multiply"]
 _REST = 1e-3
 #: Where waves end and where they are whole, in multiples of sin(colatitude) = m / degree.
 _NONE, _ALL = 0.6, 1.0
+#: Bytes of windows that are kept over all tables: .1 MB at 32 colatitudes, .6 at 64, 4 at 128, and as long to make as
+#: three look-ups. A scene asks for all fruits at several levels of detail.
+_ROOM = 128 << 20
 
 
 def highest_degree(power: NDArray[np.floating]) -> int:
@@ -40,7 +43,8 @@ def multiply(waves: Array, factor: Array, degree: int) -> None:
     real = waves.real.dtype
     parts = waves.view(real).reshape(count, band + 1, band + 1, 2)
     # a window is the same on both hemispheres, so even and odd k do not mix: half the products
-    for first, windows in enumerate(_windows(band, degree, real.str)):
+    kept_windows = _kept.get((band, degree, real.str), lambda: _windows(band, degree, real.str))
+    for first, windows in enumerate(kept_windows):
         kept = len(windows)
         rows = np.empty((kept, count, 2, windows.shape[-1]), real)
         by = gain[:kept, None, None, first::2]
@@ -51,7 +55,6 @@ def multiply(waves: Array, factor: Array, degree: int) -> None:
             sums[:, :kept, first::2] += lines[:, :, i].transpose(1, 0, 2)
 
 
-@lru_cache(maxsize=16)
 def _windows(band: int, degree: int, dtype: str) -> tuple[Array, Array]:
     """Return the windows on cosine (even m) or sine (odd m) amplitudes, those of even k and those of odd k, each as
     matrices (m, k, k) from the right; the waves m beyond them have no room anywhere.
@@ -73,3 +76,6 @@ def _windows(band: int, degree: int, dtype: str) -> tuple[Array, Array]:
             windows[m] = ((weight[:, None] * basis.T)[first::2] @ shape[:, first::2]).T
     even.flags.writeable = odd.flags.writeable = False
     return even, odd
+
+
+_kept: Kept[tuple[int, int, str], tuple[Array, Array]] = Kept(_ROOM, lambda both: both[0].nbytes + both[1].nbytes)
