@@ -20,7 +20,7 @@ from solver.arrays import Array
 
 from . import transforms
 
-__all__ = ["band_of", "fill", "gradient", "poles", "spectrum", "synthesize", "truncate"]
+__all__ = ["band_of", "gradient", "poles", "spectrum", "synthesize", "truncate"]
 
 
 def spectrum(field: Array) -> Array:
@@ -68,28 +68,9 @@ def _synthesize(spectrum: Array, resolution: int, swapped: bool = False) -> Arra
     planes = planes.reshape(-1, band + 1, band + 1)
     dtype = np.dtype(np.float32 if planes.dtype == np.complex64 else np.float64)
     with transforms.borrow(resolution, min(band, resolution), len(planes), dtype, swapped) as plan:
-        fill(plan.coefficients, planes, swapped)
+        plan.put(planes)
         field = plan.run().reshape(*lead, resolution, 2 * resolution)
         return np.ascontiguousarray(np.moveaxis(field, -3, -1)) if vector else field.copy()
-
-
-def fill(coefficients: Array, planes: Array, swapped: bool = False) -> None:
-    """Put spectra (count, m, k) into the input of a `transforms.Synthesis` (count, m, n).
-
-    `swapped` takes even m for sines and odd m for cosines, as the derivative in colatitude has them.
-    """
-    n, band = coefficients.shape[2], planes.shape[2] - 1
-    low, high = min(band, n - 1), min(band, n)
-    rows = coefficients.shape[1]
-    cosine, sine = slice(int(swapped), rows, 2), slice(int(not swapped), rows, 2)
-    half = planes.real.dtype.type(0.5)  # the transforms count every wave but the constant twice
-    np.multiply(planes[:, cosine, : low + 1], half, out=coefficients[:, cosine, : low + 1])
-    np.multiply(planes[:, sine, 1 : high + 1], half, out=coefficients[:, sine, :high])
-    coefficients[:, cosine, 0] *= 2
-    if high == n:
-        coefficients[:, sine, n - 1] *= 2
-    if rows == n + 1:
-        coefficients[:, n] *= 2
 
 
 def gradient(spectrum: Array, resolution: int) -> tuple[Array, Array]:

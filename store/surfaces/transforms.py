@@ -1,7 +1,8 @@
 """The transforms under `spectra`: half-cell cosine and sine series in colatitude, Fourier series in azimuth.
 
-Synthesis, which every query needs, is by pyfftw with cached plans where it is installed, else by scipy.fft; the
-environment variable WIZEN_FFT=pyfftw|scipy|auto chooses, and both agree to round-off. FFTW plans by estimate, not by
+Synthesis, which every query needs, is by pyfftw with cached plans where it is installed, else by scipy.fft, but for few
+waves in colatitude, which are summed by matrices; the environment variable WIZEN_FFT=pyfftw|scipy|auto chooses, and all
+agree to round-off. FFTW plans by estimate, not by
 measurement: the plan, and with it the last bit of every result, is then the same in every process, and planning takes
 a millisecond.
 """
@@ -14,6 +15,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,6 +38,10 @@ __all__ = ["Synthesis", "analyse", "backend", "borrow"]
 
 #: Bytes of idle plans that are kept, over all shapes; a plan for 256 x 512 x 3 in float32 holds 4 MB.
 _IDLE = 128 << 20
+#: Colatitudes times waves up to which sums are matrices, measured: beyond, transforms are as fast.
+_MATRICES = 12_800
+#: Products of a matrix product that BLAS leaves to one thread: OpenBLAS does to 4 x 65536.
+_ALONE = 200_000
 
 
 def backend() -> str:
@@ -71,42 +77,125 @@ def analyse(field: Array) -> Array:
 
 
 class Synthesis:
-    """One planned way back, (count, m <= band, k) to (count, n, 2n); `coefficients` is its input, reused by every run.
+    """One planned way back, from amplitudes (count, m <= band, k) to (count, n, 2n).
 
-    Rows of even m hold cosine coefficients k = 0..n-1, rows of odd m sine coefficients k = 1..n, or the other way
-    round where `swapped`; what the caller does not fill stays zero. One thread at a time: take it from `borrow`.
+    What `put` puts in stays for every run; zero before. Rows of even m hold cosine amplitudes k = 0..n-1, rows of odd m
+    sine amplitudes k = 1..n, or the other way round where `swapped`. One thread at a time: take it from `borrow`.
     """
 
     def __init__(self, n: int, band: int, count: int, dtype: np.dtype[Any], swapped: bool, library: str) -> None:
-        self._n = n
+        self._n, self._band, self._count = n, band, count
+        self._dtype, self._cosine = dtype, int(swapped)
         self._library = library
-        make = _zeros if library == "pyfftw" else np.zeros
-        self.coefficients: Array = make((count, band + 1, n), _complex(dtype))
-        self._rows: Array = make((count, n + 1, n), _complex(dtype))
-        lines, sums = (a.view(dtype).reshape(*a.shape, 2) for a in (self.coefficients, self._rows))
-        even, odd = ((lines[:, first::2], sums[:, first : band + 1 : 2]) for first in (0, 1))
-        self._cosines, self._sines = (odd, even) if swapped else (even, odd)
+        self._make = _zeros if library == "pyfftw" else np.zeros
         self._plans: list[Any] = []
-        self.nbytes = self.coefficients.nbytes + 2 * self._rows.nbytes
+        # by `put` as (count, m, k); by `run` from there
+        self._is_summed = n * min(band + 1, n) <= _MATRICES
+        self._cosines, self._sines = self._by_matrices() if self._is_summed else self._by_transforms()
         if library == "pyfftw":
             self._field: Array = _empty((count, n, 2 * n), dtype)
-            self._plans = [
-                _plan(*self._cosines, ("FFTW_REDFT01",)),
-                _plan(*self._sines, ("FFTW_RODFT01",)),
-                _plan(self._rows.transpose(0, 2, 1), self._field, "FFTW_BACKWARD"),
-            ]
+            self._plans.append(_plan(self._lines, self._field, "FFTW_BACKWARD"))
+        self.nbytes = self._cosines.nbytes + self._sines.nbytes + 2 * self._lines.nbytes
+
+    def put(self, planes: Array) -> None:
+        """Take the waves m, k of spectra (count, m, k) that the lattice and the band hold."""
+        n, band = self._n, planes.shape[2] - 1
+        low, high = min(band, n - 1), min(band, n)
+        rows = self._band + 1
+        half = self._dtype.type(0.5)  # the transforms count every wave but the constant twice
+        cosines, sines = self._cosines, self._sines
+        np.multiply(planes[:, self._cosine : rows : 2, : low + 1], half, out=cosines[..., : low + 1])
+        np.multiply(planes[:, 1 - self._cosine : rows : 2, 1 : high + 1], half, out=sines[..., :high])
+        cosines[..., 0] *= 2
+        if high == n:
+            sines[..., n - 1] *= 2
+        if rows == n + 1:  # the last wave around
+            last = cosines if n % 2 == self._cosine else sines
+            last[:, -1] *= 2
 
     def run(self) -> Array:
-        """Return the field (count, n, 2n) of `coefficients`, unnormalised; overwritten by the next run."""
-        if self._library == "pyfftw":
-            for plan in self._plans:
-                plan.execute()
+        """Return the field (count, n, 2n) of what was put in, unnormalised; overwritten by the next run."""
+        self._down()
+        for plan in self._plans:
+            plan.execute()
+        if self._plans:
             return self._field
         import scipy.fft
 
-        for (source, target), transform in ((self._cosines, scipy.fft.dct), (self._sines, scipy.fft.dst)):
-            target[...] = transform(source, 3, axis=2)
-        return scipy.fft.irfft(self._rows, 2 * self._n, axis=1, norm="forward").transpose(0, 2, 1)
+        return scipy.fft.irfft(self._lines, 2 * self._n, axis=2, norm="forward")
+
+    def _by_matrices(self) -> tuple[Array, Array]:
+        """Prepare sums in colatitude by matrices: so few waves take half the time of FFTW's transforms of real fields,
+        which know no vectors. Memory: k (or a colatitude) by m.
+        """
+        n, count, dtype, waves = self._n, self._count, self._dtype, min(self._band + 1, self._n)
+        self._lines: Array = self._make((count, n, n + 1), _complex(dtype))
+        found = []
+        self._sums: list[tuple[Array, Array, Array, Array]] = []
+        for first, matrix in ((self._cosine, _cosine_sums), (1 - self._cosine, _sine_sums)):
+            amplitudes = np.zeros((count, waves, len(range(first, self._band + 1, 2))), _complex(dtype))
+            sums = matrix(n, waves, dtype.str, 2 * amplitudes.shape[2])
+            lines = np.empty((count, *sums.shape[:2], 2 * amplitudes.shape[2]), dtype)
+            whole = lines.view(_complex(dtype)).reshape(count, -1, amplitudes.shape[2])[:, :n]
+            self._sums.append((sums, amplitudes, lines, whole))
+            found.append(amplitudes.transpose(0, 2, 1))
+        return found[0], found[1]
+
+    def _by_transforms(self) -> tuple[Array, Array]:
+        """Prepare fast transforms in colatitude. Memory: m by k (or a colatitude)."""
+        dtype, first = self._dtype, self._cosine
+        coefficients = self._make((self._count, self._band + 1, self._n), _complex(dtype))
+        rows = self._make((self._count, self._n + 1, self._n), _complex(dtype))
+        self._lines = rows.transpose(0, 2, 1)
+        sides = coefficients[:, first::2], coefficients[:, 1 - first :: 2]
+        parts, sums = (a.view(dtype).reshape(*a.shape, 2) for a in (coefficients, rows))
+        even, odd = ((parts[:, i::2], sums[:, i : self._band + 1 : 2]) for i in (first, 1 - first))
+        self._pairs = even, odd
+        if self._library == "pyfftw":
+            self._plans = [_plan(*even, ("FFTW_REDFT01",)), _plan(*odd, ("FFTW_RODFT01",))]
+        return sides
+
+    def _down(self) -> None:
+        """Sum in colatitude, where no plan of FFTW does."""
+        if self._is_summed:
+            for first, (sums, amplitudes, lines, whole) in zip(
+                (self._cosine, 1 - self._cosine), self._sums, strict=True
+            ):
+                np.matmul(sums, amplitudes.view(self._dtype)[:, None], out=lines)
+                self._lines[..., first : self._band + 1 : 2] = whole
+        elif self._library != "pyfftw":
+            import scipy.fft
+
+            for (source, target), transform in zip(self._pairs, (scipy.fft.dct, scipy.fft.dst), strict=True):
+                target[...] = transform(source, 3, axis=2)
+
+
+def _cosine_sums(n: int, waves: int, dtype: str, columns: int) -> Array:
+    """Return the matrix from cosine amplitudes k = 0.. to colatitudes, as `_blocks` of it; all k but 0 count twice."""
+    return _blocks(n, waves, 0, dtype, columns)
+
+
+def _sine_sums(n: int, waves: int, dtype: str, columns: int) -> Array:
+    """Return the matrix from sine amplitudes k = 1.. to colatitudes, as `_blocks` of it; all k but n count twice."""
+    return _blocks(n, waves, 1, dtype, columns)
+
+
+@lru_cache(maxsize=128)
+def _blocks(n: int, waves: int, first: int, dtype: str, columns: int) -> Array:
+    """Return a matrix (blocks, rows, waves) of sums in colatitude, zero beyond its `n` rows.
+
+    Products with `columns` are so small by block that BLAS does not divide them among threads, which in a busy server
+    would wait for each other.
+    """
+    k = np.arange(first, waves + first)
+    angle = np.outer((np.arange(n) + 0.5) * np.pi / n, k)
+    matrix = (np.sin(angle) if first else np.cos(angle)) * np.where(k == n * first, 1.0, 2.0)
+    blocks = -(-n * waves * columns // _ALONE) or 1
+    rows = -(-n // blocks)
+    found = np.zeros((blocks * rows, waves), dtype)
+    found[:n] = matrix
+    found.flags.writeable = False
+    return found.reshape(blocks, rows, waves)
 
 
 _free: OrderedDict[tuple[Any, ...], list[Synthesis]] = OrderedDict()

@@ -17,7 +17,7 @@ import numpy as np
 
 from solver.arrays import Array
 
-from . import spectra, transforms
+from . import transforms
 
 __all__ = ["WHOLE", "Patch", "Window", "around", "down", "planes", "series"]
 
@@ -104,7 +104,7 @@ def planes(waves: Array, patch: Patch) -> Iterator[Array]:
         yield series(waves, patch)
         return
     with transforms.borrow(n, min(waves.shape[1] - 1, n), len(waves), waves.real.dtype) as plan:
-        spectra.fill(plan.coefficients, waves)
+        plan.put(waves)
         found = plan.run()
         yield found if patch.is_whole else found[:, patch.rows][..., patch.columns]
 

@@ -199,3 +199,34 @@ def test_half_cell_offset() -> None:
     expected = np.zeros((11, 11))
     expected[0, 3] = 1
     np.testing.assert_allclose(waves, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize(("n", "band"), [(4, 4), (5, 3), (16, 16), (33, 12), (33, 33), (40, 64)])
+@pytest.mark.parametrize(("dtype", "error"), [(np.float32, 1e-5), (np.float64, 1e-13)])
+def test_matrices_and_transforms_are_the_same_series(
+    n: int, band: int, swapped: bool, dtype: type, error: float, library: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Few waves are summed by matrices, many by fast transforms: against the series written out."""
+    rng, held = np.random.default_rng(n), min(band, n)
+    waves = (rng.standard_normal((2, band + 1, band + 1)) + 1j * rng.standard_normal((2, band + 1, band + 1))).astype(
+        np.complex64 if dtype is np.float32 else complex
+    )
+    theta, phi = (np.arange(n) + 0.5) * np.pi / n, np.arange(2 * n) * np.pi / n
+    series = np.zeros((2, n, 2 * n))
+    for order in range(held + 1):
+        of_cosines = order % 2 == int(swapped)
+        k = np.arange(min(held, n - 1) + 1) if of_cosines else np.arange(1, held + 1)
+        down = (np.cos if of_cosines else np.sin)(np.outer(theta, k)) @ waves[:, order, k].T  # (n, 2)
+        twice = 1 if order == 0 else 2
+        series += twice * np.real(np.einsum("tc,p->ctp", down, np.exp(1j * order * phi)))
+    found = []
+    for most in (0, 10**9):
+        monkeypatch.setattr(transforms, "_MATRICES", most)
+        plan = transforms.Synthesis(n, held, 2, np.dtype(dtype), swapped, library)
+        for _ in range(2):  # what was put in stays
+            plan.put(waves)
+            field = plan.run()
+        found.append(field.copy())
+        np.testing.assert_allclose(found[-1], series, atol=error * np.abs(series).max())
+    np.testing.assert_allclose(found[0], found[1], atol=error * np.abs(series).max())
