@@ -26,7 +26,9 @@ def engine(vertices: int = 300, **values) -> Engine:
 
 def sag(**values) -> float:
     """How far the tip of a clamped strip hangs down under a small weight."""
-    state = engine(400, **STRIP, attached=CLAMPED, **values).reach(0.05, Context())
+    params = GrowthParams.parse({"imperfection": 0, "tools": [], "attached": CLAMPED} | STRIP | values)
+    # the weight of a vertex is 1e-8: mean curvature, which has no second derivatives, stops where less is left
+    state = Engine(params, 400, 1e-9, history=False).reach(0.05, Context())
     return -float(state.x[:, 2].min())
 
 
@@ -153,5 +155,5 @@ def test_what_is_no_thickness_is_refused(part, said: str):
 def test_a_map_of_another_mesh_and_one_too_thin_are_refused():
     with pytest.raises(InvalidInput, match="3 values are painted on"):
         engine(thicknesses=[{"where": {"kind": "painted", "values": [0, 0.5, 1]}, "times": 2}])
-    with pytest.raises(InvalidInput, match="0.01 to 0.01 times"):
+    with pytest.raises(InvalidInput, match=r"0\.01 to 0\.01 times"):
         engine(thicknesses=2 * [{"where": EVERYWHERE, "times": 0.1}])
