@@ -27,8 +27,7 @@ def engine(vertices: int = 300, **values) -> Engine:
 def sag(**values) -> float:
     """How far the tip of a clamped strip hangs down under a small weight."""
     params = GrowthParams.parse({"imperfection": 0, "tools": [], "attached": CLAMPED} | STRIP | values)
-    # the weight of a vertex is 1e-8: mean curvature, which has no second derivatives, stops where less is left
-    state = Engine(params, 400, 1e-9, history=False).reach(0.05, Context())
+    state = Engine(params, 400, 1e-4, history=False).reach(0.05, Context())
     return -float(state.x[:, 2].min())
 
 
@@ -41,15 +40,16 @@ def beam(thickness) -> float:
     return float((1e-6 * moment / h**3 * (2.0 - x)).sum() * dx / (0.1**2 / 6))
 
 
-@pytest.mark.parametrize("bending", ["hinges", "mean_curvature"])
 @pytest.mark.parametrize(("low", "high", "times"), [(0.05, -0.05, 2.0), (-1.0, 1.5, 0.5)], ids=["root", "tip"])
-def test_a_strip_of_two_thicknesses_sags_as_the_beam_in_series(bending: str, low: float, high: float, times: float):
+def test_a_strip_of_two_thicknesses_sags_as_the_beam_in_series(low: float, high: float, times: float):
+    """Bending by mean curvature makes no beam: a saddle costs it nothing (Poisson's ratio 1), so a free strip is softer."""
+
     def thickness(x):
         v = np.clip((x - low) / (high - low), 0, 1)
         return 1 + (times - 1) * v * v * (3 - 2 * v)
 
     part = {"where": {"kind": "band", "along": "x", "low": low, "high": high}, "times": times}
-    found = sag(bending=bending, thicknesses=[part]) / sag(bending=bending)
+    found = sag(thicknesses=[part]) / sag()
     assert found == pytest.approx(beam(thickness) / beam(np.ones_like), rel=0.05)
 
 
