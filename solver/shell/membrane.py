@@ -110,8 +110,7 @@ def membrane_tangent(
     places: (f, 9) block of corner pair (row, column). thick: (f,) as `membrane` has it.
     """
     local = np.empty((2, 2, 3, 3))
-    c = np.empty((3, 3))
-    b = np.empty((3, 2, 3))
+    c, b = np.empty((3, 3)), np.empty((3, 2, 3))
     whole = np.empty((3, 3, 3, 3))
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]

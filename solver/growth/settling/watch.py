@@ -70,14 +70,18 @@ class Watch:
     """Tells of states of one run whether parts pass through each other, or come nearer each other than a distance."""
 
     def __init__(self, distance: float) -> None:
-        #: That parts keep from each other once they are near.
-        self.distance = distance
+        self._distance = distance
         self._mesh: shell.Topology | None = None
         #: Vertices along the border in turn, where it is one ring.
         self._rim: Ints | None = None
         self._along: _Along | None = None
         self._close: _Close | None = None
         self._far: _Far | None = None
+
+    @property
+    def distance(self) -> float:
+        """Return the distance that parts keep from each other once they are near."""
+        return self._distance
 
     def apart(self, start: Floats, end: State) -> Generator[None, None, bool]:
         """Find whether no part of the sheet is as near another as the distance at the end of a straight way.
@@ -102,7 +106,7 @@ class Watch:
                 return False
             known = self._along_still(lengths_of(end))
             if known is None:
-                return not touches(end, self.distance, vertex_areas(end))
+                return not touches(end, self._distance, vertex_areas(end))
             # what is near along the sheet outlives a long way, and takes longer to find than all the rest
             return not self._touches(known, self._searched(known, end, 0.0), end)
         along = self._along_now(end)
@@ -114,7 +118,7 @@ class Watch:
         # what meets on the way was no further apart at its end than both ends moved
         if over:
             through = False
-        elif close is None or len(shell.within(end.x, far.pairs, 2 * _SURE * size / self.distance)):
+        elif close is None or len(shell.within(end.x, far.pairs, 2 * _SURE * size / self._distance)):
             through = yield from _through(end, way, looks)
         else:
             through = any(shell.any_cross(end.x - k / looks * way, mesh.triangles, close.pairs) for k in range(looks))
@@ -144,13 +148,13 @@ class Watch:
         way leaves the sheet. Then both are as near its rim, which is looked at as a sheet of its own.
         """
         lengths, mesh, rim = lengths_of(state), state.mesh, self._rim
-        felt = max(_FELT, self.distance / (self.distance + 2 * float(lengths.max())))
+        felt = max(_FELT, self._distance / (self._distance + 2 * float(lengths.max())))
         if rim is None or over < _LEAN * felt:
             return False
         i, j = mesh.edges.T
         edge = float(np.linalg.norm(state.x[i] - state.x[j], axis=1).max())
         flat = state.x @ axes.T
-        reach = self.distance + 3 * edge
+        reach = self._distance + 3 * edge
         away = cKDTree(flat[rim]).query(flat, distance_upper_bound=reach)[0]
         by_rim: Bools = np.asarray(away < reach)
         faces = np.flatnonzero(by_rim[mesh.triangles].any(axis=1))
@@ -158,7 +162,7 @@ class Watch:
             return False
         part, vertices, _ = shell.part_of(mesh, faces)
         strip = replace(state, x=state.x[vertices], mesh=part, g=state.g[faces])
-        return not touches(strip, self.distance, vertex_areas(strip))
+        return not touches(strip, self._distance, vertex_areas(strip))
 
     def _along_now(self, state: State) -> _Along:
         """Return what is near along a state's sheet; ways, and the longest that count, change by no more than edges."""
@@ -166,7 +170,7 @@ class Watch:
         known = self._along_still(lengths)
         if known is None:
             more = _SURE * (1 + _DRIFT) / (1 - _DRIFT)
-            near = near_in(state, self.distance, vertex_areas(state), more)
+            near = near_in(state, self._distance, vertex_areas(state), more)
             known = self._along = _Along(lengths, near, near.within(1 / more**2))
             self._close = self._far = None
         return known
@@ -203,7 +207,7 @@ class Watch:
         return known
 
     def _searched(self, along: _Along, end: State, room: float) -> _Far:
-        there = end.x, end.mesh, along.surely, self.distance, _SURE * room, 0.0, end.length
+        there = end.x, end.mesh, along.surely, self._distance, _SURE * room, 0.0, end.length
         return _Far(end.x, room, shell.search(*there, only="far"))
 
     def _touches(self, along: _Along, far: _Far, state: State) -> bool:
@@ -215,10 +219,10 @@ class Watch:
         rows[ends[:, 0]] = True
         if not rows.any():
             return False
-        near = near_in(state, self.distance, vertex_areas(state), rows=rows)
+        near = near_in(state, self._distance, vertex_areas(state), rows=rows)
         if not near.holds(ends).all():
             return True
-        pairs = shell.search(x, mesh, near, self.distance, 0.0, 0.0, state.length, only="near")
+        pairs = shell.search(x, mesh, near, self._distance, 0.0, 0.0, state.length, only="near")
         return len(shell.within(x, pairs)) > 0
 
 

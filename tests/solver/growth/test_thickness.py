@@ -42,7 +42,7 @@ def beam(thickness) -> float:
 
 @pytest.mark.parametrize(("low", "high", "times"), [(0.05, -0.05, 2.0), (-1.0, 1.5, 0.5)], ids=["root", "tip"])
 def test_a_strip_of_two_thicknesses_sags_as_the_beam_in_series(low: float, high: float, times: float):
-    """Bending by mean curvature makes no beam: a saddle costs it nothing (Poisson's ratio 1), so a free strip is softer."""
+    """Bending by mean curvature makes no beam: a saddle costs it nothing (Poisson's ratio 1)."""
 
     def thickness(x):
         v = np.clip((x - low) / (high - low), 0, 1)
