@@ -17,6 +17,7 @@ from ..contract import Context, InvalidGeometry
 from ..geometry.crossings import crossings
 from .fresh import fresh
 from .living.history import History, Moment
+from .matter import thickest
 from .params import GrowthParams
 from .remeshing.remesh import MOST
 from .settling.active import Habit
@@ -79,7 +80,9 @@ class Engine:
         #: Of a closed surface.
         self._volume = 0.0 if len(self.state.mesh.border) else enclosed(begun)
         longest, largest = params.remesh * self.state.length, MOST * len(self.state.x)
-        self._way = Steps(params, tolerance, most, longest, largest, self._volume, Watch(params.thickness))
+        self._way = Steps(
+            params, tolerance, most, longest, largest, self._volume, Watch(thickest(self.state, params.thickness))
+        )
         self._carried = Carried(Tangent(self.state.mesh), Habit(), params.contact or 0.0)
         self._steps = 0
 
@@ -239,7 +242,7 @@ class Engine:
         free = self.params.contact is None and not distance
         found = yield from self._settled(state, distance, free)
         if found is None or (free and not (yield from self._way.watch.apart(state.x, found))):
-            found = yield from self._settled(state, self.params.thickness)
+            found = yield from self._settled(state, self._way.watch.distance)
             assert found is not None  # it is not free
         check_outward(found, self._volume, self.state.time, self.params)
         return found

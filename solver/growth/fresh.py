@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import shell
 from ..contract import Context
-from .matter import matter, springs
+from .matter import matter, springs, thickness_map
 from .own.textured import corners_of, faces_of, groups_of
 from .params import GrowthParams
 from .shapes import Mesh
@@ -25,8 +25,11 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
     np.add.at(normals, mesh.triangles, np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, None, :])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
-    x = mesh.x + offset[:, None] * normals
     material = matter(params.ribs, params.colours, mesh, border(top), params.seed) | groups_of(params.mesh)
+    if params.thicknesses:
+        material["thick"] = thickness_map(params.thicknesses, mesh, border(top), params.seed)
+        offset *= material["thick"]
+    x = mesh.x + offset[:, None] * normals
     if params.bed:
         flexural = shell.Material(params.thickness, params.poisson).flexural
         below, stiffer = springs(params.bed, flexural, mesh, border(top), params.seed)

@@ -16,12 +16,28 @@ from .tooling.places import Everywhere, Place, share
 if TYPE_CHECKING:
     from .state import State
 
-__all__ = ["BARE", "Bed", "Colour", "Rib", "coloured", "grown_further", "matter", "springs"]
+__all__ = [
+    "BARE",
+    "Bed",
+    "Colour",
+    "Rib",
+    "Thickness",
+    "coloured",
+    "grown_further",
+    "matter",
+    "softer",
+    "springs",
+    "thickest",
+    "thickness_map",
+]
 
 #: Mean edges of a mesh to a wavelength of its folds at least.
 _SHOWN = 5.0
 
 Channel = Annotated[float, Field(ge=0, le=1)]
+
+#: What a map may make of the thickness, over the sheet's.
+_THINNEST, _THICKEST = 0.05, 20.0
 
 #: Colour of a surface that says none, linear light.
 BARE = (0.42, 0.50, 0.20)
@@ -36,6 +52,13 @@ class Rib(_Model):
 
     where: Place = Field(description="Share of each vertex of the start shape, of the logarithm of `stiffness`")
     stiffness: float = Field(30.0, ge=1e-3, le=1e4, description="Bending stiffness over that of the sheet [1]")
+
+
+class Thickness(_Model):
+    """A part that is thicker than the sheet, a vein, or thinner, a rim: its membrane, bending and weight follow."""
+
+    where: Place = Field(description="Share of each vertex of the start shape: 0 the sheet's thickness, 1 `times` it")
+    times: float = Field(ge=0.05, le=20, description="Thickness over that of the sheet [1]")
 
 
 class Bed(_Model):
@@ -91,6 +114,39 @@ def matter(ribs: Sequence[Rib], colours: Sequence[Colour], mesh: Mesh, border: I
         if any(c.grown > 1 for c in colours):
             found["grown"] = np.zeros(len(mesh.x))
     return found
+
+
+def thickness_map(parts: Sequence[Thickness], mesh: Mesh, border: Ints, seed: int) -> Floats:
+    """Return the thickness (n,) of each vertex over the sheet's [1]: the product of 1 + share (times - 1).
+
+    Raises:
+        InvalidInput: a place that the shape does not have, values of another mesh, a map that leaves 0.05 to 20.
+
+    """
+    shares = [1 + (part.times - 1) * share(part.where, mesh, border, seed + k) for k, part in enumerate(parts)]
+    found: Floats = np.prod(shares, axis=0)
+    if found.min() < _THINNEST or found.max() > _THICKEST:
+        raise InvalidInput(
+            f"thicknesses: together they make the sheet {found.min():.3g} to {found.max():.3g} times as thick.",
+            advice=f"Keep their product between {_THINNEST:g} and {_THICKEST:g}, or change `thickness`.",
+        )
+    return found
+
+
+def thickest(state: State, thickness: float) -> float:
+    """Return the largest thickness of a sheet, that of most being `thickness` [start shape's unit]."""
+    return thickness * float(state.matter["thick"].max()) if "thick" in state.matter else thickness
+
+
+def softer(state: State, flexural: float) -> float:
+    """Return the lesser of a stretched edge's force and a folded one's [mu], where the sheet is as thick as its mean.
+
+    flexural: rigidity of the sheet where its thickness is 1 over `thickness` [mu l^2].
+    """
+    if "thick" not in state.matter:
+        return min(1.0, flexural / state.length**2)
+    mean = float(state.matter["thick"].mean())
+    return min(mean, mean**3 * flexural / state.length**2)
 
 
 def springs(bed: Bed, flexural: float, mesh: Mesh, border: Ints, seed: int) -> tuple[Floats, Floats]:

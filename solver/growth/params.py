@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
 from ..contract import Params
-from .matter import Bed, Colour, Rib
+from .matter import Bed, Colour, Rib, Thickness
 from .own.imported import OwnMesh
 from .shapes import Shape
 from .solids import Solid, check_pace
@@ -82,6 +82,14 @@ class GrowthParams(Params):
         description="Thickness of the sheet: thicker folds wider",
         json_schema_extra=_units("start shape's unit"),
     )
+    thicknesses: tuple[Thickness, ...] = Field(
+        (),
+        max_length=50,
+        description="Where the sheet is thicker, or thinner, than `thickness`; of several the factors multiply",
+        json_schema_extra=_units("1"),
+        # runs without a map keep their keys
+        exclude_if=lambda value: not value,
+    )
     poisson: float = Field(0.3, ge=0, le=0.49, description="Poisson's ratio", json_schema_extra=_units("1"))
     bending: Bending = Field(
         "hinges",
@@ -151,7 +159,7 @@ class GrowthParams(Params):
     )
     contact: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
-        description="Distance that parts keep from each other; not given: the thickness; 0: they pass through",
+        description="Distance that parts keep from each other; not given: the largest thickness; 0: they pass through",
         json_schema_extra=_units("start shape's unit"),
     )
     step: float = Field(

@@ -37,8 +37,9 @@ class State:
     forces: largest out-of-balance force over mu l. iterations: steps of the minimiser so far. drift: (n, 3) how fast
     the shape moved in the last step, None at the start. minimum: whether it was shown, when it was settled to be
     handed over, that the energy bends up along every way as far as its digits tell. matter: (n, ...) what rides on the
-    material (`matter`); led: (n, 3) how fast what is held is led. corners: (f, 3, k) what rides on triangles, and
-    differs along seams: uv. faces: (f,) numbers that triangles hand down: material.
+    material (`matter`); thick: (n,) thickness over the sheet's, where that differs; led: (n, 3) how fast what is held
+    is led. corners: (f, 3, k) what rides on triangles, and differs along seams: uv. faces: (f,) numbers that triangles
+    hand down: material.
     """
 
     time: float

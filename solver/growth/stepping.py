@@ -88,7 +88,7 @@ class Steps:
             yield None
             if not (clear and (yield from self.watch.apart(meshed.x, state))):
                 yield None
-                near = carried._replace(distance=self.params.thickness)
+                near = carried._replace(distance=self.watch.distance)
                 _, state, after = yield from self._taken(before, near, tools, solids, dt)
         return state, after
 

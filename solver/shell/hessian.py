@@ -108,8 +108,10 @@ def bending_hessian(
 
 
 @njit(cache=True, error_model="numpy")
-def membrane_hessian(x: Floats, triangles: Ints, g: Floats, lame: float, places: Ints, blocks: Floats) -> None:
-    """Add the membrane energy's second derivative to `blocks` (nnz, 3, 3); places (f, 9)."""
+def membrane_hessian(
+    x: Floats, triangles: Ints, g: Floats, lame: float, places: Ints, blocks: Floats, thick: Floats | None = None
+) -> None:
+    """Add the membrane energy's second derivative to `blocks` (nnz, 3, 3); places (f, 9), thick (f,) or None for 1."""
     edge = np.empty((2, 3))
     up, stress = np.empty((2, 2)), np.empty((2, 2))
     strain, mixed = np.empty((2, 2)), np.empty((2, 2))
@@ -119,6 +121,8 @@ def membrane_hessian(x: Floats, triangles: Ints, g: Floats, lame: float, places:
         g11, g12, g22 = g[t, 0], g[t, 1], g[t, 2]
         determinant = g11 * g22 - g12 * g12
         area = 0.5 * np.sqrt(determinant)
+        if thick is not None:
+            area *= thick[t]
         up[0, 0], up[0, 1], up[1, 0], up[1, 1] = (
             g22 / determinant,
             -g12 / determinant,

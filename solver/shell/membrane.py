@@ -47,8 +47,10 @@ def areas(g: Floats) -> Floats:
 
 
 @njit(cache=True, error_model="numpy")
-def membrane(x: Floats, triangles: Ints, g: Floats, lame: float, gradient: Floats) -> float:
-    """Return the membrane's energy and add its gradient (n, 3) to `gradient`."""
+def membrane(
+    x: Floats, triangles: Ints, g: Floats, lame: float, gradient: Floats, thick: Floats | None = None
+) -> float:
+    """Return the membrane's energy and add its gradient (n, 3); thick (f,): thickness over the sheet's, None for 1."""
     energy = 0.0
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -57,6 +59,8 @@ def membrane(x: Floats, triangles: Ints, g: Floats, lame: float, gradient: Float
         g11, g12, g22 = g[t, 0], g[t, 1], g[t, 2]
         determinant = g11 * g22 - g12 * g12
         area = 0.5 * np.sqrt(determinant)
+        if thick is not None:
+            area *= thick[t]
         p, q, r = g22 / determinant, -g12 / determinant, g11 / determinant
         e11 = 0.5 * (ax * ax + ay * ay + az * az - g11)
         e12 = 0.5 * (ax * bx + ay * by + az * bz - g12)
@@ -97,21 +101,24 @@ def _positive(s11: float, s12: float, s22: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def membrane_tangent(x: Floats, triangles: Ints, g: Floats, lame: float, places: Ints, blocks: Floats) -> None:
+def membrane_tangent(
+    x: Floats, triangles: Ints, g: Floats, lame: float, places: Ints, blocks: Floats, thick: Floats | None = None
+) -> None:
     """Add the tangent to `blocks` (nnz, 3, 3): exact where stress is tensile, without its compressive part elsewhere.
 
     Leaving compression out keeps the matrix positive semidefinite where the sheet is about to buckle.
-    places: (f, 9) block of corner pair (row, column).
+    places: (f, 9) block of corner pair (row, column). thick: (f,) as `membrane` has it.
     """
     local = np.empty((2, 2, 3, 3))
-    c = np.empty((3, 3))
-    b = np.empty((3, 2, 3))
+    c, b = np.empty((3, 3)), np.empty((3, 2, 3))
     whole = np.empty((3, 3, 3, 3))
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         g11, g12, g22 = g[t, 0], g[t, 1], g[t, 2]
         determinant = g11 * g22 - g12 * g12
         area = 0.5 * np.sqrt(determinant)
+        if thick is not None:
+            area *= thick[t]
         p, q, r = g22 / determinant, -g12 / determinant, g11 / determinant
         e11, e12, e22 = -g11, -g12, -g22
         for d in range(3):

@@ -17,6 +17,7 @@ from ...arrays import Floats, Ints
 from ...linalg.multifrontal import Analysis
 from ...shell.inverse import fronts_of, inverse_of
 from ...shell.normals import normals
+from ..matter import softer
 from ..params import Bending
 from ..solids import Solid
 from ..state import State
@@ -78,6 +79,12 @@ class StepEnergy:
         self._pressure, self._gravity, self._bending, self._pushing = pressure, gravity, bending, pushing
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
+        thick = state.matter.get("thick")
+        #: Thickness over the sheet's of triangles (f,), None where it is 1 everywhere.
+        self.thick = None if thick is None else thick[state.mesh.triangles].mean(axis=1)
+        if thick is not None:
+            self.stiffness *= thick[state.mesh.hinges[:, :2]].mean(axis=1) ** 3
+            self._mean = None if self._mean is None else (self._mean[0], self._mean[1] * thick**3)
         if "stiff" in state.matter:
             stiff = state.matter["stiff"]
             self.stiffness *= np.exp(stiff[state.mesh.hinges[:, :2]].mean(axis=1))
@@ -95,7 +102,7 @@ class StepEnergy:
         self.cut = False
         self.areas = vertex_areas(state)
         self.bed = Bed.under(state, self.areas)
-        unit = state.length * min(1.0, material.flexural / state.length**2)
+        unit = state.length * softer(state, material.flexural)
         self.touching = Touching(state, distance, unit, self.areas) if distance else None
         self.follow(state.x)
 
@@ -106,9 +113,12 @@ class StepEnergy:
             self._fixed = self._pressure * area_vectors(x, self.state.mesh.triangles)
         if any(self._gravity):
             weight = self.areas[:, None] * np.array(self._gravity)
+            if "thick" in self.state.matter:
+                weight *= self.state.matter["thick"][:, None]
             self._fixed = weight if self._fixed is None else self._fixed + weight
         if self._pushing:
-            pushed = self._pushing * compressed(x, self.state.mesh.triangles, self.state.g, self.material.lame)
+            mesh, g = self.state.mesh, self.state.g
+            pushed = self._pushing * compressed(x, mesh.triangles, g, self.material.lame, self.thick)
             self.pushed = balanced(pushed, self.areas, self.rigid(x))
 
     def lay(self, before: Floats | None, share: float) -> None:
@@ -131,7 +141,7 @@ class StepEnergy:
 
     def _at(self, x: Floats) -> tuple[float, Floats]:
         state, gradient = self.state, np.zeros_like(x)
-        energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient)
+        energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient, self.thick)
         if self._mean is None:
             energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
         else:
@@ -202,7 +212,7 @@ class StepEnergy:
         pattern = coupled[0] if coupled else self.tangent.pattern
         mesh, lame = state.mesh, self.material.lame
         blocks = np.zeros((pattern.blocks, 3, 3))
-        shell.membrane_hessian(x, mesh.triangles, state.g, lame, pattern.of_triangles, blocks)
+        shell.membrane_hessian(x, mesh.triangles, state.g, lame, pattern.of_triangles, blocks, self.thick)
         angles = shell.angles(x, mesh.hinges)
         shell.bending_hessian(x, mesh.hinges, angles, state.rest, self.stiffness, pattern.of_hinges, blocks)
         if self.following:
@@ -263,7 +273,8 @@ class StepEnergy:
         if new:
             yield
         blocks = np.zeros((pattern.blocks, 3, 3))
-        shell.membrane_tangent(x, state.mesh.triangles, state.g, self.material.lame, pattern.of_triangles, blocks)
+        triangles, lame = state.mesh.triangles, self.material.lame
+        shell.membrane_tangent(x, triangles, state.g, lame, pattern.of_triangles, blocks, self.thick)
         shell.bending_tangent(x, state.mesh.hinges, self.stiffness, pattern.of_hinges, blocks)
         blocks[pattern.diagonal] += _SHIFT * np.eye(3)
         self._add_ground(x, pattern.diagonal, blocks)

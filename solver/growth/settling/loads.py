@@ -18,16 +18,18 @@ def area_vectors(x: Floats, triangles: Ints) -> Floats:
     return np.stack([np.bincount(triangles.ravel(), np.repeat(third[:, c], 3), len(x)) for c in range(3)], -1)
 
 
-def compressed(x: Floats, triangles: Ints, g: Floats, lame: float) -> Floats:
+def compressed(x: Floats, triangles: Ints, g: Floats, lame: float, thick: Floats | None = None) -> Floats:
     """Return the compression of triangles, turned into forces along their normals, at vertices (n, 3).
 
     The normal stress F_N of Combaz and Neyret: each triangle's compressive resultant, -(1 + lame) tr(e) [mu] where that
-    is positive, the mean of its two principal stresses, times its area vector.
+    is positive, the mean of its two principal stresses, times its area vector; and times thick (f,), its thickness over
+    the sheet's.
     """
     now = shell.metric(x, triangles)
     # half the trace of a - g, indices raised by g
     trace = (g[:, 2] * now[:, 0] - 2 * g[:, 1] * now[:, 1] + g[:, 0] * now[:, 2]) / (g[:, 0] * g[:, 2] - g[:, 1] ** 2)
     squeezed = np.maximum(-(1 + lame) * (trace - 2) / 2, 0.0)
+    squeezed = squeezed if thick is None else squeezed * thick
     p = x[triangles]
     third = squeezed[:, None] * np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 6
     return np.stack([np.bincount(triangles.ravel(), np.repeat(third[:, c], 3), len(x)) for c in range(3)], -1)

@@ -15,6 +15,7 @@ import numpy as np
 from ... import shell
 from ...arrays import Floats
 from ...contract import Unstable
+from ..matter import softer
 from ..params import GrowthParams
 from ..solids import present
 from ..state import State
@@ -36,7 +37,7 @@ _NEARER, _LEAST_SHARE = 0.7, 0.02
 
 def force_unit(state: State, material: shell.Material) -> float:
     """Return the force that residuals are measured in [mu l]: the lesser of a stretched edge's and a folded one's."""
-    return state.length * min(1.0, material.flexural / state.length**2)
+    return state.length * softer(state, material.flexural)
 
 
 def residual(state: State, params: GrowthParams) -> float:

@@ -78,6 +78,11 @@ class Watch:
         self._close: _Close | None = None
         self._far: _Far | None = None
 
+    @property
+    def distance(self) -> float:
+        """Return the distance that parts keep from each other once they are near."""
+        return self._distance
+
     def apart(self, start: Floats, end: State) -> Generator[None, None, bool]:
         """Find whether no part of the sheet is as near another as the distance at the end of a straight way.
 
