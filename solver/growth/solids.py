@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -32,6 +32,9 @@ def _sum(a: Point, b: Point) -> Point:
 
 
 class _Solid(_Model):
+    #: The field that says where it is, which moves.
+    place: ClassVar[str] = "centre"
+
     start: float = Field(0.0, ge=0, le=1000, description="From when it is there [growth time]")
     duration: float = Field(1000.0, gt=0, le=1000, description="How long it is there [growth time]")
     velocity: tuple[Speed, Speed, Speed] = Field(
@@ -43,9 +46,15 @@ class _Solid(_Model):
         x, y, z = ((time - self.start) * v for v in self.velocity)
         return (x, y, z)
 
+    def at(self, time: float) -> Self:
+        """Return it where it is at a growth time."""
+        return self.model_copy(update={self.place: _sum(getattr(self, self.place), self.moved(time))})
+
 
 class Plane(_Solid):
     """A half-space that the surface cannot enter."""
+
+    place: ClassVar[str] = "point"
 
     kind: Literal["plane"] = "plane"
     point: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="A point of the plane [start shape's unit]")
@@ -55,10 +64,6 @@ class Plane(_Solid):
     def thick(self) -> float:
         """How deep its middle lies at least: it has none."""
         return math.inf
-
-    def at(self, time: float) -> Self:
-        """Return it where it is at a growth time."""
-        return self.model_copy(update={"point": _sum(self.point, self.moved(time))})
 
 
 class SolidBall(_Solid):
@@ -72,10 +77,6 @@ class SolidBall(_Solid):
     def thick(self) -> float:
         """How deep its middle lies at least."""
         return self.radius
-
-    def at(self, time: float) -> Self:
-        """Return it where it is at a growth time."""
-        return self.model_copy(update={"centre": _sum(self.centre, self.moved(time))})
 
 
 class SolidBox(_Solid):
@@ -92,10 +93,6 @@ class SolidBox(_Solid):
     def thick(self) -> float:
         """How deep its middle lies at least."""
         return min(self.size) / 2
-
-    def at(self, time: float) -> Self:
-        """Return it where it is at a growth time."""
-        return self.model_copy(update={"centre": _sum(self.centre, self.moved(time))})
 
     @model_validator(mode="after")
     def _round(self) -> Self:
@@ -136,10 +133,6 @@ class SolidMesh(_Solid):
     def thick(self) -> float:
         """How deep its middle lies at least, but for thin edges and tips."""
         return self.mesh.signed.thick()
-
-    def at(self, time: float) -> Self:
-        """Return it where it is at a growth time."""
-        return self.model_copy(update={"centre": _sum(self.centre, self.moved(time))})
 
 
 Solid = Annotated[Plane | SolidBall | SolidBox | SolidMesh, Field(discriminator="kind")]

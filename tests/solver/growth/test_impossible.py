@@ -32,6 +32,17 @@ def test_a_sheet_beside_its_solid_falls_and_says_so():
     assert "Attach" in found.value.advice
 
 
+def test_a_sheet_that_begins_wholly_inside_a_solid_is_refused_before_any_work():
+    ball, plane = {"kind": "ball", "radius": 2}, {"kind": "plane", "point": [0, 0, 0.5]}
+    box = {"kind": "box", "centre": [0, 0, 9], "size": [1, 1, 1]}
+    for solid, depth in ((ball, "1 deep or deeper, 2"), (plane, "0.5 deep or deeper, 0.5")):
+        with pytest.raises(InvalidInput, match=f"wholly inside solid 1, a {solid['kind']}: all of it is {depth}"):
+            SOLVER.parse(DISC | {"solids": [box, solid]})
+        SOLVER.parse(DISC | {"solids": [solid | {"start": 0.1}]})
+    # partly inside, and laid on it by less than it is thick
+    SOLVER.parse(DISC | {"solids": [ball | {"radius": 0.9}, plane | {"point": [0, 0, 0.04]}]})
+
+
 def test_pressure_blows_an_open_sheet_away():
     with pytest.raises(NotConverged, match=r"falls|nothing holds"):
         run(DISC | {"pressure": 0.05})
