@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 from ..contract import Params
 from .matter import Bed, Colour, Rib, Thickness
 from .own.imported import OwnMesh
-from .shapes import Shape, start
+from .shapes import Shape, is_closed, start
 from .solids import Solid, check_pace
 from .tooling.places import Place
 from .tooling.tools import HotSurface, Tool
@@ -193,20 +193,18 @@ class GrowthParams(Params):
     @model_validator(mode="after")
     def _outside(self) -> Self:
         first = [(k, solid) for k, solid in enumerate(self.solids) if not solid.start]
-        if first:
-            # compiled code, which parameters must not load
-            from .settling.loads import depth_in
-
-            x = (self.mesh.shape() if self.mesh else start(self.shape, _LOOKED_AT, self.aspect)).x
-            for number, solid in first:
-                depth = depth_in(solid, x)[0]
-                # what lies in it by less than it is thick is laid on it
-                if depth.min() > self.thickness:
-                    raise ValueError(
-                        f"the sheet begins wholly inside solid {number}, a {solid.kind}: all of it is "
-                        f"{depth.min():.3g} deep or deeper, {depth.max():.3g} at most; move the solid off the sheet, "
-                        "make it smaller, or give it a later `start`"
-                    )
+        if not first:
+            return self
+        sheet = self.mesh.shape() if self.mesh else start(self.shape, _LOOKED_AT, self.aspect)
+        for number, solid in first:
+            depth = solid.depth(sheet.x)[0]
+            # what lies in it by less than it is thick is laid on it; what is closed is stretched over what is in it
+            if depth.min() > self.thickness and not is_closed(sheet.triangles):
+                raise ValueError(
+                    f"the sheet begins wholly inside solid {number}, a {solid.kind}: all of it is "
+                    f"{depth.min():.3g} deep or deeper, {depth.max():.3g} at most; move the solid off the sheet, "
+                    "make it smaller, or give it a later `start`"
+                )
         return self
 
     @model_validator(mode="after")

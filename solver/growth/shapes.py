@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, Delaunay
 from ..arrays import Floats, Ints
 from . import revolved
 
-__all__ = ["Mesh", "Shape", "start"]
+__all__ = ["Mesh", "Shape", "is_closed", "start"]
 
 Shape = Literal[
     "sphere", "disc", "half_disc", "strip", "square", "triangle", "tube", "stem", "capsule", "cone", "torus"
@@ -22,6 +22,12 @@ class Mesh(NamedTuple):
 
     x: Floats
     triangles: Ints
+
+
+def is_closed(triangles: Ints) -> bool:
+    """Return whether a surface has no rim: every edge has two triangles."""
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def start(shape: Shape, vertices: int, aspect: float) -> Mesh:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ..arrays import Floats
 from ..contract.mesh import ClosedMesh
 
 if TYPE_CHECKING:
@@ -41,6 +42,10 @@ class _Solid(_Model):
         (0.0, 0.0, 0.0), description="How it moves from its start on [start shape's unit per growth time]"
     )
 
+    def depth(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return how deep points (n, 3) are in it (n,), 0 outside, and the way out (n, 3)."""
+        raise NotImplementedError
+
     def moved(self, time: float) -> tuple[float, float, float]:
         """Return how far it has come by a growth time."""
         x, y, z = ((time - self.start) * v for v in self.velocity)
@@ -65,6 +70,11 @@ class Plane(_Solid):
         """How deep its middle lies at least: it has none."""
         return math.inf
 
+    def depth(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return depths and ways out, all along its normal."""
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        return np.maximum((np.array(self.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
+
 
 class SolidBall(_Solid):
     """A ball that the surface cannot enter."""
@@ -77,6 +87,12 @@ class SolidBall(_Solid):
     def thick(self) -> float:
         """How deep its middle lies at least."""
         return self.radius
+
+    def depth(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return depths and ways out, away from its centre."""
+        way = x - np.array(self.centre)
+        distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
+        return np.maximum(self.radius - distance, 0.0), way / distance[:, None]
 
 
 class SolidBox(_Solid):
@@ -93,6 +109,19 @@ class SolidBox(_Solid):
     def thick(self) -> float:
         """How deep its middle lies at least."""
         return min(self.size) / 2
+
+    def depth(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return depths and ways out: of a side, or of the rounding of an edge or a corner."""
+        way = x - np.array(self.centre)
+        signs = np.where(way < 0, -1.0, 1.0)
+        # how far beyond the box without its rounding: outside of that the nearest point is on it, inside a side is
+        beyond = np.abs(way) - (np.array(self.size) / 2 - self.edge)
+        outside = np.maximum(beyond, 0.0)
+        away = np.linalg.norm(outside, axis=1)
+        nearest = np.eye(3)[np.argmax(beyond, axis=1)]
+        depth = self.edge - np.where(away > 0, away, beyond.max(axis=1))
+        normal = np.where(away[:, None] > 0, outside / np.maximum(away, 1e-300)[:, None], nearest)
+        return np.maximum(depth, 0.0), signs * normal
 
     @model_validator(mode="after")
     def _round(self) -> Self:
@@ -133,6 +162,16 @@ class SolidMesh(_Solid):
     def thick(self) -> float:
         """How deep its middle lies at least, but for thin edges and tips."""
         return self.mesh.signed.thick()
+
+    def depth(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return depths and ways out, to the nearest place of the mesh."""
+        way, signed = x - np.array(self.centre), self.mesh.signed
+        # only what is in the box about it can be in it
+        near = ((way > signed.low) & (way < signed.high)).all(axis=1)
+        depth, out = np.zeros(len(way)), np.tile([0.0, 0.0, 1.0], (len(way), 1))
+        found, out[near] = signed.depth(way[near])
+        depth[near] = np.maximum(found, 0.0)
+        return depth, out
 
 
 Solid = Annotated[Plane | SolidBall | SolidBox | SolidMesh, Field(discriminator="kind")]

@@ -54,6 +54,9 @@ def test_a_job_runs_beside_the_service_and_its_events_tell(store: Store) -> None
         assert answer.content[:8] == b"\x89HDF\r\n\x1a\n"
 
 
+_WITHIN = {"shape": "disc", "solids": [{"kind": "ball", "radius": 2}]}
+
+
 @pytest.mark.parametrize(
     ("change", "status", "code"),
     [
@@ -66,6 +69,8 @@ def test_a_job_runs_beside_the_service_and_its_events_tell(store: Store) -> None
         ({"need": {"fields": ["colour"]}}, 422, "invalid-input"),
         ({"need": {"quality": "superb"}}, 422, "invalid-query"),
         ({"extra": 1}, 422, "invalid-query"),
+        # a disc in the middle of a ball
+        ({"solver": "growth", "preset": None, "params": _WITHIN, "need": {"stages": [0.1]}}, 422, "invalid-geometry"),
         ({"solver": "\ud800"}, 404, "unknown-solver"),
         ({"params": []}, 422, "invalid-query"),
         ({"need": {"resolution": 1024, "stages": [i / 1000 for i in range(200)]}}, 422, "too-costly"),

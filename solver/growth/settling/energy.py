@@ -22,7 +22,7 @@ from ..params import Bending
 from ..solids import Solid
 from ..state import State
 from .bed import Bed
-from .loads import area_vectors, balanced, compressed, depth_in, half_way
+from .loads import area_vectors, balanced, compressed, half_way
 from .minimise import longest
 from .tangent import LEAF, Tangent
 from .touching import Touching
@@ -159,7 +159,7 @@ class StepEnergy:
         if self.bed:
             energy += self.bed.energy(x, gradient)
         for solid in self.solids:
-            depth, normal = depth_in(solid, x)
+            depth, normal = solid.depth(x)
             energy += 0.5 * _HARDNESS * float(self.areas @ (depth * depth))
             gradient -= (_HARDNESS * self.areas * depth)[:, None] * normal
         gradient[state.held] = 0.0
@@ -259,7 +259,7 @@ class StepEnergy:
         if self.bed:
             self.bed.add_hessian(diagonal, blocks)
         for solid in self.solids:
-            depth, normal = depth_in(solid, x)
+            depth, normal = solid.depth(x)
             weight = np.where(depth > 0, _HARDNESS * self.areas, 0.0)
             blocks[diagonal] += weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
 

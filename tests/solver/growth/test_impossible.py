@@ -41,6 +41,8 @@ def test_a_sheet_that_begins_wholly_inside_a_solid_is_refused_before_any_work():
         SOLVER.parse(DISC | {"solids": [solid | {"start": 0.1}]})
     # partly inside, and laid on it by less than it is thick
     SOLVER.parse(DISC | {"solids": [ball | {"radius": 0.9}, plane | {"point": [0, 0, 0.04]}]})
+    # a balloon over a ball that is larger than it
+    SOLVER.parse({"shape": "sphere", "solids": [ball]})
 
 
 def test_pressure_blows_an_open_sheet_away():

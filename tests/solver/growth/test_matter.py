@@ -8,7 +8,6 @@ from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.matter import BARE, coloured
 from solver.growth.params import GrowthParams
-from solver.growth.settling.loads import depth_in
 from solver.growth.shapes import start
 from solver.growth.solids import Plane, SolidBox, present
 from solver.growth.tooling.places import Lines, share
@@ -112,7 +111,7 @@ def test_a_box_pushes_out_the_shortest_way(edge):
     box = SolidBox(centre=(1, 2, 3), size=(1.0, 0.8, 0.6), edge=edge)
     half = np.array(box.size) / 2
     x = np.array(box.centre) + np.random.default_rng(0).uniform(-0.7, 0.7, (2000, 3))
-    depth, normal = depth_in(box, x)
+    depth, normal = box.depth(x)
     assert np.linalg.norm(normal, axis=1) == pytest.approx(np.ones(len(x)))
 
     def inner(p):
@@ -138,7 +137,7 @@ def test_a_cloth_lies_on_a_box_and_hangs_over_its_sides():
     state, params = reached(
         0.05, 600, shape="square", thickness=0.01, curved=False, gravity=[0, 0, -0.02], attached=held, solids=[box]
     )
-    depth = depth_in(params.solids[0], state.x)[0]
+    depth = params.solids[0].depth(state.x)[0]
     top = (np.abs(state.x[:, :2]) < 0.2).all(axis=1)
     # solids are penalties: where two sides hang from a corner of the box the cloth is pressed in further
     assert depth[top].max() < 0.002
@@ -156,7 +155,7 @@ def test_a_ball_that_rises_lifts_the_sheet_and_leaves_it_behind():
     there = present(params.solids, 0.5)[0]
     assert there.centre == pytest.approx((0.1, 0.0, -0.25))
     # a stretched sheet presses itself into a penalty, a little
-    assert depth_in(there, state.x)[0].max() < 0.03
+    assert there.depth(state.x)[0].max() < 0.03
     assert state.x[:, 2].max() == pytest.approx(0.25, abs=0.03)
     assert not present(params.solids, 0.65)
     back, _ = reached(1.0, 300, **common, solids=[ball])

@@ -10,7 +10,6 @@ from solver.contract import InvalidInput
 from solver.geometry.signed import Signed
 from solver.growth import SOLVER
 from solver.growth.params import GrowthParams
-from solver.growth.settling.loads import depth_in
 from solver.growth.solids import SolidBox, SolidMesh
 
 from .test_growth import grow
@@ -55,7 +54,7 @@ def test_a_mesh_of_a_box_is_as_deep_as_the_box() -> None:
     x = np.array([1.0, 2, 3]) + np.random.default_rng(1).uniform(-0.6, 0.6, (2000, 3))
     mesh = SolidMesh.model_validate(meshed(trimesh.creation.box((1, 0.8, 0.6)), centre=(1, 2, 3)))
     box = SolidBox(centre=(1, 2, 3), size=(1, 0.8, 0.6), edge=0)
-    (deep, way), (wanted, out) = depth_in(mesh, x), depth_in(box, x)
+    (deep, way), (wanted, out) = mesh.depth(x), box.depth(x)
     assert deep == pytest.approx(wanted, abs=1e-12)
     assert (wanted > 0).sum() > 300
     assert way[wanted > 0] == pytest.approx(out[wanted > 0], abs=1e-9)
