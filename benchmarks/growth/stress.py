@@ -127,8 +127,10 @@ _LEAF = {"kind": "band", "along": "radius", "low": 0.6, "high": 1.0}
 
 CASES: dict[str, Callable[[], str]] = {
     "lengths x3 at once": lambda: _grown([_surface(stretch=(3, 3))], step=1.0),
+    # tenfold in one step: whether the way there is found hangs on round-off (on one processor it is, on its successor
+    # it ends in NotConverged with advice, and the equilibrium before stands)
     "lengths x10 along one way, at once": lambda: _grown(
-        [_surface(frame=(1, 0, 0), stretch=(10, 1))], shape="strip", step=1.0
+        [_surface(frame=(1, 0, 0), stretch=(10, 1))], shape="strip", step=1.0, may_fail=True
     ),
     "a spot x10 at once": lambda: _grown([_spot(stretch=(10, 10))], step=1.0, may_fail=True),
     "rest edges against the triangle inequality": _violated,

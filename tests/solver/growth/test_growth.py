@@ -274,8 +274,9 @@ HOSTILE = {
     },
     "paper thin": {"thickness": 0.001, "tools": [{"kind": "spot", "at": (0, 0, 1), "stretch": (3.0, 3.0)}]},
 }
-#: Which of them end in an error, with the last equilibrium kept.
-MAY_FAIL = frozenset({"plastic and remeshed"})
+#: Which of them may end in an error, with the last equilibrium kept. At exact symmetry round-off alone says which way a
+#: sheet buckles: in steps of .25 that finds an equilibrium with one thread of BLAS, as runs have, and not with two.
+MAY_FAIL = frozenset({"plastic and remeshed", "perfect buckling"})
 
 
 @pytest.mark.parametrize("name", HOSTILE)
