@@ -42,7 +42,7 @@ class Attachment(_Model):
         return self
 
 
-#: Vertices of a start shape by which it is told whether it begins inside a solid.
+#: Vertices by which it is told first whether a sheet begins inside a solid: of most meshes one is outside.
 _LOOKED_AT = 1000
 
 Bending = Literal["hinges", "mean_curvature"]
@@ -197,6 +197,8 @@ class GrowthParams(Params):
             return self
         sheet = self.mesh.shape() if self.mesh else start(self.shape, _LOOKED_AT, self.aspect)
         for number, solid in first:
+            if solid.depth(sheet.x[:: len(sheet.x) // _LOOKED_AT + 1])[0].min() <= self.thickness:
+                continue
             depth = solid.depth(sheet.x)[0]
             # what lies in it by less than it is thick is laid on it; what is closed is stretched over what is in it
             if depth.min() > self.thickness and not is_closed(sheet.triangles):

@@ -42,10 +42,6 @@ class _Solid(_Model):
         (0.0, 0.0, 0.0), description="How it moves from its start on [start shape's unit per growth time]"
     )
 
-    def depth(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return how deep points (n, 3) are in it (n,), 0 outside, and the way out (n, 3)."""
-        raise NotImplementedError
-
     def moved(self, time: float) -> tuple[float, float, float]:
         """Return how far it has come by a growth time."""
         x, y, z = ((time - self.start) * v for v in self.velocity)
@@ -71,7 +67,7 @@ class Plane(_Solid):
         return math.inf
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return depths and ways out, all along its normal."""
+        """Return how deep points (n, 3) are in it (n,), 0 outside, and the way out (n, 3), along its normal."""
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         return np.maximum((np.array(self.point) - x) @ normal, 0.0), np.broadcast_to(normal, x.shape)
 
@@ -89,7 +85,7 @@ class SolidBall(_Solid):
         return self.radius
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return depths and ways out, away from its centre."""
+        """Return depths (n,) and ways out (n, 3) of points (n, 3), away from its centre."""
         way = x - np.array(self.centre)
         distance = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
         return np.maximum(self.radius - distance, 0.0), way / distance[:, None]
@@ -111,7 +107,7 @@ class SolidBox(_Solid):
         return min(self.size) / 2
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return depths and ways out: of a side, or of the rounding of an edge or a corner."""
+        """Return depths (n,) and ways out (n, 3) of points (n, 3): of a side, an edge or a corner."""
         way = x - np.array(self.centre)
         signs = np.where(way < 0, -1.0, 1.0)
         # how far beyond the box without its rounding: outside of that the nearest point is on it, inside a side is
@@ -164,7 +160,7 @@ class SolidMesh(_Solid):
         return self.mesh.signed.thick()
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return depths and ways out, to the nearest place of the mesh."""
+        """Return depths (n,) and ways out (n, 3) of points (n, 3), to the nearest place of the mesh."""
         way, signed = x - np.array(self.centre), self.mesh.signed
         # only what is in the box about it can be in it
         near = ((way > signed.low) & (way < signed.high)).all(axis=1)

@@ -132,9 +132,9 @@ class Synthesis:
         self._lines: Array = self._make((count, n, n + 1), _complex(dtype))
         found = []
         self._sums: list[tuple[Array, Array, Array, Array]] = []
-        for first, matrix in ((self._cosine, _cosine_sums), (1 - self._cosine, _sine_sums)):
+        for k, first in enumerate((self._cosine, 1 - self._cosine)):
             amplitudes = np.zeros((count, waves, len(range(first, self._band + 1, 2))), _complex(dtype))
-            sums = matrix(n, waves, dtype.str, 2 * amplitudes.shape[2])
+            sums = _blocks(n, waves, k, dtype.str, 2 * amplitudes.shape[2])
             lines = np.empty((count, *sums.shape[:2], 2 * amplitudes.shape[2]), dtype)
             whole = lines.view(_complex(dtype)).reshape(count, -1, amplitudes.shape[2])[:, :n]
             self._sums.append((sums, amplitudes, lines, whole))
@@ -170,19 +170,10 @@ class Synthesis:
                 target[...] = transform(source, 3, axis=2)
 
 
-def _cosine_sums(n: int, waves: int, dtype: str, columns: int) -> Array:
-    """Return the matrix from cosine amplitudes k = 0.. to colatitudes, as `_blocks` of it; all k but 0 count twice."""
-    return _blocks(n, waves, 0, dtype, columns)
-
-
-def _sine_sums(n: int, waves: int, dtype: str, columns: int) -> Array:
-    """Return the matrix from sine amplitudes k = 1.. to colatitudes, as `_blocks` of it; all k but n count twice."""
-    return _blocks(n, waves, 1, dtype, columns)
-
-
 @lru_cache(maxsize=128)
 def _blocks(n: int, waves: int, first: int, dtype: str, columns: int) -> Array:
-    """Return a matrix (blocks, rows, waves) of sums in colatitude, zero beyond its `n` rows.
+    """Return the matrix (blocks, rows, waves) from amplitudes to colatitudes, zero beyond its `n` rows: of cosines with
+    `first` 0, k = 0.., of sines with 1, k = 1... All count twice but the constant and the last sine, k = n.
 
     Products with `columns` are so small by block that BLAS does not divide them among threads, which in a busy server
     would wait for each other.

@@ -15,6 +15,8 @@ from solver.growth.settling.energy import StepEnergy
 from solver.growth.settling.stage import residual, settled
 from solver.growth.settling.tangent import Tangent
 
+from ._differences import differences
+
 RIM = {"kind": "surface", "where": {"kind": "rim", "width": 0.3}, "stretch": (1.5, 1.0)}
 SPOT = {"kind": "spot", "at": (0.0, 0.0, 1.0), "radius": 0.6, "stretch": (2.5, 2.5)}
 
@@ -125,13 +127,7 @@ def test_second_derivatives_are_those_of_differences(shape: str, pressure: float
     energy = StepEnergy(state, shell.Material(0.5), pressure, (), Tangent(state.mesh), following=True)
     assert energy.following == (pressure > 0)
     matrix = energy.hessian(x).toarray()
-    columns, slopes = np.empty_like(matrix), np.empty(x.size)
-    for k in range(x.size):
-        move = np.zeros(x.size)
-        move[k] = 1e-6
-        move = move.reshape(x.shape)
-        columns[:, k] = (energy(x + move)[1] - energy(x - move)[1]).ravel() / 2e-6
-        slopes[k] = (energy(x + move)[0] - energy(x - move)[0]) / 2e-6
+    slopes, columns = differences(energy, x)
     assert np.abs(matrix - columns).max() <= 1e-7 * np.abs(columns).max()
     gradient = energy(x)[1].ravel()
     assert np.abs(gradient - slopes).max() <= 1e-6 * np.abs(gradient).max()
