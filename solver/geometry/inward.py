@@ -29,6 +29,8 @@ _WIDE = 1.3
 _FINE, _MOST = 0.75, 384
 #: Cells that are left out together, both ways.
 _BLOCK = 4
+#: Boxes that are held against one together; keys of one bin up to which they are sorted by bins.
+_TOGETHER, _CROWD = 32, 64
 
 
 @njit(cache=True, error_model="numpy")
@@ -209,7 +211,7 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
     first_y, last_y = box[:, 1].min(), box[:, 4].max()
     strips = min(max(int(math.sqrt(count)) // 4, 1), 64)
     scale = strips / max(last_y - first_y, 1e-6)
-    order = np.argsort(box[:, 0])
+    order = _order(np.ascontiguousarray(box[:, 0]))
     lows, highs, ends = np.empty(count, np.int32), np.empty(count, np.int32), np.zeros(strips + 1, np.int64)
     for m in range(count):
         n = order[m]
@@ -218,64 +220,108 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
         for strip in range(lows[m], highs[m] + 1):
             ends[strip + 1] += 1
     ends = np.cumsum(ends)
-    place, sorted_box, fill = np.empty(ends[-1], np.int32), np.empty((ends[-1], 6), np.float32), ends[:-1].copy()
-    first_strip, corners = np.empty(ends[-1], np.int32), np.empty((ends[-1], 3), np.int32)
+    fill = ends[:-1].copy()
+    # by bound and by corner, for several are looked at together; behind the last come some that nothing meets
+    bounds, corners = (
+        np.full((6, ends[-1] + _TOGETHER), np.inf, np.float32),
+        np.zeros((3, ends[-1] + _TOGETHER), np.int32),
+    )
+    place, first_strip = np.empty(ends[-1], np.int32), np.zeros(ends[-1] + _TOGETHER, np.int32)
     for m in range(count):
         for strip in range(lows[m], highs[m] + 1):
-            place[fill[strip]], first_strip[fill[strip]] = some[order[m]], lows[m]
+            there = fill[strip]
+            place[there], first_strip[there] = some[order[m]], lows[m]
             for k in range(6):
-                sorted_box[fill[strip], k] = box[order[m], k]
+                bounds[k, there] = box[order[m], k]
             for k in range(3):
-                corners[fill[strip], k] = faces[some[order[m]], k]
+                corners[k, there] = faces[some[order[m]], k]
             fill[strip] += 1
     found, room = np.empty((1024, 2), np.int32), 0
+    met = np.empty(_TOGETHER, np.uint8)
+    eights = met.view(np.uint64)
     for strip in range(strips):
         for m in range(ends[strip], ends[strip + 1]):
-            x1, y0, y1, z0, z1 = (
-                sorted_box[m, 3],
-                sorted_box[m, 1],
-                sorted_box[m, 4],
-                sorted_box[m, 2],
-                sorted_box[m, 5],
-            )
-            for o in range(m + 1, ends[strip + 1]):
-                if sorted_box[o, 0] > x1:
+            o = m + 1
+            while o < ends[strip + 1]:
+                _meet(bounds, corners, first_strip, m, o, strip, met)
+                for eight in range(_TOGETHER // 8):
+                    if eights[eight] == 0:
+                        continue
+                    for k in range(8 * eight, min(8 * eight + 8, ends[strip + 1] - o)):
+                        if met[k] == 0 or _lie_apart(x, size, faces, place[m], place[o + k]):
+                            continue
+                        if room == len(found):
+                            found = np.concatenate((found, found))
+                        found[room, 0], found[room, 1] = place[m], place[o + k]
+                        room += 1
+                if bounds[0, o + _TOGETHER - 1] > bounds[3, m]:
                     break
-                if sorted_box[o, 1] > y1 or y0 > sorted_box[o, 4] or sorted_box[o, 2] > z1 or z0 > sorted_box[o, 5]:
-                    continue
-                # a pair belongs to the strip in which both are met first
-                if max(first_strip[m], first_strip[o]) != strip:
-                    continue
-                if _neighbours(corners, m, o) or _lie_apart(x, size, corners, place, m, o):
-                    continue
-                if room == len(found):
-                    found = np.concatenate((found, found))
-                found[room, 0], found[room, 1] = place[m], place[o]
-                room += 1
+                o += _TOGETHER
     return found[:room]
 
 
 @njit(cache=True, error_model="numpy")
-def _neighbours(faces: Words, a: int, b: int) -> bool:
-    for i in range(3):
-        for j in range(3):
-            if faces[a, i] == faces[b, j]:
-                return True
-    return False
+def _order(keys: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Return what sorts `keys`, in a third of the time of numpy's way where they are spread."""
+    count, low = len(keys), keys.min()
+    scale = count / max(keys.max() - low, 1e-30)
+    ends, bins = np.zeros(count + 2, np.int64), np.empty(count, np.int64)
+    for n in range(count):
+        bins[n] = min(int((keys[n] - low) * scale), count)
+        ends[bins[n] + 1] += 1
+    if ends.max() > _CROWD:
+        return np.argsort(keys)
+    ends = np.cumsum(ends)
+    order = np.empty(count, np.int64)
+    for n in range(count):
+        order[ends[bins[n]]] = n
+        ends[bins[n]] += 1
+    for n in range(1, count):
+        one, back = order[n], n
+        while back > 0 and keys[order[back - 1]] > keys[one]:
+            order[back] = order[back - 1]
+            back -= 1
+        order[back] = one
+    return order
 
 
 @njit(cache=True, error_model="numpy")
-def _lie_apart(x: Doubles, size: Doubles, corners: Words, place: Words, a: int, b: int) -> bool:
+def _meet(
+    bounds: NDArray[np.float32], corners: Words, first_strip: Words, m: int, o: int, strip: int, met: NDArray[np.uint8]
+) -> None:
+    """Fill which of the boxes from `o` on meet box `m`, without a common corner, and for the first time in this strip.
+
+    No branch: the compiler makes it a few instructions for all of them.
+    """
+    x1, y0, y1, z0, z1 = bounds[3, m], bounds[1, m], bounds[4, m], bounds[2, m], bounds[5, m]
+    p, q, r = corners[0, m], corners[1, m], corners[2, m]
+    # a pair belongs to the strip in which both are met first
+    first = np.int32(strip if first_strip[m] < strip else -1)
+    for k in range(_TOGETHER):
+        n = o + k
+        a, b, c = corners[0, n], corners[1, n], corners[2, n]
+        is_other = (
+            (a != p) & (a != q) & (a != r) & (b != p) & (b != q) & (b != r) & (c != p) & (c != q) & (c != r)
+        )  # fmt: skip
+        is_here = (bounds[0, n] <= x1) & (bounds[1, n] <= y1) & (bounds[4, n] >= y0)
+        met[k] = (
+            is_other & is_here & (bounds[2, n] <= z1) & (bounds[5, n] >= z0)
+            & ((first < 0) | (first_strip[n] == first))
+        )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _lie_apart(x: Doubles, size: Doubles, faces: Words, a: int, b: int) -> bool:
     """Whether two triangles are clearly apart along the line between their middles: most that lie side by side are."""
     nx = ny = nz = 0.0
     for k in range(3):
-        v, w = corners[a, k], corners[b, k]
+        v, w = faces[a, k], faces[b, k]
         nx, ny, nz = nx + x[w, 0] - x[v, 0], ny + x[w, 1] - x[v, 1], nz + x[w, 2] - x[v, 2]
     high, low = -math.inf, math.inf
     for k in range(3):
-        v, w = corners[a, k], corners[b, k]
+        v, w = faces[a, k], faces[b, k]
         high = max(high, nx * x[v, 0] + ny * x[v, 1] + nz * x[v, 2])
         low = min(low, nx * x[w, 0] + ny * x[w, 1] + nz * x[w, 2])
-    more = _AROUND * (size[place[a]] + size[place[b]]) + 1e-6
+    more = _AROUND * (size[a] + size[b]) + 1e-6
     gap = low - high
     return gap > 0 and gap * gap > more * more * (nx * nx + ny * ny + nz * nz)

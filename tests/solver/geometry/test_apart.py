@@ -89,11 +89,15 @@ def test_what_did_not_move_is_not_looked_at_again(topology: Topology) -> None:
     assert everything[0] in some
 
 
-def test_pairs_are_those_of_all_boxes_that_touch(topology: Topology) -> None:
-    """But for those that lie apart along the line between their middles."""
+@pytest.mark.parametrize("power", [1, 9])
+def test_pairs_are_those_of_all_boxes_that_touch(topology: Topology, power: int) -> None:
+    """But for those that lie apart along the line between their middles. A power of x crowds most about x = 0."""
     x, faces, size = sphere(0.4), topology.triangles, np.empty(len(topology.triangles))
-    some = candidates(x, faces, np.empty(0, bool))
-    found = {tuple(sorted(pair)) for pair in pairs(x, faces, some, size).tolist()}
+    x[:, 0] **= power
+    some = candidates(x, faces, np.empty(0, bool)) if power == 1 else np.arange(len(faces), dtype=np.int32)
+    listed = pairs(x, faces, some, size).tolist()
+    found = {tuple(sorted(pair)) for pair in listed}
+    assert len(found) == len(listed)
     corners = x[faces[some]]
     sides = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2).max(axis=1)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
