@@ -40,6 +40,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("start", "load", "batch", "memory", "swaps")
 #: Its points take as many bytes as the peer's chunk of 50000 numbers.
 RESOLUTION = 90
+#: Load before the first round [s].
+_WARM_S = 2.0
 #: A shape of the table in the package, as long as there has been one.
 STARTER = "/v1/shapes/dehydration?te=0.035&gamma=20&s=0.2&resolution=64&format=points"
 QUERY = "/v1/shapes/dehydration?te={te:.6f}&gamma={gamma:.4f}&s=0.17&resolution={n}&format=points"
@@ -118,8 +120,7 @@ def running(
 
 
 def service(root: Path, workers: int = 1, **environment: str) -> Any:
-    command = [sys.executable, "-m", "uvicorn", "service.app:app", "--port", "{port}", "--workers", str(workers)]
-    command += ["--log-level", "warning", "--no-access-log"]
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "{port}", "--workers", str(workers)]
     path = ours(0) if root != starter.ROOT else ours(0).replace("te=0.02", "te=0.03")
     return running(command, path, WIZEN_STORE=str(root), WIZEN_JOBS_WORKERS="0", **environment)
 
@@ -187,6 +188,8 @@ def _turns(sides: dict[str, Any], seconds: float, rounds: int) -> list[dict[str,
     found: dict[str, list[Any]] = {name: [] for name in sides}
     busy: dict[str, list[float]] = {name: [] for name in sides}
     asked = 0
+    for port, path, _ in sides.values():  # what a server loads aside, once it answers, is no part of any round
+        drive(port, path, 16, _WARM_S)
     for _ in range(rounds):
         for name, (port, path, pid) in sides.items():
             begun = family(pid)
@@ -245,7 +248,10 @@ def _pss(root: Path | None, workers: int) -> float:
                 drive(port, ours, 8, 0.6)
         total = 0.0
         for child in children:
-            lines = Path(f"/proc/{child}/smaps_rollup").read_text().splitlines()
+            try:
+                lines = Path(f"/proc/{child}/smaps_rollup").read_text().splitlines()
+            except ProcessLookupError:  # it made what is compiled, and has ended
+                continue
             total += float(next(line.split()[1] for line in lines if line.startswith("Pss:"))) / 1e3
     return total
 

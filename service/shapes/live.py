@@ -45,7 +45,7 @@ class LiveTables:
 
     def __init__(self, root: Path, interval: float, before_folds: Callable[[], None] = lambda: None) -> None:
         self._root = root
-        self._before_folds = before_folds
+        self.before_folds = before_folds
         self._interval = interval
         self._open: dict[str, _Open] = {}
         self._manifests: dict[str, tuple[Stamp, TableInfo]] = {}
@@ -212,7 +212,7 @@ class LiveTables:
         return opened
 
     def _read(self, name: str) -> ShapeTable:
-        return ShapeTable.open(self.store, name, surfaces=registry.surface, before_folds=self._before_folds)
+        return ShapeTable.open(self.store, name, surfaces=registry.surface, before_folds=self.before_folds)
 
     def _look(self, name: str, entry: _Open) -> None:
         """See whether there is another generation, and open it on the side: a large one takes seconds to verify."""
