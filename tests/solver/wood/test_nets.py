@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+from scipy.stats import qmc
 
 from solver.wood import SOLVER
 from solver.wood.model.bundle import lay
+from solver.wood.model.section import apart
 
 from ._bonds_twin import bond_energies
 
@@ -35,3 +38,14 @@ def test_a_bundle_pulled_across_the_grain_has_the_modulus_asked_for(unevenness):
         c, s = np.cos(angle), np.sin(angle)
         stress = np.array([c * c, s * s, c * s])
         assert 1 / (stress @ compliance @ stress) == pytest.approx(params.transverse, rel=0.05)
+
+
+@pytest.mark.parametrize("least", [0.5, 0.13, 0.04])
+def test_rods_stand_where_scipy_s_poisson_disk_has_them(least):
+    """Bundles that were laid by it are laid the same; and no point of the square is free any more, or nearly none."""
+    found = apart(least, np.random.default_rng(3))
+    twin = qmc.PoissonDisk(2, radius=least, rng=np.random.default_rng(3)).fill_space()
+    assert found.tobytes() == twin.tobytes()
+    assert np.asarray(cKDTree(found).query(found, 2)[0])[:, 1].min() > least * (1 - 1e-6)
+    anywhere = np.random.default_rng(0).uniform(size=(20_000, 2))
+    assert (np.asarray(cKDTree(found).query(anywhere)[0]) > least).mean() < 0.03

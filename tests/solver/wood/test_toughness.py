@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.wood.bench import bent, opened, slid
-from benchmarks.wood.fracture import DCB, ENF, measured, trial
+from benchmarks.wood.fracture import DCB, ENF, WIDE, measured, trial
 
 
 @pytest.mark.parametrize("of", [DCB, ENF], ids=["opening", "sliding"])
@@ -15,6 +15,7 @@ def test_a_crack_grows_at_beam_theory_s_load_and_costs_its_toughness(of):
     found = measured(of, trial(replace(of, scaling=1600.0), 24, 35))
     assert found["before"] == pytest.approx(1, abs=0.06)
     assert found["highest"] == pytest.approx(1, abs=0.12)
+    assert found["borne"] == pytest.approx(1, abs=0.06)
     assert found["mean"] == pytest.approx(1, abs=0.08)
     assert found["by_area"] == pytest.approx({"DCB": 250.0, "ENF": 700.0}[of.name], rel=0.03)
     assert found["area"] > 2e-4
@@ -28,6 +29,18 @@ def test_slowly_driven_it_does_within_five_percent(of):
     assert found["before"] == pytest.approx(1, abs=0.05)
     assert found["mean"] == pytest.approx(1, abs=0.05)
     assert found["by_area"] == pytest.approx({"DCB": 250.0, "ENF": 700.0}[of.name], rel=0.02)
+
+
+def test_what_a_coarse_mesh_bears_is_held_against_theory_with_its_strength():
+    """A curve drawn with half of the strength: less than what the wood bears, all of what the mesh does."""
+    cut, weak = 0.121, 4e6
+    way, force = ENF.theory(cut, weak)
+    way, force = way[way < ENF.way], force[way < ENF.way]
+    run = {"way": way, "force": force, "area": np.array([cut, cut + 0.04]) * WIDE, "spent": np.array([0.0, 0.5])}
+    run |= {"balance": np.zeros(2), "shears": np.array(weak)}
+    found = measured(ENF, run)
+    assert found["highest"] < 0.95
+    assert found["borne"] == pytest.approx(1, abs=1e-9)
 
 
 def test_the_bench_reads_curves_as_beam_theory_made_them():
