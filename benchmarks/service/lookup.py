@@ -3,7 +3,9 @@
 Rows go by resolution, by what is asked for (in the default method), and by method (positions).
 
 The table is synthetic (30 samples, 5 stages, 96 waves of random smooth displacement that does not fold), because only
-its size matters here; errors against finite-element runs are measured elsewhere. Then shapes that fold, of the default
+its size matters here; errors against finite-element runs are measured elsewhere. Its rows ask for one place again and
+again; then come places at random, as a sweep asks for them, and all tables that come with wizen in turn at three levels
+of detail, as a scene does: what is kept between questions is measured with them. Then shapes that fold, of the default
 table that comes with wizen at random places: what putting them apart takes hangs on how they fold.
 """
 
@@ -14,6 +16,7 @@ import os
 import statistics
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -41,6 +44,10 @@ STAGE = 0.17
 _HEIGHT = 3e-5
 #: Stages at which a shape that folds is asked for, and places of each.
 _FOLDED, _PLACES = (0.2, 0.25, 0.3), 12
+#: Places at random; turns through the tables of the package, and the stage asked for there (displacements: none is put
+#: out of contact).
+_RANDOM, _TURNS, _TURNED = 500, 6, 0.22
+_WANDERING, _IN_TURN = "unfolded, places at random", "displacements, all tables in turn"
 
 
 def smooth(rng: np.random.Generator, stages: int, band: int) -> np.ndarray:
@@ -125,17 +132,60 @@ def main() -> None:
             rows.append({"resolution": n, "what": "normals", "ms": round(ms, 4)})
         ms = median(lambda: table.at(QUERY, STAGE, m=8, fields=()), options.seconds)
         rows.append({"resolution": 0, "what": "descriptors only", "ms": round(ms, 4)})
-    rows += _folded()
+        rows += _wandering(table)
+    rows += _in_turn() + _folded()
     print(f"fft: {transforms.backend()}, one core, medians [ms of processor]")
     for row in rows:
         print(f"{row['resolution']:>5} {row['what']:<28} {row['ms']:9.3f}")
     usual = {row["resolution"]: row["ms"] for row in rows if row["what"] == "position"}
     head = ["lattice", *(f"{n} x {2 * n}" for n in usual)]
-    cells = [["unfolded, ms", *(f"{ms:.2f}" for ms in usual.values())]]
+    cells = []
+    for what, told in {"position": "unfolded, one place", _WANDERING: _WANDERING, _IN_TURN: _IN_TURN}.items():
+        found = {row["resolution"]: row["ms"] for row in rows if row["what"] == what}
+        cells.append([f"{told}, ms", *(f"{found[n]:.2f}" if n in found else "" for n in usual)])
     for s in _FOLDED:
         found = {row["resolution"]: row["ms"] for row in rows if row["what"] == _name(s)}
         cells.append([f"{_name(s)}, ms", *(f"{found[n]:.1f}" if n in found else "" for n in usual)])
     keep("service-lookup", rows, fft=transforms.backend(), table={"head": head, "rows": cells})
+
+
+def _wandering(table: ShapeTable) -> list[dict[str, Any]]:
+    """Return rows of the means over places and stages at random, after as many to fill what is kept."""
+    rng, rows = np.random.default_rng(0), []
+    for n in (32, 64, 128):
+        times = []
+        for _ in range(2 * _RANDOM):
+            point = {name: float(rng.uniform(*span)) for name, span in table.axes.items()}
+            times.append(_once(table, point, float(rng.uniform(STAGES[0], STAGES[-1])), resolution=n))
+        rows.append(_row(n, _WANDERING, times[_RANDOM:]))
+    return rows
+
+
+def _in_turn() -> list[dict[str, Any]]:
+    """Return rows of the means over the tables of the package, each asked at three resolutions in turn."""
+    store, rng, times = Store.open(starter.ROOT), np.random.default_rng(0), defaultdict(list)
+    opened = [ShapeTable.open(store, name, surfaces=registry.surface) for name in store.table_names()]
+    for turn in range(_TURNS):
+        for n in (32, 64, 128):
+            for table in opened:
+                point = {name: float(rng.uniform(*span)) for name, span in table.axes.items()}
+                stage = min(_TURNED, max(table.stages))
+                ms = _once(table, point, stage, resolution=n, fields=("displacement",))
+                if turn > 1:
+                    times[n].append(ms)
+    return [_row(n, _IN_TURN, found) for n, found in times.items()]
+
+
+def _once(table: ShapeTable, point: dict[str, float], stage: float, **options: Any) -> float:
+    """Return the processor time [ms] of one look-up."""
+    start = time.process_time()
+    table.at(point, stage, **options)
+    return 1e3 * (time.process_time() - start)
+
+
+def _row(n: int, what: str, times: list[float]) -> dict[str, Any]:
+    mean, late = statistics.fmean(times), float(np.quantile(times, 0.99))
+    return {"resolution": n, "what": what, "ms": round(mean, 4), "p99": round(late, 4), "times": len(times)}
 
 
 def _name(s: float) -> str:
