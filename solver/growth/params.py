@@ -12,7 +12,7 @@ from .matter import Bed, Colour, Rib, Thickness
 from .own.imported import OwnMesh
 from .shapes import Shape, is_closed, start
 from .solids import Solid, check_pace
-from .tooling.places import Place
+from .tooling.places import Place, check_mapped
 from .tooling.tools import HotSurface, Tool
 
 __all__ = ["Attachment", "Bending", "GrowthParams"]
@@ -188,6 +188,13 @@ class GrowthParams(Params):
     def _slow(self) -> Self:
         for solid in self.solids:
             check_pace(solid, self.step)
+        return self
+
+    @model_validator(mode="after")
+    def _mapped(self) -> Self:
+        if self.mesh is None or not self.mesh.uv:
+            for part in (self.tools, self.thicknesses, self.ribs, self.colours, self.attached, self.bed):
+                check_mapped(part)
         return self
 
     @model_validator(mode="after")
