@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -27,6 +28,7 @@ __all__ = [
     "matter",
     "softer",
     "springs",
+    "thickened",
     "thickest",
     "thickness_map",
 ]
@@ -131,6 +133,16 @@ def thickness_map(parts: Sequence[Thickness], ground: Ground, seed: int) -> Floa
             advice=f"Keep their product between {_THINNEST:g} and {_THICKEST:g}, or change `thickness`.",
         )
     return found
+
+
+def thickened(state: State, rate: Floats | None, dt: float) -> State:
+    """Return a state whose thickness grew for dt at logarithmic rates (n,), as far as a map may make it; None: none."""
+    if rate is None or not rate.any():
+        return state
+    before = state.matter.get("thick", np.ones(len(state.x)))
+    # where nothing thickens it keeps its numbers
+    now = np.where(rate != 0, np.clip(before * np.exp(dt * rate), _THINNEST, _THICKEST), before)
+    return replace(state, matter=state.matter | {"thick": now})
 
 
 def thickest(state: State, thickness: float) -> float:
