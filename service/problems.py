@@ -37,6 +37,7 @@ __all__ = [
     "install",
     "of",
     "responses",
+    "status_of",
     "told",
     "unforeseen",
 ]
@@ -134,6 +135,15 @@ class Problem(BaseModel):
     errors: list[Culprit] = Field(default_factory=list, description="Every wrong parameter")
     nearest: Nearest | None = Field(None, description="The table that comes nearest")
     links: dict[str, str] = Field(default_factory=dict, description="The run that answers: its address and its command")
+
+
+def status_of(code: str) -> int:
+    """Return the status of a solver's error by its code, which is all that comes from another process; else 500."""
+    kinds: list[type[contract.SolverError]] = [contract.SolverError, *contract.SolverError.__subclasses__()]
+    for kind in kinds:
+        kinds += [below for below in kind.__subclasses__() if below not in kinds]
+    found = [STATUS[base] for kind in kinds if kind.code == code for base in kind.__mro__ if base in STATUS]
+    return found[0] if found else 500
 
 
 def told(error: Exception) -> dict[str, Any]:

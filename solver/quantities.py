@@ -176,6 +176,7 @@ register(
     elastic_strain=Quantity(
         "1", "mean principal stretch of the membrane less 1, averaged over a vertex's triangles", "e"
     ),
+    sheet_thickness=Quantity("1", "thickness of the sheet at a vertex, in the start shape's unit", "h"),
     red=Quantity("1", "red of the surface, linear light", "R", share=True),
     green=Quantity("1", "green of the surface, linear light", "G", share=True),
     blue=Quantity("1", "blue of the surface, linear light", "B", share=True),

@@ -28,7 +28,6 @@ from solver.growth.settling.energy import vertex_areas
 from solver.growth.settling.stage import residual, settled
 from solver.growth.settling.tangent import Tangent
 from solver.growth.settling.touching import touches
-from solver.growth.settling.watch import Watch
 from solver.growth.state import State
 from solver.growth.stepping import Carried, Steps
 
@@ -47,7 +46,7 @@ def moved(state: State, params: GrowthParams, distance: float, goal: float) -> f
 def stepped(state: State, params: GrowthParams, distance: float) -> float:
     """Return how far the vertices of a state move at most, over the mean rest edge, in a step that grows nothing."""
     still = params.model_copy(update={"remesh": 0.0, "plasticity": 0.0})
-    steps = Steps(still, _GOAL * _FINEST, 4000, np.inf, 10**9, 0.0, Watch(params.thickness))
+    steps = Steps(still, _GOAL * _FINEST, 4000, np.inf, 10**9, 0.0, params.thickness)
     work = steps.step(state, Carried(Tangent(state.mesh), Habit(), distance), params.tools, params.solids, 0.0)
     while True:
         try:

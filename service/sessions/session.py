@@ -19,7 +19,7 @@ from solver import contract
 from store.ledger.asks import Asker
 from sweeps.live.worker import packet
 
-from .. import errors
+from .. import errors, problems
 from ..telemetry import LOGGER
 
 __all__ = ["CLOSED", "Session"]
@@ -179,7 +179,7 @@ class Session:
                 if letter == b"B":
                     await client.send_bytes(content)
                 else:
-                    await client.send_text(content.decode())
+                    await client.send_text(_told(content).decode())
         except TimeoutError:
             # it holds up nobody but itself, and may come back
             await self.detach(client)
@@ -192,3 +192,12 @@ class Session:
             with contextlib.suppress(Exception):
                 async with asyncio.timeout(1.0):
                     await client.close(CLOSED + status, why[:120])
+
+
+def _told(content: bytes) -> bytes:
+    """Return a text of the engine's, which knows no status, with that of its problem if it tells of one."""
+    if not content.startswith(b'{"say": "error"'):
+        return content
+    said = json.loads(content)
+    said["problem"]["status"] = problems.status_of(said["problem"]["type"].rpartition(":")[2])
+    return json.dumps(said).encode()

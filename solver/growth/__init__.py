@@ -54,7 +54,7 @@ SOLVER = Solver(
     version="10",
     title="Growth of thin shells",
     params=GrowthParams,
-    fields=("mesh_position", "elastic_strain", *CHANNELS, "mesh_area", "stored_energy", "rest_area"),
+    fields=("mesh_position", "elastic_strain", "sheet_thickness", *CHANNELS, "mesh_area", "stored_energy", "rest_area"),
     default_fields=("mesh_position", "mesh_area", "rest_area", "stored_energy"),
     stages=StageAxis("t", "growth time", "1", 0.0, 100.0, (0.25, 0.5, 0.75, 1.0)),
     default_resolution={"preview": 16, "default": 32, "fine": 64},
@@ -64,6 +64,6 @@ SOLVER = Solver(
     looks=LOOKS,
     run=_run,
     cost=_cost,
-    live=Live(ACTIONS, _live, ("elastic_strain", *CHANNELS)),
+    live=Live(ACTIONS, _live, ("elastic_strain", "sheet_thickness", *CHANNELS)),
     extent=_extent,
 )

@@ -24,7 +24,6 @@ from .settling.active import Habit
 from .settling.impossible import check_outward, enclosed
 from .settling.stage import settled
 from .settling.tangent import Tangent
-from .settling.watch import Watch
 from .shapes import start
 from .solids import Solid
 from .state import State
@@ -80,9 +79,8 @@ class Engine:
         #: Of a closed surface.
         self._volume = 0.0 if len(self.state.mesh.border) else enclosed(begun)
         longest, largest = params.remesh * self.state.length, MOST * len(self.state.x)
-        self._way = Steps(
-            params, tolerance, most, longest, largest, self._volume, Watch(thickest(self.state, params.thickness))
-        )
+        distance = thickest(self.state, params.thickness)
+        self._way = Steps(params, tolerance, most, longest, largest, self._volume, distance)
         self._carried = Carried(Tangent(self.state.mesh), Habit(), params.contact or 0.0)
         self._steps = 0
 
@@ -241,8 +239,9 @@ class Engine:
         state, distance = yield from self._reached(time)
         free = self.params.contact is None and not distance
         found = yield from self._settled(state, distance, free)
-        if found is None or (free and not (yield from self._way.watch.apart(state.x, found))):
-            found = yield from self._settled(state, self._way.watch.distance)
+        watch = self._way.watch(state)
+        if found is None or (free and not (yield from watch.apart(state.x, found))):
+            found = yield from self._settled(state, watch.distance)
             assert found is not None  # it is not free
         check_outward(found, self._volume, self.state.time, self.params)
         return found

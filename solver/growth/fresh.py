@@ -9,7 +9,7 @@ from ..contract import Context
 from .matter import matter, springs, thickness_map
 from .own.textured import corners_of, faces_of, groups_of
 from .params import GrowthParams
-from .shapes import Mesh
+from .shapes import Ground, Mesh
 from .state import State
 from .tooling.places import share
 from .tooling.placing import border
@@ -25,14 +25,16 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
     np.add.at(normals, mesh.triangles, np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, None, :])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offset = Context.generator(params.seed).normal(size=len(mesh.x)) * params.imperfection * params.thickness
-    material = matter(params.ribs, params.colours, mesh, border(top), params.seed) | groups_of(params.mesh)
+    corners = corners_of(params.mesh)
+    ground = Ground(mesh, border(top), corners.get("uv"))
+    material = matter(params.ribs, params.colours, ground, params.seed) | groups_of(params.mesh)
     if params.thicknesses:
-        material["thick"] = thickness_map(params.thicknesses, mesh, border(top), params.seed)
+        material["thick"] = thickness_map(params.thicknesses, ground, params.seed)
         offset *= material["thick"]
     x = mesh.x + offset[:, None] * normals
     if params.bed:
         flexural = shell.Material(params.thickness, params.poisson).flexural
-        below, stiffer = springs(params.bed, flexural, mesh, border(top), params.seed)
+        below, stiffer = springs(params.bed, flexural, ground, params.seed)
         # the ground is uneven: a sheet that is uneven alone would be pressed flat long before it folds
         material["bed"] = np.concatenate([below[:, None], x, normals], axis=1)
         if stiffer.any():
@@ -41,7 +43,7 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         material["pushed"] = np.zeros_like(x)
     held, led = np.zeros(mesh.x.shape, bool), np.zeros(mesh.x.shape)
     for attachment in params.attached:
-        inside = share(attachment.where, mesh, border(top), params.seed) >= 0.5
+        inside = share(attachment.where, ground, params.seed) >= 0.5
         held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
         # of several the last one that leads anywhere
         if any(attachment.velocity):
@@ -59,6 +61,6 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         spots={},
         curves={},
         matter=material | ({"led": led} if led.any() else {}),
-        corners=corners_of(params.mesh),
+        corners=corners,
         faces=faces_of(params.mesh),
     )

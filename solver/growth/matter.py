@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from ..contract import Context, InvalidInput
-from .shapes import Mesh
+from .shapes import Ground
 from .tooling.places import Everywhere, Place, share
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ __all__ = [
     "matter",
     "softer",
     "springs",
+    "thickened",
     "thickest",
     "thickness_map",
 ]
@@ -95,7 +97,7 @@ class Colour(_Model):
     )
 
 
-def matter(ribs: Sequence[Rib], colours: Sequence[Colour], mesh: Mesh, border: Ints, seed: int) -> dict[str, Floats]:
+def matter(ribs: Sequence[Rib], colours: Sequence[Colour], ground: Ground, seed: int) -> dict[str, Floats]:
     """Return what rides on the material of a start shape, for `State.matter`; nothing where nothing is asked for.
 
     stiff: (n,) logarithm of the bending stiffness over the sheet's. coats: (n, k) shares of the colours. grown: (n,)
@@ -107,23 +109,23 @@ def matter(ribs: Sequence[Rib], colours: Sequence[Colour], mesh: Mesh, border: I
     """
     found: dict[str, Floats] = {}
     if ribs:
-        shares = [np.log(rib.stiffness) * share(rib.where, mesh, border, seed + k) for k, rib in enumerate(ribs)]
+        shares = [np.log(rib.stiffness) * share(rib.where, ground, seed + k) for k, rib in enumerate(ribs)]
         found["stiff"] = np.sum(shares, axis=0)
     if colours:
-        found["coats"] = np.stack([share(c.where, mesh, border, seed + k) for k, c in enumerate(colours)], -1)
+        found["coats"] = np.stack([share(c.where, ground, seed + k) for k, c in enumerate(colours)], -1)
         if any(c.grown > 1 for c in colours):
-            found["grown"] = np.zeros(len(mesh.x))
+            found["grown"] = np.zeros(len(ground.mesh.x))
     return found
 
 
-def thickness_map(parts: Sequence[Thickness], mesh: Mesh, border: Ints, seed: int) -> Floats:
+def thickness_map(parts: Sequence[Thickness], ground: Ground, seed: int) -> Floats:
     """Return the thickness (n,) of each vertex over the sheet's [1]: the product of 1 + share (times - 1).
 
     Raises:
         InvalidInput: a place that the shape does not have, values of another mesh, a map that leaves 0.05 to 20.
 
     """
-    shares = [1 + (part.times - 1) * share(part.where, mesh, border, seed + k) for k, part in enumerate(parts)]
+    shares = [1 + (part.times - 1) * share(part.where, ground, seed + k) for k, part in enumerate(parts)]
     found: Floats = np.prod(shares, axis=0)
     if found.min() < _THINNEST or found.max() > _THICKEST:
         raise InvalidInput(
@@ -131,6 +133,16 @@ def thickness_map(parts: Sequence[Thickness], mesh: Mesh, border: Ints, seed: in
             advice=f"Keep their product between {_THINNEST:g} and {_THICKEST:g}, or change `thickness`.",
         )
     return found
+
+
+def thickened(state: State, rate: Floats | None, dt: float) -> State:
+    """Return a state whose thickness grew for dt at logarithmic rates (n,), as far as a map may make it; None: none."""
+    if rate is None or not rate.any():
+        return state
+    before = state.matter.get("thick", np.ones(len(state.x)))
+    # where nothing thickens it keeps its numbers
+    now = np.where(rate != 0, np.clip(before * np.exp(dt * rate), _THINNEST, _THICKEST), before)
+    return replace(state, matter=state.matter | {"thick": now})
 
 
 def thickest(state: State, thickness: float) -> float:
@@ -149,7 +161,7 @@ def softer(state: State, flexural: float) -> float:
     return min(mean, mean**3 * flexural / state.length**2)
 
 
-def springs(bed: Bed, flexural: float, mesh: Mesh, border: Ints, seed: int) -> tuple[Floats, Floats]:
+def springs(bed: Bed, flexural: float, ground: Ground, seed: int) -> tuple[Floats, Floats]:
     """Return the stiffness K [mu / l^2] (n,) of springs by which a plate of flexural rigidity D folds as asked.
 
     And the logarithm (n,) of what its rigidity is over D: where the wavelength differs from place to place both change,
@@ -159,7 +171,7 @@ def springs(bed: Bed, flexural: float, mesh: Mesh, border: Ints, seed: int) -> t
         InvalidInput: folds too short for the mesh to show, a place that the shape does not have.
 
     """
-    x, (i, j) = mesh.x, mesh.triangles[:, :2].T
+    x, (i, j) = ground.mesh.x, ground.mesh.triangles[:, :2].T
     length = float(np.linalg.norm(x[i] - x[j], axis=1).mean())
     if bed.wavelength < _SHOWN * length:
         raise InvalidInput(
@@ -172,7 +184,7 @@ def springs(bed: Bed, flexural: float, mesh: Mesh, border: Ints, seed: int) -> t
     noise = np.cos(x @ waves.T + generator.uniform(0, 2 * np.pi, 64)).sum(axis=1) / np.sqrt(32)
     longer = (1 - bed.regularity) * noise
     stiff = flexural * (2 * np.pi / bed.wavelength) ** 4 * np.exp(-2 * longer)
-    return share(bed.where, mesh, border, seed) * stiff, 2 * longer
+    return share(bed.where, ground, seed) * stiff, 2 * longer
 
 
 def grown_further(state: State, g: Floats) -> dict[str, Floats]:

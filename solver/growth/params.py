@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 from ..contract import Params
 from .matter import Bed, Colour, Rib, Thickness
 from .own.imported import OwnMesh
-from .shapes import Shape, is_closed, start
-from .solids import Solid, check_pace
-from .tooling.places import Place
+from .shapes import Shape, start
+from .solids import Solid, check_outside, check_pace
+from .tooling.places import Place, check_mapped
 from .tooling.tools import HotSurface, Tool
 
 __all__ = ["Attachment", "Bending", "GrowthParams"]
@@ -42,7 +42,7 @@ class Attachment(_Model):
         return self
 
 
-#: Vertices by which it is told first whether a sheet begins inside a solid: of most meshes one is outside.
+#: Vertices of a start shape by which it is told whether a sheet begins inside a solid.
 _LOOKED_AT = 1000
 
 Bending = Literal["hinges", "mean_curvature"]
@@ -191,22 +191,20 @@ class GrowthParams(Params):
         return self
 
     @model_validator(mode="after")
+    def _mapped(self) -> Self:
+        if self.mesh is None or not self.mesh.uv:
+            for part in (self.tools, self.thicknesses, self.ribs, self.colours, self.attached, self.bed):
+                check_mapped(part)
+        return self
+
+    @model_validator(mode="after")
     def _outside(self) -> Self:
         first = [(k, solid) for k, solid in enumerate(self.solids) if not solid.start]
         if not first:
             return self
         sheet = self.mesh.shape() if self.mesh else start(self.shape, _LOOKED_AT, self.aspect)
         for number, solid in first:
-            if solid.depth(sheet.x[:: len(sheet.x) // _LOOKED_AT + 1])[0].min() <= self.thickness:
-                continue
-            depth = solid.depth(sheet.x)[0]
-            # what lies in it by less than it is thick is laid on it; what is closed is stretched over what is in it
-            if depth.min() > self.thickness and not is_closed(sheet.triangles):
-                raise ValueError(
-                    f"the sheet begins wholly inside solid {number}, a {solid.kind}: all of it is "
-                    f"{depth.min():.3g} deep or deeper, {depth.max():.3g} at most; move the solid off the sheet, "
-                    "make it smaller, or give it a later `start`"
-                )
+            check_outside(f"solid {number}", solid, sheet, self.thickness)
         return self
 
     @model_validator(mode="after")

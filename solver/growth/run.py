@@ -26,7 +26,7 @@ from .state import State
 
 __all__ = ["run"]
 
-_MESH = frozenset({"mesh_position", "elastic_strain", *CHANNELS})
+_MESH = frozenset({"mesh_position", "elastic_strain", "sheet_thickness", *CHANNELS})
 
 
 def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
@@ -61,7 +61,7 @@ def _run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
             state = engine.reach(stage, context)
             rows.append(_row(state, params, need, settings.tolerance, stage, time.perf_counter() - begun))
             if _MESH & set(need.fields):
-                fields = shown(state, params.colours, need.fields)
+                fields = shown(state, params, need.fields)
                 states.append(state)
                 frames.append(Frame(state.x, state.mesh.triangles, fields))
             context.report(stage / max(need.stages[-1], 1e-9), f"growth time {stage:g} settled")

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, Delaunay
 from ..arrays import Floats, Ints
 from . import revolved
 
-__all__ = ["Mesh", "Shape", "is_closed", "start"]
+__all__ = ["Ground", "Mesh", "Shape", "is_closed", "start"]
 
 Shape = Literal[
     "sphere", "disc", "half_disc", "strip", "square", "triangle", "tube", "stem", "capsule", "cone", "torus"
@@ -22,6 +22,17 @@ class Mesh(NamedTuple):
 
     x: Floats
     triangles: Ints
+
+
+class Ground(NamedTuple):
+    """What shares are found on: a mesh, the vertices of its edge (b,), and its texture coordinates if it has some.
+
+    uv: (f, 3, 2) of the triangles' corners, v upwards [1].
+    """
+
+    mesh: Mesh
+    border: Ints
+    uv: Floats | None = None
 
 
 def is_closed(triangles: Ints) -> bool:

@@ -12,11 +12,15 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ..arrays import Floats
 from ..contract.mesh import ClosedMesh
+from .shapes import Mesh, is_closed
 
 if TYPE_CHECKING:
     from ..geometry.signed import Signed
 
-__all__ = ["Plane", "Solid", "SolidBall", "SolidBox", "SolidMesh", "check_pace", "present"]
+__all__ = ["Plane", "Solid", "SolidBall", "SolidBox", "SolidMesh", "check_outside", "check_pace", "present"]
+
+#: Vertices by which it is told first whether a sheet is inside a solid.
+_LOOKED_AT = 1000
 
 Side = Annotated[float, Field(gt=0, le=100)]
 Speed = Annotated[float, Field(ge=-100, le=100)]
@@ -191,4 +195,25 @@ def check_pace(solid: Solid, step: float) -> None:
         raise ValueError(
             f"a {solid.kind} moves by {way:.3g} in a step of {step:g}, and could pass through the sheet: its middle is "
             f"{solid.thick:g} deep, and half of that is the most; take a shorter step, or let it move more slowly"
+        )
+
+
+def check_outside(called: str, solid: Solid, sheet: Mesh, thickness: float) -> None:
+    """Refuse a solid that a whole open sheet lies in, deeper than it is thick; called: as its asker knows it.
+
+    What lies in it by less than it is thick is laid on it; what is closed is stretched over what is in it.
+
+    Raises:
+        ValueError: all of the sheet is inside.
+
+    """
+    # of most meshes one of some vertices is outside
+    if solid.depth(sheet.x[:: len(sheet.x) // _LOOKED_AT + 1])[0].min() <= thickness:
+        return
+    depth = solid.depth(sheet.x)[0]
+    if depth.min() > thickness and not is_closed(sheet.triangles):
+        raise ValueError(
+            f"the sheet begins wholly inside {called}, a {solid.kind}: all of it is "
+            f"{depth.min():.3g} deep or deeper, {depth.max():.3g} at most; move the solid off the sheet, "
+            "make it smaller, or give it a later `start`"
         )

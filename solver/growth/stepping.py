@@ -8,13 +8,13 @@ with contact from before, where all was apart, and so are all that follow.
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from .. import shell
-from .matter import grown_further
+from .matter import grown_further, thickened, thickest
 from .params import GrowthParams
 from .plastic import forgotten
 from .remeshing.remesh import remesh
@@ -28,7 +28,7 @@ from .settling.watch import Watch
 from .solids import Solid, present
 from .state import State
 from .tooling.placing import branched, started
-from .tooling.rates import grown, rates
+from .tooling.rates import grown, rates, thickening
 from .tooling.tools import Tool
 
 __all__ = ["Carried", "Pieces", "Steps"]
@@ -60,7 +60,8 @@ class Steps:
     """How a run takes its steps.
 
     tolerance: residual; most: steps to an equilibrium. longest: rest edge that is not cut; largest: vertices at most.
-    volume: inside a closed surface, 0 of others. watch: of parts that come near each other.
+    volume: inside a closed surface, 0 of others. distance: that parts keep from each other once they are near, as
+    long as nothing is thicker.
     """
 
     params: GrowthParams
@@ -69,7 +70,17 @@ class Steps:
     longest: float
     largest: int
     volume: float
-    watch: Watch
+    distance: float
+    _watches: dict[float, Watch] = field(default_factory=dict)
+
+    def watch(self, state: State) -> Watch:
+        """Return what watches over parts that come nearer each other than a state's sheet is thick."""
+        distance = max(self.distance, thickest(state, self.params.thickness))
+        if distance not in self._watches:
+            # what it remembers is of another distance
+            self._watches.clear()
+            self._watches[distance] = Watch(distance)
+        return self._watches[distance]
 
     def step(
         self, before: State, carried: Carried, tools: Sequence[Tool], solids: Sequence[Solid], dt: float
@@ -84,11 +95,12 @@ class Steps:
         found = yield from self._taken(before, carried, tools, solids, dt)
         meshed, state, after = found
         if self.params.contact is None and not carried.distance:
-            clear = meshed is before or self.watch.clear(meshed)
+            watch = self.watch(state)
+            clear = meshed is before or watch.clear(meshed)
             yield None
-            if not (clear and (yield from self.watch.apart(meshed.x, state))):
+            if not (clear and (yield from watch.apart(meshed.x, state))):
                 yield None
-                near = carried._replace(distance=self.watch.distance)
+                near = carried._replace(distance=watch.distance)
                 _, state, after = yield from self._taken(before, near, tools, solids, dt)
         return state, after
 
@@ -100,16 +112,23 @@ class Steps:
         self, before: State, carried: Carried, tools: Sequence[Tool], solids: Sequence[Solid], dt: float
     ) -> Generator[State | None, None, tuple[State, State, Carried]]:
         """Take a step; the value is the state on the step's mesh, the one at its end, and what is carried."""
-        p, distance = self.params, carried.distance
+        p = self.params
         # the way on from here is the same after an undo only with the same inverse
         carried = carried._replace(tangent=carried.tangent.copy())
         meshed, carried = yield from self._readied(before, carried)
         state = started(meshed, tools, p.step, p.seed)
         middle = state.time + dt / 2
         acting = dict(enumerate(tools))
-        g, rest = grown(state, rates(state, {k: t for k, t in acting.items() if t.start <= middle}, middle), dt)
+        now = {k: t for k, t in acting.items() if t.start <= middle}
+        g, rest = grown(state, rates(state, now, middle), dt)
+        thicker = thickening(state, now, middle)
         yield None
         state = replace(state, g=g, rest=rest, time=state.time + dt, matter=grown_further(state, g))
+        state = thickened(state, thicker, dt)
+        if carried.distance and p.contact is None:
+            # what was near keeps apart by the sheet as it is now
+            carried = carried._replace(distance=max(carried.distance, thickest(state, p.thickness)))
+        distance = carried.distance
         if "led" in state.matter:
             state = replace(state, x=state.x + np.where(state.held, dt * state.matter["led"], 0.0))
         there = present(solids, state.time)

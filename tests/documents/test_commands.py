@@ -131,8 +131,10 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
         shards.write(at / name, rotting(), "0" * 64)
     for name in ("patch.obj", "my.obj", "banana.glb"):
         trimesh.creation.icosphere(3).export(at / name)
-    for name in ("sun.png", "mask.png"):
+    for name in ("sun.png", "mask.png", "rot.png"):
         Image.linear_gradient("L").save(at / name)
+    shown = [block.text for block in blocks() if block.language == "toml" and '"@rot.png"' in block.text]
+    (at / "rind.toml").write_text("\n".join(shown), encoding="utf-8")
     # the package is served, too, where nothing else is named
     shutil.copytree(starter.ROOT / "tables" / "raisin", at / "demo" / "tables" / "raisin")
     with _served(at) as port:

@@ -21,7 +21,11 @@ GROWN = 2.0
 STAGES = (0.0, 1.0)
 
 
-def written(path: Path, count: int = 7) -> dict:
+def on_map(chart: int, x, y):
+    return (0.2 + 0.15 * x, 0.5 + 0.3 * y) if chart == 0 else (0.9 - 0.3 * y, 0.1 + 0.25 * x)
+
+
+def written(path: Path, count: int = 7, on_map=on_map) -> dict:
     """Write a square in two charts, left and right of x = 0, of two materials; the right one is turned."""
     lines = []
     ticks = np.linspace(-1, 1, count)
@@ -39,10 +43,6 @@ def written(path: Path, count: int = 7) -> dict:
                 lines.append("f " + " ".join(f"{k + 1}/{k + 1 + chart * count * count}" for k in square))
     path.write_text("\n".join(lines) + "\n")
     return read(path)
-
-
-def on_map(chart: int, x, y):
-    return (0.2 + 0.15 * x, 0.5 + 0.3 * y) if chart == 0 else (0.9 - 0.3 * y, 0.1 + 0.25 * x)
 
 
 @pytest.fixture(scope="module")

@@ -132,6 +132,60 @@ def test_a_mushroom_is_painted_and_replayed_to_the_same_bytes(live: Served, tmp_
     assert closed.value.rcvd.code == 1000
 
 
+def test_thickness_is_painted_taken_back_and_replayed_to_the_same_bytes(live: Served, tmp_path: Path) -> None:
+    """As pace is: the brush of docs/sessions.md, which grows nothing here but the sheet's thickness."""
+    client = live.client({"shape": "disc", "thickness": 0.04, "tools": [], "step": 0.05}, fields=["sheet_thickness"])
+    assert client.opened()["fields"] == ["sheet_thickness"]
+    client.until(lambda c: c.frames)
+    assert set(client.frames[-1]["fields"][0]) == {np.float32(0.04)}
+    brush = {"radius": 0.6, "stretch": [1, 1], "kernel": "flat", "thickening": 8.0, "hold": 0.1}
+    for x in (0.3, 0.4):
+        client.do("brush", at=[x, 0, 0], **brush)
+    client.ask("lift")
+    client.do("play", until=0.2)
+    client.rest()
+    painted = client.x.copy(), client.frames[-1]["fields"][0].copy()
+    assert painted[1].max() == pytest.approx(0.04 * 8**0.15, rel=0.05)
+    assert painted[1].min() == pytest.approx(0.04, rel=1e-6)
+    client.do("undo")
+    client.do("undo")
+    client.rest()
+    assert client.state["undo"] == 0
+    assert set(client.frames[-1]["fields"][0]) == {np.float32(0.04)}
+    client.do("redo")
+    client.do("redo")
+    client.rest()
+    assert client.x.tobytes() == painted[0].tobytes()
+    assert np.array_equal(client.frames[-1]["fields"][0], painted[1])
+    client.do("settle")
+    client.rest()
+    saved = client.ask("save")
+    assert "thickening = 8.0" in saved["toml"]
+    vertices, triangles = mesh(saved, tmp_path)
+    assert client.x.tobytes() == vertices.tobytes()
+    assert np.array_equal(client.triangles, triangles)
+    client.end()
+
+
+def test_a_solid_around_the_whole_sheet_is_refused_and_the_session_goes_on(live: Served) -> None:
+    client = live.client({"shape": "disc", "thickness": 0.05, "tools": [], "step": 0.05})
+    client.opened()
+    client.until(lambda c: c.frames)
+    said = client.ask("solid", solid={"kind": "ball", "radius": 3})
+    assert said["say"] == "error"
+    assert said["problem"]["type"] == "urn:wizen:problem:invalid-geometry"
+    assert said["problem"]["status"] == 422
+    assert "wholly inside it, a ball" in said["problem"]["detail"]
+    assert said["problem"]["advice"]
+    # it lies beside, and it is painted on
+    assert client.do("solid", solid={"kind": "ball", "centre": [0, 0, -3], "radius": 1})["solid"] == 0
+    client.do("brush", at=[0.5, 0, 0])
+    client.rest()
+    assert client.frames[-1]["stage"] > 0
+    assert client.state["undo"] == 2
+    client.end()
+
+
 def refused(client: Client) -> tuple[dict[str, Any], int]:
     """Return the problem that a client is sent away with, and the code."""
     said = client.opened()

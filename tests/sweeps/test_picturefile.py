@@ -8,7 +8,7 @@ from PIL import Image
 
 from solver import registry
 from solver.painted import painted
-from sweeps.commands.terminal.options import assignments
+from sweeps.commands.terminal.options import assignments, parameters
 from sweeps.errors import InvalidOption
 
 
@@ -39,3 +39,56 @@ def test_a_picture_of_the_wrong_size_is_refused(tmp_path: Path) -> None:
     Image.new("L", (1, 40)).save(tmp_path / "thin.png")
     with pytest.raises(InvalidOption, match="1 x 40 pixels"):
         assignments([f"wound_map=@{tmp_path}/thin.png"])
+
+
+def laid_out(folder: Path, name: str) -> np.ndarray:
+    """Return what a params file in a folder has for a texture of a picture."""
+    (folder / "leaf.toml").write_text(f'[[ribs]]\nwhere = {{kind = "texture", picture = "@{name}"}}\n')
+    return np.array(parameters(folder / "leaf.toml")["ribs"][0]["where"]["picture"])
+
+
+def test_a_texture_is_the_picture_as_it_is_with_all_its_bits(tmp_path: Path) -> None:
+    """Sixteen bits, the first row on top, its own shape; read as a map it keeps them too."""
+    levels = np.linspace(0, 65535, 15).astype(np.uint16).reshape(3, 5)
+    Image.fromarray(levels).save(tmp_path / "deep.png")
+    found = laid_out(tmp_path, "deep.png")
+    assert np.abs(found - levels / 65535).max() < 6e-7
+    wide = np.repeat(levels[:, :1], 6, axis=1)
+    Image.fromarray(wide).save(tmp_path / "map.png")
+    rows = assignments([f"light_map=@{tmp_path}/map.png"])["light_map"]
+    assert np.abs(np.array(rows) - wide / 65535).max() < 6e-7
+    Image.fromarray((levels >> 8).astype(np.uint8)).save(tmp_path / "flat.png")
+    assert np.abs(laid_out(tmp_path, "flat.png") - (levels >> 8) / 255).max() < 6e-5
+
+
+def test_a_large_picture_is_averaged(tmp_path: Path) -> None:
+    levels = (np.random.default_rng(0).random((512, 1024)) * 65535).astype(np.uint16)
+    Image.fromarray(levels).save(tmp_path / "large.png")
+    mean = levels.reshape(256, 2, 512, 2).mean(axis=(1, 3)) / 65535
+    assert np.abs(laid_out(tmp_path, "large.png") - mean).max() < 6e-7
+
+
+def exr(path: Path, **channels: np.ndarray) -> None:
+    OpenEXR = pytest.importorskip("OpenEXR")
+    head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(head, {name: values.astype(np.float32) for name, values in channels.items()}) as file:
+        file.write(str(path))
+
+
+def test_a_texture_may_be_the_one_channel_of_an_exr_picture(tmp_path: Path) -> None:
+    values = np.random.default_rng(1).random((4, 7))
+    exr(tmp_path / "rot.exr", rot=values)
+    assert np.abs(laid_out(tmp_path, "rot.exr") - values).max() < 6e-7
+    exr(tmp_path / "both.exr", rot=values, mould=values)
+    with pytest.raises(InvalidOption, match=r"channels.*mould.*a texture has one") as told:
+        laid_out(tmp_path, "both.exr")
+    assert "--map NAME" in told.value.advice
+    exr(tmp_path / "warm.exr", temperature=20 + values)
+    with pytest.raises(InvalidOption, match=r"temperature goes from 20\.\d+ to 2") as told:
+        laid_out(tmp_path, "warm.exr")
+    assert "--low" in told.value.advice
+    exr(tmp_path / "nan.exr", rot=np.full((4, 4), np.nan))
+    (tmp_path / "none.exr").write_bytes(b"no picture")
+    for name in ("nan.exr", "none.exr", "absent.exr"):
+        with pytest.raises(InvalidOption, match=name):
+            laid_out(tmp_path, name)

@@ -25,6 +25,9 @@ class Brush(_Action):
     way: Point | None = Field(None, description="Direction of the brush; none: from the dab before [1]")
     radius: float = Field(0.3, gt=0, le=100, description="Radius of influence [start shape's unit]")
     stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the way, per unit time [1]")
+    thickening: Stretch = Field(
+        1.0, description="Through the sheet: what its thickness is multiplied by, per unit time [1]"
+    )
     kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
     hold: float | None = Field(None, gt=0, le=1000, description="How long it acts; none: one step [growth time]")
 

@@ -9,16 +9,18 @@ import numpy as np
 from pydantic import BaseModel
 
 from ...arrays import Floats
-from ...contract import Glimpse, InvalidInput, Quality, SolverError
+from ...contract import Glimpse, InvalidGeometry, InvalidInput, Quality, SolverError
 from ...meshes import Frame
 from ..anchors import place
 from ..engine import Engine, Undone
 from ..params import GrowthParams
 from ..settings import choose
 from ..settling.stage import residual
+from ..shapes import Mesh
 from ..shown import shown
-from ..solids import Solid, check_pace
+from ..solids import Solid, check_outside, check_pace
 from ..state import State
+from ..tooling.places import check_mapped
 from ..tooling.tools import HotStroke, Point, Tool
 from .actions import Add, Brush, End, Lift, Put
 
@@ -103,6 +105,7 @@ class GrowingLive:
         Raises:
             InvalidInput: too many tools, solids or dabs, a place off the surface, a solid that is too fast, or
                 a number that nothing has.
+            InvalidGeometry: a solid that the whole sheet lies in, a texture without coordinates to lie by.
 
         """
         if self.owed > self.stage + 1e-9:
@@ -116,14 +119,16 @@ class GrowingLive:
         self._stroke = None
         if isinstance(action, Add):
             _room("tools", len(self.script.tools), _MOST_TOOLS)
+            if "uv" not in self._engine.state.corners:
+                try:
+                    check_mapped(action.tool)
+                except ValueError as error:
+                    raise InvalidGeometry(f"tool: {error}.", advice="Begin with such a mesh, or project it.") from None
             self.begin()
             return {"tool": self._engine.add(action.tool)}
         if isinstance(action, Put):
             _room("solids", len(self.script.solids), _MOST_SOLIDS)
-            try:
-                check_pace(action.solid, self.step)
-            except ValueError as error:
-                raise InvalidInput(f"solid: {error}.", advice="Take a smaller `velocity`.") from None
+            self._check_solid(action.solid)
             self.begin()
             return {"solid": self._engine.put(action.solid)}
         assert isinstance(action, Lift)
@@ -135,18 +140,32 @@ class GrowingLive:
         self._gestures.append(_Gesture(steps, self.script.tools, self.script.solids))
         self._undone.clear()
 
+    def _check_solid(self, solid: Solid) -> None:
+        try:
+            check_pace(solid, self.step)
+        except ValueError as error:
+            raise InvalidInput(f"solid: {error}.", advice="Take a smaller `velocity`.") from None
+        if solid.start > self._engine.following + 1e-9:
+            return
+        state = self._engine.state
+        try:
+            check_outside("it", solid, Mesh(state.x, state.mesh.triangles), self.script.thickness)
+        except ValueError as error:
+            advice = "Or take another place for it: nothing has changed."
+            raise InvalidGeometry(f"solid: {error}.", advice=advice) from None
+
     def _dab(self, brush: Brush) -> int:
         self._check_near(brush)
         hold = brush.hold or self.step
         stroke = None if self._stroke is None else self.script.tools[self._stroke]
         if not (
             isinstance(stroke, HotStroke)
-            and (stroke.radius, stroke.stretch, stroke.kernel, stroke.hold)
-            == (brush.radius, brush.stretch, brush.kernel, hold)
+            and (stroke.radius, stroke.stretch, stroke.thickening, stroke.kernel, stroke.hold)
+            == (brush.radius, brush.stretch, brush.thickening, brush.kernel, hold)
         ):
             _room("tools", len(self.script.tools), _MOST_TOOLS)
             self.begin()
-            looks = {"radius": brush.radius, "stretch": brush.stretch, "kernel": brush.kernel, "hold": hold}
+            looks = brush.model_dump(include={"radius", "stretch", "thickening", "kernel"}) | {"hold": hold}
             tool = HotStroke(points=(brush.at,), ways=(brush.way or (0.0, 0.0, 0.0),), times=(0.0,), **looks)
             self._stroke = self._engine.add(tool)
             return self._stroke
@@ -254,7 +273,7 @@ class GrowingLive:
         return self._shown(state, fields), residual(state, self._engine.params)
 
     def _shown(self, state: State, fields: Sequence[str]) -> Frame:
-        return Frame(state.x, state.mesh.triangles, shown(state, self._engine.params.colours, fields))
+        return Frame(state.x, state.mesh.triangles, shown(state, self._engine.params, fields))
 
 
 def _room(what: str, count: int, most: int) -> None:

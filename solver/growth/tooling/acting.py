@@ -13,7 +13,7 @@ from .geodesic import Distances, carried, distances
 from .reach import within
 from .tools import HotCurve, HotSpot, HotStroke, HotSurface, clocked, intensities
 
-__all__ = ["Acting", "curve", "spots", "stretches", "stroke", "surface", "tips"]
+__all__ = ["Acting", "curve", "dabbed", "spots", "stretches", "stroke", "surface", "tips"]
 
 
 class Acting(NamedTuple):
@@ -126,7 +126,14 @@ def _slope(p: Floats, normal: Floats, values: Floats) -> Floats:
 
 def stroke(state: State, tool: HotStroke, number: int, time: float) -> Acting:
     """Return where a stroke acts, how much, and along which way: that of the dab that acts most."""
-    triangles, x = state.mesh.triangles, state.x
+    whole, ways = dabbed(state, tool, number, time)
+    some, share = tips(state, whole)
+    return Acting(some, share, ways[state.mesh.triangles[some]].mean(axis=1))
+
+
+def dabbed(state: State, tool: HotStroke, number: int, time: float) -> tuple[Floats, Floats]:
+    """Return how much a stroke acts at each vertex (n,), and along which way (n, 3): as the dab that acts most."""
+    x = state.x
     whole, ways = np.zeros(len(x)), np.zeros((len(x), 3))
     for spot in state.spots[number]:
         if not 0 <= time - tool.laid(spot.dab) < tool.hold:
@@ -135,8 +142,7 @@ def stroke(state: State, tool: HotStroke, number: int, time: float) -> Acting:
         stronger = value > whole[near]
         whole[near[stronger]] = value[stronger]
         ways[near[stronger]] = tool.ways[spot.dab] if tool.ways else 0.0
-    some, share = tips(state, whole)
-    return Acting(some, share, ways[triangles[some]].mean(axis=1))
+    return whole, ways
 
 
 def _kernel(name: str, r: Floats) -> Floats:

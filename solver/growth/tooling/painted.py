@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from ...arrays import Floats, Ints
 from ...contract import InvalidInput
-from ..shapes import Mesh
+from ..shapes import Ground
 from .harmonic import harmonic_tensors
 from .places import share
 from .tools import HotTensors, PaintedStroke
@@ -28,13 +28,14 @@ _UPPER = np.triu_indices(3)
 _FINE = 0.5
 
 
-def laid_tensors(number: int, tool: HotTensors, mesh: Mesh, rim: Ints, seed: int) -> Floats:
+def laid_tensors(number: int, tool: HotTensors, ground: Ground, seed: int) -> Floats:
     """Return what rides on the vertices (n, 11) of a mesh with a tool's painted tensors, harmonic between its strokes.
 
     Raises:
         InvalidInput: a stroke without a direction where one is needed, a part of the surface without a stroke.
 
     """
+    mesh = ground.mesh
     ways, rates = np.zeros_like(mesh.x), np.zeros((len(mesh.x), 2))
     painted = np.zeros(len(mesh.x), np.bool_)
     tree = KDTree(mesh.x)
@@ -50,7 +51,7 @@ def laid_tensors(number: int, tool: HotTensors, mesh: Mesh, rim: Ints, seed: int
         painted[under], ways[under], rates[under] = True, along, (first, second)
     at = np.flatnonzero(painted)
     spread, found = harmonic_tensors(mesh.x, mesh.triangles, at, ways[at], rates[at])
-    whole = share(tool.where, mesh, rim, seed)
+    whole = share(tool.where, ground, seed)
     tensors = (found[:, :, None] * found[:, None, :])[:, *_UPPER]
     return np.concatenate([whole[:, None] * spread, tensors, mesh.x], axis=1)
 

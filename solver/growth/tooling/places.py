@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from scipy.spatial import KDTree
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats
 from ...contract import Context, InvalidInput
-from ..shapes import Mesh
+from ..shapes import Ground
 from .harmonic import harmonic
-from .textures import Projection, gray_scott, laid
+from .textures import UNMAPPED, Projection, gray_scott, laid
 
 __all__ = [
     "Ball",
@@ -29,6 +29,7 @@ __all__ = [
     "Reaction",
     "Rim",
     "Texture",
+    "check_mapped",
     "share",
 ]
 
@@ -92,19 +93,39 @@ class Painted(_Model):
     values: tuple[float, ...] = Field(max_length=200_000, description="Share of each vertex, 0 to 1 [1]")
 
 
+_PROJECTED = "Axis of view, round about the z axis, sphere as maps of bodies are laid out, or uv, as the mesh says"
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
 class Texture(_Model):
-    """Values on a grid, laid on the surface by a temporary map when the tool starts."""
+    """Values on a grid, laid on the surface by a map when the tool starts."""
 
     kind: Literal["texture"] = "texture"
-    values: tuple[tuple[float, ...], ...] = Field(min_length=2, max_length=1024, description="Rows from below [1]")
-    projection: Projection = Field("z", description="Axis of view, or round about the z axis")
+    values: tuple[tuple[float, ...], ...] = Field(
+        (), max_length=1024, description="Rows from below [1]", exclude_if=lambda value: not value
+    )
+    picture: tuple[tuple[Share, ...], ...] = Field(
+        (),
+        max_length=1024,
+        description="Or rows from above, as of pictures: black 0, white 1 [1]",
+        # runs without a picture keep their keys
+        exclude_if=lambda value: not value,
+    )
+    projection: Projection = Field("z", description=_PROJECTED)
 
-    @field_validator("values")
-    @classmethod
-    def _even(cls, value: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-        if len(value[0]) < 2 or any(len(row) != len(value[0]) for row in value):
-            raise ValueError("the rows of a texture are equally long, two values at least")
-        return value
+    @model_validator(mode="after")
+    def _even(self) -> Self:
+        if bool(self.values) == bool(self.picture):
+            raise ValueError("a texture has either values or a picture")
+        rows = self.values or self.picture
+        if len(rows) < 2 or len(rows[0]) < 2 or any(len(row) != len(rows[0]) for row in rows):
+            raise ValueError("the rows of a texture, two at least, are equally long, two values at least")
+        return self
+
+    @property
+    def grid(self) -> Floats:
+        """Its values (rows, columns), the first row low."""
+        return np.array(self.values) if self.values else np.array(self.picture)[::-1]
 
 
 class Reaction(_Model):
@@ -115,7 +136,7 @@ class Reaction(_Model):
     kill: float = Field(0.06, ge=0, le=0.1, description="Kill rate k [1]")
     size: int = Field(64, ge=16, le=256, description="Cells of the grid: more are finer")
     steps: int = Field(4000, ge=1, le=20_000, description="Steps of the reaction")
-    projection: Projection = Field("z", description="Axis of view, or round about the z axis")
+    projection: Projection = Field("z", description=_PROJECTED)
 
 
 class Harmonic(_Model):
@@ -174,14 +195,32 @@ def _away(x: Floats, lines: Sequence[Sequence[tuple[float, float, float]]]) -> F
     return found
 
 
-def share(place: Place, mesh: Mesh, border: Ints, seed: int) -> Floats:
-    """Return the share (n,) of each vertex; border: vertices of the surface's edge.
+def check_mapped(value: object) -> None:
+    """Refuse textures that lie by texture coordinates, in parameters of a surface that has none.
 
     Raises:
-        InvalidInput: a rim of a closed surface, painted values of another mesh.
+        ValueError: there is one.
 
     """
-    x = mesh.x
+    if isinstance(value, Texture | Reaction) and value.projection == "uv":
+        raise ValueError(f'a {value.kind} with projection = "uv" has no texture coordinates to lie by: {UNMAPPED}')
+    if isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            check_mapped(getattr(value, name))
+    elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+        for each in value:
+            check_mapped(each)
+
+
+def share(place: Place, ground: Ground, seed: int) -> Floats:
+    """Return the share (n,) of each vertex of a surface.
+
+    Raises:
+        InvalidInput: a rim of a closed surface, painted values of another mesh, a texture that lies by coordinates
+            which there are not.
+
+    """
+    (x, triangles), border = ground.mesh, ground.border
     if isinstance(place, Ball):
         return _smooth(1 - np.asarray(np.linalg.norm(x - np.array(place.centre), axis=1)) / place.radius)
     if isinstance(place, Band):
@@ -203,12 +242,12 @@ def share(place: Place, mesh: Mesh, border: Ints, seed: int) -> Floats:
         total = np.cos(x @ waves.T + generator.uniform(0, 2 * np.pi, 64)).sum(axis=1) / np.sqrt(32)
         return _smooth(0.5 + 0.5 * place.sharpness * total)
     if isinstance(place, Texture):
-        return np.clip(laid(np.array(place.values), x, place.projection), 0, 1)
+        return np.clip(laid(place.grid, ground, place.projection), 0, 1)
     if isinstance(place, Reaction):
-        return laid(gray_scott(place.feed, place.kill, place.size, place.steps, seed), x, place.projection)
+        return laid(gray_scott(place.feed, place.kill, place.size, place.steps, seed), ground, place.projection)
     if isinstance(place, Harmonic):
         painted, first = np.unique(KDTree(x).query(np.array(place.points))[1], return_index=True)
-        return np.clip(harmonic(x, mesh.triangles, painted, np.array(place.values)[first]), 0, 1)
+        return np.clip(harmonic(x, triangles, painted, np.array(place.values)[first]), 0, 1)
     if isinstance(place, Painted):
         if len(place.values) != len(x):
             raise InvalidInput(

@@ -11,7 +11,7 @@ from ... import shell
 from ...arrays import Floats, Ints
 from ...contract import Context, InvalidInput
 from ..anchors import Anchors, place
-from ..shapes import Mesh
+from ..shapes import Ground, Mesh
 from ..state import Spot, State
 from .painted import laid_tensors
 from .places import share
@@ -40,7 +40,7 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
     """
     shares, spots, curves = dict(state.shares), dict(state.spots), dict(state.curves)
     mesh = Mesh(state.x, state.mesh.triangles)
-    rim = border(state.mesh)
+    ground = Ground(mesh, border(state.mesh), state.corners.get("uv"))
     later = state.time > 1e-9
     for number, tool in enumerate(tools):
         if isinstance(tool, HotStroke):
@@ -50,15 +50,15 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
         if number in shares or number in spots or number in curves or tool.start > state.time + step - 1e-9:
             continue
         if isinstance(tool, HotSurface):
-            shares[number] = share(tool.where, mesh, rim, seed + number)
+            shares[number] = share(tool.where, ground, seed + number)
             _check_direction(number, tool, shares[number], mesh)
             if clocked(tool):
                 clocks = (
-                    share(p, mesh, rim, seed + number) if p else np.zeros(len(mesh.x)) for p in (tool.later, tool.paced)
+                    share(p, ground, seed + number) if p else np.zeros(len(mesh.x)) for p in (tool.later, tool.paced)
                 )
                 shares[number] = np.stack([shares[number], *clocks], -1)
         elif isinstance(tool, HotTensors):
-            shares[number] = laid_tensors(number, tool, mesh, rim, seed + number)
+            shares[number] = laid_tensors(number, tool, ground, seed + number)
         elif isinstance(tool, HotCurve):
             if tool.apex is None:
                 curves[number] = _on(number, "a point", np.array(tool.points), tool.radius, mesh, later)

@@ -10,12 +10,12 @@ import numpy as np
 from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..state import State
-from .acting import Acting, curve, spots, stretches, stroke, surface, tips
+from .acting import Acting, curve, dabbed, spots, stretches, stroke, surface, tips
 from .agreeing import agreed
 from .painted import carried_ways, logs_of
 from .tools import HotCurve, HotSpot, HotStroke, HotSurface, HotTensors, Tool, clocked, intensities
 
-__all__ = ["Rates", "grown", "rates"]
+__all__ = ["Rates", "grown", "rates", "thickening"]
 
 
 class Rates(NamedTuple):
@@ -59,6 +59,19 @@ def rates(state: State, tools: Mapping[int, Tool], time: float) -> Rates:
             mean = share.mean(axis=1)
             curving[some] += _tensor(mean * tool.curl[0], mean * tool.curl[1], v)
     return Rates(edges.mean(axis=1), edges, curving)
+
+
+def thickening(state: State, tools: Mapping[int, Tool], time: float) -> Floats | None:
+    """Return the logarithmic rates (n,) at which strokes thicken the sheet at a growth time; None where none does."""
+    found: Floats | None = None
+    for number, tool in tools.items():
+        if not isinstance(tool, HotStroke) or tool.thickening == 1:
+            continue
+        strength = float(intensities(tool, np.array([time - tool.start]))[0])
+        if strength:
+            more = strength * np.log(tool.thickening) * dabbed(state, tool, number, time)[0]
+            found = more if found is None else found + more
+    return found
 
 
 def _acting(

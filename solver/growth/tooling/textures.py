@@ -1,4 +1,4 @@
-"""Expansion textures: values on a grid, laid on a surface by a temporary uv map; spots and stripes by reaction."""
+"""Expansion textures: values on a grid, laid on a surface by a map; spots and stripes by reaction."""
 
 from __future__ import annotations
 
@@ -8,19 +8,41 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ...arrays import Floats
-from ...contract import Context
+from ...contract import Context, InvalidInput
+from ..shapes import Ground
 
-__all__ = ["Projection", "gray_scott", "laid"]
+__all__ = ["UNMAPPED", "Projection", "gray_scott", "laid"]
 
-Projection = Literal["x", "y", "z", "round"]
+Projection = Literal["x", "y", "z", "round", "sphere", "uv"]
+#: What to do where there are no texture coordinates.
+UNMAPPED = (
+    "give a `mesh` that has texture coordinates (vt in OBJ, TEXCOORD_0 in GLB), or take another projection: x, y, z, "
+    "round, sphere"
+)
 
 
-def laid(values: Floats, x: Floats, projection: Projection) -> Floats:
-    """Return the texture's values (rows, columns) at vertices (n, 3), bilinear.
+def laid(values: Floats, ground: Ground, projection: Projection) -> Floats:
+    """Return the texture's values (rows, columns), the first row low, at vertices (n,), bilinear.
 
     x, y, z: seen along that axis, over the surface's box, the next two axes across (columns) and up (rows).
-    round: columns about the z axis from x, periodic; rows along z. The first row is low.
+    round: columns about the z axis from x, periodic; rows along z.
+    sphere: as seen from the origin, rows by the angle to z, columns about z from x towards -y. Values are at the
+    middles of cells, and beyond a pole the rows go on on the other side. Turned so that y is up, as in files, that is
+    how maps of bodies whose poles are on y are laid out.
+    uv: by texture coordinates, values at the middles of cells; columns repeat, and so do rows, each tile by itself. A
+    vertex on a seam has the mean of its triangles' corners.
+
+    Raises:
+        InvalidInput: there are no texture coordinates.
+
     """
+    x = ground.mesh.x
+    if projection == "uv":
+        if ground.uv is None:
+            raise InvalidInput("a texture lies by texture coordinates, and the surface has none.", advice=UNMAPPED)
+        return _by_corners(values, ground.uv, ground)
+    if projection == "sphere":
+        return _around_middle(values, x)
     if projection == "round":
         u = (np.arctan2(x[:, 1], x[:, 0]) / (2 * np.pi)) % 1.0 * values.shape[1]
         v = _shares(x[:, 2]) * (len(values) - 1)
@@ -30,6 +52,30 @@ def laid(values: Floats, x: Floats, projection: Projection) -> Floats:
     u = _shares(x[:, first]) * (values.shape[1] - 1)
     v = _shares(x[:, (first + 1) % 3]) * (len(values) - 1)
     return np.asarray(map_coordinates(values, [v, u], order=1, mode="nearest"))
+
+
+def _around_middle(values: Floats, x: Floats) -> Floats:
+    """Return the values at the directions of points (n, 3) from the origin."""
+    n, m = values.shape
+    rows = np.concatenate([np.roll(values[:1], m // 2, axis=1), values, np.roll(values[-1:], m // 2, axis=1)])
+    up = 1 - np.arctan2(np.hypot(x[:, 0], x[:, 1]), x[:, 2]) / np.pi
+    along = np.arctan2(-x[:, 1], x[:, 0]) / (2 * np.pi) % 1.0
+    return _repeating(rows, up * n + 0.5, along * m)
+
+
+def _by_corners(values: Floats, uv: Floats, ground: Ground) -> Floats:
+    """Return the means of the values at the texture coordinates (f, 3, 2) of each vertex's corners."""
+    u, v = uv.reshape(-1, 2).T
+    inside = np.where((v >= 0) & (v <= 1), v, v % 1.0)
+    found = _repeating(values, inside * len(values) - 0.5, u % 1.0 * values.shape[1])
+    corners, count = ground.mesh.triangles.ravel(), len(ground.mesh.x)
+    return np.bincount(corners, found, count) / np.maximum(np.bincount(corners, minlength=count), 1)
+
+
+def _repeating(rows: Floats, down: Floats, along: Floats) -> Floats:
+    """Return the values at rows `down`, and columns `along` whose middles are at halves, which repeat."""
+    wide = np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
+    return np.asarray(map_coordinates(wide, [down, along + 0.5], order=1, mode="nearest"))
 
 
 def _shares(v: Floats) -> Floats:

@@ -193,6 +193,12 @@ class HotStroke(_Tool):
     kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
     distance: Way = Field("space", description=_HOW_FAR)
     stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the way of the brush [1]")
+    thickening: Stretch = Field(
+        1.0,
+        description="Through the sheet: what its thickness is multiplied by; it stays within .05 and 20 times [1]",
+        # runs whose strokes thicken nothing keep their keys
+        exclude_if=lambda value: value == 1,
+    )
 
     @model_validator(mode="after")
     def _matching(self) -> Self:

@@ -47,7 +47,7 @@ Params = Annotated[
     typer.Option(
         "--params",
         metavar="FILE",
-        help='Parameters as TOML or JSON; they go over --preset, --set over them. "@FILE" in it is a mesh beside it.',
+        help='TOML or JSON of parameters, over --preset; --set goes over it. "@FILE" is a mesh or a picture beside it.',
     ),
 ]
 Stages = Annotated[str | None, typer.Option("--stages", metavar="S,S,...", help="Stages, e.g. 0.05,0.1.")]
@@ -122,20 +122,25 @@ def parameters(path: Path | None) -> dict[str, Any]:
     return {name: _with_files(value, path.parent) for name, value in values.items()}
 
 
-def _with_files(value: Any, folder: Path) -> Any:
-    """Return a value of a file in `folder` in which every text "@FILE" is what that file holds."""
+def _with_files(value: Any, folder: Path, name: str = "") -> Any:
+    """Return a value of a file in `folder` in which every text "@FILE" is what that file holds.
+
+    What is called `picture` is one as it is; other pictures are maps around a body.
+    """
     if isinstance(value, dict):
-        return {name: _with_files(each, folder) for name, each in value.items()}
+        return {each: _with_files(own, folder, each) for each, own in value.items()}
     if isinstance(value, list):
-        return [_with_files(each, folder) for each in value]
-    return _file(folder / value[1:]) if isinstance(value, str) and value.startswith("@") else value
+        return [_with_files(each, folder, name) for each in value]
+    return _file(folder / value[1:], name) if isinstance(value, str) and value.startswith("@") else value
 
 
-def _file(path: Path) -> Any:
-    """Return the picture or the mesh of a file."""
+def _file(path: Path, name: str = "") -> Any:
+    """Return the picture or the mesh of a file, as what bears that name takes it."""
     from . import meshfile, picturefile
 
-    return picturefile.read(path) if path.suffix.lower() in picturefile.KINDS else meshfile.read(path)
+    if path.suffix.lower() not in picturefile.KINDS:
+        return meshfile.read(path)
+    return picturefile.picture(path) if name == "picture" else picturefile.read(path)
 
 
 def _value(text: str) -> Any:

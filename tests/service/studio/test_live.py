@@ -46,6 +46,10 @@ def test_a_shape_is_painted_while_it_grows(browser: Browser, studio: str) -> Non
     page.get_by_role("button", name="Dab in the middle").press("Enter")
     # the next dab is taken once this one is at rest
     dabbed = visit.shown("shown.stage > 0 && !shown.underway")
+    # the brush of the form is the one of the schema: the second stroke thickens as it grows
+    thickening = page.locator("#tools-live details").first.get_by_label("Thickening", exact=True)
+    thickening.fill("4")
+    thickening.press("Enter")
     box = page.locator("#view").bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -60,7 +64,7 @@ def test_a_shape_is_painted_while_it_grows(browser: Browser, studio: str) -> Non
     page.get_by_role("button", name="Save as TOML").click()
     saved = tomllib.loads(page.locator(".toml").inner_text(timeout=60_000))
     strokes = [tool for tool in saved["tools"] if tool["kind"] == "stroke"]
-    assert len(strokes) == 2
+    assert [stroke.get("thickening", 1) for stroke in strokes] == [1, 4]
     page.get_by_role("button", name="Undo").click()
     page.wait_for_function("() => document.getElementById('view').dataset.undo === '1'")
     assert visit.complaints == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from solver.contract import InvalidInput, Need
+from solver.contract import Context, InvalidGeometry, InvalidInput, Need
 from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.living import history
@@ -195,3 +195,102 @@ def test_numbers_and_places_that_there_are_not():
     assert live.gestures == 0
     with pytest.raises(InvalidInput, match="one for each dab"):
         GrowthParams.parse({"tools": [{"kind": "stroke", "points": [[0, 0, 1]], "times": [0, 1]}]})
+
+
+def thick(live):
+    return live.frame(("sheet_thickness",)).fields["sheet_thickness"]
+
+
+def test_a_brush_paints_thickness_and_it_goes_back_and_forth(monkeypatch):
+    """Also over the start; and the script, whose strokes thicken, is the batch run of the same bytes."""
+    monkeypatch.setattr(history, "_MOMENTS", 2)
+    live = begun(shape="disc", thickness=0.04)
+    dab = {"radius": 0.5, "stretch": [1, 1], "kernel": "flat", "thickening": 8.0, "hold": 0.1}
+    found = [(x(live), thick(live))]
+    act(live, "brush", at=[0.4, 0, 0], steps=2, **dab)
+    act(live, "brush", at=[0.4, 0.1, 0], steps=2, **dab)
+    act(live, "lift", steps=0)
+    found.append((x(live), thick(live)))
+    act(live, "brush", at=[-0.5, 0, 0], steps=2, **(dab | {"thickening": 0.5}))
+    found.append((x(live), thick(live)))
+    assert (live.gestures, len(live.script.tools)) == (2, 2)
+    # eightfold in a unit of time, over two dabs of .1 that overlap
+    assert found[1][1].max() == pytest.approx(0.04 * 8**0.2, rel=1e-9)
+    assert found[2][1].min() == pytest.approx(0.04 * 0.5**0.1, rel=1e-9)
+    far = np.linalg.norm(found[0][0] - [0.4, 0.05, 0], axis=1) > 0.6
+    assert (found[1][1][far] == 0.04).all()
+    for expected in reversed(found[:-1]):
+        assert live.undo()
+        again(live)
+        assert all(np.array_equal(a, b) for a, b in zip((x(live), thick(live)), expected, strict=True))
+    for expected in found[1:]:
+        assert live.redo()
+        again(live)
+        assert all(np.array_equal(a, b) for a, b in zip((x(live), thick(live)), expected, strict=True))
+    need = Need(stages=(live.stage,), quality="preview", dtype="float64", fields=("mesh_position", "sheet_thickness"))
+    run = SOLVER.solve(live.script, need)
+    assert np.array_equal(run.mesh_position.values, end_of(live))
+    assert np.array_equal(run.sheet_thickness.values, thick(live))
+
+
+def test_thickening_is_bounded_and_what_stays_keeps_its_key():
+    values = {"kind": "stroke", "points": [[0, 0, 0]], "radius": 5, "kernel": "flat", "stretch": [1, 1]}
+    disc = {"shape": "disc", "tools": [values | {"thickening": 10}], "thickness": 0.001, "contact": 0, "step": 1}
+    state = Engine(GrowthParams.parse(disc), 60).reach(2.0, Context())
+    assert (state.matter["thick"] == 20).all()
+    assert "thickening" not in HotStroke.model_validate(values).model_dump(mode="json")
+    assert HotStroke.model_validate(values | {"thickening": 3}).model_dump(mode="json")["thickening"] == 3
+
+
+def test_parts_keep_apart_by_the_thickness_that_was_painted():
+    """Two sheets over each other, nearer than the upper one is thick in the end, part as far as that."""
+    ticks = np.linspace(-0.5, 0.5, 6)
+    plane = np.stack([*np.meshgrid(ticks, ticks), np.zeros((6, 6))], -1).reshape(-1, 3)
+    corner = (np.arange(5) + 6 * np.arange(5)[:, None]).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 1, corner + 7], -1), np.stack([corner, corner + 7, corner + 6], -1)]
+    )
+    points = np.concatenate([plane, plane + np.array([0.01, 0.02, 0.03])])
+    mesh = {"points": points.tolist(), "faces": np.concatenate([faces, faces + 36]).tolist()}
+    stroke = {"kind": "stroke", "points": [[0, 0, 0.03]], "radius": 5, "kernel": "flat", "stretch": [1, 1]}
+    values = {"mesh": mesh, "thickness": 0.02, "remesh": 0, "step": 0.05, "imperfection": 0}
+    gaps = []
+    for thickening in (1.0, 10.0):
+        made = Engine(GrowthParams.parse(values | {"tools": [stroke | {"thickening": thickening}]}), 100)
+        made.advance(1e9, until=0.4)
+        z = made.state.x[:, 2]
+        gaps.append(float(z[36:].mean() - z[:36].mean()))
+    assert gaps[0] == pytest.approx(0.03, abs=1e-6)
+    assert made.distance == pytest.approx(0.02 * 10**0.4, rel=1e-9)
+    assert gaps[1] > 0.7 * made.distance
+
+
+def test_a_solid_that_holds_the_whole_sheet_is_refused_and_nothing_changes():
+    live = begun(shape="disc", thickness=0.05)
+    act(live, "brush", at=[0.5, 0, 0])
+    before = x(live), live.gestures, live.stage
+    for solid, said in (
+        ({"kind": "ball", "radius": 3}, "wholly inside it, a ball: all of it is 2 deep or deeper"),
+        ({"kind": "plane", "point": [0, 0, 0.5]}, "a plane: all of it is 0.5"),
+        ({"kind": "box", "size": [4, 4, 1]}, "a box"),
+    ):
+        with pytest.raises(InvalidGeometry, match=said) as found:
+            live.do(SOLVER.live.parse("solid", {"solid": solid}))
+        assert "later `start`" in str(found.value)
+    assert np.array_equal(before[0], x(live))
+    assert before[1:] == (live.gestures, live.stage)
+    assert live.script.solids == ()
+    # under it, over a part of it, and later
+    act(live, "solid", solid={"kind": "ball", "centre": [0, 0, -0.5], "radius": 0.5})
+    act(live, "solid", steps=0, solid={"kind": "ball", "radius": 3, "start": 50})
+    # a balloon may be stretched over what is in it
+    closed = begun()
+    assert closed.do(SOLVER.live.parse("solid", {"solid": {"kind": "ball", "radius": 1.3}})) == {"solid": 0}
+
+
+def test_a_texture_without_coordinates_to_lie_by_is_refused_and_nothing_changes():
+    live = begun()
+    place = {"kind": "texture", "picture": [[0, 1], [1, 0]], "projection": "uv"}
+    with pytest.raises(InvalidGeometry, match="no texture coordinates"):
+        live.do(SOLVER.live.parse("add", {"tool": {"kind": "surface", "where": place}}))
+    assert (live.gestures, live.script.tools) == (0, ())

@@ -8,7 +8,7 @@ from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.matter import BARE, coloured
 from solver.growth.params import GrowthParams
-from solver.growth.shapes import start
+from solver.growth.shapes import Ground, start
 from solver.growth.solids import Plane, SolidBox, present
 from solver.growth.tooling.places import Lines, share
 
@@ -95,7 +95,7 @@ def test_parts_that_settle_alone_know_their_ribs():
 def test_a_line_fades_to_nothing_at_its_width():
     mesh = start("square", 900, 1.0)
     place = Lines.model_validate({"lines": [[[-0.5, 0, 0], [0, 0, 0], [0, 0.5, 0]]], "width": 0.1})
-    found = share(place, mesh, np.empty(0, np.int64), 0)
+    found = share(place, Ground(mesh, np.empty(0, np.int64)), 0)
     x, y = mesh.x[:, 0], mesh.x[:, 1]
     away = np.minimum(np.hypot(np.maximum(x, 0), y), np.hypot(x, np.maximum(-y, 0)))
     v = np.clip(1 - away / 0.1, 0, 1)

@@ -119,8 +119,8 @@ def test_parts_keep_the_largest_thickness_and_unevenness_is_that_of_the_place():
     values = {"shape": "disc", "thickness": 0.02, "imperfection": 0.1}
     rim = [{"where": {"kind": "rim", "width": 0.3}, "times": 4.0}]
     mapped, plain = engine(thicknesses=rim, **values), engine(**values)
-    assert mapped._way.watch.distance == pytest.approx(0.08)
-    assert plain._way.watch.distance == 0.02
+    assert mapped._way.watch(mapped.state).distance == pytest.approx(0.08)
+    assert plain._way.watch(plain.state).distance == 0.02
     assert mapped.state.x[:, 2] == pytest.approx(mapped.state.matter["thick"] * plain.state.x[:, 2], abs=1e-15)
 
 

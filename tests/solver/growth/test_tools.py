@@ -6,16 +6,21 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from solver.contract import Context, InvalidInput, Need
+from solver.contract import Context, InvalidGeometry, InvalidInput, Need
 from solver.growth import SOLVER
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
-from solver.growth.shapes import start
+from solver.growth.shapes import Ground, Mesh, start
 from solver.growth.tooling.harmonic import harmonic, harmonic_tensors
+from solver.growth.tooling.places import Reaction, Texture, share
 from solver.growth.tooling.placing import border, branched, started
 from solver.growth.tooling.rates import rates
 from solver.growth.tooling.textures import gray_scott, laid
 from solver.shell import topology
+
+
+def ground(mesh: Mesh) -> Ground:
+    return Ground(mesh, np.empty(0, np.int64))
 
 
 def engine(*tools, **values) -> Engine:
@@ -59,13 +64,68 @@ def test_a_part_without_paint_is_refused():
 
 
 def test_a_texture_lies_where_its_map_says():
-    x = start("square", 400, 1.0).x
+    square = start("square", 400, 1.0)
+    x = square.x
     ramp = np.array([[0.0, 1.0], [0.0, 1.0]])
-    assert laid(ramp, x, "z") == pytest.approx(x[:, 0] + 0.5, abs=1e-9)
-    assert laid(ramp.T, x, "z") == pytest.approx(x[:, 1] + 0.5, abs=1e-9)
-    tube = start("tube", 400, 2.0).x
+    assert laid(ramp, ground(square), "z") == pytest.approx(x[:, 0] + 0.5, abs=1e-9)
+    assert laid(ramp.T, ground(square), "z") == pytest.approx(x[:, 1] + 0.5, abs=1e-9)
+    tube = start("tube", 400, 2.0)
     waves = np.cos(2 * np.pi * np.arange(64) / 64)[None, :].repeat(2, axis=0)
-    assert laid(waves, tube, "round") == pytest.approx(tube[:, 0], abs=2e-3)
+    assert laid(waves, ground(tube), "round") == pytest.approx(tube.x[:, 0], abs=2e-3)
+
+
+def test_a_map_of_a_body_lies_around_the_origin_as_in_files():
+    """Coordinates themselves, drawn as maps are: y up, colatitude down from it, azimuth from x towards z."""
+    sphere, errors = start("sphere", 2500, 1.0), []
+    for rows in (32, 64):
+        colatitude = (np.arange(rows) + 0.5) / rows * np.pi
+        azimuth = (np.arange(2 * rows + 1) + 0.5) / (2 * rows + 1) * 2 * np.pi
+        axes = (
+            np.outer(np.sin(colatitude), np.cos(azimuth)),
+            np.outer(np.cos(colatitude), np.ones_like(azimuth)),
+            np.outer(np.sin(colatitude), np.sin(azimuth)),
+        )
+        # files turn z up into y up: (x, y, z) becomes (x, z, -y)
+        turned = np.stack([sphere.x[:, 0], sphere.x[:, 2], -sphere.x[:, 1]])
+        found = [share(Texture(picture=(axis + 1) / 2, projection="sphere"), ground(sphere), 0) for axis in axes]
+        errors.append(np.abs(2 * np.array(found) - 1 - turned).max())
+    assert errors[1] < 0.012
+    assert errors[1] < errors[0]
+    scaled = ground(sphere._replace(x=3.7 * sphere.x))
+    assert share(Texture(picture=(axes[1] + 1) / 2, projection="sphere"), scaled, 0) == pytest.approx(found[1])
+
+
+def test_a_picture_has_its_first_row_on_top():
+    square = ground(start("square", 100, 1.0))
+    rows = [[0.9, 0.9], [0.5, 0.5], [0.1, 0.1]]
+    picture = share(Texture(picture=rows, projection="z"), square, 0)
+    assert picture == pytest.approx(share(Texture(values=rows[::-1], projection="z"), square, 0))
+    assert picture == pytest.approx(0.5 + 0.8 * square.mesh.x[:, 1])
+
+
+@pytest.mark.parametrize("place", [{"kind": "texture", "picture": [[0, 1], [1, 0]]}, {"kind": "reaction", "steps": 1}])
+def test_coordinates_are_asked_of_a_mesh_that_has_some(place):
+    place = place | {"projection": "uv"}
+    bare = start("square", 30, 1.0)
+    mesh = {"points": bare.x.tolist(), "faces": bare.triangles.tolist()}
+    surface = {"kind": "surface", "where": {"kind": "everywhere"}}
+    for wrong in (
+        {"tools": [surface | {"paced": place}]},
+        {"thicknesses": [{"where": place, "times": 2}], "mesh": mesh},
+        {"ribs": [{"where": place}]},
+        {"attached": [{"where": place}]},
+        {"bed": {"where": place, "wavelength": 1}},
+    ):
+        with pytest.raises(InvalidGeometry, match=r'projection = "uv" has no texture coordinates.*sphere'):
+            GrowthParams.parse(wrong)
+    with pytest.raises(InvalidInput, match="has none"):
+        share(Reaction(projection="uv", steps=1), ground(bare), 0)
+
+
+def test_runs_without_pictures_keep_their_words():
+    """Stored runs are found by what their parameters say."""
+    texture = {"kind": "texture", "values": [[0.0, 1.0], [1.0, 0.0]], "projection": "z"}
+    assert Texture.model_validate(texture).model_dump(mode="json") == texture
 
 
 def test_a_reaction_makes_a_pattern_of_its_seed():
@@ -194,6 +254,9 @@ def test_a_fork_turns_by_its_angle():
         ({"kind": "curve"}, "tools.0.curve.*apex"),
         ({"kind": "curve", "points": [(0, 0, 0), (1, 0, 0)], "paces": [1]}, "tools.0.curve.*paces"),
         ({"kind": "surface", "where": {"kind": "texture", "values": [[1, 2], [3]]}}, "tools.0.*texture"),
+        ({"kind": "surface", "where": {"kind": "texture", "picture": [[1, 0]]}}, "tools.0.*two at least"),
+        ({"kind": "surface", "where": {"kind": "texture"}}, "tools.0.*either values or a picture"),
+        ({"kind": "surface", "where": {"kind": "texture", "picture": [[1, 2], [0, 0]]}}, "tools.0.*less than or equal"),
     ],
 )
 def test_a_wrong_entry_is_named(tool, said):
@@ -227,7 +290,7 @@ def test_a_hanging_strip_stretches_by_its_weight():
 def test_normalised_outgrowth_stays_flat():
     """G19: kept in its plane, what grows out at a disc's rim fits best at lambda = 1."""
     energies = []
-    for share in (0.0, 1.0, 2.0):
+    for normalised in (0.0, 1.0, 2.0):
         turns = 2 * np.pi * np.arange(32) / 32
         rim = {
             "kind": "curve",
@@ -235,7 +298,7 @@ def test_normalised_outgrowth_stays_flat():
             "closed": True,
             "radius": 0.5,
             "stretch": (1.0, 2.0),
-            "normalised": share,
+            "normalised": normalised,
         }
         held = {"where": {"kind": "everywhere"}, "axes": ["z"]}
         values = {"shape": "disc", "tools": [rim], "attached": [held]}
