@@ -12,7 +12,7 @@ from ...arrays import Floats
 from ...contract import Context
 from ...shell import metric
 from ...shell.normals import normals
-from ..fields.system import laid
+from ..fields.skin import laid
 from ..params import DecayParams
 from ..settings import Settings
 from ..surfaces.surface import geodesic, sampler, shares_at

@@ -9,7 +9,7 @@ from solver.decay import SOLVER, DecayParams
 from solver.decay.body import embedded
 from solver.decay.body.rind import rind
 from solver.decay.body.solid import volumes
-from solver.decay.fields.system import laid
+from solver.decay.fields.skin import laid
 from solver.decay.surfaces.surface import lay
 from solver.geometry.inside import inside
 from solver.geometry.nearest import nearest
