@@ -25,6 +25,7 @@ from solver.meshes import Frame
 from .errors import InvalidOption
 from .pictures import colours, render
 from .pictures.render import View
+from .surfaced import positions
 
 __all__ = ["Cut", "opened", "parsed", "picture"]
 
@@ -115,8 +116,10 @@ def _whole(run: xr.Dataset, index: int) -> Frame:
         found = meshes.frame(run, index)
         fields = {name: np.asarray(x, float) for name, x in found.fields.items() if np.ndim(x) == 1}
         whole = Frame(found.vertices.astype(float), found.triangles, fields)
-    elif "position" in run and json.loads(run.attrs.get("need", "{}")).get("region") is None:
-        position = run["position"].values[index]
+    elif (
+        json.loads(run.attrs.get("need", "{}")).get("region") is None
+        and (position := positions(run, index)) is not None
+    ):
         points, triangles = render.mesh(position)
         fields = {}
         for name, variable in run.data_vars.items():

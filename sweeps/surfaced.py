@@ -7,16 +7,39 @@ from typing import TYPE_CHECKING
 
 from solver import registry
 from solver.contract import Context, Need
+from solver.lattice import lattice
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["has_surface", "surfaced"]
+    from solver.arrays import Array
+
+__all__ = ["has_surface", "positions", "surfaced"]
 
 
 def has_surface(run: xr.Dataset) -> bool:
     """Return whether a result holds something to draw: a mesh of its own, or a field on the fruit's lattice."""
     return "mesh_position" in run or {"colatitude", "azimuth"} <= set(run.dims)
+
+
+def positions(run: xr.Dataset, index: int) -> Array | None:
+    """Return where the lattice (n, 2n, 3) of a result is on a stage; the fresh one where nothing moves it.
+
+    None where it moves and does not say where to, where nobody knows the fresh shape, or where it is a part of one.
+    """
+    if "position" in run:
+        found: Array = run["position"].values[index]
+        return found
+    name = str(run.attrs.get("solver", ""))
+    part = json.loads(run.attrs.get("need", "{}")).get("region") is not None
+    if part or "colatitude" not in run.dims or name not in registry.names() or "params" not in run.attrs:
+        return None
+    solver, values = registry.get(name), json.loads(run.attrs["params"])
+    fresh = solver.fresh(values)
+    if fresh is None or ("displacement" not in run and not solver.parse(values).keeps_shape):
+        return None
+    start = fresh.points(*lattice(run.sizes["colatitude"])).astype("f4")
+    return start + run["displacement"].values[index] if "displacement" in run else start
 
 
 def surfaced(run: xr.Dataset, context: Context) -> xr.Dataset | None:

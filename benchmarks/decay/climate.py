@@ -56,7 +56,7 @@ def grown(species: str, days: tuple[float, ...], with_mould: bool = True, **air:
     params = _fruit(species, **air)
     system = System(params, _CELLS, with_mould)
     whole = system.surface.total(1.0)
-    radius = system._radius * np.sqrt(whole / (4 * np.pi))
+    radius = system.skin.radius * np.sqrt(whole / (4 * np.pi))
     rows = []
     for reached in march(system, days, _TOLERANCE, choose(params, "preview").longest, Context()):
         rot, mould = system.rot.share(reached.state.rot), np.zeros(1)
@@ -84,7 +84,7 @@ def measured(species: str, celsius: float, humidity: float = 90.0) -> dict[str, 
     if len(kept) < 3:
         return {"mm_per_day": 0.0, "lag": 0.0}
     slope, start = np.polyfit([r["day"] for r in kept], [r["radius_mm"] for r in kept], 1)
-    wound = 0.12 * System(_fruit(species), 4, False)._radius
+    wound = 0.12 * System(_fruit(species), 4, False).skin.radius
     return {"mm_per_day": float(slope), "lag": float((wound - start) / slope)}
 
 

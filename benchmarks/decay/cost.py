@@ -12,8 +12,9 @@ import numpy as np
 
 from benchmarks.figures import Sheet, short
 from solver.decay import DecayParams
+from solver.decay.fields.both import Both
 from solver.decay.fields.diffusion import listed_around
-from solver.decay.fields.system import Both, System
+from solver.decay.fields.system import System
 
 _CELLS = (32, 64, 96, 128)
 _SHARES = (0.01, 0.1, 0.4, 1.0)

@@ -112,7 +112,7 @@ def costs(count: int) -> tuple[float, float]:
     assert params.within is not None
     full = np.full(len(system.joint.area), 0.5 * system.rot.rates.cap)
     state = system.start.rot._replace(u=full)
-    dried = water.Water(params, params.within, system.joint, system.extent)
+    dried = water.Water(params, params.within, system.joint, system.skin.extent)
     sound: Floats = np.zeros(len(system.surface.points))
     took = []
     for step in (lambda: system.rot.advance(state, 0.05), lambda: dried.advance(dried.fresh, sound, 0.0, 1.0)):

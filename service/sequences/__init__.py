@@ -94,7 +94,7 @@ def _opened(run: xr.Dataset, cut: str, stage: float | None, single: bool) -> xr.
             days = days[-1:] if stage is None else days[np.isclose(run["stage"].values, stage, rtol=1e-9, atol=1e-9)]
         return opened.opened(run.isel(stage=days) if len(days) and "vertex_count" not in run else run, where)
     except InvalidOption as error:
-        raise InvalidQuery.of([Wrong("cut", str(error), error.advice or "")]) from None
+        raise InvalidQuery.of([Wrong("cut", error.message, error.advice)]) from None
 
 
 def write(sequence: Sequence, export: Export, options: Options) -> bytes:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from solver.arrays import Array, Singles, Words32
 from solver.contract import Fur
-from solver.lattice import lattice as angles
 from store.surfaces import spectra
 from sweeps.pictures import colours
 from sweeps.pictures.fur import Feet, Threads, feet, grown
@@ -337,20 +336,15 @@ def lattice_fields(run: xr.Dataset, index: int) -> dict[str, Array]:
 
 
 def _positions(run: xr.Dataset, index: int) -> Array:
-    if "position" in run:
-        found: Array = run["position"].values[index]
-        return found
-    from solver import registry
+    from sweeps.surfaced import positions
 
-    solver, values = registry.get(str(run.attrs["solver"])), json.loads(run.attrs["params"])
-    fresh = solver.fresh(values)
-    if fresh is None or ("displacement" not in run and not solver.parse(values).keeps_shape):
+    found = positions(run, index)
+    if found is None:
         raise UnfitFormat(
             "this result holds fields of a surface that moves, and not where it is.",
             advice="Solve again with the field 'position': `wizen solve` keeps it, a plan names it under [need].",
         )
-    start = fresh.points(*angles(run.sizes["colatitude"])).astype("f4")
-    return start + run["displacement"].values[index] if "displacement" in run else start
+    return found
 
 
 def _flat(values: Array) -> Singles:

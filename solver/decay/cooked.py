@@ -25,7 +25,7 @@ def cooked(system: System, days: tuple[float, ...], context: Context) -> Iterato
     assert params.within is not None
     assert params.oven is not None
     assert joint is not None
-    roast = Roast(params, params.within, params.oven, joint, system.extent)
+    roast = Roast(params, params.within, params.oven, joint, system.skin.extent)
     state, done = roast.fresh, 0
     for day in days:
         while (done + 1) * STEP <= day * _DAY * (1 + 1e-12):

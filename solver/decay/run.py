@@ -16,8 +16,9 @@ from ..fruit import azimuths, colatitudes, window
 from .browning import browned
 from .cooked import cooked
 from .environment import deficit
+from .fields.skin import laid
 from .fields.stepping import Reached, march
-from .fields.system import System, laid
+from .fields.system import System
 from .names import BESIDE, FIELDS, MOULD, VECTORS, completed
 from .params import DecayParams
 from .settings import Settings, cells_of, choose, nodes, stepped
@@ -194,9 +195,9 @@ def _fields(system: System, reached: Reached, need: Need, cells: int) -> dict[st
 
 def _bared(system: System, day: float) -> dict[str, Any]:
     """Return where a cut fruit is bare flesh, and how brown that is."""
-    if not system.bare.any():
+    if not system.skin.bare.any():
         return {}
-    bare = system.bare.astype(float)
+    bare = system.skin.bare.astype(float)
     return {"flesh": bare, "browned": bare * browned(system.params, day)}
 
 

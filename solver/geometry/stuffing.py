@@ -8,6 +8,7 @@ that neighbours cut it alike.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..arrays import Bools, Floats, Ints
 from .inside import inside
 from .nearest import nearest
 
-__all__ = ["Stuffed", "boundary", "pieces", "stuffed"]
+__all__ = ["Stuffed", "boundary", "pieces", "stuffed", "touched"]
 
 #: Share of an edge along an axis, and of a diagonal one, within which a node moves to a cut (the paper's Table 1).
 _LONG, _SHORT = 0.24999, 0.41189
@@ -25,6 +26,8 @@ _LONG, _SHORT = 0.24999, 0.41189
 _OFF = np.array([0.137_041, 0.241_733, 0.189_337])
 
 
+#: The most corners of cubes that a lattice is looked at for.
+_NODES = 2e7
 #: Corners of the three tetrahedra of a prism whose side away from its least corner is cut from 1 to 5, or from 2 to 4.
 _WAYS = ([[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]], [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]])
 
@@ -36,22 +39,25 @@ class Stuffed(NamedTuple):
     tets: Ints
 
 
+def touched(points: Floats, faces: Ints, edge: float) -> float:
+    """Return how many tetrahedra of the lattice that `stuffed` would lay have a node in a closed mesh (v, 3), (f, 3).
+
+    Infinite where the lattice has more nodes than are looked at. Takes a hundredth of the time that `stuffed` does.
+    """
+    if np.prod(_count(points, edge)[1].astype(float)) > _NODES:
+        return np.inf
+    return float(sum(near.sum() for *_, near in _tetrahedra(*_grids(points, faces, edge)[1])))
+
+
 def stuffed(points: Floats, faces: Ints, edge: float) -> Stuffed:
     """Return tetrahedra with axis edges of about `edge` in a closed mesh (v, 3), (f, 3); none if it is thinner."""
-    low, high = points.min(axis=0) - edge * (1 + _OFF), points.max(axis=0) + edge
-    count = np.ceil((high - low) / edge).astype(int) + 1
-    nodes, tets = _lattice(low, edge, tuple(count.tolist()))
-    corner = int(count.prod())
-    shapes = (tuple(count.tolist()), tuple((count - 1).tolist()))
-    within = np.concatenate(
-        [inside(low + k * edge / 2, edge, shape, points, faces).ravel() for k, shape in enumerate(shapes)]
-    )
-    near = within[tets]
-    # what is as a whole outside is left out, and its nodes with it
-    tets = tets[near.any(axis=1)]
-    used, tets = np.unique(tets, return_inverse=True)
+    low, grids = _grids(points, faces, edge)
+    # what is as a whole outside is never laid, and its nodes neither: of a leaf that is nearly all of the lattice
+    laid = np.concatenate([np.stack([each[near] for each in tets], axis=-1) for *tets, near in _tetrahedra(*grids)])
+    used, tets = np.unique(laid, return_inverse=True)
     tets = tets.reshape(-1, 4)
-    nodes, within, centred = nodes[used], within[used], used >= corner
+    nodes, centred = low + edge * _places(used, *(grid.shape for grid in grids)), used >= grids[0].size
+    within = np.concatenate([grid.ravel() for grid in grids])[used]
     mixed = np.unique(tets[within[tets].any(axis=1) & ~within[tets].all(axis=1)])
     level = np.where(within, np.inf, -np.inf)
     level[mixed] = np.where(within[mixed], 1.0, -1.0) * nearest(nodes[mixed], points, faces).distance
@@ -59,29 +65,58 @@ def stuffed(points: Floats, faces: Ints, edge: float) -> Stuffed:
     return _cut(moved, level, tets)
 
 
-def _lattice(low: Floats, edge: float, shape: tuple[int, ...]) -> tuple[Floats, Ints]:
-    """Return nodes, corners of cubes before their middles, and tetrahedra of a body-centred cubic lattice."""
-    number = np.arange(np.prod(shape)).reshape(shape)
-    inner = tuple(n - 1 for n in shape)
-    middle = np.prod(shape) + np.arange(np.prod(inner)).reshape(inner)
-    grids = [
-        np.stack(np.meshgrid(*[np.arange(n) for n in s], indexing="ij"), axis=-1).reshape(-1, 3) + k / 2
-        for k, s in enumerate((shape, inner))
-    ]
-    found = []
+def _count(points: Floats, edge: float) -> tuple[Floats, Ints]:
+    """Return where the lattice starts (3), and its corners along each axis (3)."""
+    low, high = points.min(axis=0) - edge * (1 + _OFF), points.max(axis=0) + edge
+    return low, np.ceil((high - low) / edge).astype(int) + 1
+
+
+def _grids(points: Floats, faces: Ints, edge: float) -> tuple[Floats, list[Bools]]:
+    """Return where the lattice starts (3), and which corners (i, j, k) and middles of its cubes are inside."""
+    low, count = _count(points, edge)
+    shapes = ((*count.tolist(),), (*(count - 1).tolist(),))
+    return low, [inside(low + k * edge / 2, edge, shape, points, faces) for k, shape in enumerate(shapes)]
+
+
+def _tetrahedra(corners: Bools, middles: Bools) -> Iterator[tuple[Ints, Ints, Ints, Ints, Bools]]:
+    """Yield the four nodes, corners numbered before middles, of arrays of tetrahedra, and whether one is inside."""
+    number = np.arange(corners.size).reshape(corners.shape)
+    middle = corners.size + np.arange(middles.size).reshape(middles.shape)
     for axis in range(3):
-        # two middles across a face, and each edge of that face
-        a, b = np.moveaxis(middle, axis, 0)[:-1], np.moveaxis(middle, axis, 0)[1:]
-        face = np.moveaxis(number, axis, 0)[1:-1]
-        ring = [face[:, :-1, :-1], face[:, 1:, :-1], face[:, 1:, 1:], face[:, :-1, 1:]]
-        for c, d in zip(ring, [*ring[1:], ring[0]], strict=True):
-            found.append(np.stack([a, b, c, d], axis=-1).reshape(-1, 4))
-    return low + edge * np.concatenate(grids), np.concatenate(found)
+        a, b, *ring = _around(number, middle, axis)
+        in_a, in_b, *in_ring = _around(corners, middles, axis)
+        for k, c in enumerate(ring):
+            after = (k + 1) % 4
+            yield a, b, c, ring[after], in_a | in_b | in_ring[k] | in_ring[after]
+
+
+def _around(corners: Any, middles: Any, axis: int) -> list[Any]:
+    """Return of values at the nodes, for each face between two cubes, those of both middles and its corners in turn."""
+    middles, face = np.moveaxis(middles, axis, 0), np.moveaxis(corners, axis, 0)[1:-1]
+    turn = [face[:, :-1, :-1], face[:, 1:, :-1], face[:, 1:, 1:], face[:, :-1, 1:]]
+    return [middles[:-1], middles[1:], *turn]
+
+
+def _places(nodes: Ints, corners: tuple[int, ...], middles: tuple[int, ...]) -> Floats:
+    """Return where nodes (n) of a lattice with so many corners and middles are, in edges (n, 3)."""
+    count = int(np.prod(corners))
+    centred = nodes >= count
+    return np.concatenate(
+        [
+            np.stack(np.unravel_index(nodes[~centred], corners), axis=-1) + 0.0,
+            np.stack(np.unravel_index(nodes[centred] - count, middles), axis=-1) + 0.5,
+        ]
+    )
 
 
 def _edges(tets: Ints) -> Ints:
+    """Return the edges (e, 2) of tetrahedra, lesser node first, in order."""
     pairs = np.concatenate([tets[:, [i, j]] for i in range(4) for j in range(i + 1, 4)])
-    return np.unique(np.sort(pairs, axis=1), axis=0)
+    # numbers are sorted ten times as fast as rows are, and twice as fast as they are hashed
+    count = int(pairs.max(initial=0)) + 1
+    keys = np.sort(pairs.min(axis=1) * count + pairs.max(axis=1))
+    keys = keys[np.diff(keys, prepend=-1) > 0]
+    return np.stack(np.divmod(keys, count), axis=1)
 
 
 def _warped(nodes: Floats, level: Floats, centred: Bools, edges: Ints) -> tuple[Floats, Floats]:

@@ -17,6 +17,7 @@ from solver import meshes, registry
 from solver.arrays import Array
 
 from ..errors import InvalidOption
+from ..surfaced import positions
 from . import colours
 from .render import mesh
 from .shading import BACKGROUND
@@ -127,9 +128,10 @@ def _section(run: xr.Dataset, index: int, where: Plane) -> tuple[Array, Array | 
         frame = meshes.frame(run, index)
         skin = colours.painted(run, index, frame.fields)
         return cut(frame.vertices.astype(float), frame.triangles, where, None if skin is None else skin.colour)
-    if "position" not in run or "colatitude" not in run.dims:
+    position = positions(run, index)
+    if position is None or "colatitude" not in run.dims:
         raise InvalidOption("there is no surface to cut.", "Ask for the field 'position' and no region.")
-    vertices, triangles = mesh(run["position"].values[index])
+    vertices, triangles = mesh(position)
     skin = colours.of_run(run, index)
     if skin is None:
         return cut(vertices, triangles, where)

@@ -49,7 +49,8 @@ def _blocks(path: Path) -> list[Block]:
             number = end + 1
         elif line.startswith("    ") and (number == 0 or not lines[number - 1].strip()):
             end = number
-            while end < len(lines) and lines[end].startswith("    "):
+            # a blank line does not end a block that goes on behind it
+            while end < len(lines) and (lines[end] or "".join(lines[end + 1 : end + 2])).startswith("    "):
                 end += 1
             if not _in_list(lines[:number]):
                 found.append(Block(path, number + 1, "", "\n".join(text[4:] for text in lines[number:end])))

@@ -31,7 +31,7 @@ from sweeps.planning.plan import Plan
 from tests.service._asking import until
 from tests.service._runs import rotting
 
-from ._blocks import DOCUMENTS, ROOT, Block, blocks, commands
+from ._blocks import DOCUMENTS, ROOT, Block, _blocks, blocks, commands
 
 #: What answers within seconds. Whatever is not here solves, and runs with the slow tests.
 _QUICK = re.compile(
@@ -203,6 +203,12 @@ def test_a_python_block_works(workshop: Workshop, monkeypatch: pytest.MonkeyPatc
 def test_every_plan_that_is_named_can_be_read() -> None:
     for path in (ROOT / "examples").rglob("*.toml"):
         tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def test_a_block_goes_on_behind_a_blank_line(tmp_path: Path) -> None:
+    path = tmp_path / "page.md"
+    path.write_text("Words.\n\n    wizen a\n\n    wizen b\nWords.\n\n- entry\n\n    goes on\n", encoding="utf-8")
+    assert [commands(block) for block in _blocks(path)] == [["wizen a", "wizen b"]]
 
 
 def test_commands_are_found() -> None:

@@ -59,6 +59,22 @@ def test_a_ball_without_its_cap_is_closed_and_as_large_as_it_should_be() -> None
     assert found.area_faces[face].sum() == pytest.approx(np.pi * (radius**2 - off**2), rel=6e-3)
 
 
+def test_a_fruit_that_keeps_its_shape_is_cut_open_where_it_was_fresh() -> None:
+    """A run of the default fields holds no position, for nothing moves; one that moves is refused, and says it once."""
+    params = SOLVER.parse({}, preset="apple")
+    run = SOLVER.solve(params, Need(quality="preview", resolution=16, stages=(4.0,), fields=("rot", "mould")))
+    assert "position" not in run
+    found = opened(run)
+    there = SOLVER.solve(
+        params, Need(quality="preview", resolution=16, stages=(4.0,), fields=("rot", "mould", "position"))
+    )
+    assert np.array_equal(found.vertices, opened(there).vertices)
+    moves = run.assign_attrs(params=SOLVER.parse({"body": "quasi-static"}, preset="apple").model_dump_json())
+    with pytest.raises(InvalidQuery) as refused:
+        opened(moves)
+    assert str(refused.value).count("no surface to cut") == str(refused.value).count("Ask for the field") == 1
+
+
 def test_rot_goes_as_deep_as_the_body_says() -> None:
     """The law of the body: what the skin above has, times 1 - depth / rot_depth; read off the file's own columns."""
     run = rotting(16)

@@ -51,5 +51,9 @@ def test_a_picture_shows_stone_and_colours() -> None:
     assert np.allclose(middle, np.array([0x8A, 0x6A, 0x4C]) / 255, atol=0.02)
     skin = section.colours.encoded(np.array(apple.skin_colour)) / 255
     assert (np.abs(image - skin).max(axis=2) < 0.02).sum() > 500
+    # a fruit that keeps its shape is where it was fresh; where one that moves has gone to nobody knows
+    still = run.drop_vars("position")
+    assert section.picture(still, section.plane("0")) == section.picture(run, section.plane("0"))
+    moves = solver.parse({"body": "quasi-static"}, "apple").model_dump_json()
     with pytest.raises(InvalidOption, match="no surface"):
-        section.picture(run.drop_vars("position"), section.plane("0"))
+        section.picture(still.assign_attrs(params=moves), section.plane("0"))

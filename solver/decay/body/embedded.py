@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidGeometry
 from ...geometry.nearest import Nearest, nearest
-from ...geometry.stuffing import Stuffed, boundary, pieces, stuffed
+from ...geometry.stuffing import Stuffed, boundary, pieces, stuffed, touched
 from ..params import DecayParams
 from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.places import Neighbour
@@ -33,6 +33,10 @@ _RIDGE = 1.25
 #: Refinements of a lattice that is too coarse for a thin part, and the most tetrahedra that one may have.
 _TRIES, _MOST = 5, 150_000
 _FINER = 1.5
+#: Tetrahedra of a refined lattice that a mesh touches, over the most it may keep: a leaf keeps half of them, and few
+#: only where it lies between two layers of nodes. What touches more is not laid at all: a lattice of 1.1 million for a
+#: leaf took 24 s to lay, and was refused.
+_TOUCHED = 6
 
 
 class Embedded:
@@ -110,8 +114,11 @@ def _filled(points: Floats, faces: Ints, layers: int, far: float) -> tuple[Stuff
     a, b, c = (points[faces[:, k]] for k in range(3))
     volume = abs(float(np.sum(a * np.cross(b, c)))) / 6
     edge = asked = float((_PER_CUBE * volume / (_PER_SHELLS * layers**3)) ** (1 / 3))
-    why, tipped = "", dict[float, tuple[Stuffed, float]]()
+    why, tipped = "it is too thin for its size", dict[float, tuple[Stuffed, float]]()
     for _ in range(_TRIES):
+        crowd = touched(points, faces, edge)
+        if crowd == np.inf or (edge < asked and crowd > _TOUCHED * _MOST):
+            break
         found = stuffed(points, faces, edge)
         # a leaf holds nothing of a coarse lattice, and more of a finer one than a body can settle with
         if len(found.tets) > _MOST and edge < asked:
@@ -134,7 +141,8 @@ def _filled(points: Floats, faces: Ints, layers: int, far: float) -> tuple[Stuff
         return tipped[min(tipped)]
     raise InvalidGeometry(
         f"the mesh cannot be filled with flesh: {why}.",
-        advice="Thicken it there, close what is open, or take body=none.",
+        advice="Thicken it there, close what is open, give one side of a leaf alone (an open mesh gets a rind), "
+        "or take body=none.",
     )
 
 

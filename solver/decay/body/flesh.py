@@ -66,6 +66,14 @@ class Skin(BaseModel):
         "deeper folds close, and skin that dries gives way; a choice [1]",
     )
     depth: float = Field(0.1, ge=0.01, le=1, description="Depth of the flesh that holds the skin [r1]")
+    uneven_hold: float = Field(
+        0.0,
+        ge=0,
+        le=0.95,
+        description="How much firmer or looser than on the mean the flesh holds the skin by place: dimples are of all "
+        "widths then, and not even [1]",
+        exclude_if=lambda value: value == 0,
+    )
 
 
 class Swing(BaseModel):

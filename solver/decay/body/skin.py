@@ -69,9 +69,14 @@ class Settled(NamedTuple):
 
 
 class Shell:
-    """A skin on fresh points (v, 3) with faces (f, 3), of one thickness [r1]; area: of each vertex (v) [r1^2]."""
+    """A skin on fresh points (v, 3) with faces (f, 3), of one thickness [r1]; area: of each vertex (v) [r1^2].
 
-    def __init__(self, points: Floats, faces: Ints, area: Floats, skin: Skin, thickness: float) -> None:
+    firm: how firmly it is held, over the skin's constants, by vertex (v) or everywhere.
+    """
+
+    def __init__(
+        self, points: Floats, faces: Ints, area: Floats, skin: Skin, thickness: float, firm: Floats | float = 1.0
+    ) -> None:
         self._points, self._faces = points, faces
         self._material = Material(thickness)
         self._mesh = topology(faces, len(points))
@@ -80,7 +85,7 @@ class Shell:
         self._angles = angles(points, self._mesh.hinges)
         # flesh of modulus 1 and this depth, over the skin's mu t = s t / (2 (1 + nu))
         unit = skin.stiffness * thickness / (2 * (1 + self._material.poisson))
-        self._hold = area / (skin.depth * unit)
+        self._hold = area * firm / (skin.depth * unit)
 
     def wrinkled(
         self,

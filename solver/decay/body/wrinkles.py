@@ -12,7 +12,8 @@ from ...arrays import Floats
 from ...contract import Context
 from ...shell import metric
 from ...shell.normals import normals
-from ..fields.system import laid
+from ..fields.noise import patches
+from ..fields.skin import laid
 from ..params import DecayParams
 from ..settings import Settings
 from ..surfaces.surface import geodesic, sampler, shares_at
@@ -22,6 +23,9 @@ from .flesh import Skin
 from .skin import Settled, Shell
 
 __all__ = ["Wrinkles"]
+
+#: Size of the places that hold the skin alike, where they differ: about a dimple's width; a choice [r1].
+_LOOSE = 0.5
 
 
 class Wrinkles:
@@ -39,7 +43,12 @@ class Wrinkles:
             self._normals = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
         fresh = metric(surface.points, surface.faces)
         self._faces, self._square = surface.faces, fresh[:, 0] * fresh[:, 2] - fresh[:, 1] ** 2
-        self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness)
+        firm: Floats | float = 1.0
+        if skin.uneven_hold > 0:
+            # the fifth stream: the first four are those of the fields and of what lands
+            generator = Context.generator(params.seed).spawn(5)[-1]
+            firm = 1 + skin.uneven_hold * patches(surface.points, _LOOSE, generator)
+        self._shell = Shell(surface.points, surface.faces, surface.area, skin, params.exocarp_thickness, firm)
 
     def at(
         self,

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contract import Context, Unstable
-from .system import Both, System
+from .both import Both
+from .system import System
 
 __all__ = ["Reached", "march"]
 

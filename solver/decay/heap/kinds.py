@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ..environment import reference_radius
-from ..fields.system import laid
+from ..fields.skin import laid
 from ..params import DecayParams
 from ..presets import FRUITS, SPECIES
 from ..surfaces.surface import Extent, Surface, extent

@@ -173,7 +173,9 @@ class HeapRun:
             if gap > _BRIDGED:
                 continue
             rays = [self._ray(pair[0], way), self._ray(pair[1], -way)]
-            seen = [float(rots[b][self.systems[b].near(ray, _PATCH)].max()) for b, ray in zip(pair, rays, strict=True)]
+            seen = [
+                float(rots[b][self.systems[b].skin.near(ray, _PATCH)].max()) for b, ray in zip(pair, rays, strict=True)
+            ]
             for one in (0, 1):
                 here, there = pair[one], pair[1 - one]
                 if self._feeds(here, there) and self._exposure.sees(

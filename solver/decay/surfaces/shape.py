@@ -13,7 +13,7 @@ from ...contract.mesh import named_groups
 from ...fruit import lattice, window
 from ..body.flesh import Booked
 from ..environment import reference_radius, water_lost
-from ..fields.system import laid
+from ..fields.skin import laid
 from ..names import BODY
 from ..params import DecayParams
 from ..puddle import puddle_radius

@@ -19,7 +19,7 @@ from ...arrays import Floats, Ints
 from ...contract import InvalidGeometry
 from ...fruit import Fruit
 from ...geometry.nearest import nearest
-from ...geometry.stuffing import boundary, stuffed
+from ...geometry.stuffing import boundary, stuffed, touched
 from ...geometry.tetrahedra import edges
 from ..body.rind import rind
 from ..surfaces.imported import extent_of
@@ -31,6 +31,8 @@ __all__ = ["Joint", "joined"]
 _PER_CUBE = 2.0
 #: Refinements of a lattice that is too coarse for a thin mesh.
 _TRIES, _FINER = 4, 1.3
+#: The most tetrahedra of a refined lattice that a mesh may touch: what needs more has more points than steps are for.
+_TOUCHED = 4e6
 #: No vertex may lie farther from the flesh than so many edges of the lattice.
 _FAR = 1.5
 
@@ -168,8 +170,11 @@ def _filled(points: Floats, faces: Ints, shown: Floats, count: int) -> tuple[Flo
     if volume <= 0:
         raise InvalidGeometry("the mesh is flat: nothing is inside of it.", advice="Leave within out.")
     edge = (_PER_CUBE * volume / count) ** (1 / 3)
-    far = None
+    far, asked = None, edge
     for _ in range(_TRIES):
+        crowd = touched(points, faces, edge)
+        if crowd == np.inf or (edge < asked and crowd > _TOUCHED):
+            break
         found = stuffed(points, faces, edge)
         if len(found.tets):
             away = nearest(shown, found.points, boundary(found.tets)).distance

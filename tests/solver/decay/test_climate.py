@@ -27,7 +27,7 @@ def lesion(species, days, mould=False, cells=16, **air):
     """Return radii [mm] of a lesion on days, and the share of the skin that is mouldy on the last."""
     params = SOLVER.parse({**ONE, "rot": ROTS[species].model_dump(), **air}, SPEEDS[species][0])
     system = System(params, cells, mould)
-    sphere = system._radius * np.sqrt(system.surface.total(1.0) / (4 * np.pi))
+    sphere = system.skin.radius * np.sqrt(system.surface.total(1.0) / (4 * np.pi))
     radii, felt = [], 0.0
     for reached in march(system, tuple(days), 3e-4, choose(params, "preview").longest, Context()):
         cap = system.surface.mean(system.rot.share(reached.state.rot) >= 0.1)

@@ -124,7 +124,7 @@ def test_the_age_of_rot_is_the_time_since_its_front_came():
     far = np.arccos(np.clip(found.surface.points[:, 1] / np.linalg.norm(found.surface.points, axis=1), -1, 1))
     slope, _ = np.polyfit(ages[1][ring], 1.04 * far[ring], 1)
     # the front of the model runs at the speed that its species was measured to have, in mm a day
-    speed = found.params.rot.speed * float(warmth(found.params.rot, found.params.temperature)) / found._radius
+    speed = found.params.rot.speed * float(warmth(found.params.rot, found.params.temperature)) / found.skin.radius
     assert -slope == pytest.approx(speed, rel=0.1)
 
 

@@ -9,11 +9,11 @@ from solver.decay import SOLVER, DecayParams
 from solver.decay.body import embedded
 from solver.decay.body.rind import rind
 from solver.decay.body.solid import volumes
-from solver.decay.fields.system import laid
+from solver.decay.fields.skin import laid
 from solver.decay.surfaces.surface import lay
 from solver.geometry.inside import inside
 from solver.geometry.nearest import nearest
-from solver.geometry.stuffing import boundary, pieces, stuffed
+from solver.geometry.stuffing import boundary, pieces, stuffed, touched
 
 BODY = ("mesh_position", "triangle", "volume", "density", "mass", "water_lost", "least_jacobian")
 STILL = {"rot_collapse": 0.0, "rot_softness": 0.0, "rot_respired": 0.0}
@@ -269,6 +269,35 @@ def test_a_carrot_is_a_body() -> None:
     scale = (1 - float(found.water_lost[1])) ** (1 / 3)
     assert np.abs(dry - dry.mean(axis=0) - scale * (fresh - fresh.mean(axis=0))).max() < 1e-3
     assert float(found.least_jacobian.min()) > 0
+
+
+def test_a_lattice_is_counted_before_it_is_laid() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    points, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
+    whole = 12 * ball.volume / 0.1**3
+    # all within, and what the skin cuts: a layer of the lattice's edge
+    assert whole < touched(points, faces, 0.1) < whole + 12 * ball.area / 0.1**2
+    assert touched(points, faces, 0.3) >= len(np.unique(stuffed(points, faces, 0.3).tets[:, 0]))
+    assert touched(points, faces, 1e-3) == np.inf
+
+
+@pytest.mark.parametrize(("thick", "tilted"), [(0.005, 0.0), (1e-7, 0.7)])
+def test_a_thin_leaf_is_refused_before_a_huge_lattice_is_laid(
+    monkeypatch: pytest.MonkeyPatch, thick: float, tilted: float
+) -> None:
+    leaf = trimesh.creation.icosphere(subdivisions=4)
+    leaf.vertices = leaf.vertices * [1, thick, 1]
+    leaf.apply_transform(trimesh.transformations.rotation_matrix(tilted, [1, 0, 1]))
+    laid_out = []
+
+    def counted(*given):
+        laid_out.append(stuffed(*given))
+        return laid_out[-1]
+
+    monkeypatch.setattr(embedded, "stuffed", counted)
+    with pytest.raises(InvalidGeometry, match=r"too thin (at \(|for its size).*an open mesh gets a rind"):
+        embedded._filled(np.asarray(leaf.vertices), np.asarray(leaf.faces), 6, embedded._FAR)
+    assert all(len(found.tets) <= embedded._MOST for found in laid_out)
 
 
 def test_a_leaf_that_only_a_huge_lattice_holds_is_refused() -> None:

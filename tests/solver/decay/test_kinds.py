@@ -116,7 +116,7 @@ def test_what_a_fruit_catches_grows_as_it_does_on_that_fruit():
     slow = system.rot.rates.mobility
     system.taken_by(peach.rot, peach.mould)
     quick = pear.model_copy(update={"rot": peach.rot, "mould": peach.mould})
-    assert system.rot.rates == daily(peach.rot, quick, system._radius)
+    assert system.rot.rates == daily(peach.rot, quick, system.skin.radius)
     assert system.rot.rates.mobility > 5 * slow
     system.caught(0.0, np.array([0.0, 1.0, 0.0]), 0.15)
     assert np.isfinite(system.next_root(system.start, 10.0))

@@ -1,5 +1,7 @@
 """The skin against the buckling of a shell on springs: when it wrinkles, and how wide."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,52 @@ def test_a_skin_wrinkles_past_the_critical_shrinkage_with_the_width_of_theory(sp
     tall, found = heights(sphere, 1.25 * critical)
     assert tall > 0.1
     assert found == pytest.approx(wave, rel=0.1)
+
+
+def test_dimples_are_wide_where_the_flesh_holds_the_skin_loosely(sphere):
+    """Wave numbers are as the fourth roots of what resists, k or k + E t / R^2; k is 0.1 or 1.9 times its mean.
+
+    Loose folds are a third of the sphere wide, where shallow theory's curvature counts in part: between both roots.
+    """
+    firm = np.where(sphere.points[:, 1] > 0, 1.9, 0.1)
+    shell = Shell(sphere.points, sphere.faces, sphere.area, Skin(), THICKNESS, firm)
+    outward = sphere.points / RADIUS
+    carried = (1 - 1.6 * onset()[0]) * sphere.points
+    found, *_ = shell.wrinkled(carried, 1.0, carried + shell.uneven(outward, Context.generator(0)), 1e-4)
+    h = np.einsum("vi,vi->v", found - carried, outward)
+    own = np.repeat(np.arange(len(h)), np.diff(sphere.start))
+    tall, waves = [], []
+    for side in (1, -1):
+        here = side * sphere.points[:, 1] > 0.2
+        g = np.where(here, h - np.average(h[here], weights=sphere.area[here]), 0.0)
+        both = here[own] & here[sphere.near]
+        slopes = np.sum((sphere.weight * (g[own] - g[sphere.near]) ** 2)[both]) / 2
+        tall.append(np.sqrt(np.sum(sphere.area * g**2)))
+        waves.append(np.sqrt(slopes) / tall[-1])
+    curved = Skin().stiffness * THICKNESS / RADIUS**2
+    theory = ((1.9 / Skin().depth + curved) / (0.1 / Skin().depth + curved)) ** 0.25
+    assert theory < waves[0] / waves[1] < 19**0.25
+
+
+def test_a_skin_s_hold_differs_by_place_only_where_it_is_asked_for():
+    """The same places on two meshes; without it keys and holds are what they were."""
+    assert "uneven_hold" not in SOLVER.parse({"skin": {}}, "apple").model_dump_json()
+    params = SOLVER.parse({"skin": {"uneven_hold": 0.8}, "body": "quasi-static"}, "apple")
+    even = params.model_copy(update={"skin": Skin()})
+    factors = []
+    for cells in (8, 16):
+        settings = replace(choose(params, "preview"), skin=cells)
+        body = Body(params, lay(params, settings.cells), settings.cells, settings.layers, settings.balance)
+        holds = [Wrinkles(each, each.skin, body, settings)._shell._hold for each in (params, even)]
+        factors.append(holds[0] / holds[1])
+    assert factors[1].min() < 0.4
+    assert factors[1].max() > 1.6
+    assert factors[1].mean() == pytest.approx(1, abs=0.2)
+    points = [lay(params, cells).points for cells in (8, 16)]
+    far = np.linalg.norm(points[0][:, None] - points[1][None], axis=2)
+    near = far.min(axis=1) < 1e-9
+    assert near.sum() > 100
+    assert factors[0][near] == pytest.approx(factors[1][far.argmin(axis=1)[near]], abs=1e-9)
 
 
 def test_a_skin_that_shrinks_with_its_body_stays_on_it(sphere):
