@@ -93,14 +93,14 @@ def _cantilever(low: float, rigidity: float) -> float:
     mesh = MeshQuad.init_tensor(np.linspace(low, 2.0, 61), np.linspace(-0.5, 0.5, 17))
     basis = Basis(mesh, ElementQuadBFS(), intorder=6)
 
-    @BilinearForm
+    @BilinearForm  # type: ignore[untyped-decorator]
     def bent(u: Any, v: Any, _: Any) -> Any:
         (uxx, uxy), (_a, uyy) = u.hess
         (vxx, vxy), (_b, vyy) = v.hess
         twist = uxx * vyy + uyy * vxx - 2 * uxy * vxy
         return rigidity * ((uxx + uyy) * (vxx + vyy) - (1 - _RATIO) * twist)
 
-    @LinearForm
+    @LinearForm  # type: ignore[untyped-decorator]
     def load(v: Any, _: Any) -> Any:
         return v
 
