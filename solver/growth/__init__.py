@@ -58,8 +58,8 @@ SOLVER = Solver(
     default_fields=("mesh_position", "mesh_area", "rest_area", "stored_energy"),
     stages=StageAxis("t", "growth time", "1", 0.0, 100.0, (0.25, 0.5, 0.75, 1.0)),
     default_resolution={"preview": 16, "default": 32, "fine": 64},
-    # error of the height of a smooth hot spot's bulge, by extrapolation over three meshes (docs/growth.md)
-    tolerances={"preview": 0.04, "default": 0.01, "fine": 0.003},
+    # the worst of sheets that curl, hang and ripple (docs/growth.md): a clamped one, whose hold ends between two rows
+    tolerances={"preview": 0.3, "default": 0.16, "fine": 0.08},
     presets=PRESETS,
     looks=LOOKS,
     run=_run,

@@ -96,7 +96,8 @@ class GrowthParams(Params):
     poisson: float = Field(0.3, ge=0, le=0.49, description="Poisson's ratio", json_schema_extra=_units("1"))
     bending: Bending = Field(
         "hinges",
-        description="What resists bending: angles between triangles, or the mean curvature of vertices, as the paper's",
+        description="What resists bending: angles between triangles, or, as the paper has it, the mean curvature of "
+        "vertices: blind to saddles, right only for what is closed or clamped all round",
         json_schema_extra=_units("1"),
     )
     curved: bool = Field(

@@ -5,6 +5,8 @@ edge shared by its ends), against the same sum of rest angles: energy 2 D (M - M
 D (2 H)^2 / 2 per area. l and A are rest lengths and areas: so where a surface grows evenly by s, its rest mean
 curvature M_rest / A falls as 1 / s while the rest angles stay, and no area weights are left to differentiate. Gaussian
 curvature costs nothing (Poisson's ratio 1 in bending): saddles without mean curvature are held by the membrane alone.
+Over closed surfaces and inside clamped borders that bends as any plate (Gauss and Bonnet). At a free edge it is none: a
+clamped strip with free sides sags as far as its mesh lets it, without a limit as that is refined.
 """
 
 from __future__ import annotations

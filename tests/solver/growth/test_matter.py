@@ -15,23 +15,26 @@ from solver.growth.tooling.places import Lines, share
 RGB = ("red", "green", "blue")
 
 
-def reached(time: float = 1.0, vertices: int = 300, **values):
+def reached(time: float = 1.0, vertices: int = 300, residual: float = 1e-4, **values):
     params = GrowthParams.parse({"imperfection": 0, "tools": []} | values)
-    return Engine(params, vertices, 1e-4, history=False).reach(time, Context()), params
+    return Engine(params, vertices, residual, history=False).reach(time, Context()), params
 
 
 def sag(bending: str, **values) -> float:
     """How far the tip of a clamped strip hangs down under a small weight."""
     held = [{"where": {"kind": "band", "along": "x", "low": -1.6, "high": -2.0}}]
     strip = {"shape": "strip", "aspect": 4, "thickness": 0.1, "gravity": [0, 0, -1e-6], "attached": held}
-    state, _ = reached(0.05, **strip, bending=bending, **values)
+    # of a looser residual the weight is a part, and bending by mean curvature knows no Newton steps to go on by
+    state, _ = reached(0.05, residual=1e-8, **strip, bending=bending, **values)
     return -float(state.x[:, 2].min())
 
 
 @pytest.mark.parametrize("bending", ["hinges", "mean_curvature"])
 def test_a_stiff_sheet_sags_by_as_much_less(bending):
     everywhere = {"where": {"kind": "everywhere"}, "stiffness": 8.0}
-    assert sag(bending, ribs=[everywhere]) == pytest.approx(sag(bending) / 8, rel=0.01)
+    bare = sag(bending)
+    assert bare > 0.01
+    assert sag(bending, ribs=[everywhere]) == pytest.approx(bare / 8, rel=0.01)
 
 
 def test_a_midrib_holds_a_leaf_up_and_a_rib_across_does_not():
