@@ -9,12 +9,12 @@ import numpy as np
 
 from solver.arrays import Array
 
+from ..kept import Kept, Part
 from ..surfaces.packed import Stored
-from .kept import Kept
 
 __all__ = ["Stacks"]
 
-#: Bytes of stacks that a table keeps.
+#: Bytes of stacks that all tables keep.
 _ROOM = 64 << 20
 #: Share of waves that are not zero up to which the others are left out: putting them back takes its time, too.
 _SPARSE = 0.6
@@ -32,12 +32,15 @@ class _Stack(NamedTuple):
     shape: tuple[int, ...]
 
 
+_kept: Kept[tuple[int, _Key], _Stack] = Kept(_ROOM, lambda stack: stack.waves.nbytes)
+
+
 class Stacks:
     """Weighted means of the spectra (sample, stage, component, m, k, part) of a table."""
 
     def __init__(self, stored: Stored) -> None:
         self._stored = stored
-        self._kept: Kept[_Key, _Stack] = Kept(_ROOM, lambda stack: stack.waves.nbytes)
+        self._kept = Part(_kept, self)
 
     def mean(self, samples: tuple[int, ...], stages: tuple[int, ...], parts: Array, band: int) -> Array:
         """Return the sum (component, m, k, part), m, k <= `band`, of all samples at all stages, samples first, times

@@ -15,6 +15,7 @@ import numpy as np
 
 from solver.arrays import Array
 
+from ..kept import Kept, Part
 from . import harmonics, spectra
 
 __all__ = ["FINEST", "Codes", "Packed", "Stored", "encode", "loss"]
@@ -22,7 +23,7 @@ __all__ = ["FINEST", "Codes", "Packed", "Stored", "encode", "loss"]
 #: Least step [r1]: waves of less than half of it are nothing. At degree 128 it costs some 1e-5 r1 of the surface.
 FINEST = 2e-7
 _LARGEST = 32767
-#: Bytes of unpacked blocks that a table keeps.
+#: Bytes of unpacked blocks that all tables keep.
 _ROOM = 64 << 20
 
 
@@ -64,6 +65,10 @@ def loss(blocks: Sequence[Array], codes: Codes) -> tuple[float, float]:
     return rms, most
 
 
+#: By sample and stage of each table.
+_kept: Kept[tuple[int, tuple[int, int]], Array] = Kept(_ROOM, lambda block: block.nbytes)
+
+
 class Packed:
     """Packed spectra that read like an array (sample, stage, component, m, k, part) of float32."""
 
@@ -74,8 +79,7 @@ class Packed:
         waves = len(step)
         self.shape: tuple[int, ...] = (*self.codes.shape[:2], 3, waves, waves, 2)
         self._steps = np.repeat(np.tile(step[_shells(waves)].ravel(), 3), 2)[self._place]
-        size = 4 * int(np.prod(self.shape[2:]))
-        self._block = lru_cache(maxsize=max(8, _ROOM // size))(self._unpack)
+        self._kept = Part(_kept, self)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -90,7 +94,8 @@ class Packed:
     def __getitem__(self, place: int | tuple[int, int]) -> Array:
         """Return a sample (stage, component, m, k, part), or one of its stages, which is kept and read-only."""
         if isinstance(place, tuple):
-            return self._block(int(place[0]), int(place[1]))
+            i, j = int(place[0]), int(place[1])
+            return self._kept.get((i, j), lambda: self._unpack(i, j))
         return np.stack([self._unpack(int(place), j) for j in range(self.shape[1])])
 
     def _unpack(self, i: int, j: int) -> Array:

@@ -22,6 +22,8 @@ import numpy as np
 
 from solver.arrays import Array
 
+from . import alone
+
 # pyfftw would import all of dask and scipy's older transforms, for interfaces that are not used here: up to a second
 _hidden = [name for name in ("dask", "scipy.fftpack", "scipy.fft") if name not in sys.modules]
 sys.modules.update(dict.fromkeys(_hidden))  # type: ignore[arg-type]
@@ -40,8 +42,6 @@ __all__ = ["Synthesis", "analyse", "backend", "borrow"]
 _IDLE = 128 << 20
 #: Colatitudes times waves up to which sums are matrices, measured: beyond, transforms are as fast.
 _MATRICES = 12_800
-#: Products of a matrix product that BLAS leaves to one thread: OpenBLAS does to 4 x 65536.
-_ALONE = 200_000
 
 
 def backend() -> str:
@@ -181,7 +181,7 @@ def _blocks(n: int, waves: int, first: int, dtype: str, columns: int) -> Array:
     k = np.arange(first, waves + first)
     angle = np.outer((np.arange(n) + 0.5) * np.pi / n, k)
     matrix = (np.sin(angle) if first else np.cos(angle)) * np.where(k == n * first, 1.0, 2.0)
-    blocks = -(-n * waves * columns // _ALONE) or 1
+    blocks = -(-n * waves * columns // alone.MOST) or 1
     rows = -(-n // blocks)
     found = np.zeros((blocks * rows, waves), dtype)
     found[:n] = matrix

@@ -17,7 +17,7 @@ import numpy as np
 
 from solver.arrays import Array
 
-from . import transforms
+from . import alone, transforms
 
 __all__ = ["WHOLE", "Patch", "Window", "around", "down", "planes", "series"]
 
@@ -127,7 +127,8 @@ def series(waves: Array, patch: Patch) -> Array:
     for first, matrix in ((0, cosines), (1, sines)):
         parts = np.ascontiguousarray(waves[:, first::2]).view(real).reshape(count, -1, held, 2)
         lines[:, :, first::2] = np.einsum("cmkp,kt->ctmp", parts, matrix, optimize=True)
-    return lines.reshape(count, patch.height, -1) @ around(patch.n, held, patch.left, patch.width, real.str)
+    columns = around(patch.n, held, patch.left, patch.width, real.str)
+    return alone.product(lines.reshape(count * patch.height, -1), columns).reshape(count, patch.height, -1)
 
 
 @lru_cache(maxsize=32)

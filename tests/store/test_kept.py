@@ -8,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from store.blending.kept import Kept
 from store.blending.methods import bands, cells, poles
+from store.kept import Kept, Part
 
 
 def test_the_last_used_stay_and_no_more_than_there_is_room_for() -> None:
@@ -33,6 +33,36 @@ def test_the_last_used_stay_and_no_more_than_there_is_room_for() -> None:
     assert len(kept) == 1
     get("a", 4), get("b", 4)
     assert len(kept) == 2
+
+
+def test_owners_share_a_room_and_leave_it() -> None:
+    class Owner:
+        pass
+
+    made: list[tuple[int, str]] = []
+    shared: Kept[tuple[int, str], bytes] = Kept(10, len)
+    owners = [Owner(), Owner()]
+    parts = [Part(shared, owner) for owner in owners]
+
+    def get(number: int, key: str) -> None:
+        def make() -> bytes:
+            made.append((number, key))
+            return bytes(4)
+
+        parts[number].get(key, make)
+
+    get(0, "a"), get(1, "a"), get(0, "a"), get(1, "a")
+    assert made == [(0, "a"), (1, "a")]
+    get(1, "b")  # the first owner's makes room for it
+    get(1, "a"), get(1, "b")
+    assert made == [(0, "a"), (1, "a"), (1, "b")]
+    get(0, "a")
+    assert len(shared) == 2
+    del owners[0]
+    assert len(shared) == 1
+    get(1, "b"), get(1, "c")
+    assert made[3:] == [(0, "a"), (1, "c")]
+    assert len(shared) == 2
 
 
 def test_threads_that_make_one_thing_twice_count_it_once() -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
 
 from store.blending import stacks
 from store.blending.stacks import Stacks
+from store.kept import Kept
 
 
 def spectra(symmetric: bool) -> np.ndarray:
@@ -35,11 +37,13 @@ def test_a_sum_is_a_sum(symmetric: bool, band: int) -> None:
     assert not kept.mean(samples, (), np.empty(0), band).any()
 
 
-def test_no_more_is_kept_than_there_is_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_keep_no_more_together_than_there_is_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
     stored = spectra(False)
-    monkeypatch.setattr(stacks, "_ROOM", 5 * stored[0, 0].nbytes)
-    kept = Stacks(stored)
+    room = Kept[Any, Any](5 * stored[0, 0].nbytes, lambda stack: stack.waves.nbytes)
+    monkeypatch.setattr(stacks, "_kept", room)
+    tables = Stacks(stored), Stacks(2 * stored)
     for i in range(5):
-        found = kept.mean((i, (i + 1) % 5), (0,), np.array([0.5, 0.5]), 8)
-        np.testing.assert_allclose(found, (stored[i, 0] + stored[(i + 1) % 5, 0]) / 2, atol=1e-6)
-    assert len(kept._kept) == 2
+        for scale, kept in enumerate(tables, 1):
+            found = kept.mean((i, (i + 1) % 5), (0,), np.array([0.5, 0.5]), 8)
+            np.testing.assert_allclose(found, scale * (stored[i, 0] + stored[(i + 1) % 5, 0]) / 2, atol=1e-6)
+    assert len(room) == 2

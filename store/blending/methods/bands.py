@@ -18,8 +18,8 @@ import numpy as np
 
 from solver.arrays import Array
 
+from ...kept import Kept
 from ...surfaces import harmonics
-from ..kept import Kept
 from . import poles
 from .weights import Samples
 
@@ -155,14 +155,16 @@ def multiplier(gains: Array, bands: Bands, band: int) -> Array:
     is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
     """
     sharp = np.minimum(np.maximum(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST), _MOST)
-    excess = _kept_spreading(band, tuple(bands.centres.tolist())) @ (sharp - 1).astype(np.float32)
+    # not by BLAS: see `alone`
+    excess = np.einsum("b,bn->n", (sharp - 1).astype(np.float32), _kept_spreading(band, tuple(bands.centres.tolist())))
     excess += np.float32(1)
     found: Array = excess.reshape(band + 1, band + 1)
     return found
 
 
 def _kept_spreading(band: int, centres: tuple[float, ...]) -> Array:
-    return _kept.get((band, centres), lambda: _spreading(band, centres).astype(np.float32))
+    """Return `_spreading` transposed, (bands, m k)."""
+    return _kept.get((band, centres), lambda: np.ascontiguousarray(_spreading(band, centres).T, np.float32))
 
 
 _kept: Kept[tuple[int, tuple[float, ...]], Array] = Kept(_ROOM, lambda matrix: matrix.nbytes)

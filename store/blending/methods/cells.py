@@ -14,9 +14,9 @@ import numpy as np
 
 from solver.arrays import Array
 
+from ...kept import Kept, Part
 from ...surfaces import harmonics, spectra
 from ...surfaces.packed import Stored
-from ..kept import Kept
 from .bands import Bands
 
 __all__ = ["COARSE", "Cell", "Cells"]
@@ -26,7 +26,7 @@ __all__ = ["COARSE", "Cell", "Cells"]
 COARSE = 12
 #: Degree up to which the envelope is resolved, and the width [radian] of the window in which amplitude is averaged.
 _SMOOTH, _WIDTH = 9, 0.35
-#: Bytes of cells that a table keeps. One takes .1 to 1 MB and some 10 ms to make, which is ten look-ups: a table of a
+#: Bytes of cells that all tables keep. One takes .1 to 1 MB and some 10 ms to make, which is ten look-ups: a table of a
 #: hundred cells is to find all of them again.
 _ROOM = 96 << 20
 #: Lattice on which squares are taken; wrinkles beyond degree 48 are folded there, which moves no energy far.
@@ -44,13 +44,21 @@ class Cell(NamedTuple):
     low: Array
 
 
+def _size(cell: Cell) -> int:
+    return sum(part.nbytes for part in cell)
+
+
+#: By samples and stages of each table.
+_kept: Kept[tuple[int, tuple[tuple[int, ...], tuple[int, ...]]], Cell] = Kept(_ROOM, _size)
+
+
 class Cells:
     """Products of the spectra (sample, stage, component, m, k, part) of a table, kept for the cells last visited."""
 
     def __init__(self, stored: Stored, bands: Bands) -> None:
         self._stored = stored
         self._bands = bands
-        self._kept: Kept[tuple[tuple[int, ...], tuple[int, ...]], Cell] = Kept(_ROOM, _size)
+        self._kept = Part(_kept, self)
 
     def of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> Cell:
         """Return the products of all samples at all stages, samples first."""
@@ -78,10 +86,6 @@ def _power(found: Array, bands: Bands) -> Array:
         block = np.ascontiguousarray(flat[:, first:last]).reshape(len(flat), -1)
         products.append((block @ block.conj().T).real)
     return np.stack(products, axis=-1)
-
-
-def _size(cell: Cell) -> int:
-    return sum(part.nbytes for part in cell)
 
 
 def _local(waves: Array, found: Array | None = None) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.lattice import azimuths, colatitudes
 
-from ...surfaces import harmonics, window
+from ...surfaces import alone, harmonics, window
 from ...surfaces.harmonics import legendre
 from ...surfaces.window import Patch
 from .cells import COARSE
@@ -72,8 +72,9 @@ def apply(planes: Array, ratio: Array, low: Array, patch: Patch) -> None:
     if len(patch.components) < len(low):
         low = low[list(patch.components)]
     parts = np.ascontiguousarray(low).view(float).reshape(len(low), -1).astype(kind)
-    lines = (parts @ _low_lines(patch.n, patch.top, patch.height, kind.str)).reshape(len(low), patch.height, -1)
-    planes += lines @ window.around(patch.n, harmonics.LOWEST, patch.left, patch.width, kind.str)
+    lines = alone.product(parts, _low_lines(patch.n, patch.top, patch.height, kind.str))
+    around = window.around(patch.n, harmonics.LOWEST, patch.left, patch.width, kind.str)
+    planes += alone.product(lines.reshape(len(low) * patch.height, -1), around).reshape(planes.shape)
 
 
 def at_poles(ratio: Array) -> Array:
@@ -85,8 +86,7 @@ def at_poles(ratio: Array) -> Array:
 def _on_lattice(ratio: Array, patch: Patch, kind: np.dtype[Any]) -> Array:
     """Sum the series of `ratio` on a patch (height, width): so few waves are cheaper by matrices than by transforms."""
     down, around = _ways(patch.n, patch.top, patch.height, patch.left, patch.width, kind.str)
-    found: Array = down @ (ratio.astype(kind) @ around).reshape(-1, patch.width)
-    return found
+    return alone.product(down, (ratio.astype(kind) @ around).reshape(-1, patch.width))
 
 
 @lru_cache(maxsize=1)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solver.arrays import Array
 
-from ..kept import Kept
+from ...kept import Kept
 
 __all__ = ["highest_degree", "multiply"]
 
