@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from benchmarks.figures import keep
 from solver import registry
@@ -113,7 +114,9 @@ def main() -> None:
         print(f"build: {built.samples} samples in {time.perf_counter() - start:.2f} s")
         start = time.perf_counter()
         table = ShapeTable.open(store, surfaces=registry.surface)
-        compiled()  # as a service is, which has others to answer
+        # as a service is, which has others to answer
+        compiled()
+        threadpool_limits(1, user_api="blas")
         print(f"open and verify: {(time.perf_counter() - start) * 1e3:.1f} ms")
         rows = []
         for n in (32, 64, 96, 128, 256, 512):
@@ -199,7 +202,7 @@ def _folded() -> list[dict[str, Any]]:
     rows = []
     for s in _FOLDED:
         for n in (64, 128, 256):
-            for point in points[:2]:
+            for point in points:  # as a slider that goes to and fro: what is kept is there
                 table.at(point, s, resolution=n)
             times, crossing = [], 0
             for point in points:

@@ -11,6 +11,8 @@ import threading
 import time
 from collections.abc import Callable
 
+from threadpoolctl import threadpool_limits
+
 from solver import registry
 from solver.contract import SolverError
 from store.errors import StoreError
@@ -42,6 +44,8 @@ def _load(tables: LiveTables, then: Callable[[LiveTables], object]) -> None:
     time.sleep(_PAUSE)
     for name in registry.names():
         registry.get(name)
+    # a product that BLAS divides (a table's cell has some) leaves a thread that spins on for 27 ms, on another's core
+    threadpool_limits(1, user_api="blas")
     try:
         _open_first(tables)
         then(tables)

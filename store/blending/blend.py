@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.arrays import Array
 
-from ..surfaces import harmonics, window
+from ..surfaces import alone, harmonics, window
 from ..surfaces.packed import Stored
 from ..surfaces.window import Patch
 from . import methods
@@ -107,8 +107,9 @@ class Blender:
             total = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
         if "env" not in method.corrections:
             return Blend(waves)
-        ratio = envelope.factor(_form(parts, cell.local), parts @ cell.amplitude, total)
-        low = (parts @ cell.low.view(float).reshape(len(parts), -1)).view(complex).reshape(cell.low.shape[1:])
+        ratio = envelope.factor(_form(parts, cell.local), alone.total(parts, cell.amplitude), total)
+        flat = cell.low.view(float).reshape(len(parts), -1)
+        low = alone.total(parts, flat).view(complex).reshape(cell.low.shape[1:])
         envelope.take_low(waves, low)
         return Blend(waves, ratio, low)
 
@@ -151,5 +152,6 @@ def powers(stored: Stored) -> Array:
 def _form(parts: Array, products: Array) -> Array:
     """Return the quadratic form (...) of terms (T,) and their products (T, T, ...)."""
     count, parts = len(parts), parts.astype(products.dtype)
-    found: Array = parts @ (parts @ products.reshape(count, -1)).reshape(count, -1)
-    return found
+    return alone.total(parts, alone.total(parts, products.reshape(count, -1)).reshape(count, -1)).reshape(
+        products.shape[2:]
+    )

@@ -22,6 +22,7 @@ from store.store import Store
 SCRIPT = """
 import sys, threading
 from fastapi.testclient import TestClient
+from threadpoolctl import threadpool_info
 from service.app import create_app
 from service.settings import Settings
 from store.starter import ROOT
@@ -32,6 +33,8 @@ with TestClient(app) as client:
     for thread in threading.enumerate():
         if thread.name == "warming":
             thread.join()
+            # one that has others to answer leaves no product to threads
+            assert all(lib["num_threads"] == 1 for lib in threadpool_info() if lib["user_api"] == "blas")
     print("numba" in sys.modules, app.state.tables.is_open("default"))
 """
 

@@ -19,7 +19,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ...kept import Kept
-from ...surfaces import harmonics
+from ...surfaces import alone, harmonics
 from . import poles
 from .weights import Samples
 
@@ -155,8 +155,7 @@ def multiplier(gains: Array, bands: Bands, band: int) -> Array:
     is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
     """
     sharp = np.minimum(np.maximum(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST), _MOST)
-    # not by BLAS: see `alone`
-    excess = np.einsum("b,bn->n", (sharp - 1).astype(np.float32), _kept_spreading(band, tuple(bands.centres.tolist())))
+    excess = alone.total((sharp - 1).astype(np.float32), _kept_spreading(band, tuple(bands.centres.tolist())))
     excess += np.float32(1)
     found: Array = excess.reshape(band + 1, band + 1)
     return found
