@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, model_validator
 
-__all__ = ["MOST_GROUPS", "ClosedMesh", "GivenMesh", "check_groups", "check_textures", "named_groups"]
+__all__ = ["MOST_GROUPS", "ClosedMesh", "GivenMesh", "check_faces", "check_groups", "check_textures", "named_groups"]
 
 #: Groups of a mesh, and letters of the name of one, at most.
 MOST_GROUPS, _LETTERS = 64, 64
@@ -35,6 +35,18 @@ class GivenMesh(BaseModel):
                 'in a params file mesh = "@FILE"'
             )
         return values
+
+
+def check_faces(points: int, faces: Sequence[Sequence[int]]) -> None:
+    """Refuse triangles of vertices that are not there, of a mesh of so many points; before there is an array of them,
+    which holds no number of more than 64 bits.
+
+    Raises:
+        ValueError: a number below 0 or too large.
+
+    """
+    if min(map(min, faces)) < 0 or max(map(max, faces)) >= points:
+        raise ValueError(f"a triangle names a vertex that is not there: they are numbered 0 to {points - 1}")
 
 
 def check_textures(
@@ -106,9 +118,8 @@ class ClosedMesh(GivenMesh):
 
     @model_validator(mode="after")
     def _closed(self) -> Self:
+        check_faces(len(self.points), self.faces)
         points, faces = np.array(self.points), np.array(self.faces, np.int64)
-        if faces.min() < 0 or faces.max() >= len(points):
-            raise ValueError(f"a triangle names a vertex that is not there: they are numbered 0 to {len(points) - 1}")
         ways = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         key, back = ways[:, 0] * len(points) + ways[:, 1], ways[:, 1] * len(points) + ways[:, 0]
         sides, times = np.unique(key, return_counts=True)

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...arrays import Floats
-from ...contract.mesh import GivenMesh, check_groups, check_textures
+from ...contract.mesh import GivenMesh, check_faces, check_groups, check_textures
 from .surface import Extent, Surface
 
 __all__ = ["Mesh", "extent_of", "rays_from"]
@@ -43,11 +43,7 @@ class Mesh(GivenMesh):
 
     @model_validator(mode="after")
     def _within(self) -> Self:
-        numbers = np.array(self.faces)
-        if numbers.min() < 0 or numbers.max() >= len(self.points):
-            raise ValueError(
-                f"a triangle names a vertex that is not there: they are numbered 0 to {len(self.points) - 1}"
-            )
+        check_faces(len(self.points), self.faces)
         check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
         check_groups(len(self.points), self.groups)
         return self

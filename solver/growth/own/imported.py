@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...contract import InvalidGeometry
-from ...contract.mesh import GivenMesh, check_groups, check_textures
+from ...contract.mesh import GivenMesh, check_faces, check_groups, check_textures
 
 if TYPE_CHECKING:
     from ... import shell
@@ -50,6 +50,7 @@ class OwnMesh(GivenMesh):
         # parameters and schemas are read without what compiles
         from ... import shell
 
+        check_faces(len(self.points), self.faces)
         check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
         check_groups(len(self.points), self.groups)
         points, faces = np.array(self.points), np.array(self.faces, np.int64)
