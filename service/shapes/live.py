@@ -41,7 +41,10 @@ class _Open:
 
 
 class LiveTables:
-    """The store's tables by name, each opened when first asked for and looked at again at most every `interval` s."""
+    """The store's tables by name, each opened when first asked for and looked at again at most every `interval` s.
+
+    before_folds: called before a shape that folds is put out of contact, as `ShapeTable.open` says.
+    """
 
     def __init__(self, root: Path, interval: float, before_folds: Callable[[], None] = lambda: None) -> None:
         self._root = root

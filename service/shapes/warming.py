@@ -11,8 +11,6 @@ import threading
 import time
 from collections.abc import Callable
 
-from threadpoolctl import threadpool_limits
-
 from solver import registry
 from solver.contract import SolverError
 from store.errors import StoreError
@@ -42,6 +40,8 @@ def warm(tables: LiveTables, then: Callable[[LiveTables], object]) -> threading.
 
 def _load(tables: LiveTables, then: Callable[[LiveTables], object]) -> None:
     time.sleep(_PAUSE)
+    from threadpoolctl import threadpool_limits
+
     for name in registry.names():
         registry.get(name)
     # a product that BLAS divides (a table's cell has some) leaves a thread that spins on for 27 ms, on another's core

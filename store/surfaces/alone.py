@@ -8,15 +8,10 @@ import numpy as np
 
 from solver.arrays import Array
 
-__all__ = ["MOST", "product", "rows", "total"]
+__all__ = ["MOST", "product", "total"]
 
 #: Multiplications of a matrix product that BLAS leaves to one thread: OpenBLAS does to 4 x 65536.
 MOST = 200_000
-
-
-def rows(across: int, columns: int) -> int:
-    """Return how many rows times a matrix (across, columns) BLAS leaves to one thread, 1 at least."""
-    return max(MOST // max(across * columns, 1), 1)
 
 
 def product(a: Array, b: Array) -> Array:
@@ -25,12 +20,11 @@ def product(a: Array, b: Array) -> Array:
     if n * k * m <= MOST:
         return a @ b
     found = np.empty((n, m), np.result_type(a, b))
+    step = max(MOST // (k * min(n, m)), 1)
     if n < m:
-        step = rows(k, n)
         for first in range(0, m, step):
             np.matmul(a, b[:, first : first + step], out=found[:, first : first + step])
     else:
-        step = rows(k, m)
         for first in range(0, n, step):
             np.matmul(a[first : first + step], b, out=found[first : first + step])
     return found
