@@ -18,7 +18,7 @@ import numpy as np
 
 from service.portraits import DRAWN, said, table_file
 from solver import registry
-from solver.contract import Context, InvalidInput, Need, Solver, SolverError
+from solver.contract import Context, InvalidInput, Need, Solver, SolverError, dryness
 from store import seal, starter
 from store.errors import UnknownTable
 from store.families import stored
@@ -116,9 +116,9 @@ def portrait(solver: Solver, preset: str, seconds: float) -> tuple[bytes, dict[s
     axes = {name: params.axis(name) for name in params.axes}
     shapes = [outputs.of_result(run, axes, 0)] if "position" in run else []
     panel, view = _framed(outputs.panels(Made(shapes, {}, preset, solver.name, run=run))[-1])
-    plain = covering.tint(solver.name, (preset, "clay"))
+    plain = solver.looks.shade_of((preset, "clay"))
     if panel.colour is None and panel.triangles is None and plain is not None:
-        panel = replace(panel, colour=np.broadcast_to(plain, panel.position.shape))
+        panel = replace(panel, worn=plain[1].worn(dryness(stage, (0.0, solver.stages.default[-1]))))
     out = io.BytesIO()
     image = Image.fromarray(panel.image(_PIXELS, view))
     image.quantize(128, Image.Quantize.MEDIANCUT).save(out, "PNG", optimize=True)

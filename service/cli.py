@@ -7,6 +7,7 @@ import os
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -265,6 +266,7 @@ def _encode(chosen: Format, made: Made) -> bytes:
     from .formats import About
 
     about = About(made.solver, made.table, made.fixed, made.stage_symbol, made.units)
+    about = replace(about, shade=made.shade, reach=made.reach)
     return chosen.encode(made.shapes[0], about)
 
 

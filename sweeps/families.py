@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import registry
-from solver.contract import InvalidGeometry, Solver
+from solver.contract import InvalidGeometry, Shade, Solver, dryness
 from store.errors import UnknownTable
 from store.families import stored
 from store.families.choose import Families
@@ -20,7 +20,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, path_of
 
-__all__ = ["covered", "drawn", "gallery", "portrait", "thumbnail", "tint"]
+__all__ = ["covered", "drawn", "gallery", "portrait", "shade", "thumbnail"]
 
 #: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
 _DRY = 0.67
@@ -121,10 +121,10 @@ def thumbnail(
 
     shape = table.at(point, stage, resolution=96)
     assert shape.position is not None  # asked for by default
-    skin = tint(table.info.solver, (table.info.name, *presets))
-    colour = None if skin is None else np.broadcast_to(skin, shape.position.shape)
+    named = registry.get(table.info.solver).looks.shade_of((table.info.name, *presets))
+    worn = None if named is None else named[1].worn(dryness(stage, table.reach))
     out = io.BytesIO()
-    Image.fromarray(render(shape.position, shape.poles, pixels, colour=colour)).save(out, "PNG", optimize=True)
+    Image.fromarray(render(shape.position, shape.poles, pixels, worn=worn)).save(out, "PNG", optimize=True)
     return out.getvalue()
 
 
@@ -157,21 +157,16 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
         shape = table.at(point, stage, resolution=128)
         assert shape.position is not None  # asked for by default
         said = [f"{axis} {value:g}" for axis, value in point.items()]
-        colour = tint(table.info.solver, (table.info.name, *families.presets_of(table.info)))
-        skin = None if colour is None else np.broadcast_to(colour, shape.position.shape)
+        skin = shade(solver, table.info, families)
+        worn = None if skin is None else skin.worn(dryness(stage, table.reach))
         note = f"{name}: {', '.join([*said, f'{solver.stages.symbol} {stage:g}'])}"
-        panels.append(Panel(shape.position, shape.poles, note, skin))
+        panels.append(Panel(shape.position, shape.poles, note, worn=worn))
     if not panels:
         raise UnknownTable("the store has no table of shapes.", "Build one: `wizen table build`.")
     return sheet([panels[i : i + columns] for i in range(0, len(panels), columns)], pixels=pixels)
 
 
-def tint(solver: str, names: Sequence[str]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """Return the colour, linear light, of the shade that begins the first of `names` that one begins, if any does."""
-    shades = registry.get(solver).looks.shades
-    name = next((shade for one in names for shade in shades if one.startswith(shade)), None)
-    if name is None:
-        return None
-    text = shades[name].ridge[0]
-    display = np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)]) / 255
-    return np.asarray(display**2.2)
+def shade(solver: Solver, info: TableInfo, families: Families) -> Shade | None:
+    """Return the skin of a table's fruits: the one that begins its name, or that of a preset in it; None for none."""
+    found = solver.looks.shade_of((info.name, *families.presets_of(info)))
+    return None if found is None else found[1]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
+    from solver.contract import Shade
     from store.shape import Shape
 
 __all__ = ["Encoder", "Made", "added", "extend"]
@@ -19,8 +20,8 @@ class Made:
     """What a command has to write: shapes by stage, what it says about them, and the whole run if there was one.
 
     `table` and `fixed` are the look-up table's name and the parameters that are the same in all of it; `units` are
-    those of the parameters and of the stage, whose symbol is `stage_symbol`. `cut` is the plane in which a
-    picture shows the run cut open.
+    those of the parameters and of the stage, whose symbol is `stage_symbol`. `shade` is the skin of shapes of a table
+    whose stages `reach` so far. `cut` is the plane in which a picture shows the run cut open.
     """
 
     shapes: Sequence[Shape]
@@ -34,6 +35,8 @@ class Made:
     run: xr.Dataset | None = None
     key: str = ""
     cut: str | None = None
+    shade: Shade | None = None
+    reach: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from solver.contract import Solver
+from solver.contract import Solver, Worn, dryness
 from store import seal, shards
 from store.shape import Shape
 from store.surfaces import spectra
@@ -76,12 +76,21 @@ def panels(made: Made) -> list[Panel]:
     places = [(shape.position, shape.poles) for shape in made.shapes]
     fur = [None] * len(skins) if made.run is None else standing.on_lattices(made.run, places)
     return [
-        Panel(shape.position, shape.poles)
+        Panel(shape.position, shape.poles, worn=_worn(made, shape.stage))
         if skin is None
         else Panel(shape.position, shape.poles, colour=skin.colour, roughness=skin.roughness, more=more)
         for shape, skin, more in zip(made.shapes, skins, fur, strict=True)
         if shape.position is not None
     ]
+
+
+def _worn(made: Made, stage: float) -> Worn | None:
+    """Return the skin of a surface that has no colours of its own."""
+    from .pictures import colours
+
+    if made.run is not None:
+        return colours.worn(made.run, stage)
+    return None if made.shade is None else made.shade.worn(dryness(stage, made.reach))
 
 
 def triangles(run: xr.Dataset) -> list[Panel]:

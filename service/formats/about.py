@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from solver import __version__
+from solver.contract import Shade, Worn, dryness
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -24,7 +25,8 @@ class About:
 
     `made` says how its runs were done where that is not the usual: mirror planes, a pattern that they start from.
     `units` are those of the parameters and the stage; `detail` says what was chosen of resolution, part and fields;
-    `links` and `timings` [ms] appear in JSON alone.
+    `links` and `timings` [ms] appear in JSON alone. `shade` is its skin, if anybody knows it, over stages that `reach`
+    so far.
     """
 
     solver: str = ""
@@ -36,6 +38,12 @@ class About:
     links: Mapping[str, str] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     made: Mapping[str, Any] = field(default_factory=dict)
+    shade: Shade | None = None
+    reach: tuple[float, float] = (0.0, 1.0)
+
+    def worn(self, stage: float) -> Worn | None:
+        """Return what the skin is at a stage."""
+        return None if self.shade is None else self.shade.worn(dryness(stage, self.reach))
 
 
 def extras(shape: Shape, about: About) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from . import mesh
 from .about import GENERATOR, About, extras
-from .gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack
+from .gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack, skin
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -36,7 +36,7 @@ def encode(shape: Shape, about: About) -> bytes:
         "TEXCOORD_0": buffer.add(mesh.texture(n), FLOAT, "VEC2", VERTICES),
     }
     primitive = {"attributes": attributes, "indices": buffer.add(indices.ravel(), index_type, "SCALAR", INDICES)}
-    name = about.solver or "shape"
+    name, worn = about.solver or "shape", about.worn(shape.stage)
     document = {
         "asset": {"version": "2.0", "generator": GENERATOR},
         "scene": 0,
@@ -44,15 +44,6 @@ def encode(shape: Shape, about: About) -> bytes:
         "nodes": [{"mesh": 0, "name": name, "extras": extras(shape, about)}],
         "meshes": [{"name": name, "primitives": [{**primitive, "material": 0}]}],
         # without one, viewers fall back to polished metal
-        "materials": [
-            {
-                "name": "skin",
-                "pbrMetallicRoughness": {
-                    "baseColorFactor": [0.45, 0.09, 0.06, 1.0],
-                    "metallicFactor": 0.0,
-                    "roughnessFactor": 0.6,
-                },
-            }
-        ],
+        "materials": [skin("skin", worn)],
     }
     return pack(document, buffer)

@@ -6,13 +6,18 @@ import json
 import struct
 from typing import Any
 
-from solver.arrays import Array
+import numpy as np
 
-__all__ = ["FLOAT", "INDICES", "UINT", "USHORT", "VERTICES", "Buffer", "bounds", "pack"]
+from solver.arrays import Array
+from solver.contract import Worn
+
+__all__ = ["FLOAT", "INDICES", "UINT", "USHORT", "VERTICES", "Buffer", "bounds", "material", "pack", "skin"]
 
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 FLOAT, USHORT, UINT = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963
+
+_JUJUBE = Worn(np.array([0.45, 0.09, 0.06]), np.array([0.45, 0.09, 0.06]), 0.6, 0.0, np.zeros(3))
 
 
 def bounds(points: Array) -> dict[str, list[float]]:
@@ -20,6 +25,36 @@ def bounds(points: Array) -> dict[str, list[float]]:
     # column by column: numpy's reduction along the short last axis takes twenty times as long
     columns = [points[:, i] for i in range(points.shape[1])]
     return {"min": [float(c.min()) for c in columns], "max": [float(c.max()) for c in columns]}
+
+
+def material(name: str, base: Array, worn: Worn) -> dict[str, Any]:
+    """Return the material of a skin; `base` (3,) is the factor over colours of vertices, or its one colour. What its
+    `extensions` are the document has to name as used.
+    """
+    extensions: dict[str, Any] = {}
+    if worn.coat:
+        extensions["KHR_materials_clearcoat"] = {"clearcoatFactor": worn.coat, "clearcoatRoughnessFactor": 0.3}
+    if worn.bloom.any():
+        extensions["KHR_materials_sheen"] = {"sheenColorFactor": _rounded(worn.bloom), "sheenRoughnessFactor": 0.6}
+    return {
+        "name": name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*_rounded(base), 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": round(worn.roughness, 4),
+        },
+        **({"doubleSided": True} if worn.thin else {}),
+        **({"extensions": extensions} if extensions else {}),
+    }
+
+
+def skin(name: str, worn: Worn | None) -> dict[str, Any]:
+    """Return the material of a surface without colours of its own; a dried jujube's where nobody says its skin."""
+    return material(name, _JUJUBE.ridge, _JUJUBE) if worn is None else material(name, worn.smooth, worn)
+
+
+def _rounded(values: Array) -> list[float]:
+    return [round(float(value), 5) for value in values]
 
 
 class Buffer:
@@ -64,8 +99,11 @@ class Buffer:
 
 def pack(document: dict[str, Any], buffer: Buffer) -> bytes:
     """Return the file: header, JSON chunk and binary chunk, both multiples of four bytes."""
+    own = (name for one in document.get("materials", ()) for name in one.get("extensions", ()))
+    used = sorted({*document.get("extensionsUsed", ()), *own})
     document = {
         **document,
+        **({"extensionsUsed": used} if used else {}),
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": buffer.length}],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import quote
@@ -237,6 +238,7 @@ def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
 
     """
     from sweeps.outputs import of_result
+    from sweeps.pictures.colours import shade
 
     solver = vocabulary.solver_named(job.solver)
     params = _params(solver, job)
@@ -256,7 +258,9 @@ def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
     shape = replace(of_result(run, {name: params.axis(name) for name in axes}, near), table=str(job.digest))
     symbol = solver.stages.symbol
     units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}
-    return chosen.encode(shape, About(job.solver, "", {}, symbol, units))
+    skin = shade(job.solver, json.dumps(job.params)) if chosen.name == "glb" else None
+    reach = (0.0, max(solver.stages.default, key=abs, default=0.0))
+    return chosen.encode(shape, About(job.solver, "", {}, symbol, units, shade=skin, reach=reach))
 
 
 def _params(solver: Solver, job: Job) -> Params:

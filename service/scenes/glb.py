@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from solver.arrays import Array, Floats
+from solver.arrays import Array
 
+from ..formats import gltf
 from ..formats.about import GENERATOR
 from . import moving, props
 from .kinds import Kind
-from .meshes import VERTEX, Packed, Skin
+from .meshes import VERTEX, Packed
 from .placing import Instances
 
 __all__ = ["compressor", "encode"]
@@ -164,7 +165,7 @@ def _meshes(
         kind = kinds[k]
         if kind.look not in worn:
             worn[kind.look] = len(materials)
-            materials.append(_material(kind.look[0], kind.skin))
+            materials.append(gltf.material(kind.look[0], kind.skin.base, kind.skin))
         material = worn[kind.look]
         made[k, size] = len(meshes), kind.step
         tag = moving.etag(kind, size)
@@ -271,28 +272,3 @@ def _one_by_one(name: str, seen: Instances, mesh: int, step: float) -> list[Json
         }
         found.append({"mesh": mesh, "name": name, **place})
     return found
-
-
-def _material(name: str, looks: Skin) -> Json:
-    extensions: Json = {}
-    if looks.coat:
-        extensions["KHR_materials_clearcoat"] = {"clearcoatFactor": looks.coat, "clearcoatRoughnessFactor": 0.3}
-    if looks.bloom.any():
-        extensions["KHR_materials_sheen"] = {
-            "sheenColorFactor": _rounded(looks.bloom),
-            "sheenRoughnessFactor": 0.6,
-        }
-    return {
-        "name": name,
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [*_rounded(looks.base), 1.0],
-            "metallicFactor": 0.0,
-            "roughnessFactor": round(looks.roughness, 4),
-        },
-        **({"doubleSided": True} if looks.thin else {}),
-        **({"extensions": extensions} if extensions else {}),
-    }
-
-
-def _rounded(values: Floats) -> list[float]:
-    return [round(float(value), 5) for value in values]

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from solver.arrays import Array, Floats
-from solver.contract import Shade
+from solver.contract import Worn
 from store.shape import Shape
 
 from ..formats import mesh
 
-__all__ = ["STEPS", "VERTEX", "Packed", "Skin", "linear", "pack", "quantised", "relief", "skin", "weathered"]
+__all__ = ["STEPS", "VERTEX", "Packed", "pack", "quantised", "relief", "weathered"]
 
 #: One vertex: 16 bytes, multiples of four as accessors want them.
 VERTEX = np.dtype([("position", "<i2", 4), ("normal", "i1", 4), ("colour", "u1", 4)])
@@ -34,42 +34,6 @@ class Packed(NamedTuple):
     high: list[int]
 
 
-class Skin(NamedTuple):
-    """Colours (3) of ridges and furrows, linear light, roughness, coat, and the colour of the bloom.
-
-    thin: it has an inner side that may be seen.
-    """
-
-    ridge: Floats
-    furrow: Floats
-    roughness: float
-    coat: float
-    bloom: Floats
-    thin: bool = False
-
-    @property
-    def base(self) -> Floats:
-        """The factor over vertex colours: 8 bits of a dark colour would be few."""
-        return np.maximum(np.maximum(self.ridge, self.furrow), 1e-3)
-
-
-def linear(colour: str) -> Floats:
-    """Return a colour #rrggbb in linear light."""
-    c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
-    return np.asarray(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4))
-
-
-def skin(shade: Shade, dryness: float) -> Skin:
-    """Return what a shade says of a fruit that is so dry, 0 to 1."""
-
-    def between(pair: tuple[str, str]) -> Floats:
-        return linear(pair[0]) * (1 - dryness) + linear(pair[1]) * dryness
-
-    rough = shade.roughness[0] * (1 - dryness) + shade.roughness[1] * dryness
-    bloom = linear(shade.bloom) * shade.bloom_amount
-    return Skin(between(shade.ridge), between(shade.furrow), rough, shade.coat, bloom)
-
-
 def relief(position: Array, normal: Array) -> Floats:
     """Return how high (n, 2n) a lattice surface stands over itself smoothed over an eighth of the way pole to pole."""
     n = len(position)
@@ -81,7 +45,7 @@ def relief(position: Array, normal: Array) -> Floats:
     return np.asarray(np.einsum("ijk,ijk->ij", position - smooth, normal))
 
 
-def weathered(position: Array, normal: Array, looks: Skin) -> Floats:
+def weathered(position: Array, normal: Array, looks: Worn) -> Floats:
     """Return colours (2 n^2 + 2, 3) over the skin's base of a lattice surface (n, 2n, 3) and its poles."""
     height = relief(position, normal)
     # a smoothed round body lies within it: only what stands out of the mean is ridge
@@ -106,7 +70,7 @@ def quantised(points: Array, normal: Array, colour: Floats, reach: float) -> Pac
     return Packed(out, scale, [int(c.min()) for c in columns], [int(c.max()) for c in columns])
 
 
-def pack(shape: Shape, looks: Skin, reach: float | None = None) -> Packed:
+def pack(shape: Shape, looks: Worn, reach: float | None = None) -> Packed:
     """Return a shape's closed mesh, 2 n^2 + 2 vertices, quantised; `reach` [r1] is the largest coordinate that counts,
     None: the shape's own.
     """

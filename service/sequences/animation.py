@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import UnfitFormat
 from ..formats.about import GENERATOR
-from ..formats.gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack
+from ..formats.gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack, skin
 from .options import Options
 from .skins import looked, matter
 from .standing import Extra, cards, stems
@@ -31,8 +31,6 @@ Json = dict[str, Any]
 
 #: The largest 16-bit index is reserved by WebGL as a restart mark.
 _SHORT = 0xFFFF
-#: Skin of fruits that say nothing about it.
-_PLAIN = {"baseColorFactor": [0.45, 0.09, 0.06, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.6}
 
 
 def animation(sequence: Sequence, options: Options) -> bytes:
@@ -138,9 +136,12 @@ class _File:
         rough = 0.6 if surface.roughness is None else round(float(surface.roughness.mean()), 2)
         if rough not in self.rough:
             self.rough[rough] = len(self.materials)
-            pbr = _PLAIN if surface.colour is None else {"metallicFactor": 0.0, "roughnessFactor": rough}
             names = [name or "skin" for name, _ in self.sequence.materials]
-            self.materials += [{"name": name, "pbrMetallicRoughness": pbr} for name in names]
+            if surface.colour is None:
+                self.materials += [skin(name, self.sequence.worn()) for name in names]
+            else:
+                pbr = {"metallicFactor": 0.0, "roughnessFactor": rough}
+                self.materials += [{"name": name, "pbrMetallicRoughness": pbr} for name in names]
         return self.rough[rough]
 
     def _extras(self, surface: Surface) -> list[Json]:

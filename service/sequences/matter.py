@@ -37,7 +37,7 @@ def dressed(stage: Any, mesh: Any, sequence: Sequence, pictures: Pictures | None
     """Bind materials under the mesh's own names, which take what they show from pictures, else from the vertices."""
     from pxr import UsdGeom, UsdShade, Vt
 
-    if not sequence.coloured:
+    if not sequence.coloured and sequence.worn() is None:
         return
     # where triangles change from stage to stage none of them stays in its part
     parts = sequence.materials if sequence.kept else (("", np.empty(0, int)),)

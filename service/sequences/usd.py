@@ -23,6 +23,7 @@ from .skins import matter
 from .standing import Extra, stems
 
 if TYPE_CHECKING:
+    from solver.contract import Worn
     from sweeps.pictures.fur import Threads
 
     from .seam import Seam
@@ -71,6 +72,8 @@ def composed(sequence: Sequence, options: Options, pictures: Pictures | None = N
         if surface.seam is not None:
             _texture(mesh, surface.seam, at)
         _sample(mesh, surface, at)
+        if surface.colour is None:
+            _wear(mesh, sequence.worn(sequence.stages[number]), at)
         _threads(stage, mesh, sequence.threads(surface, options.grown), at)
         for one in stems(sequence, surface, options):
             _stem(stage, mesh, one, at)
@@ -126,6 +129,18 @@ def _sample(mesh: Any, surface: Surface, at: float) -> None:
     for name, values in {**surface.fields, **more}.items():
         own = primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
         own.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(values)), at)
+
+
+def _wear(mesh: Any, worn: Worn | None, at: float) -> None:
+    """Write the one colour and roughness of a surface that has none of its own at its vertices."""
+    from pxr import Gf, Sdf, UsdGeom, Vt
+
+    if worn is None:
+        return
+    colour = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant)
+    colour.Set(Vt.Vec3fArray([Gf.Vec3f(*map(float, worn.smooth))]), at)
+    rough = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("roughness", Sdf.ValueTypeNames.Float, UsdGeom.Tokens.constant)
+    rough.Set(worn.roughness, at)
 
 
 def _threads(stage: Any, mesh: Any, threads: Threads | None, at: float) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Singles, Words32
-from solver.contract import Fur
+from solver.contract import Fur, Worn
 from store.surfaces import spectra
 from sweeps.pictures import colours
 from sweeps.pictures.fur import Feet, Threads, feet, grown
@@ -174,6 +174,10 @@ class Sequence:
         if size not in self._texels:
             self._texels[size] = charts.texels(self.seam, size)
         return charts.drawn(self.seam, self._texels[size], values, size)
+
+    def worn(self, stage: float | None = None) -> Worn | None:
+        """Return the skin of a surface without colours at a stage, or at its stages' mean; None where none is known."""
+        return colours.worn(self.run, float(np.mean(self.stages)) if stage is None else stage)
 
     @cached_property
     def fresh(self) -> Singles:

@@ -14,6 +14,7 @@ from store.families import stored
 from store.families.choose import Families
 from store.families.match import STAGE, Fit
 from store.lookup import ShapeTable
+from sweeps import families as covering
 
 from .. import vocabulary
 from ..errors import InvalidQuery, ServiceError, Wrong
@@ -143,7 +144,7 @@ def read(request: Request, solver: str, only: Format | None = None, without: tup
     table = tables.get(found.name)
     words = _kept_words.get(table)
     if words is None:
-        words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution))
+        words = _kept_words.setdefault(table, words_of(known, table, settings.max_resolution, tables))
     detail = level.read(given)
     unknown = [Wrong(name, "means nothing here", f"Ask /v1/shapes/{solver}.") for name in without if name in given]
     also = [*unknown, *detail.refused(chosen)]
@@ -164,7 +165,7 @@ def beyond(found: Found, words: Words) -> list[Wrong]:
     ]
 
 
-def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
+def words_of(solver: Solver, table: ShapeTable, max_resolution: int, tables: LiveTables) -> Words:
     """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers.
 
     Raises:
@@ -184,4 +185,5 @@ def words_of(solver: Solver, table: ShapeTable, max_resolution: int) -> Words:
         max_resolution=max_resolution,
         tied=table.info.tied,
         made=stored.made(table.info, solver),
+        shade=covering.shade(solver, table.info, tables.families(solver)),
     )

@@ -63,7 +63,7 @@ def batch(request: Request, body: BatchRequest) -> Response:
     entries = expand(body.points)
     found = _table(tables, solver, body, entries)
     name, table = found.name, tables.get(found.name)
-    words = words_of(solver, table, settings.max_resolution)
+    words = words_of(solver, table, settings.max_resolution, tables)
     detail = level.read(body.detail)
     # what is wrong with all of them is said first, and alone: it would hide what is wrong with some
     _check_count(len(entries), settings)

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from solver.contract import Shade
 from store.blending import methods
 from store.errors import OutsideTable
 from store.families.match import TIED, same
@@ -43,7 +44,7 @@ Range = tuple[float, float]
 
 class Words(NamedTuple):
     """What may be asked: axes and stage with their ranges and units, the numbers that the table holds fixed, and those
-    that follow one of its axes. `made` says how its runs were done.
+    that follow one of its axes. `made` says how its runs were done, `shade` what its fruits wear.
     """
 
     axes: Mapping[str, Range]
@@ -54,6 +55,7 @@ class Words(NamedTuple):
     max_resolution: int
     tied: Mapping[str, Tie] = {}
     made: Mapping[str, Any] = {}
+    shade: Shade | None = None
 
     @property
     def ranges(self) -> dict[str, Range]:
@@ -62,7 +64,8 @@ class Words(NamedTuple):
 
     def about(self, solver: str, table: str) -> About:
         """Return what files say of every shape of the table of that name."""
-        return About(solver, table, self.fixed, self.stage, self.units, made=self.made)
+        more: dict[str, Any] = {"made": self.made, "shade": self.shade, "reach": self.stages}
+        return About(solver, table, self.fixed, self.stage, self.units, **more)
 
     def say(self, name: str) -> str:
         """Return the range of an axis or of the stage with its units, in words."""

@@ -8,7 +8,7 @@ from .clock import Clock
 from .context import Context
 from .errors import Cancelled, InvalidGeometry, InvalidInput, NotConverged, OverBudget, SolverError, Unstable
 from .live import Glimpse, Live, LiveEngine
-from .looks import Fur, Label, Looks, Matter, Part, Place, Shade, Skin
+from .looks import Fur, Label, Looks, Matter, Part, Place, Shade, Skin, Worn, dryness
 from .need import Need, Quality, Region, Start
 from .params import Params
 from .solver import Cost, Solver, StageAxis, finish
@@ -46,5 +46,7 @@ __all__ = [
     "Start",
     "Surface",
     "Unstable",
+    "Worn",
+    "dryness",
     "finish",
 ]

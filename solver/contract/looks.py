@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..arrays import Array
 
-__all__ = ["Fur", "Label", "Looks", "Matter", "Part", "Place", "Shade", "Skin"]
+__all__ = ["Fur", "Label", "Looks", "Matter", "Part", "Place", "Shade", "Skin", "Worn", "dryness", "linear"]
+
+#: Share of the furrows' colour where a surface is neither ridge nor furrow.
+FURROW = 0.2
 
 
 class Skin(NamedTuple):
@@ -76,8 +81,47 @@ class Label(NamedTuple):
     name: str
 
 
+def dryness(stage: float, reach: tuple[float, float]) -> float:
+    """Return the share of the way from the fresh shape to the last of stages that reach so far, 0 to 1."""
+    last = max(reach, key=abs)
+    return round(min(abs(stage / last), 1.0), 3) if last else 0.0
+
+
+def linear(colour: str) -> Array:
+    """Return a colour #rrggbb (sRGB, IEC 61966-2-1) in linear light, (3,)."""
+    c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    found: Array = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    return found
+
+
+class Worn(NamedTuple):
+    """A shade on what is so dry: colours (3,) of ridges and furrows in linear light, roughness, coat, and the bloom's
+    colour as far as it covers ridges.
+
+    thin: it has an inner side that may be seen.
+    """
+
+    ridge: Array
+    furrow: Array
+    roughness: float
+    coat: float
+    bloom: Array
+    thin: bool = False
+
+    @property
+    def base(self) -> Array:
+        """The factor (3,) over colours of vertices: 8 bits of a dark colour would be few."""
+        found: Array = np.maximum(np.maximum(self.ridge, self.furrow), 1e-3)
+        return found
+
+    @property
+    def smooth(self) -> Array:
+        """What is neither ridge nor furrow (3,): of a fruit one sees its ridges."""
+        return self.ridge + FURROW * (self.furrow - self.ridge)
+
+
 class Shade(NamedTuple):
-    """A surface without fields of its own, for pages: colours as #rrggbb (sRGB), each fresh and at the last stage.
+    """A surface without fields of its own: colours as #rrggbb (sRGB), each fresh and at the last stage.
 
     coat: waxy gloss, 0 to 1. bloom: the dust that settles on ridges, and how much of it, 0 to 1.
     """
@@ -88,6 +132,16 @@ class Shade(NamedTuple):
     coat: float = 0.0
     bloom: str = "#ffffff"
     bloom_amount: float = 0.0
+
+    def worn(self, dryness: float) -> Worn:
+        """Return what it is on something that is so dry: 0 fresh, 1 at the last stage."""
+
+        def between(pair: tuple[str, str]) -> Array:
+            return linear(pair[0]) * (1 - dryness) + linear(pair[1]) * dryness
+
+        rough = self.roughness[0] * (1 - dryness) + self.roughness[1] * dryness
+        bloom = linear(self.bloom) * self.bloom_amount
+        return Worn(between(self.ridge), between(self.furrow), rough, self.coat, bloom)
 
 
 class Place(NamedTuple):
@@ -127,6 +181,10 @@ class Looks:
     advance: str = "Play"
     shades: Mapping[str, Shade] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
+
+    def shade_of(self, names: Iterable[str]) -> tuple[str, Shade] | None:
+        """Return the shade that begins the first of `names` that one begins, with its own name."""
+        return next(((own, shade) for one in names for own, shade in self.shades.items() if one.startswith(own)), None)
 
     def to_json(self) -> dict[str, Any]:
         """Return what a page wants to know, as JSON values."""

@@ -6,7 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
 from .live import Live
-from .looks import Looks
+from .looks import Looks, Shade
 from .need import Need, Quality
 from .params import Params
 from .surface import Extent, Fresh, Surface
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Cost", "Solver", "StageAxis", "finish"]
+
+T = TypeVar("T")
 
 #: Distance [r1] within which two fresh surfaces are of one fruit: its skin may be thicker or thinner.
 _ALIKE = 0.04
@@ -136,8 +138,25 @@ class Solver:
         Known are the sizes of presets: what has the fresh shape of one alone, but for its skin, is as large as that.
         Where several have one shape, all that a preset says must agree.
         """
+        return self._of_alike(values, self.sizes.get) if self.sizes else None
+
+    def shade(self, values: Mapping[str, Any]) -> Shade | None:
+        """Return the shade of what has these parameters, plain values by name, as `metres` its size; None where the
+        presets of that shape have none, or each its own.
+        """
+        shades = self.looks.shades
+
+        def named(preset: str) -> str | None:
+            found = self.looks.shade_of((preset,))
+            return None if found is None else found[0]
+
+        name = self._of_alike(values, named) if shades else None
+        return None if name is None else shades[name]
+
+    def _of_alike(self, values: Mapping[str, Any], of: Callable[[str], T | None]) -> T | None:
+        """Return what `of` says of the presets with the fresh shape of these parameters; None unless they agree."""
         plain = self.params.model_validate({}).model_dump(mode="json")
-        asked = self.fresh({**plain, **values}) if self.sizes else None
+        asked = self.fresh({**plain, **values})
         if asked is None:
             return None
         said = {name: self.parse({}, name).model_dump(mode="json") for name in self.presets}
@@ -145,10 +164,10 @@ class Solver:
         points = asked.points(*angles)
         shapes = {name: self.fresh(full) for name, full in said.items()}
         alike = [name for name, one in shapes.items() if one and np.abs(one.points(*angles) - points).max() < _ALIKE]
-        if len({self.sizes.get(name) for name in alike}) > 1:
+        if len({of(name) for name in alike}) > 1:
             full = {**plain, **values}
             alike = [n for n in alike if all(_same(said[n].get(f), full.get(f)) for f in self.presets[n])]
-        found = {self.sizes.get(name) for name in alike}
+        found = {of(name) for name in alike}
         return found.pop() if len(found) == 1 else None
 
     def axis_units(self) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -71,8 +71,9 @@ def draw_map(asked: _Drawn) -> None:
     """
     from solver import registry
     from store import seal
+    from store.families import stored
 
-    from .. import outputs
+    from .. import families, outputs
     from ..pictures.maps import Map
 
     out = asked.out
@@ -84,8 +85,9 @@ def draw_map(asked: _Drawn) -> None:
     said = assignments(asked.set_)
     table, values = asked_table(asked.store, asked.name, None, said, asked.stage, asked.preset)
     name, given = table.info.name, {axis: value for axis, value in values.items() if axis in said}
-    units = registry.get(table.info.solver).axis_units()
-    drawing = Map(open_store(asked.store), table, units, given, asked.pixels)
+    solver, store = registry.get(table.info.solver), open_store(asked.store)
+    shade = families.shade(solver, table.info, stored.families(store, solver))
+    drawing = Map(store, table, solver.axis_units(), given, asked.pixels, shade)
     if asked.stages is not None:
         picture = drawing.by_stages(numbers(asked.stages))
     else:
@@ -148,8 +150,9 @@ def query(asked: _Asked) -> None:
     wizen query --store demo --set te=0.034 --set gamma=22 --stages 0.1,0.2,0.3 --out row.png --json
     """
     from solver import registry
+    from store.families import stored
 
-    from .. import outputs
+    from .. import families, outputs
     from ..formats import Made
 
     table, shapes, notes = _found(asked)
@@ -164,7 +167,9 @@ def query(asked: _Asked) -> None:
     }
     if asked.out is not None:
         title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
-        outputs.save(asked.out, Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units()))
+        made = Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units())
+        shade = families.shade(known, table.info, stored.families(open_store(asked.store), known))
+        outputs.save(asked.out, replace(made, shade=shade, reach=table.reach))
     emit(document, asked.as_json, lambda console: _show(console, name, shapes, known.stages.symbol, asked.out))
 
 

@@ -7,18 +7,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solver import registry
 from solver.arrays import Array, Bytes
-from solver.contract import Fur, Looks, Skin
+from solver.contract import Fur, Looks, Shade, Skin, Worn, dryness
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["by_field", "encoded", "furred", "looks", "maps_of", "of_run", "painted"]
+__all__ = ["by_field", "encoded", "furred", "looks", "maps_of", "of_run", "painted", "shade", "worn"]
 
 
 def looks(run: xr.Dataset) -> Looks:
@@ -32,6 +33,23 @@ def painted(run: xr.Dataset, index: int, fields: Mapping[str, Array]) -> Skin | 
     known = looks(run)
     stage = {name: run[name].values[index] for name in known.scalars if name in run}
     return None if known.paint is None else known.paint({**stage, **fields}, _params(run))
+
+
+def worn(run: xr.Dataset, stage: float) -> Worn | None:
+    """Return the skin, at a stage, of a result whose fields say no colours: of the preset that has its fresh shape;
+    None where nobody knows one.
+    """
+    name = str(run.attrs.get("solver", ""))
+    known = shade(name, str(run.attrs.get("params", "{}"))) if name in registry.names() else None
+    if known is None:
+        return None
+    return known.worn(dryness(stage, (0.0, max(registry.get(name).stages.default, key=abs, default=0.0))))
+
+
+@lru_cache(maxsize=64)
+def shade(solver: str, params: str) -> Shade | None:
+    """Return the skin of what has these parameters, JSON; None where nobody knows one."""
+    return registry.get(solver).shade(json.loads(params))
 
 
 def furred(run: xr.Dataset, fields: Mapping[str, Array]) -> Fur | None:

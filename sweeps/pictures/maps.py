@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.contract import InvalidGeometry
+from solver.contract import InvalidGeometry, Shade, dryness
 from store import tables
 from store.lookup import ShapeTable
 from store.store import Store
@@ -26,11 +26,20 @@ _MOST_ROWS = 60
 
 
 class Map:
-    """Draws one table. `given` fixes axes that are not drawn; `units` of the axes are written at the edges."""
+    """Draws one table. `given` fixes axes that are not drawn; `units` of the axes are written at the edges; `shade` is
+    the skin of its fruits, a dried jujube's if not given.
+    """
 
     def __init__(
-        self, store: Store, table: ShapeTable, units: Mapping[str, str], given: Mapping[str, Any], pixels: int
+        self,
+        store: Store,
+        table: ShapeTable,
+        units: Mapping[str, str],
+        given: Mapping[str, Any],
+        pixels: int,
+        shade: Shade | None = None,
     ) -> None:
+        self._shade = shade
         self._table, self._units, self._given, self._pixels = table, units, given, pixels
         with tables.open(store, table.info.name) as opened:
             self._sampled = {name: np.unique(opened[name].values.astype(float)) for name in table.axes}
@@ -110,7 +119,8 @@ class Map:
         assert shape.position is not None  # asked for by default
         number = shape.descriptors.get("buckle_count")
         note = "" if number is None or stage == 0 else f"{number:.0f} buckles"
-        return Panel(shape.position, shape.poles, note)
+        worn = None if self._shade is None else self._shade.worn(dryness(stage, self._table.reach))
+        return Panel(shape.position, shape.poles, note, worn=worn)
 
     def _label(self, point: Mapping[str, float]) -> str:
         units = {name: self._units.get(name, "1") for name in point}

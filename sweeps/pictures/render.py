@@ -12,6 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from solver.arrays import Array
+from solver.contract import Worn
 from store.surfaces import spectra
 
 from .raster import finer, normals, rasterise
@@ -81,11 +82,12 @@ def render(
     colour: Array | None = None,
     roughness: Array | None = None,
     more: More | None = None,
+    worn: Worn | None = None,
 ) -> Array:
     """Return a picture (pixels, pixels, 3), uint8, of a surface (n, 2n, 3) [r1].
 
-    colour: (n, 2n, 3) of the same lattice, linear light, in place of a dried jujube's; roughness: (n, 2n). more: what
-    stands on it.
+    worn: its skin, a dried jujube's if not given. colour: (n, 2n, 3) of the same lattice, linear light, instead of
+    a skin's; roughness: (n, 2n). more: what stands on it.
     """
     view = view or View()
     side = pixels * _SUPERSAMPLES
@@ -95,7 +97,7 @@ def render(
         matt = np.full(colour.shape[:2], _PLAIN) if roughness is None else roughness
         paint = _paint(np.concatenate([colour, matt[..., None]], axis=-1), resolution)
         return _draw(vertices, faces, paint, pixels, view, _frame(view), open_=False, more=more)
-    return _draw(vertices, faces, None, pixels, view, _frame(view), open_=False)
+    return _draw(vertices, faces, None, pixels, view, _frame(view), open_=False, worn=worn)
 
 
 def render_triangles(
@@ -133,6 +135,7 @@ def _draw(
     frame: Array,
     open_: bool,
     more: More | None = None,
+    worn: Worn | None = None,
 ) -> Array:
     """Return the picture; paint (v, 4): colours and roughness."""
     side = pixels * _SUPERSAMPLES
@@ -160,7 +163,7 @@ def _draw(
     skin = None if paint is None else np.einsum("fk,fkc->fc", weights, paint[corners])
     behind = relief(depth.reshape(side, side)).ravel()[index]
     if skin is None:
-        image.reshape(-1, 3)[index] = shade(normal, behind)
+        image.reshape(-1, 3)[index] = shade(normal, behind, worn=worn)
     else:
         image.reshape(-1, 3)[index] = shade(normal, behind, skin[:, :3], skin[:, 3])
     small = image.reshape(pixels, _SUPERSAMPLES, pixels, _SUPERSAMPLES, 3).mean(axis=(1, 3))

@@ -6,6 +6,8 @@ import numpy as np
 from scipy import ndimage
 
 from solver.arrays import Array
+from solver.contract import Worn
+from solver.contract.looks import FURROW
 
 __all__ = ["BACKGROUND", "floor_shadow", "relief", "shade"]
 
@@ -13,9 +15,8 @@ __all__ = ["BACKGROUND", "floor_shadow", "relief", "shade"]
 #: Paper-white behind the fruits; linear light, 0 to 1.
 BACKGROUND = np.array([0.93, 0.91, 0.88])
 
-#: Colours of a dried jujube: on the ridges, and in the depth of the wrinkles.
-_RIDGE = np.array([0.53, 0.105, 0.05])
-_VALLEY = np.array([0.13, 0.016, 0.014])
+#: A dried jujube, as which is drawn what nobody says anything of.
+_JUJUBE = Worn(np.array([0.53, 0.105, 0.05]), np.array([0.13, 0.016, 0.014]), 0.5, 0.0, np.zeros(3))
 
 #: Directions towards the lights in the camera's frame (right, up, towards the eye), and their colours.
 _KEY = np.array([-0.62, 0.62, 0.48])
@@ -45,15 +46,19 @@ def relief(depth: Array) -> Array:
     return np.where(inside, found, 0.0)
 
 
-def shade(normal: Array, behind: Array, paint: Array | None = None, rough: Array | None = None) -> Array:
+def shade(
+    normal: Array, behind: Array, paint: Array | None = None, rough: Array | None = None, worn: Worn | None = None
+) -> Array:
     """Return linear light (f, 3) of fragments with unit normals (f, 3) in the camera's frame.
 
-    behind: `relief` (f,). paint: their colours (f, 3) in place of a dried jujube's. rough: their roughness (f,), which
-    spreads the highlight (Blinn's exponent 2 / roughness^4 - 2); without it all shine alike.
+    behind: `relief` (f,). worn: the skin's colours of ridges and furrows, a dried jujube's if not given; paint: their
+    own (f, 3) instead. rough: their roughness (f,), which spreads the highlight (Blinn's exponent 2 / roughness^4 - 2);
+    without it all shine alike.
     """
     key, fill = _KEY / np.linalg.norm(_KEY), _FILL / np.linalg.norm(_FILL)
-    depth = np.clip(0.5 + 0.5 * behind, 0, 1)[:, None]
-    colour = _RIDGE + (_VALLEY - _RIDGE) * depth if paint is None else paint
+    depth = np.clip((0.5 if worn is None else FURROW) + 0.5 * behind, 0, 1)[:, None]
+    skin = worn or _JUJUBE
+    colour = skin.ridge + (skin.furrow - skin.ridge) * depth if paint is None else paint
     open_sky = 1 - 0.62 * np.clip(behind, 0, 1)[:, None]
     lit = np.clip(normal @ key, 0, None)[:, None]
     half = key + _TO_EYE

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array
+from solver.contract import Worn
 
 from .render import More, View, render, render_triangles
 from .shading import BACKGROUND
@@ -26,7 +27,8 @@ class Panel:
     """One surface: positions (n, 2n, 3) and poles (2, 3) [r1], a note to write below it, and colours (n, 2n, 3).
 
     With triangles (f, 3), positions and colours are those of vertices (v, 3), and `up` is the axis that points up.
-    view: where it is seen from in place of the sheet's direction. roughness: (n, 2n), or (v); more: what stands on it.
+    view: where it is seen from in place of the sheet's direction. roughness: (n, 2n), or (v); more: what stands on it;
+    worn: its skin where it has no colours.
     """
 
     position: Array
@@ -38,11 +40,12 @@ class Panel:
     view: View | None = None
     roughness: Array | None = None
     more: More | None = None
+    worn: Worn | None = None
 
     def image(self, pixels: int, view: View) -> Array:
         """Return the picture (pixels, pixels, 3)."""
         if self.triangles is None:
-            return render(self.position, self.poles, pixels, view, self.colour, self.roughness, self.more)
+            return render(self.position, self.poles, pixels, view, self.colour, self.roughness, self.more, self.worn)
         looks = (self.colour, self.up, self.roughness, self.more)
         return render_triangles(self.position, self.triangles, pixels, view, *looks)
 

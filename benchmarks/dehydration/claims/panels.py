@@ -25,8 +25,8 @@ from .shown import FIGURES, FRUITS, SKINS
 
 #: Colatitudes of the lattice that is drawn.
 _FINE = 192
-#: A picture of 16 panels stays below 200 kB with so many colours.
-_COLOURS = 96
+#: A picture of 16 panels of one skin stays below 200 kB with so many colours; of six skins, 18 do.
+_COLOURS, _MANY = 96, 240
 
 
 def main(folder: Path) -> None:
@@ -38,7 +38,7 @@ def main(folder: Path) -> None:
     stages = (0.1, 0.2, 0.3)
     fruits = [[_panel(tables, s, {}, preset) for preset in FRUITS] for s in stages]
     picture = sheet(fruits, column_labels=FRUITS, row_labels=[f"s = {s:g}" for s in stages], pixels=190)
-    _write(folder / "table1.png", picture)
+    _write(folder / "table1.png", picture, _MANY)
 
 
 def _panel(tables: LiveTables, stage: float, parameters: Mapping[str, float], preset: str | None = None) -> Panel:
@@ -46,11 +46,11 @@ def _panel(tables: LiveTables, stage: float, parameters: Mapping[str, float], pr
     (kind,), _ = distinct([item], tables, _FINE)
     shape = kind.shape(_FINE)
     assert shape.position is not None
-    return Panel(shape.position, shape.poles)
+    return Panel(shape.position, shape.poles, worn=None if preset is None else kind.skin)
 
 
-def _write(path: Path, data: bytes) -> None:
-    image = Image.open(io.BytesIO(data)).convert("RGB").quantize(_COLOURS)
+def _write(path: Path, data: bytes, colours: int = _COLOURS) -> None:
+    image = Image.open(io.BytesIO(data)).convert("RGB").quantize(colours)
     image.save(path, optimize=True)
     print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
 

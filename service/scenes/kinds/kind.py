@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array, Floats
+from solver.contract import Worn
 from solver.resting import Body
 
-from ..meshes import STEPS, Packed, Skin
+from ..meshes import STEPS, Packed
 from .runs import Missing
 
 __all__ = ["COARSE", "RUNGS", "Curve", "Kind"]
@@ -108,7 +109,7 @@ class Kind(ABC):
 
     @cached_property
     @abstractmethod
-    def skin(self) -> Skin:
+    def skin(self) -> Worn:
         """Colours and roughness of its material."""
 
     @abstractmethod

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array, Floats
-from solver.contract import Shade, Solver
+from solver.contract import Shade, Solver, Worn, dryness
 from solver.resting import Body
 from store.lookup import ShapeTable
 from store.shape import Shape
 
 from ...formats import mesh
 from ...limits import waited
-from ..meshes import Packed, Skin, pack, quantised, skin, weathered
+from ..meshes import Packed, pack, quantised, weathered
 from .kind import COARSE, RUNGS, Curve, Kind
 
 __all__ = ["Looked"]
@@ -124,10 +124,8 @@ class Looked(Kind):
     @property
     def dryness(self) -> tuple[float, ...]:
         """Share of the way from the fresh shape to the table's last stage, at the stage and those on the curve."""
-        low, high = self.table.reach
-        last = high if abs(high) >= abs(low) else low
         stages = (self.stage, *(stage for _, stage in self.curve[1:]))
-        return tuple(round(min(abs(stage / last), 1.0), 3) if last else 0.0 for stage in stages)
+        return tuple(dryness(stage, self.table.reach) for stage in stages)
 
     @property
     def body(self) -> Body:
@@ -145,7 +143,7 @@ class Looked(Kind):
         return "_".join([self.shade[0], *(f"{1000 * share:.0f}" for share in self.dryness)])
 
     @cached_property
-    def skin(self) -> Skin:
+    def skin(self) -> Worn:
         """The skin of a fruit that is so dry; on a curve its brightest colours, which others are shares of."""
         worn = self._worn
         if not self.fades:
@@ -154,9 +152,9 @@ class Looked(Kind):
         return worn[0]._replace(ridge=base, furrow=base)
 
     @cached_property
-    def _worn(self) -> list[Skin]:
+    def _worn(self) -> list[Worn]:
         """The skins along the curve."""
-        return [skin(self.shade[1], share) for share in self.dryness]
+        return [self.shade[1].worn(share) for share in self.dryness]
 
     def packed(self, n: int) -> list[Packed]:
         """Return lattices as vertices; one scale suits them all."""

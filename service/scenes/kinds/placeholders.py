@@ -10,7 +10,6 @@ from solver.contract.mesh import GivenMesh
 from solver.lattice import lattice
 
 from ...formats import mesh
-from ..meshes import skin
 from .runs import Missing
 from .shades import DUMMY
 from .solid import Solid
@@ -28,7 +27,7 @@ def placeholder(missing: Missing, name: str) -> Stored:
     """Return what stands in for a run that is not stored: the fresh shape, else a box as large as what is run."""
     solver, values = missing.solver, missing.params.model_dump(mode="json")
     fresh, metres = solver.fresh(values), solver.metres(values)
-    worn = skin(DUMMY[1], 0.0)
+    worn = DUMMY[1].worn(0.0)
     if fresh is not None:
         position = fresh.points(*lattice(_ROUND)).astype(np.float32)
         points = mesh.vertices(position, fresh.poles())

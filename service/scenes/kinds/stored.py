@@ -14,7 +14,7 @@ import numpy as np
 
 from solver import registry
 from solver.arrays import Array, Floats
-from solver.contract import Need, Shade, Solver, SolverError
+from solver.contract import Need, Shade, Solver, SolverError, Worn, dryness
 from solver.resting import Body
 from store.store import Store
 
@@ -25,7 +25,7 @@ from ...sequences import of_run
 from ...sequences.options import Options
 from ...sequences.standing import Extra, cards, stems
 from ...sequences.view import Surface
-from ..meshes import Packed, Skin, quantised, skin, weathered
+from ..meshes import Packed, quantised, weathered
 from ..request import Item
 from .kind import Curve, Kind
 from .runs import Missing
@@ -42,7 +42,7 @@ class Whole(NamedTuple):
     """A shape as it is kept: its mesh, its skin, and what is said of it."""
 
     solid: Solid
-    skin: Skin
+    skin: Worn
     metres: float | None
     round: bool
     source: dict[str, Any]
@@ -136,7 +136,7 @@ class Stored(Kind):
         return "placeholder" if self.missing is not None else f"run{self._digest[:12]}"
 
     @property
-    def skin(self) -> Skin:
+    def skin(self) -> Worn:
         """The largest of its colours, and its mean roughness."""
         return self.made.skin
 
@@ -242,15 +242,15 @@ def _row(held: Sequence[float], stage: float) -> int:
 
 def _coloured(
     stages: Stages, surfaces: Sequence[Surface], solver: Solver | None, shade: Shade
-) -> tuple[list[Floats], Skin]:
+) -> tuple[list[Floats], Worn]:
     """Return the colours of the vertices (v, 3), of every stage or of the first alone, and a skin that holds them."""
     painted = [np.clip(one.colour.astype(float), 0, 1) for one in surfaces if one.colour is not None]
     first = surfaces[0]
     if len(painted) == len(surfaces) and first.roughness is not None:
         base = np.max([colour.max(axis=0) for colour in painted], axis=0)
-        return painted, Skin(base, base, float(first.roughness.mean()), 0.0, np.zeros(3))
+        return painted, Worn(base, base, float(first.roughness.mean()), 0.0, np.zeros(3))
     last = max(map(abs, solver.stages.default), default=0.0) if solver is not None else 0.0
-    worn = skin(shade, min(abs(first.stage) / last, 1.0) if last else 0.0)
+    worn = shade.worn(dryness(first.stage, (0.0, last)))
     n = stages.lattice
     if not n:
         return [np.tile(worn.ridge, (len(first.vertices), 1))], worn
@@ -265,7 +265,7 @@ def _standing(stages: Stages, surface: Surface) -> list[Extra]:
     return [*stems(stages, surface, options), *([] if threads is None else [threads])]
 
 
-def _brighter(worn: Skin, standing: Sequence[Extra]) -> Skin:
+def _brighter(worn: Worn, standing: Sequence[Extra]) -> Worn:
     """Return a skin whose colours hold those of what stands on it, too."""
     most = np.max([worn.base, *(one.colour.max(axis=0) for one in standing)], axis=0)
     return worn._replace(ridge=most, furrow=most) if standing else worn
