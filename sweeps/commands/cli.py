@@ -14,6 +14,7 @@ from solver import __version__
 
 from . import copies as cli_copies
 from . import onset as cli_onset
+from . import presets as cli_presets
 from . import queue as cli_queue
 from . import refine as cli_refine
 from . import results as cli_results
@@ -61,41 +62,7 @@ def root(
     """Physically based wrinkling as shapes that can be asked for: solve, sweep, look up, serve."""
 
 
-@app.command()
-def presets(as_json: As_json = False) -> None:
-    """List the solvers, their parameters and their named presets.
-
-    [bold]Examples[/bold]
-
-    wizen presets
-
-    wizen presets --json | jq '.dehydration.presets.plum1'
-    """
-    from solver import registry
-
-    from .terminal.words import short
-
-    solvers = {name: registry.get(name) for name in registry.names()}
-    document = {
-        name: {
-            "title": solver.title,
-            "version": solver.version,
-            "axes": {axis: field for axis, (field, _) in solver.params.axes.items()},
-            "fields": list(solver.fields),
-            "presets": {preset: dict(values) for preset, values in solver.presets.items()},
-        }
-        for name, solver in solvers.items()
-    }
-
-    def show(console: Any) -> None:
-        for name, solver in solvers.items():
-            rows = [(p, ", ".join(f"{k}={short(v)}" for k, v in v.items())) for p, v in solver.presets.items()]
-            grid(console, ("preset", "parameters"), rows, f"{name}: {solver.title}")
-            console.print(f"  --set {', '.join(solver.params.axes)}\n")
-
-    emit(document, as_json, show)
-
-
+cli_presets.add_to(app)
 cli_solve.add_to(app)
 cli_session.add_to(app)
 

@@ -76,6 +76,32 @@ def test_presets() -> None:
     assert all(preset in listed.stdout for name in registry.names() for preset in registry.get(name).presets)
 
 
+@pytest.mark.parametrize("name", registry.names())
+def test_presets_of_one_solver_say_what_every_parameter_means(name: str) -> None:
+    solver = registry.get(name)
+    listed = wizen("presets", name)
+    assert listed.exit_code == 0
+    lines = listed.stdout.splitlines()
+    for field, info in solver.params.model_fields.items():
+        (line,) = [one for one in lines if one.split()[:1] == [field]]
+        assert info.description
+        assert info.description.split("\n")[0] in line
+    preset = next(iter(solver.presets))
+    shown = wizen("presets", name, preset)
+    assert shown.exit_code == 0
+    said = document(wizen("presets", name, preset, "--json"))
+    assert said["parameters"] == solver.parse({}, preset).model_dump(mode="json")
+    marked = {line.split()[0].split(".")[0] for line in shown.stdout.splitlines() if line.rstrip().endswith("*")}
+    assert marked == set(solver.presets[preset])
+
+
+def test_presets_that_are_not_there_are_told_from_those_that_are() -> None:
+    for words, hint in ((("decoy",), "decay"), (("decay", "orang"), "orange")):
+        wrong = wizen("presets", *words)
+        assert wrong.exit_code == 2
+        assert f"did you mean '{hint}'" in wrong.output
+
+
 @pytest.mark.parametrize(
     ("text", "value"),
     [
