@@ -20,7 +20,8 @@ def grid(rows: int, columns: int) -> Array:
     i, j = (each.ravel() for each in np.meshgrid(range(rows), range(columns), indexing="ij"))
 
     def at(a: Array, b: Array) -> Array:
-        return (a % rows) * columns + b % columns
+        number: Array = (a % rows) * columns + b % columns
+        return number
 
     corners = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
     found: Array = np.concatenate([np.stack([corners[k] for k in pick], -1) for pick in ((0, 1, 2), (0, 2, 3))])
