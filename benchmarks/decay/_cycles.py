@@ -1,6 +1,7 @@
 """Run by a Python with Blender's `bpy`: render USD or GLB files. STEM PIXELS SAMPLES AGES FILE [FILE ...].
 
-A GLB holds all stages, of which the last is rendered; of USD there is a file for each. Blender 4.5 reads curves and
+A GLB holds all stages, of which the last is rendered; of USD there is a file for each. Cycles of bpy 5.0.1 aborts on
+these files (it asks for 2^64 bytes): take 4.5, which renders them. Blender reads curves and
 points of a USD file but not the materials that are bound to them: here they get one that does what those say.
 """
 

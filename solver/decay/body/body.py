@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from ...arrays import Floats
-from ...contract import InvalidInput
+from ...contract import InvalidInput, NotConverged
 from ...fruit import lattice
 from ..environment import reference_radius
 from ..params import DecayParams
@@ -39,6 +39,8 @@ CONTACT = 30.0
 _TETHER = 0.1
 #: Neighbours farther from the fresh skin than this are never met; one may stand so deep in it [r1].
 _REACH, _DEEP = 1.0, 0.3
+#: Parts of the way from fresh to dried flesh, in powers of lengths and stiffness, by which a hard case is led.
+_PARTS = (0.25, 0.5, 0.75, 1.0)
 #: Radius of a ball that stands for a plane [r1].
 _PLANE = 1e4
 
@@ -101,6 +103,23 @@ class Body:
             Unstable: the paper's springs need shorter steps.
 
         """
+        try:
+            return self._from(state, near, watch, earlier)
+        except NotConverged:
+            if self._params.body == "paper":
+                raise
+        # flesh that dries far onto a stone is crushed at once by the even shape: it is led there by less dried ones
+        fresh, found = self.state(0.0, None), None
+        for part in _PARTS:
+            lengths = fresh.shrinkage ** (1 - part) * state.shrinkage**part
+            young = fresh.young ** (1 - part) * state.young**part
+            found = self._from(state._replace(shrinkage=lengths, young=young), found, watch)
+        assert found is not None
+        return found
+
+    def _from(
+        self, state: Softened, near: Balance | None, watch: Callable[[], None], earlier: Balance | None = None
+    ) -> Balance:
         solid, fresh = self.solid, self._params.flesh.unit * self._params.firmness
         rest = rested(solid.points, solid.tets, state.shrinkage, state.young, self._params.flesh.poisson)
         even = float(np.cbrt(np.average(state.shrinkage**3, weights=solid.volume)))

@@ -21,6 +21,11 @@ from ...linalg.patterns import of_cliques, places
 __all__ = ["Blocks", "blocks", "energy", "forces", "hessian", "inverse_edges"]
 
 
+#: Share of its volume at rest below which a tetrahedron counts as flat: on the way to rest one that a step has pressed
+#: to 1e-8 has a stiffness in which that of its neighbours is lost to rounding. None in equilibrium is near it.
+_FLAT = 1e-3
+
+
 class Blocks(NamedTuple):
     """Sparsity of a matrix of 3 x 3 blocks over the points of tetrahedra.
 
@@ -70,13 +75,13 @@ def _cofactor(f: Floats, c: Floats) -> float:
 
 @njit(cache=True)
 def energy(x: Floats, tets: Ints, inverse: Floats, volume: Floats, mu: Floats, lam: Floats) -> float:
-    """Return the energy of points x (p, 3); infinite if a tetrahedron is flat or inverted. mu, lam: (t)."""
+    """Return the energy of points x (p, 3); infinite if a tetrahedron is as good as flat, or inverted. mu, lam: (t)."""
     f, c = np.empty((3, 3)), np.empty((3, 3))
     total = 0.0
     for t in range(len(tets)):
         _gradient(x, tets[t], inverse[t], f)
         j = _cofactor(f, c)
-        if not j > 0:
+        if not j > _FLAT:
             return np.inf
         size = 0.0
         for a in range(3):

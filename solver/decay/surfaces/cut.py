@@ -1,29 +1,26 @@
 """Fruits that are cut: halves, slices and wedges as bodies of their own, closed by their cut faces (D54).
 
-Vertices that lie nearer to a plane than a share of an edge are moved into it first, so that no sliver is left to make
-steps dear. What is left is a closed mesh, whose vertices in a plane are bare flesh.
+Vertices that lie nearer to a plane than a share of the least height of their triangles are moved into it first, so that
+no sliver is left to make steps dear. What is left is a closed mesh, each of whose edges two triangles have, and whose
+vertices in a plane are bare flesh.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidInput
-from ...geometry.halved import Halved, face, halved
+from ...geometry.halved import face, halved, heights
 from .imported import Mesh, extent_of
 from .surface import Surface, triangulated
 
 __all__ = ["Cut", "Left", "bare", "left"]
 
-#: Share of an edge within which a vertex is moved into a plane, and the distance below which two places are one [r1].
-_SNAP, _ONE = 0.35, 1e-7
+#: Share of a triangle's height within which a vertex is moved into a plane: below a half, so that none is turned over
+#: and none that stands across the plane is laid flat; and the distance below which a place is in it [r1].
+_SNAP, _ONE = 0.4, 1e-6
 
 
 class Cut(BaseModel):
@@ -59,7 +56,7 @@ def bare(cuts: tuple[Cut, ...], points: Floats) -> Bools:
     """Return which points (k, 3) lie in a cut."""
     found = np.zeros(len(points), np.bool_)
     for cut in cuts:
-        found |= np.abs(cut.away(points)) < 10 * _ONE
+        found |= np.abs(cut.away(points)) < _ONE
     return found
 
 
@@ -97,28 +94,12 @@ def _cut(points: Floats, faces: Ints, cut: Cut, edge: float, number: int) -> tup
             f"cut {number} {'leaves nothing of' if away.max() > edge else 'misses'} the fruit.",
             advice="Move its point: the middle of the fruit is near 0,0,0, and its normal shows to the part that goes.",
         )
-    near = np.abs(away) < _SNAP * edge
+    near = np.abs(away) < _SNAP * heights(points, faces)
     points = np.where(near[:, None], points - away[:, None] * normal, points)
-    half = _welded(halved(points, faces, np.array(cut.point), normal))
+    half = halved(points, faces, np.array(cut.point), normal)
     closing = face(half, np.array(cut.point), normal, edge)
     known = len(closing.numbers)
     place = np.concatenate([closing.numbers, len(half.points) + np.arange(len(closing.points) - known)])
     return np.concatenate([half.points, closing.points[known:]]), np.concatenate(
         [half.triangles, place[closing.triangles]]
     )
-
-
-def _welded(half: Halved) -> Halved:
-    """Return a half whose points that lie in one place are one, without the triangles that have none left to cover."""
-    pairs = KDTree(half.points).query_pairs(_ONE, output_type="ndarray")
-    graph = sparse.csr_array((np.ones(len(pairs)), pairs.T), shape=(len(half.points),) * 2)
-    linked: Any = graph
-    _, back = connected_components(linked, directed=False)
-    _, first = np.unique(back, return_index=True)
-    triangles, rim = back[half.triangles], back[half.rim]
-    whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    used, again = np.unique(triangles[whole], return_inverse=True)
-    place = np.full(len(first), -1)
-    place[used] = np.arange(len(used))
-    rim = place[rim[rim[:, 0] != rim[:, 1]]]
-    return Halved(half.points[first[used]], again.reshape(-1, 3), rim, half.taken[first[used]])

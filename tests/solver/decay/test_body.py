@@ -294,6 +294,22 @@ def test_hostile_bodies_end_settled_or_typed(lost, values):
     assert np.isfinite(balance.points).all()
 
 
+@pytest.mark.parametrize(("stone", "rotten"), [(0.55, (1.0, 0.0)), (0.65, (1.0, 1.0))])
+def test_flesh_that_dries_onto_its_stone_is_led_there(stone, rotten):
+    """As dry as it gets: from the evenly shrunk shape the stone would crush it at once (a peach on day 10)."""
+    params = SOLVER.parse({"body": "quasi-static", "stone": (stone, stone)}, "peach")
+    surface = lay(params, 16)
+    body = Body(params, surface, 16, 6, 1e-3)
+    balance = body.settled(body.state(0.5889, np.where(surface.points[:, 1] < 0, *rotten)))
+    assert balance.residual <= 1e-3
+    assert balance.least_jacobian > 0.01
+    # the stone, which does not shrink, keeps its volume in flesh that has a tenth of its own
+    stone_cells = body.solid.tets[body.solid.stone]
+    assert volumes(balance.points, stone_cells).sum() == pytest.approx(
+        volumes(body.solid.points, stone_cells).sum(), rel=0.1
+    )
+
+
 def test_a_body_can_be_cancelled():
     params = apple()
     body = Body(params, lay(params, 8), 8, 5, 1e-3)
