@@ -157,6 +157,8 @@ def test_thin_cuts_leave_less_to_eliminate_of_a_wide_and_short_graph():
         sizes = np.array([[len(front.nodes), front.own] for front in found.fronts])
         work.append(int((sizes[:, 0] ** 3 - (sizes[:, 0] - sizes[:, 1]) ** 3).sum()))
         assert sizes[:, 1].sum() == len(at)
+        # where nothing is eliminated two parts are joined: else a front only hands on what comes from within
+        assert all(front.own or len(front.children) == 2 for front in found.fronts)
         x = factorise(found, blocks).solve(right)
         assert np.abs(dense @ x - right).max() < 1e-12
     assert work[1] < 0.8 * work[0]
