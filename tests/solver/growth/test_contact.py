@@ -52,7 +52,7 @@ def test_a_rolled_sheet_feels_no_contact_however_thick():
 
 
 def test_what_is_coupled_is_told_from_what_was_found_last():
-    """Sheets a little further apart than their distance: without room they are not found, with room they are coupled."""
+    """Sheets a little further apart than their distance: found, and coupled, where there is room."""
     x, mesh = folded()
     x[len(x) // 2 :, 2] = 0.115
     state = replace(Engine(GrowthParams.parse({"shape": "disc"}), 150).state, x=x, mesh=mesh)
