@@ -61,13 +61,17 @@ def analyse(
     """
     found = dissect(parts, centres, (len(indptr) - 1) // per_column, leaf_size, thin)
     nodes = (found.nodes[:, None] * per_column + np.arange(per_column)).ravel()
-    first = found.starts[:, 0] * per_column
+    first, own = (found.starts[:, 0] * per_column).tolist(), (found.own * per_column).tolist()
+    halves = found.children.tolist()
     fronts: list[Front] = []
 
     def visit(f: int) -> int:
         # depth first: few complements wait for their parents at a time
-        inside = tuple(visit(child) for child in found.children[f].tolist() if child >= 0)
-        fronts.append(Front(nodes[first[f] : first[f + 1]], int(found.own[f]) * per_column, inside))
+        inside = tuple(front for half in halves[f] if half >= 0 and (front := visit(half)) >= 0)
+        if not own[f] and len(inside) < 2:
+            # nothing is eliminated here: what comes from within goes further up as it is
+            return inside[0] if inside else -1
+        fronts.append(Front(nodes[first[f] : first[f + 1]], own[f], inside))
         return len(fronts) - 1
 
     visit(len(found.own) - 1)

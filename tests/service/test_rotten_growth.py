@@ -12,11 +12,16 @@ from scipy.spatial import KDTree
 from typer.testing import CliRunner
 
 from service.cli import app
+from solver.growth.engine import Engine
+from solver.growth.params import GrowthParams
+from sweeps.commands.terminal.options import parameters
 
 from .test_grown_textures import written
 
 #: Stretch of what has rotted whole, in a unit of growth time, and the time that is grown.
 STRETCH, TIME = 1.6, 0.5
+#: Thickness [l], and thickness and bending stiffness of what has rotted whole, over those of what has not.
+THICK, TIMES, SOFT = 0.05, 0.5, 0.2
 PREVIEW = "--quality", "preview"
 
 
@@ -37,16 +42,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for kind in ("exr", "png"):
         place = f'{{kind = "texture", picture = "@rot.{kind}", projection = "sphere"}}'
         (path / f"{kind}.toml").write_text(
-            'shape = "sphere"\nthickness = 0.05\nstep = 0.1\nimperfection = 0\n'
+            f'shape = "sphere"\nthickness = {THICK}\nstep = 0.1\nimperfection = 0\n'
             f"tools = [{{kind = 'surface', where = {place}, stretch = [{STRETCH}, {STRETCH}]}}]\n"
             f"colours = [{{colour = [1, 1, 1]}}, {{colour = [0, 0, 0], where = {place}}}]\n"
+            f"thicknesses = [{{where = {place}, times = {TIMES}}}]\nribs = [{{where = {place}, stiffness = {SOFT}}}]\n"
         )
     return path
 
 
 def grown(folder: Path, kind: str) -> xr.Dataset:
     out = folder / f"{kind}.h5"
-    words = *PREVIEW, "--stages", f"0,{TIME}", "--fields", "mesh_position,red,rest_area"
+    words = *PREVIEW, "--stages", f"0,{TIME}", "--fields", "mesh_position,red,rest_area,sheet_thickness"
     told("solve", "growth", "--params", folder / f"{kind}.toml", *words, "--out", out)
     return xr.load_dataset(out, engine="h5netcdf")
 
@@ -91,6 +97,23 @@ def test_growth_follows_the_rot_of_a_decay_run(folder: Path, kind: str) -> None:
     wanted = float((STRETCH ** (2 * TIME * rot) * weights).sum() / weights.sum())
     assert wanted > 1.05
     assert float(run.rest_area[1] / run.rest_area[0]) == pytest.approx(wanted, rel=0.005)
+
+
+@pytest.mark.parametrize("kind", ["exr", "png"])
+def test_thickness_and_stiffness_are_what_decays_own_field_says(folder: Path, kind: str) -> None:
+    """By value, at every vertex: h = t (1 + rot (times - 1)), and stiffness in its logarithm."""
+    run = grown(folder, kind)
+    x, y, z = run.mesh_position.values[: int(run.vertex_count[0])].astype(float).T
+    rot = own(folder, np.stack([x, z, -y], -1))
+    found = run.sheet_thickness.values[: len(rot)]
+    assert found.min() < 0.55 * THICK < 0.99 * THICK < found.max()
+    # as much as the map is off: .02 of the way from whole to rotten
+    assert np.abs(found - THICK * (1 + rot * (TIMES - 1))).max() < 0.02 * THICK * (1 - TIMES)
+    params = GrowthParams.parse(parameters(folder / f"{kind}.toml"))
+    state = Engine(params, len(rot)).state
+    x, y, z = state.x.T
+    rot = own(folder, np.stack([x, z, -y], -1))
+    assert np.abs(state.matter["stiff"] - rot * np.log(SOFT)).max() < 0.02 * abs(np.log(SOFT))
 
 
 def test_in_files_the_grown_lies_as_the_rotten_does(folder: Path) -> None:

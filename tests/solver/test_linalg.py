@@ -141,6 +141,23 @@ def test_a_factor_of_what_is_not_finite_is_refused():
         list(factor(fronts, pattern.indptr, pattern.indices, data))
 
 
+def test_fronts_that_only_join_are_kept_and_empty_ones_left_out():
+    """Spokes of one hub, each pair eight times as contact has them: the hub is in all fronts and eliminated last."""
+    spokes = 16
+    pairs = np.repeat(np.stack([np.zeros(spokes, int), np.arange(1, spokes + 1)], -1), 8, axis=0)
+    pattern = of_pairs(pairs, spokes + 1)
+    centres = np.stack([pairs[:, 1], np.zeros(len(pairs)), np.zeros(len(pairs))], -1).astype(float)
+    found = analyse(pairs, centres, pattern.indptr, pattern.indices, leaf_size=2)
+    assert len(found.fronts) < 2 * spokes
+    assert any(not front.own for front in found.fronts)
+    blocks = np.zeros((len(pattern.indices), 3, 3))
+    blocks[:] = -np.eye(3)
+    blocks[pattern.diagonal] = 20 * np.eye(3)
+    dense = bsr_array((blocks, pattern.indices, pattern.indptr), shape=(3 * (spokes + 1),) * 2).toarray()
+    right = np.random.default_rng(0).normal(size=len(dense))
+    assert np.abs(dense @ factorise(found, blocks).solve(right) - right).max() < 1e-12
+
+
 def test_thin_cuts_leave_less_to_eliminate_of_a_wide_and_short_graph():
     """Layers of 10 by 2 points, each bound to the next two layers: a cut across the layers' short side is thinnest."""
     at = np.stack(np.meshgrid(np.arange(12) * 0.9, np.arange(10), np.arange(2), indexing="ij"), -1).reshape(-1, 3)
@@ -157,6 +174,8 @@ def test_thin_cuts_leave_less_to_eliminate_of_a_wide_and_short_graph():
         sizes = np.array([[len(front.nodes), front.own] for front in found.fronts])
         work.append(int((sizes[:, 0] ** 3 - (sizes[:, 0] - sizes[:, 1]) ** 3).sum()))
         assert sizes[:, 1].sum() == len(at)
+        # where nothing is eliminated two parts are joined: else a front only hands on what comes from within
+        assert all(front.own or len(front.children) == 2 for front in found.fronts)
         x = factorise(found, blocks).solve(right)
         assert np.abs(dense @ x - right).max() < 1e-12
     assert work[1] < 0.8 * work[0]

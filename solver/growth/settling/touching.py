@@ -10,6 +10,7 @@ import numpy as np
 from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ...linalg.multifrontal import Analysis, analyse
+from ...linalg.patterns import distinct
 from ...shell.contact.steps import largest
 from ..state import State
 
@@ -33,11 +34,13 @@ class Touching:
         # pressure that bends a sheet as sharply as its mesh can show
         self._hardness = unit / state.length**2
         self._coupled: tuple[Ints, shell.Pattern, Analysis] | None = None
+        #: What was close where it was last asked for, and what `coupled` made of it.
+        self._asked: tuple[Floats, Ints, tuple[shell.Pattern, Analysis] | None] | None = None
         self.look(state.x, _FAR)
 
     def look(self, x: Floats, room: float = _FAR) -> None:
         """Find what may touch from x (n, 3) on; room: of moves, over the mean rest edge."""
-        self._seen, self._room = x, room * self._length
+        self._seen, self._room, self._asked = x, room * self._length, None
         change = _CHANGE * self._length
         self.pairs = shell.search(x, self._mesh, self._near, self._distance, self._room, change, self._length)
         self._stiffness = self._hardness * self.pairs.areas
@@ -88,10 +91,14 @@ class Touching:
 
     def coupled(self, x: Floats, leaf: int) -> tuple[shell.Pattern, Analysis] | None:
         """Return pattern and order of elimination where what touches is coupled; None where nothing does."""
-        close = self._close(x)
-        if not len(close):
-            return None
-        pairs = _couples(close, self._mesh.vertices)
+        if self._asked is None or self._asked[0] is not x:
+            close = shell.within(x, self.pairs, _AHEAD)
+            self._asked = x, close, self._order(x, close, leaf) if len(close) else None
+        return self._asked[2]
+
+    def _order(self, x: Floats, close: Ints, leaf: int) -> tuple[shell.Pattern, Analysis]:
+        """Return pattern and order of elimination that couple these stencils, the last ones where they do."""
+        pairs = _couples(self.pairs.stencils[close], self._mesh.vertices)
         if self._coupled is None or not np.isin(pairs, self._coupled[0]).all():
             n = self._mesh.vertices
             both = np.concatenate([self._mesh.edges, self._mesh.hinges[:, 2:], np.stack([pairs // n, pairs % n], -1)])
@@ -107,9 +114,6 @@ class Touching:
         where = pattern.of(p.stencils[near])
         rest = p.reach[near], self._stiffness[near], where
         shell.barrier_hessian(x, p.stencils[near], p.kinds[near], *rest, blocks)
-
-    def _close(self, x: Floats) -> Ints:
-        return self.pairs.stencils[shell.within(x, self.pairs, _AHEAD)]
 
 
 def touches(state: State, distance: float, areas: Floats) -> bool:
@@ -150,5 +154,4 @@ def _edge(state: State) -> float:
 def _couples(stencils: Ints, n: int) -> Ints:
     """Return the pairs of vertices of stencils (m, 4) as sorted keys i n + j, i < j."""
     pairs = np.concatenate([stencils[:, [a, b]] for a in range(4) for b in range(a + 1, 4)])
-    pairs = np.sort(pairs, axis=1)
-    return np.unique(pairs @ np.array([n, 1]))
+    return distinct(pairs.min(axis=1) * n + pairs.max(axis=1))

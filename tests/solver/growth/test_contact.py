@@ -51,6 +51,22 @@ def test_a_rolled_sheet_feels_no_contact_however_thick():
     assert touching.energy(rolled, gradient) == 0.0
 
 
+def test_what_is_coupled_is_told_from_what_was_found_last():
+    """Sheets a little further apart than their distance: found, and coupled, where there is room."""
+    x, mesh = folded()
+    x[len(x) // 2 :, 2] = 0.115
+    state = replace(Engine(GrowthParams.parse({"shape": "disc"}), 150).state, x=x, mesh=mesh)
+    state = replace(state, g=shell.metric(x, mesh.triangles), held=np.zeros(x.shape, bool))
+    touching = Touching(state, DISTANCE, 1.0, np.ones(len(x)))
+    touching.look(x, 0.0)
+    assert touching.coupled(x, 24) is None
+    touching.look(x)
+    coupled = touching.coupled(x, 24)
+    assert coupled is not None
+    # one order serves both who ask at one place
+    assert touching.coupled(x, 24) is coupled
+
+
 def test_a_strip_that_curls_up_stays_outside_itself():
     """Its rest curvature is that of one and a half turns: free, its ends would pass through each other."""
     curl = {
