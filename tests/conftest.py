@@ -1,10 +1,24 @@
-"""Floating-point errors raise in tests; warnings are errors (pyproject.toml). Beside others, long files come first."""
+"""Floating-point errors raise in tests; warnings are errors (pyproject.toml). On several workers, who runs what."""
+
+from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+
+if TYPE_CHECKING:
+    from xdist.remote import Producer
+    from xdist.scheduler import LoadFileScheduling
+
+#: Files that call the kernels of dehydration's contact one by one. No disk keeps these, but the loop alone that they
+#: are compiled into is (a minute for each process): one worker runs them all.
+TOGETHER = {
+    f"tests/solver/{name}.py"
+    for name in ("test_contact", "test_contact_search", "geometry/test_broad_phases", "geometry/test_closest")
+}
 
 #: Files that begin a run on several workers, in this order. The first ones compile a solver each, so that workers that
 #: begin at once do not compile the same kernels; the contract, which runs all solvers, comes when they are done.
@@ -18,6 +32,9 @@ FIRST = (
     "solver/test_onset.py",
     "solver/growth/test_coarser.py",
     "solver/test_contact_search.py",
+    "solver/test_contact.py",
+    "solver/geometry/test_broad_phases.py",
+    "solver/geometry/test_closest.py",
     "solver/wood/test_fibres.py",
     "solver/test_contract.py",
     "documents/test_commands.py",
@@ -30,7 +47,6 @@ FIRST = (
     "service/test_fuzz.py",
     "solver/test_loading.py",
     "solver/test_stress.py",
-    "solver/test_contact.py",
     "solver/decay/test_oven.py",
     "solver/decay/test_heap.py",
     "solver/decay/test_kinds.py",
@@ -51,6 +67,19 @@ FIRST = (
     "documents/test_figures.py",
     "solver/wood/test_bench_causes.py",
 )
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling | None:
+    """Hand workers whole files (--dist loadfile), and those of TOGETHER as one."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class Files(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            name = super()._split_scope(nodeid)
+            return "together" if name in TOGETHER else name
+
+    return Files(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 @pytest.hookimpl(trylast=True)
