@@ -53,7 +53,7 @@ demo-map: $(STAMP)
 
 ## test: everything quick, on two cores; CI runs this
 test: $(STAMP)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 ## test-clients: what others' generators make of the OpenAPI page, fetched from package registries; CI runs this too
 test-clients: $(STAMP)
@@ -67,7 +67,7 @@ PROCESSOR_TESTS ?= $(addprefix tests/solver/,shell growth/test_growth.py decay/t
 ## test-processor: some of the solvers' tests once more, as if on a processor of ten years ago; CI runs this too. All of
 ## them, as if on one of 2011: make test-processor PROCESSOR=sandybridge PROCESSOR_TESTS=tests
 test-processor: $(STAMP)
-	NUMBA_CPU_NAME=$(PROCESSOR) OPENBLAS_CORETYPE=$(PROCESSOR) $(BIN)/python -m pytest -n 2 --dist loadfile $(PROCESSOR_TESTS)
+	NUMBA_CPU_NAME=$(PROCESSOR) OPENBLAS_CORETYPE=$(PROCESSOR) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PROCESSOR_TESTS)
 
 ## mutants: apply the listed mutations one by one in a copy, see whether tests notice; an hour on one core, resumable
 mutants: $(STAMP)

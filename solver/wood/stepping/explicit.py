@@ -41,7 +41,8 @@ def forces(
 
     scratch.plan must be that of rods and bonds; see `state.scratch_for`.
     """
-    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, books, True)
+    # not the literal True, of which numba would compile all that hangs below once more
+    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, books, bool(1))
 
 
 @njit(cache=True, error_model="numpy")

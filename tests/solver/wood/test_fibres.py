@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from solver.contract import InvalidInput, Need
 from solver.wood import SOLVER, WoodParams
@@ -149,7 +149,9 @@ def sag(asked: WoodParams) -> float:
     wood = hewn(lay(asked, asked.vertices), asked)
     m, free = wood.motion, wood.motion.held == 0
     k = Stiffness(m.x, wood.rods, wood.bonds, free).matrix(m.x, wood.rods, wood.bonds).tocsc()
-    moved = spsolve(k, m.load[free].ravel()).reshape(-1, 3)[:, 2]
+    # symmetric and definite: ordered as such, a third of the work
+    factor = splu(k, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    moved = factor.solve(m.load[free].ravel()).reshape(-1, 3)[:, 2]
     load = m.load[free, 2]
     return float(load @ moved / load.sum() ** 2)
 
