@@ -1,4 +1,4 @@
-"""Spruce and beech that crush: python -m benchmarks.wood.strength.crushing [--seeds ...].
+"""Spruce and beech that crush: python -m benchmarks.wood.strength.crushing [--seeds ...] [--rods N].
 
 The bench's sticks (`benchmarks.wood.bench`) with a compressive strength along the grain: short blocks of 25 mm by
 100 mm are pressed between jaws, and sticks bent in three points. Wood Handbook (FPL-GTR-190), Table 5-3a, maximum
@@ -72,14 +72,14 @@ def _kept(run: dict[str, Any]) -> dict[str, Any]:
     return {k: [float(f"{v:.4g}") for v in run[k]] for k in ("way", "force")}
 
 
-def main(species: list[str], seeds: list[int]) -> None:
+def main(species: list[str], seeds: list[int], rods: int) -> None:
     """Print a row for each quantity, and keep all curves."""
-    sheet = Sheet("wood-crushing", _HEAD, "wood")
+    sheet = Sheet("wood-crushing" if rods == 20 else f"wood-crushing-{rods}", _HEAD, "wood")
     for name in species:
         wood = wood_that_crushes(name)
         for seed in seeds:
             begun = time.process_time()
-            block = pressed(wood, seed)
+            block = pressed(wood, seed, rods)
             spent = time.process_time() - begun
             rows = [("compression", "crushing", float(block["force"].max()) / _SIDE**2, CRUSHES[name], block, spent)]
             for quantity, values in (
@@ -87,7 +87,7 @@ def main(species: list[str], seeds: list[int]) -> None:
                 ("rupture without crushing", {**wood, "compressive_strength": None}),
             ):
                 begun = time.process_time()
-                stick = bending(values, seed)
+                stick = bending(values, seed, rods)
                 got = bent(stick["way"], stick["force"])[1]
                 rows.append(("bending", quantity, got, PUBLISHED[name][1], stick, time.process_time() - begun))
             for test, quantity, got, wanted, run, cpu in rows:
@@ -106,5 +106,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--species", nargs="+", default=list(SPECIES), choices=list(SPECIES))
     parser.add_argument("--seeds", nargs="+", type=int, default=[1])
+    parser.add_argument("--rods", type=int, default=20)
     asked = parser.parse_args()
-    main(asked.species, asked.seeds)
+    main(asked.species, asked.seeds, asked.rods)
