@@ -118,7 +118,7 @@ def portrait(solver: Solver, preset: str, seconds: float) -> tuple[bytes, dict[s
     panel, view = _framed(outputs.panels(Made(shapes, {}, preset, solver.name, run=run))[-1])
     plain = solver.looks.shade_of((preset, "clay"))
     if panel.colour is None and panel.triangles is None and plain is not None:
-        panel = replace(panel, worn=plain[1].worn(dryness(stage, (0.0, solver.stages.default[-1]))))
+        panel = replace(panel, worn=plain[1].worn(dryness(stage, solver.stages.reach)))
     out = io.BytesIO()
     image = Image.fromarray(panel.image(_PIXELS, view))
     image.quantize(128, Image.Quantize.MEDIANCUT).save(out, "PNG", optimize=True)

@@ -259,8 +259,7 @@ def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
     symbol = solver.stages.symbol
     units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}
     skin = shade(job.solver, json.dumps(job.params)) if chosen.name == "glb" else None
-    reach = (0.0, max(solver.stages.default, key=abs, default=0.0))
-    return chosen.encode(shape, About(job.solver, "", {}, symbol, units, shade=skin, reach=reach))
+    return chosen.encode(shape, About(job.solver, "", {}, symbol, units, shade=skin, reach=solver.stages.reach))
 
 
 def _params(solver: Solver, job: Job) -> Params:

@@ -44,6 +44,11 @@ class StageAxis(NamedTuple):
     highest: float
     default: tuple[float, ...]
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """From nothing to the last of the stages that are usual."""
+        return 0.0, max(self.default, key=abs, default=0.0)
+
 
 class Cost(NamedTuple):
     """What a run is expected to take."""

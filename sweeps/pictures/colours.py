@@ -43,12 +43,17 @@ def worn(run: xr.Dataset, stage: float) -> Worn | None:
     known = shade(name, str(run.attrs.get("params", "{}"))) if name in registry.names() else None
     if known is None:
         return None
-    return known.worn(dryness(stage, (0.0, max(registry.get(name).stages.default, key=abs, default=0.0))))
+    return known.worn(dryness(stage, registry.get(name).stages.reach))
+
+
+def shade(solver: str, params: str) -> Shade | None:
+    """Return the skin of what has these parameters, JSON; None where nobody knows one."""
+    # solvers without skins take meshes, whose parameters are megabytes that nobody shall keep
+    return _shade(solver, params) if registry.get(solver).looks.shades else None
 
 
 @lru_cache(maxsize=64)
-def shade(solver: str, params: str) -> Shade | None:
-    """Return the skin of what has these parameters, JSON; None where nobody knows one."""
+def _shade(solver: str, params: str) -> Shade | None:
     return registry.get(solver).shade(json.loads(params))
 
 

@@ -29,7 +29,5 @@ def shade_of(solver: Solver, named: str | None, preset: str | None) -> tuple[str
             known = f"Known: {', '.join(shades)}." if shades else "Leave it out."
             raise InvalidInput(f"{solver.name} has no skin {named!r}.", advice=f"{hint}{known}")
         return named, shades[named]
-    for name, shade in shades.items():
-        if preset is not None and preset.startswith(name):
-            return name, shade
-    return list(shades.items())[-1] if shades else PLAIN
+    own = solver.looks.shade_of(() if preset is None else (preset,))
+    return own or (list(shades.items())[-1] if shades else PLAIN)

@@ -249,8 +249,7 @@ def _coloured(
     if len(painted) == len(surfaces) and first.roughness is not None:
         base = np.max([colour.max(axis=0) for colour in painted], axis=0)
         return painted, Worn(base, base, float(first.roughness.mean()), 0.0, np.zeros(3))
-    last = max(map(abs, solver.stages.default), default=0.0) if solver is not None else 0.0
-    worn = shade.worn(dryness(first.stage, (0.0, last)))
+    worn = shade.worn(dryness(first.stage, (0.0, 0.0) if solver is None else solver.stages.reach))
     n = stages.lattice
     if not n:
         return [np.tile(worn.ridge, (len(first.vertices), 1))], worn
