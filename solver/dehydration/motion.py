@@ -16,7 +16,6 @@ from .fresh.mesh import FruitMesh, build_mesh
 from .fresh.pattern import pattern_heights
 from .fresh.sector import cut, evened, mirrored
 from .kernel import (
-    ElementReport,
     Layout,
     build_layout,
     dilatations,
@@ -261,19 +260,22 @@ class Motion:
         planes = self._made[1]
         return dataclasses.replace(planes, mass=self.layout.mass, inverse_mass=self.layout.inverse_mass)
 
-    def report(self, state: Fixed, rest: Floats, shrinkage: float) -> ElementReport:
-        """Return energies of what is marched, but for a constant of the rest volumes, and volume ratios (elements,)."""
+    def marched_energy(self, state: Fixed, rest: Floats, shrinkage: float) -> float:
+        """Return the energy of the part [mu r1^3] that steps lower, but for a constant of the rest volumes."""
         layout = self._ready(shrinkage, rest)
-        return element_report(layout, state, 1 - shrinkage, one_point=True)
+        return float(element_report(layout, state, 1 - shrinkage, one_point=True).energy.sum())
 
-    def strain_energy(self, state: Fixed, rest: Floats, shrinkage: float) -> float:
-        """Return the strain energy of the part [mu r1^3]: of flesh, whose bulk modulus is not the march's."""
+    def strained(self, state: Fixed, rest: Floats, shrinkage: float) -> tuple[float, float]:
+        """Return the strain energy of the part [mu r1^3], of flesh, whose bulk modulus is not the march's, and the
+        least J/Jd of all integration points, which no rest volume changes.
+        """
         theta, settings = 1 - shrinkage, self.settings
         loaded = self.drive.loaded(self.layout, shrinkage)
-        sheared = element_report(without_bulk(loaded), state, theta, one_point=True).energy
+        sheared = element_report(without_bulk(loaded), state, theta, one_point=True)
         dilatation = dilatations(self._ready(shrinkage, rest), state, theta)
         share = settings.march_kappa_ratio / settings.kappa_ratio
-        return float((sheared + pressure_energy(loaded, dilatation, theta, share)).sum())
+        energy = float((sheared.energy + pressure_energy(loaded, dilatation, theta, share)).sum())
+        return energy, float(sheared.least_ratio.min())
 
     def residual(self, state: Fixed, rest: Floats, shrinkage: float, damping: float) -> float:
         """Return the out-of-balance force, contact included: what one step from rest does to the momentum.

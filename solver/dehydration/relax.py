@@ -81,12 +81,11 @@ def relax(
     placed = sector.whole(motion.surface(state))
     began = motion.residual(state, rest, stage, _FREE_DAMPING)
     rest, residual, drift = _balance(motion, state, velocity, rest, stage, steps or _MOST, context)
-    least = float(motion.report(state, rest, stage).least_ratio.min())
+    energy, least = motion.strained(state, rest, stage)
     if least <= 0:
         raise Unstable("elements turned inside out.", advice="Run it: `exact=run`.", residual=residual)
     whole = sector.whole(motion.surface(state))
-    energy = sector.copies * motion.strain_energy(state, rest, stage)
-    found = State(whole, stage, residual, drift / params.exocarp_thickness, motion.steps, least, energy)
+    found = State(whole, stage, residual, drift / params.exocarp_thickness, motion.steps, least, sector.copies * energy)
     record = Record(params, need, motion.mesh, begin)
     record.add(found, residual <= RESIDUAL)
     attrs = {"path": "relaxed", "elements": motion.elements, "residual_limit": RESIDUAL, "unit_of_length": "r1"}

@@ -79,23 +79,21 @@ def settle(
         whole = motion.sector.whole(surface)
         return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
     copies = motion.sector.copies
-    before = float(motion.report(state, rest, shrinkage).energy.sum()) if with_release else None
+    before = motion.marched_energy(state, rest, shrinkage) if with_release else None
     spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
     looked_at = smooth is not None and spent < settings.settle_steps and smooth(state)
     if looked_at and _leaves(motion, state, velocity, rest, shrinkage):
         _, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
-    report = motion.report(state, rest, shrinkage)
-    least = float(report.least_ratio.min())
+    strained, least = motion.strained(state, rest, shrinkage)
     if least <= 0:
         raise Unstable(
             f"elements turned inside out at shrinkage s = {shrinkage:.3f} (least J {least:.2f}).",
             advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             residual=residual,
         )
-    released = copies * (before - float(report.energy.sum())) if before is not None else None
-    energy = copies * motion.strain_energy(state, rest, shrinkage)
+    released = copies * (before - motion.marched_energy(state, rest, shrinkage)) if before is not None else None
     whole = motion.sector.whole(motion.surface(state))
-    return State(whole, shrinkage, residual, drift, motion.steps, least, energy, released)
+    return State(whole, shrinkage, residual, drift, motion.steps, least, copies * strained, released)
 
 
 def _come_to_rest(

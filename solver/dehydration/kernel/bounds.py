@@ -5,16 +5,14 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
 from numba import njit, prange
 
 from ...arrays import Bools, Floats, Ints, Ints32
-from ...fem import HEX8
 from .fixed_point import QUANTUM
-from .metric import quadrature
+from .metric import SLOPES, quadrature
 
 __all__ = ["element_bounds", "nodal_sums"]
 
@@ -107,12 +105,6 @@ def _bounds(
         bound[e] = 0.5 * (total + math.sqrt(max(total * total - 4.0 * bulk * shear, 0.0)))
 
 
-@functools.cache
-def _rule(exocarp: bool) -> tuple[Floats, Floats]:
-    points, weights = quadrature(exocarp)
-    return np.ascontiguousarray(HEX8.gradients(points)), weights
-
-
 def element_bounds(
     state: Ints32, connectivity: Ints, is_exocarp: Bools, mu: Floats, kappa: Floats, least_share: float
 ) -> Floats:
@@ -123,7 +115,7 @@ def element_bounds(
     bound = np.empty(len(connectivity))
     for exocarp in (False, True):
         elements = np.flatnonzero(is_exocarp == exocarp)
-        _bounds(state, connectivity, elements, *_rule(exocarp), mu, kappa, least_share, bound)
+        _bounds(state, connectivity, elements, SLOPES[exocarp], quadrature(exocarp)[1], mu, kappa, least_share, bound)
     return bound
 
 

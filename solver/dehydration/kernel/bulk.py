@@ -19,18 +19,15 @@ from numba import njit, prange
 from solver.dehydration.kernel.algebra import EXOCARP_WEIGHTS, INVERSE_VOLUME, KAPPA, MU
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.layout import Layout, aligned_copy
-from solver.dehydration.kernel.metric import EXOCARP_POINTS, GAUSS_POINTS
-from solver.fem import HEX8
+from solver.dehydration.kernel.metric import GAUSS_POINTS, SLOPES
 
 from ...arrays import Floats, Ints, Ints32
 
 __all__ = ["dilatations", "pressure_energy", "rested", "rests", "without_bulk"]
 
 
-#: dN_a/dxi_k (points, 8, 3) and weights of the exocarp's rule; the core's rule is exact for a trilinear hexahedron.
-_SKIN = HEX8.gradients(EXOCARP_POINTS)
+#: Weights of the exocarp's rule; the core's rule is exact for a trilinear hexahedron.
 _SKIN_WEIGHTS = np.array(EXOCARP_WEIGHTS)
-_CORE = HEX8.gradients(GAUSS_POINTS)
 _CORE_WEIGHTS = np.ones(len(GAUSS_POINTS))
 
 
@@ -45,18 +42,20 @@ def _volumes(
     """Volume of each of `elements` by a rule with shape derivatives `slopes` (q, 8, 3), in quanta cubed."""
     result = np.empty(elements.size)
     for place in prange(elements.size):
-        nodes = connectivity[elements[place]]
+        e = elements[place]
         total = 0.0
         for q in range(weights.size):
-            f = np.zeros((3, 3))
+            # scalars: an array for each point would come from the heap, which took most of the time
+            f00 = f01 = f02 = f10 = f11 = f12 = f20 = f21 = f22 = 0.0
             for a in range(8):
-                for i in range(3):
-                    for k in range(3):
-                        f[i, k] += state[nodes[a], i] * slopes[q, a, k]
+                node = connectivity[e, a]
+                x, y, z = state[node, 0], state[node, 1], state[node, 2]
+                s, t, u = slopes[q, a, 0], slopes[q, a, 1], slopes[q, a, 2]
+                f00, f01, f02 = f00 + x * s, f01 + x * t, f02 + x * u
+                f10, f11, f12 = f10 + y * s, f11 + y * t, f12 + y * u
+                f20, f21, f22 = f20 + z * s, f21 + z * t, f22 + z * u
             total += weights[q] * (
-                f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
-                - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
-                + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
+                f00 * (f11 * f22 - f12 * f21) - f01 * (f10 * f22 - f12 * f20) + f02 * (f10 * f21 - f11 * f20)
             )
         result[place] = total
     return result
@@ -70,8 +69,8 @@ def dilatations(layout: Layout, state: Ints32, theta: float) -> Floats:
     inverse = layout.lanes(layout.core_planes[:, INVERSE_VOLUME], layout.exocarp_planes[:, INVERSE_VOLUME])
     ratio = np.empty(layout.elements)
     for held, slopes, weights, cube in (
-        (layout.core_elements, _CORE, _CORE_WEIGHTS, theta**3),
-        (layout.exocarp_elements, _SKIN, _SKIN_WEIGHTS, 1.0),
+        (layout.core_elements, SLOPES[False], _CORE_WEIGHTS, theta**3),
+        (layout.exocarp_elements, SLOPES[True], _SKIN_WEIGHTS, 1.0),
     ):
         elements = held[held >= 0]
         volume = _volumes(state, layout.connectivity, elements, slopes, weights) * QUANTUM**3

@@ -21,11 +21,11 @@ import numpy as np
 from solver.dehydration.kernel.algebra import HOURGLASS
 from solver.dehydration.kernel.metric import (
     CORNERS,
+    SLOPES,
     inverse_jacobians,
     one_point_geometry,
     quadrature,
 )
-from solver.fem import HEX8
 
 from ...arrays import Floats
 
@@ -70,14 +70,13 @@ def largest_stiffness(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool,
 
     Core elements get the larger of the bounds of the 2x2x2 and, if `one_point`, the one-point element.
     """
-    points, weights = quadrature(exocarp)
-    derivatives = HEX8.gradients(points)
+    slopes, weights = SLOPES[exocarp], quadrature(exocarp)[1]
     result = np.empty(len(corners))
     for first in range(0, len(corners), CHUNK):
         part = slice(first, first + CHUNK)
-        inverse, determinants = inverse_jacobians(corners[part], points)
+        inverse, determinants = inverse_jacobians(corners[part], slopes)
         volumes = determinants * weights
-        gradients = (derivatives @ inverse).transpose(0, 2, 1, 3)
+        gradients = (slopes @ inverse).transpose(0, 2, 1, 3)
         weighted = gradients * volumes[:, None, :, None]
         volume = volumes.sum(axis=1)
         by_node = (len(volume), 8, -1)

@@ -28,6 +28,9 @@ CORNERS = HEX8.nodes
 """Local coordinates of the eight nodes, (8, 3): bits of the node's number."""
 GAUSS_POINTS = GAUSS * np.array(GAUSS_SIGNS, dtype=np.float64)
 EXOCARP_POINTS = np.concatenate([GAUSS_POINTS, [(0.0, 0.0, s * LINE) for s in SIGNS]])
+SLOPES = {False: HEX8.gradients(GAUSS_POINTS), True: HEX8.gradients(EXOCARP_POINTS)}
+"""dN_a/dxi_k (q, 8, 3) at the points of the core's (False) and of the exocarp's rule."""
+_AT_CENTRE = HEX8.gradients(np.zeros((1, 3)))
 
 
 def quadrature(exocarp: bool) -> tuple[Floats, Floats]:
@@ -37,9 +40,11 @@ def quadrature(exocarp: bool) -> tuple[Floats, Floats]:
     return GAUSS_POINTS, np.array(CORE_WEIGHTS)
 
 
-def inverse_jacobians(corners: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """B = dxi/dX (ne, q, 3, 3), row k = local direction, and det(dX/dxi) (ne, q), for corners (ne, 8, 3)."""
-    jacobians = corners.transpose(0, 2, 1)[:, None] @ HEX8.gradients(points)
+def inverse_jacobians(corners: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+    """B = dxi/dX (ne, q, 3, 3), row k = local direction, and det(dX/dxi) (ne, q), for corners (ne, 8, 3) and shape
+    derivatives (q, 8, 3).
+    """
+    jacobians = corners.transpose(0, 2, 1)[:, None] @ slopes
     columns = np.moveaxis(jacobians, -1, 0)
     # Row k of the inverse is the cross product of the other two columns over the determinant.
     rows = [np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)]
@@ -49,11 +54,14 @@ def inverse_jacobians(corners: Floats, points: Floats) -> tuple[Floats, Floats]:
 
 def refuse_inverted(corners: Floats, chunk: int = 4096) -> None:
     """ValueError if an element (corners (ne, 8, 3)) is inverted or flat at an integration point or its centre."""
-    derivatives = HEX8.gradients(np.concatenate([EXOCARP_POINTS, np.zeros((1, 3))]))
+    slopes = np.concatenate([SLOPES[True], _AT_CENTRE])
     least = np.empty(len(corners))
     for first in range(0, len(corners), chunk):
-        jacobians = corners[first : first + chunk].transpose(0, 2, 1)[:, None] @ derivatives
-        least[first : first + chunk] = np.linalg.det(jacobians).min(axis=1)
+        a, b, c = np.moveaxis(corners[first : first + chunk].transpose(0, 2, 1)[:, None] @ slopes, -1, 0)
+        # not `det`, which factors one small matrix after the other: a run begins with this
+        bx, by, bz, cx, cy, cz = (side[..., i] for side in (b, c) for i in range(3))
+        volumes = a[..., 0] * (by * cz - bz * cy) + a[..., 1] * (bz * cx - bx * cz) + a[..., 2] * (bx * cy - by * cx)
+        least[first : first + chunk] = volumes.min(axis=1)
     if not np.all(least > 0):
         raise ValueError(
             f"{int(np.sum(~(least > 0)))} fresh elements are inverted or flat, element {int(np.argmin(least))} worst; "
@@ -68,8 +76,7 @@ def _modes(corners: Floats) -> Any:
 
 def element_planes(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool) -> Floats:
     """Planes of the full core or the exocarp element, (planes, ne) float64."""
-    points, weights = quadrature(exocarp)
-    volume = np.linalg.det(corners.transpose(0, 2, 1)[:, None] @ HEX8.gradients(points)) @ weights
+    volume = np.linalg.det(corners.transpose(0, 2, 1)[:, None] @ SLOPES[exocarp]) @ quadrature(exocarp)[1]
     return np.stack([mu, kappa, 1.0 / volume, *(component for mode in _modes(corners)[1:] for component in mode)])
 
 
@@ -89,7 +96,7 @@ class OnePoint(NamedTuple):
 def one_point_geometry(corners: Floats) -> OnePoint:
     """The mean gradient is that of the exact volume: b_a = dV/dX_a, mean F = sum_a x_a b_a^T / V."""
     modes = _modes(corners)
-    inverse = inverse_jacobians(corners, np.zeros((1, 3)))[0][:, 0]
+    inverse = inverse_jacobians(corners, _AT_CENTRE)[0][:, 0]
     scaled_volume, by_mode = hexahedron_volume(modes)
     affine = np.stack([np.stack(modes[m], axis=-1) for m in (XI, ETA, ZETA)], axis=1)
     hourglass = np.stack([np.stack(modes[m], axis=-1) for m in HOURGLASS], axis=1)
