@@ -24,7 +24,6 @@ from .verlet import drift, grip, kick, pin, pinned, slowed
 __all__ = ["forces", "march"]
 
 
-@njit(cache=True, error_model="numpy")
 def forces(
     motion: Motion,
     rods: Rods,
@@ -41,8 +40,8 @@ def forces(
 
     scratch.plan must be that of rods and bonds; see `state.scratch_for`.
     """
-    # not the literal True, of which numba would compile all that hangs below once more
-    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, books, bool(1))
+    # not compiled: one more function around `_fill` is as long to compile as all that it holds
+    _fill(motion, rods, turns, bodies, scratch, turning, time, dt, books, True)
 
 
 @njit(cache=True, error_model="numpy")
