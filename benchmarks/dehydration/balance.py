@@ -46,9 +46,11 @@ def main() -> None:
     parser.add_argument("--families", nargs="+", default=["default", "stone-radius", "prolate", "plum2"])
     parser.add_argument("--stages", nargs="+", type=float, default=[0.1, 0.2, 0.3])
     parser.add_argument("--points", type=int, default=3, help="of each family")
+    parser.add_argument("--tier", action="store_true", help="the tier between table and run alone")
     asked = parser.parse_args()
     _tier()
-    _score(asked.families, asked.stages, asked.points)
+    if not asked.tier:
+        _score(asked.families, asked.stages, asked.points)
 
 
 def _score(families: Sequence[str], stages: Sequence[float], count: int) -> None:
