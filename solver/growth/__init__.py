@@ -51,7 +51,7 @@ def _extent(params: GrowthParams) -> Extent:
 
 SOLVER = Solver(
     name="growth",
-    version="10",
+    version="11",
     title="Growth of thin shells",
     params=GrowthParams,
     fields=("mesh_position", "elastic_strain", "sheet_thickness", *CHANNELS, "mesh_area", "stored_energy", "rest_area"),
