@@ -187,8 +187,8 @@ def pushed_plate(vertices):
 
 def test_a_clamped_disc_that_grows_is_pushed_out_as_a_plate_under_its_own_compression():
     """D lap^2 w + N lap w = p, p = c N, w = w' = 0 at R: w(0) = p (2 R (1 - J0(kR)) / (k J1(kR)) - R^2) / (4 N) with
-    k^2 = N / D (Timoshenko and Gere 1961), at half the load at which it buckles. Measured: 1.008, 1.003, 1.002 and 1.001
-    at 1000, 2500, 4000 and 6000 vertices; of a hold that ends at a row of vertices 1.079, 1.044 and 1.033.
+    k^2 = N / D (Timoshenko and Gere 1961), at half the load at which it buckles. Measured: 1.008, 1.003 and 1.001 at
+    1000, 2500 and 6000 vertices; of a hold that ends at a row of vertices 1.079, 1.044 and 1.033.
     """
     coarse, fine = pushed_plate(1000), pushed_plate(4000)
     assert coarse == pytest.approx(1.0, abs=0.015)
