@@ -11,7 +11,8 @@ from .own.textured import corners_of, faces_of, groups_of
 from .params import GrowthParams
 from .shapes import Ground, Mesh
 from .state import State
-from .tooling.places import share
+from .tooling.holding import Holds, known, loosened
+from .tooling.holding import held as held_by
 from .tooling.placing import border
 
 __all__ = ["fresh"]
@@ -41,16 +42,13 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
             material["stiff"] = material.get("stiff", 0.0) + stiffer
     if params.normal_force:
         material["pushed"] = np.zeros_like(x)
-    held, led = np.zeros(mesh.x.shape, bool), np.zeros(mesh.x.shape)
-    for attachment in params.attached:
-        inside = share(attachment.where, ground, params.seed) >= 0.5
-        held[np.ix_(np.flatnonzero(inside), np.array(["xyz".index(axis) for axis in attachment.axes]))] = True
-        # of several the last one that leads anywhere
-        if any(attachment.velocity):
-            led[inside] = attachment.velocity
+    holds = Holds(params.attached, ground, params.seed)
+    held, led = held_by(holds)
+    material |= known(holds) if params.attached else {}
+    material |= {"led": led} if led.any() else {}
     angles = shell.angles(mesh.x, top.hinges)
     x = np.where(held, mesh.x, x)
-    return State(
+    state = State(
         time=0.0,
         x=x,
         mesh=top,
@@ -60,7 +58,9 @@ def fresh(params: GrowthParams, mesh: Mesh) -> State:
         held=held,
         spots={},
         curves={},
-        matter=material | ({"led": led} if led.any() else {}),
+        matter=material,
         corners=corners,
         faces=faces_of(params.mesh),
+        holds=holds if params.attached else None,
     )
+    return loosened(state)

@@ -10,6 +10,7 @@ import numpy as np
 from .. import shell
 from ..arrays import Bools, Floats, Ints
 from .anchors import Anchors
+from .tooling.holding import Holds
 
 __all__ = ["Spot", "State"]
 
@@ -39,7 +40,8 @@ class State:
     handed over, that the energy bends up along every way as far as its digits tell. matter: (n, ...) what rides on the
     material (`matter`); thick: (n,) thickness over the sheet's, where that differs; led: (n, 3) how fast what is held
     is led. corners: (f, 3, k) what rides on triangles, and differs along seams: uv. faces: (f,) numbers that triangles
-    hand down: material.
+    hand down: material. holds: what holds it, None where nothing does; loose: (f,) with it,
+    which share of a triangle lies outside of it (`tooling.holding`).
     """
 
     time: float
@@ -58,6 +60,8 @@ class State:
     matter: dict[str, Floats] = field(default_factory=dict)
     corners: dict[str, Floats] = field(default_factory=dict)
     faces: dict[str, Ints] = field(default_factory=dict)
+    holds: Holds | None = None
+    loose: Floats | None = None
 
     @cached_property
     def length(self) -> float:

@@ -15,6 +15,7 @@ from ... import shell
 from ...arrays import Bools, Floats, Ints
 from ..anchors import corners_of, on_surface
 from ..state import Spot, State
+from ..tooling.holding import loosened
 from .rest import edge_squares
 
 __all__ = ["cut"]
@@ -81,7 +82,7 @@ def cut(state: State, longest: float) -> tuple[State, Ints]:
         spots={k: tuple(moved(spot) for spot in spots) for k, spots in state.spots.items()},
         curves={k: on_surface(a, state.x, mesh.triangles, corners) for k, a in state.curves.items()},
     )
-    return found, mesh.edges[marked]
+    return loosened(found), mesh.edges[marked]
 
 
 def _children(

@@ -10,6 +10,7 @@ from ... import shell
 from ...arrays import Floats, Ints
 from ..anchors import Anchors, corners_of, on_surface
 from ..state import State
+from ..tooling.holding import loosened
 
 __all__ = ["FOLD", "rebuilt"]
 
@@ -41,7 +42,7 @@ def rebuilt(
     def moved(anchors: Anchors) -> Anchors:
         return on_surface(anchors, state.x, mesh.triangles, corners)
 
-    return replace(
+    found = replace(
         state,
         x=x,
         mesh=new,
@@ -56,6 +57,7 @@ def rebuilt(
         spots={k: tuple(replace(spot, anchor=moved(spot.anchor)) for spot in v) for k, v in state.spots.items()},
         curves={k: moved(a) for k, a in state.curves.items()},
     )
+    return loosened(found)
 
 
 def _widths(g: Floats, mesh: shell.Topology) -> Floats:

@@ -61,6 +61,7 @@ class Part:
             held=state.held[v] | ~self.free[:, None],
             drift=None if state.drift is None else state.drift[v] * self.free[:, None],
             matter={k: values[v] for k, values in state.matter.items()},
+            loose=None if state.loose is None else state.loose[self.faces],
             shares={},
             spots={},
             curves={},

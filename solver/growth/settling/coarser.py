@@ -21,6 +21,7 @@ from ... import shell
 from ...arrays import Floats, Ints
 from ...shell.normals import normals
 from ..state import State
+from ..tooling.holding import loosened
 from .cells import Coarser, carried, coarser
 from .energy import StepEnergy
 from .minimise import longest, quasi_newton
@@ -99,7 +100,7 @@ def _sheet(energy: StepEnergy, found: Coarser, x: Floats) -> State | None:
         return None
     angles = shell.angles(y, mesh.hinges)
     rest = angles - shell.added_angles(_seen(y, mesh.triangles, bend), g, mesh)
-    return replace(
+    sheet = replace(
         state,
         x=y,
         mesh=mesh,
@@ -109,6 +110,7 @@ def _sheet(energy: StepEnergy, found: Coarser, x: Floats) -> State | None:
         matter={name: values[found.seeds] for name, values in state.matter.items()},
         drift=None, shares={}, spots={}, curves={}, corners={}, faces={},
     )  # fmt: skip
+    return loosened(sheet)
 
 
 def _averaged(x: Floats, triangles: Ints, forms: Floats, sizes: Floats, found: Coarser) -> Floats:

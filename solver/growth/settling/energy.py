@@ -21,6 +21,7 @@ from ..matter import softer
 from ..params import Bending
 from ..solids import Solid
 from ..state import State
+from ..tooling.holding import free_shares
 from .bed import Bed
 from .loads import area_vectors, balanced, compressed, half_way
 from .minimise import longest
@@ -89,6 +90,10 @@ class StepEnergy:
             stiff = state.matter["stiff"]
             self.stiffness *= np.exp(stiff[state.mesh.hinges[:, :2]].mean(axis=1))
             self._mean = None if self._mean is None else (self._mean[0], self._mean[1] * np.exp(stiff))
+        if state.loose is not None:
+            hinges, corners = free_shares(state)
+            self.stiffness /= hinges
+            self._mean = None if self._mean is None else (self._mean[0], self._mean[1] / corners)
         self._fixed: Floats | None = None
         #: What compression pushes (n, 3), None where it does not.
         self.pushed: Floats | None = None

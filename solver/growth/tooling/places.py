@@ -29,6 +29,7 @@ __all__ = [
     "Reaction",
     "Rim",
     "Texture",
+    "anywhere",
     "check_mapped",
     "share",
 ]
@@ -212,15 +213,22 @@ def check_mapped(value: object) -> None:
             check_mapped(each)
 
 
-def share(place: Place, ground: Ground, seed: int) -> Floats:
-    """Return the share (n,) of each vertex of a surface.
+def anywhere(place: Place) -> bool:
+    """Return whether a place's share is known at any point, and not at the vertices of a mesh alone."""
+    if isinstance(place, Texture | Reaction):
+        return place.projection != "uv"
+    return not isinstance(place, Painted | Harmonic)
+
+
+def share(place: Place, ground: Ground, seed: int, points: Floats | None = None) -> Floats:
+    """Return the share (n,) of each vertex of a surface, or of each of its `points` (n, 3) if it is told `anywhere`.
 
     Raises:
         InvalidInput: a rim of a closed surface, painted values of another mesh, a texture that lies by coordinates
             which there are not.
 
     """
-    (x, triangles), border = ground.mesh, ground.border
+    x, border = ground.mesh.x if points is None else points, ground.border
     if isinstance(place, Ball):
         return _smooth(1 - np.asarray(np.linalg.norm(x - np.array(place.centre), axis=1)) / place.radius)
     if isinstance(place, Band):
@@ -230,7 +238,7 @@ def share(place: Place, ground: Ground, seed: int) -> Floats:
     if isinstance(place, Rim):
         if not len(border):
             raise InvalidInput("a closed surface has no rim.", advice="Start from a disc, a strip or a tube.")
-        return _smooth(1 - KDTree(x[border]).query(x)[0] / place.width)
+        return _smooth(1 - KDTree(ground.mesh.x[border]).query(x)[0] / place.width)
     if isinstance(place, Meridians):
         turn = np.arctan2(x[:, 1], x[:, 0]) * place.count / (2 * np.pi)
         return _smooth(np.abs(turn - np.round(turn)) * 2 / place.width - 0.5)
@@ -242,12 +250,12 @@ def share(place: Place, ground: Ground, seed: int) -> Floats:
         total = np.cos(x @ waves.T + generator.uniform(0, 2 * np.pi, 64)).sum(axis=1) / np.sqrt(32)
         return _smooth(0.5 + 0.5 * place.sharpness * total)
     if isinstance(place, Texture):
-        return np.clip(laid(place.grid, ground, place.projection), 0, 1)
+        return np.clip(laid(place.grid, ground, place.projection, points), 0, 1)
     if isinstance(place, Reaction):
-        return laid(gray_scott(place.feed, place.kill, place.size, place.steps, seed), ground, place.projection)
+        return laid(gray_scott(place.feed, place.kill, place.size, place.steps, seed), ground, place.projection, points)
     if isinstance(place, Harmonic):
         painted, first = np.unique(KDTree(x).query(np.array(place.points))[1], return_index=True)
-        return np.clip(harmonic(x, triangles, painted, np.array(place.values)[first]), 0, 1)
+        return np.clip(harmonic(x, ground.mesh.triangles, painted, np.array(place.values)[first]), 0, 1)
     if isinstance(place, Painted):
         if len(place.values) != len(x):
             raise InvalidInput(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -21,8 +22,8 @@ UNMAPPED = (
 )
 
 
-def laid(values: Floats, ground: Ground, projection: Projection) -> Floats:
-    """Return the texture's values (rows, columns), the first row low, at vertices (n,), bilinear.
+def laid(values: Floats, ground: Ground, projection: Projection, points: Floats | None = None) -> Floats:
+    """Return the texture's values (rows, columns), the first row low, bilinear, at vertices or `points` (n, 3).
 
     x, y, z: seen along that axis, over the surface's box, the next two axes across (columns) and up (rows).
     round: columns about the z axis from x, periodic; rows along z.
@@ -36,7 +37,8 @@ def laid(values: Floats, ground: Ground, projection: Projection) -> Floats:
         InvalidInput: there are no texture coordinates.
 
     """
-    x = ground.mesh.x
+    every = ground.mesh.x
+    x = every if points is None else points
     if projection == "uv":
         if ground.uv is None:
             raise InvalidInput("a texture lies by texture coordinates, and the surface has none.", advice=UNMAPPED)
@@ -45,12 +47,13 @@ def laid(values: Floats, ground: Ground, projection: Projection) -> Floats:
         return _around_middle(values, x)
     if projection == "round":
         u = (np.arctan2(x[:, 1], x[:, 0]) / (2 * np.pi)) % 1.0 * values.shape[1]
-        v = _shares(x[:, 2]) * (len(values) - 1)
+        v = _shares(x[:, 2], every[:, 2]) * (len(values) - 1)
         wide = np.concatenate([values, values[:, :1]], axis=1)
         return np.asarray(map_coordinates(wide, [v, u], order=1, mode="nearest"))
     first = ("xyz".index(projection) + 1) % 3
-    u = _shares(x[:, first]) * (values.shape[1] - 1)
-    v = _shares(x[:, (first + 1) % 3]) * (len(values) - 1)
+    second = (first + 1) % 3
+    u = _shares(x[:, first], every[:, first]) * (values.shape[1] - 1)
+    v = _shares(x[:, second], every[:, second]) * (len(values) - 1)
     return np.asarray(map_coordinates(values, [v, u], order=1, mode="nearest"))
 
 
@@ -78,10 +81,12 @@ def _repeating(rows: Floats, down: Floats, along: Floats) -> Floats:
     return np.asarray(map_coordinates(wide, [down, along + 0.5], order=1, mode="nearest"))
 
 
-def _shares(v: Floats) -> Floats:
-    return np.asarray((v - v.min()) / max(float(np.ptp(v)), 1e-300))
+def _shares(v: Floats, every: Floats) -> Floats:
+    return np.asarray((v - every.min()) / max(float(np.ptp(every)), 1e-300))
 
 
+# what is held is looked up again where remeshing made other triangles
+@lru_cache(maxsize=4)
 def gray_scott(feed: float, kill: float, size: int, steps: int, seed: int) -> Floats:
     """Return the second substance (size, size) of Gray and Scott's reaction, periodic, scaled to 0 to 1.
 

@@ -10,7 +10,7 @@ Liang and Mahadevan 2009). nu_b: Poisson's ratio in bending, -1/3 of hinges.
 Waves that are 5 % longer or shorter appear .2 % later, and a strip of ten waves has one more or less: so which of them
 a strip shows that has been grown a third beyond its threshold is the noise's choice, and the sheet's own modes at the
 threshold are compared as well, with those of the finite strip by conforming elements (Bogner, Fox and Schmit 1965, of
-scikit-fem). What bends at the first row that is held stands for half a row beyond it: there the plate is clamped.
+scikit-fem). The plate is clamped at the line up to which the sheet was asked to be held, between two of its rows.
 With 1, as the mean curvature alone has it, the threshold falls towards 0 for short waves: the mesh sets their length.
 """
 
@@ -59,7 +59,7 @@ def threshold(k, low, material, ratio=-1 / 3, cells=60):
     return 1 / eigh(load[2:, 2:], stiff[2:, 2:], eigvals_only=True)[-1]
 
 
-def grown_strip(border):
+def grown_strip(border, seed=0):
     """Return an engine of a strip that is held below y = border, and in x at its ends."""
     held = [{"where": {"kind": "band", "along": "y", "low": border + 0.1, "high": border - 0.1}}]
     held += [
@@ -77,6 +77,7 @@ def grown_strip(border):
         "step": STEP,
         # five times less than usual: ripples of the start are seen before those of the edge
         "imperfection": 0.004,
+        "seed": seed,
     }
     return Engine(GrowthParams.parse(values), 6000, 1e-7)
 
@@ -100,25 +101,30 @@ def waves_of(x, z):
 @pytest.mark.slow
 @pytest.mark.parametrize("border", [0.0, 0.15])
 def test_ripples_of_a_growing_edge_come_when_a_plates_do_and_are_as_long(border):
-    """Measured: k 4.18 for 4.04 (border 0) and 5.42 for 5.58; onset at 1.01 and 0.91 of the plate's.
+    """Measured, seeds 0 to 3: k 3.86, 4.25, 4.25 and 3.86 for 4.18 (border 0), 6.21, 5.82, 6.21 and 6.21 for 6.06.
 
-    To 1e-6 the sheet lagged behind growth, its onset said 1.16 and 1.00; from 1e-7 to 1e-8 nothing changes at border
-    0.15. A step is 0.05 of the threshold, and so finely is the onset known. Without a border it hangs on what the sheet
-    starts from, .85, 1.01 and 1.16 at imperfections .02, .004 and .001, with one it does not.
+    Onset at 1.03, .95, 1.10 and .95 of the plate's, and .94, .90, .94 and .94. Half a wave more on the strip is .39 of
+    k: which one it shows is the noise's choice, and two seeds lie about theory's. To 1e-6 the sheet lagged behind
+    growth, its onset said 1.16 and 1.00; from 1e-7 to 1e-8 nothing changes at border 0.15. A step is 0.05 of the
+    threshold, and so finely is the onset known. Without a border it hangs on what the sheet starts from, .85, 1.01 and
+    1.16 at imperfections .02, .004 and .001, with one it does not.
     """
-    engine = grown_strip(border)
-    state, material = engine.state, Material(THICKNESS)
-    low = state.x[state.held[:, 2], 1].max()
-    expected = minimize_scalar(lambda k: threshold(k, low, material), bounds=(1.0, 25.0), method="bounded").x
-    least = threshold(expected, low, material)
-    onset, found = np.inf, 0.0
-    while engine.state.time * np.log(STRETCH) < 1.3 * least:
-        engine.advance(1e9, until=engine.state.time + STEP)
-        found, height = edge_of(engine.state)
-        if height > 0.1 * THICKNESS:
-            onset = min(onset, engine.state.time * np.log(STRETCH))
-    assert found == pytest.approx(expected, rel=0.05)
-    assert 0.9 < onset / least < 1.2
+    material = Material(THICKNESS)
+    expected = minimize_scalar(lambda k: threshold(k, border, material), bounds=(1.0, 25.0), method="bounded").x
+    least = threshold(expected, border, material)
+    onsets, waves = [], []
+    for seed in (0, 1):
+        engine, onset, found = grown_strip(border, seed), np.inf, 0.0
+        while engine.state.time * np.log(STRETCH) < 1.3 * least:
+            engine.advance(1e9, until=engine.state.time + STEP)
+            found, height = edge_of(engine.state)
+            if height > 0.1 * THICKNESS:
+                onset = min(onset, engine.state.time * np.log(STRETCH))
+        onsets.append(onset / least)
+        waves.append(found)
+    assert waves == pytest.approx([expected, expected], abs=np.pi / ASPECT)
+    assert np.mean(waves) == pytest.approx(expected, rel=0.05)
+    assert 0.9 < np.mean(onsets) < 1.2
 
 
 def plates_modes(low, material, ratio=-1 / 3):
@@ -153,18 +159,16 @@ def plates_modes(low, material, ratio=-1 / 3):
 
 
 def sheets_modes(border, vertices):
-    """Return the same of the sheet, by its second derivative where it is flat; and where its plate is clamped."""
+    """Return the same of the sheet, by its second derivative where it is flat."""
     engine = Engine(grown_strip(border).params, vertices, 1e-7)
     given, start, material = engine.params, engine.state, Material(THICKNESS)
-    row = np.diff(np.unique(start.x[:, 1].round(6))).max()
-    low = start.x[start.held[:, 2], 1].max() - row / 2
     flat = {"where": {"kind": "everywhere"}, "axes": ("z",)}
     more = {"attached": [flat, *(a.model_dump() for a in given.attached)], "imperfection": 0, "step": 0.05}
     engine = Engine(GrowthParams.parse(given.model_dump() | more), vertices, 1e-8)
     free = np.flatnonzero(~start.held[:, 2])
     grown, matrices = [], []
     for k in (1, 2):
-        state = replace(engine.reach(k * 0.05, Context()), held=start.held)
+        state = replace(engine.reach(k * 0.05, Context()), held=start.held, loose=start.loose)
         whole = StepEnergy(state, material, 0.0, (), Tangent(state.mesh)).hessian(state.x).tocsr()
         matrices.append(csc_array(whole[3 * free + 2][:, 3 * free + 2]))
         grown.append(state.time * np.log(STRETCH))
@@ -174,16 +178,16 @@ def sheets_modes(border, vertices):
     z[free] = ways
     edge = np.isclose(x[:, 1], 0.5, atol=0.02)
     found = [(1 / v, waves_of(x[edge, 0], w[edge])[0]) for v, w in zip(values, z.T, strict=True)]
-    return np.array(sorted(found)), low
+    return np.array(sorted(found))
 
 
 @pytest.mark.parametrize("border", [0.0, 0.15])
 def test_the_sheet_s_own_ripples_are_those_of_a_plate(border):
-    """Measured, thresholds and wave numbers over the plate's: 1.004 and .99, 1.011 and 1.00 at 3000 vertices, 1.013 and
-    1.017, 1.020 and 1.012 at 6000, 1.006 and 1.000, 1.015 and 1.000 at 12000.
+    """Measured, thresholds and wave numbers over the plate's: .991 and 1.000, .983 and .995 at 3000 vertices, 1.005 and
+    1.016, .993 and 1.005 at 6000, 1.001 and 1.000, .999 and 1.000 at 12000.
     """
-    found, low = sheets_modes(border, 3000)
-    expected = plates_modes(low, Material(THICKNESS))
+    found = sheets_modes(border, 3000)
+    expected = plates_modes(border, Material(THICKNESS))
     threshold, wave = found[2:4].mean(axis=0) / expected[2:4].mean(axis=0)
     assert threshold == pytest.approx(1.0, abs=0.03)
     assert wave == pytest.approx(1.0, abs=0.03)
