@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -67,6 +68,18 @@ FIRST = (
     "documents/test_figures.py",
     "solver/wood/test_bench_causes.py",
 )
+
+
+#: What several workers begin with: they share the cores, and BLAS threads that spin until another worker's are done
+#: made a dozen processor seconds of one. Whether numbers hang on threads, `test_contract` asks for itself.
+SHARED = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive"}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Libraries read these when they load: workers, and what they start, inherit them."""
+    if config.getoption("numprocesses", None):
+        for name, value in SHARED.items():
+            os.environ.setdefault(name, value)
 
 
 @pytest.hookimpl(optionalhook=True)
