@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -13,11 +14,15 @@ if TYPE_CHECKING:
     from xdist.remote import Producer
     from xdist.scheduler import LoadFileScheduling
 
-#: Files that call the kernels of dehydration's contact one by one. No disk keeps these, but the loop alone that they
-#: are compiled into is (a minute for each process): one worker runs them all.
+#: Files that call dehydration's loop, on both back ends, or the kernels of contact that it is compiled from. No disk
+#: keeps these, but the loops alone (a minute for each process): one worker runs them all. The first file compiles the
+#: loop, and whoever has done that has its parts as well.
 TOGETHER = {
     f"tests/solver/{name}.py"
-    for name in ("test_contact", "test_contact_search", "geometry/test_broad_phases", "geometry/test_closest")
+    for name in (
+        *("test_dehydration", "test_contact_search", "test_contact", "test_kernel"),
+        *("geometry/test_broad_phases", "geometry/test_closest"),
+    )
 }
 
 #: Files that begin a run on several workers, in this order. The first ones compile a solver each, so that workers that
@@ -26,15 +31,16 @@ TOGETHER = {
 FIRST = (
     "solver/wood/test_runs.py",
     "solver/test_dehydration.py",
+    "solver/test_contact_search.py",
+    "solver/test_contact.py",
+    "solver/geometry/test_broad_phases.py",
+    "solver/geometry/test_closest.py",
+    "solver/test_kernel.py",
     "solver/growth/test_growth.py",
     "solver/decay/test_within.py",
     "solver/wood/test_crushing.py",
     "solver/test_onset.py",
     "solver/growth/test_coarser.py",
-    "solver/test_contact_search.py",
-    "solver/test_contact.py",
-    "solver/geometry/test_broad_phases.py",
-    "solver/geometry/test_closest.py",
     "solver/wood/test_fibres.py",
     "solver/test_contract.py",
     "documents/test_commands.py",
@@ -67,6 +73,18 @@ FIRST = (
     "documents/test_figures.py",
     "solver/wood/test_bench_causes.py",
 )
+
+
+#: What several workers begin with: they share the cores, and BLAS threads that spin until another worker's are done
+#: made a dozen processor seconds of one. Whether numbers hang on threads, `test_contract` asks for itself.
+SHARED = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive"}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Libraries read these when they load: workers, and what they start, inherit them."""
+    if config.getoption("numprocesses", None):
+        for name, value in SHARED.items():
+            os.environ.setdefault(name, value)
 
 
 @pytest.hookimpl(optionalhook=True)

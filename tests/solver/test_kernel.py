@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 
 import numba
@@ -42,16 +43,22 @@ def assembled_twin(mesh, layout, state, theta, one_point):
     return nodal, np.array(each), energy
 
 
+@cache
+def case(columns, one_point, full_levels):
+    """A mesh, its layout, a state that nobody changes, and what the twin makes of them, which takes seconds."""
+    rng = np.random.default_rng(5)
+    mesh = block_mesh(rng, columns)
+    layout = build_layout(**mesh, full_levels=full_levels)
+    state, _ = deformed(layout, rng, 0.005)
+    return mesh, layout, state, assembled_twin(mesh, layout, state, 0.9, one_point)
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize(("one_point", "full_levels"), [(False, 0), (True, 0), (True, 1), (True, 5)])
 @pytest.mark.parametrize("columns", [(1, 1), (4, 5)])
 def test_compiled_force_agrees_with_twin(backend, one_point, full_levels, columns):
     """One column fills a vector with 15 repetitions; 20 columns are a full strip and a quarter."""
-    rng = np.random.default_rng(5)
-    mesh = block_mesh(rng, columns)
-    layout = build_layout(**mesh, full_levels=full_levels)
-    state, _ = deformed(layout, rng, 0.005)
-    nodal, each, energy = assembled_twin(mesh, layout, state, 0.9, one_point)
+    mesh, layout, state, (nodal, each, energy) = case(columns, one_point, full_levels)
     force = internal_force(layout, state, 0.9, one_point=one_point, backend=backend)
     close(force.nodal, nodal, 2e-5)
     free = ~mesh["fixed"]

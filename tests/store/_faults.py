@@ -1,11 +1,11 @@
 """Tries a fault at every change that an operation makes to its store: no space, a broken disk, or the end of power.
 
-    LD_PRELOAD=shim.so python -m tests.store._faults OPERATION DIRECTORY SHIM [EVERY]
+    LD_PRELOAD=shim.so python -m tests.store._faults DIRECTORY SHIM OPERATION=EVERY...
 
-Of the points, every EVERY-th is tried. A child process is forked for each point, with `_shim.c` armed; then its parent
-looks at what is left: what was there before still is, what was said to be done is, the operation works when it is
-tried again, and nothing lies about. Prints, as JSON, how often each fault came and what became of it, and what was
-wrong at which point.
+Of an operation's points, every EVERY-th is tried. A child process is forked for each point, with `_shim.c` armed;
+then its parent looks at what is left: what was there before still is, what was said to be done is, the operation works
+when it is tried again, and nothing lies about. Prints, as JSON, for each operation how often each fault came and what
+became of it, and what was wrong at which point.
 """
 
 from __future__ import annotations
@@ -143,11 +143,9 @@ def attempt(root: Path, operation: str, shim: Any, n: int, kind: int) -> tuple[s
     return said[1:].decode(), said[:1] == b"1"
 
 
-def main(operation: str, directory: Path, library: str, every: int = 1) -> None:
-    shim = ctypes.CDLL(library)
-    shim.arm.argtypes = [ctypes.c_char_p, ctypes.c_int, ctypes.c_int]
+def tried(operation: str, directory: Path, shim: Any, every: int) -> dict[str, Any]:
+    """Try an operation's points on copies of the store that is there."""
     whole, root = directory / "whole", directory / "tried"
-    prepare(whole)
     found: dict[str, Counter[str]] = {name: Counter() for name in KINDS}
     wrong: list[str] = []
     for name, kind in KINDS.items():
@@ -163,8 +161,16 @@ def main(operation: str, directory: Path, library: str, every: int = 1) -> None:
                 check(root, operation, outcome == "ok")
             except BaseException:
                 wrong.append(f"{name} at {n}, which ended with {outcome}\n{traceback.format_exc()}")
-    print(json.dumps({"found": found, "wrong": wrong}))
+    return {"found": found, "wrong": wrong}
+
+
+def main(directory: Path, library: str, *asked: str) -> None:
+    shim = ctypes.CDLL(library)
+    shim.arm.argtypes = [ctypes.c_char_p, ctypes.c_int, ctypes.c_int]
+    prepare(directory / "whole")
+    each = (one.split("=") for one in asked)
+    print(json.dumps({operation: tried(operation, directory, shim, int(every)) for operation, every in each}))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]), sys.argv[3], *map(int, sys.argv[4:]))
+    main(Path(sys.argv[1]), *sys.argv[2:])

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,10 +37,10 @@ OPERATIONS = ["put", "build", "token", "claim"]
 EVERY = {"put": 3, "build": 17, "token": 2, "claim": 25}
 
 
-def faults(operation: str, shim: Path, tmp_path: Path, every: int) -> int:
-    """Try them; return how many points there were."""
+def tried(shim: Path, at: Path, asked: dict[str, int]) -> dict[str, Any]:
+    """Try every so many of the operations' changes; return what was found and what was wrong."""
     done = subprocess.run(
-        [sys.executable, "-m", "tests.store._faults", operation, tmp_path, shim, str(every)],
+        [sys.executable, "-m", "tests.store._faults", at, shim, *(f"{name}={every}" for name, every in asked.items())],
         cwd=ROOT,
         env={**os.environ, "LD_PRELOAD": str(shim)},
         capture_output=True,
@@ -47,9 +48,14 @@ def faults(operation: str, shim: Path, tmp_path: Path, every: int) -> int:
         check=False,
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    said = json.loads(done.stdout)
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def points(said: dict[str, Any]) -> int:
+    """Hold what was said of an operation against what may be; return how many points there were."""
     found = said["found"]
-    print(operation, found)
+    print(found)
     assert not said["wrong"], "\n".join(said["wrong"])[-6000:]
     assert set(found["killed amid"]) == set(found["killed before"]) == {"killed"}
     # what comes after the last change that counts may fail unheard: the ledger's log stays, and is read by the next
@@ -60,12 +66,18 @@ def faults(operation: str, shim: Path, tmp_path: Path, every: int) -> int:
     return sum(sum(times.values()) for times in found.values())
 
 
+@pytest.fixture(scope="module")
+def some(shim: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What was found at some changes, by operation: one process tries them all."""
+    return tried(shim, tmp_path_factory.mktemp("some"), EVERY)
+
+
 @pytest.mark.parametrize("operation", OPERATIONS)
-def test_faults_at_some_changes(operation: str, shim: Path, tmp_path: Path) -> None:
-    assert faults(operation, shim, tmp_path, EVERY[operation]) >= 8, "the shim saw nothing"
+def test_faults_at_some_changes(operation: str, some: dict[str, Any]) -> None:
+    assert points(some[operation]) >= 8, "the shim saw nothing"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_a_fault_at_every_change(operation: str, shim: Path, tmp_path: Path) -> None:
-    assert faults(operation, shim, tmp_path, 1) >= 20, "the shim saw nothing"
+    assert points(tried(shim, tmp_path, {operation: 1})[operation]) >= 20, "the shim saw nothing"

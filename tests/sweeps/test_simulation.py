@@ -19,14 +19,15 @@ def play(seeds: range, root: Path, **defect: Any) -> int | None:
     return None
 
 
-def test_two_thousand_schedules(tmp_path: Path) -> None:
-    for seed in range(2000):
+def test_a_thousand_schedules(tmp_path: Path) -> None:
+    """As many as find each old defect, see below."""
+    for seed in range(1000):
         World(seed, tmp_path).run()
 
 
 @pytest.mark.slow
 def test_a_hundred_thousand_schedules(tmp_path: Path) -> None:
-    for seed in range(2000, 102_000):
+    for seed in range(1000, 102_000):
         World(seed, tmp_path).run()
 
 

@@ -202,7 +202,7 @@ def test_cells_are_covered_as_far_as_the_outline_reaches():
 
 def test_a_little_slope_changes_little():
     """What runs out is cut obliquely: sticks of a twentieth of slope are as stiff as the beam, within a tenth."""
-    loads: dict[str, object] = {"tip_load": (0.0, 0.0, -1.0), "length": 0.3, "vertices": 61}
+    loads: dict[str, object] = {"tip_load": (0.0, 0.0, -1.0), "length": 0.3, "vertices": 31, "rods": 24}
     straight = sag(params({}, **loads))
     for slope, wanted in ((0.005, 1.0), (0.05, 1 / (1 + 0.05**2 * 10e9 / 0.7e9))):
         for pith in ((1.0, 0.0), (0.0, 1.0)):
