@@ -1,6 +1,6 @@
 """Meshes of one's own with 100,000 vertices, by the documented commands: seconds, memory, and what of them is kept.
 
-    python -m benchmarks.decay.own [FOLDER] [PYTHON_WITH_BPY]
+    python -m benchmarks.decay.own [FOLDER] [PYTHON_WITH_BPY] [mesh ...]
 
 A ring, a banana and a rabbit, each of 400 rows of 250 points with texture coordinates and two materials as OBJ. Each
 goes through `wizen solve` (a body, three stages) and `wizen export` to GLB, USDZ (pictures of 1024 pixels) and USDC, in
@@ -66,7 +66,7 @@ def rabbit(a: Array, b: Array) -> Array:
     far = np.full(a.shape, 2.5)
     for _ in range(120):  # inwards from outside, by the distance that is surely free
         far -= 0.5 * _outside(far[..., None] * ray)
-    return far[..., None] * ray
+    return np.asarray(far[..., None] * ray)
 
 
 def _outside(points: Array) -> Array:
@@ -78,7 +78,7 @@ def _outside(points: Array) -> Array:
         away = np.linalg.norm(points - start - along[..., None] * way, axis=-1)
         gaps.append(away - wide - along * (slim - wide))
     soft = 0.06
-    return -soft * np.log(np.sum(np.exp(-np.array(gaps) / soft), axis=0))
+    return np.asarray(-soft * np.log(np.sum(np.exp(-np.array(gaps) / soft), axis=0)))
 
 
 def text(shape: Any, closed: bool) -> str:
@@ -207,14 +207,17 @@ def measured(shape: Any, where: Path) -> dict[str, Any]:
     return row
 
 
-def main(folder: str = "own", python: str | None = None) -> None:
+def main(folder: str = "own", python: str | None = None, *chosen: str) -> None:
     """See the module."""
     where = Path(folder)
     where.mkdir(parents=True, exist_ok=True)
     head = ("mesh", "points", "triangles", "solve", "memory", "rotten, day 10", "volume", "out of balance", "budget")
     sheet = Sheet("decay-own", (*head, *(kind.upper() for kind in KINDS), "not kept"), "decay")
     for shape in (ring, banana, rabbit):
-        name, row = shape.__name__, measured(shape, where)
+        name = shape.__name__
+        if chosen and name not in chosen:
+            continue
+        row = measured(shape, where)
         given = read(where / f"{name}.obj")
         row |= {"points": len(given["points"]), "triangles": len(given["faces"])}
         with xr.open_dataset(where / f"{name}.h5", engine="h5netcdf") as found:
