@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.special import eval_legendre, sph_harm_y
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from solver.contract import Cancelled, Context, InvalidInput
 from solver.dehydration import SOLVER, DehydrationParams
@@ -334,3 +335,18 @@ def test_the_solver_answers_it_as_well() -> None:
 
     found = solver.dehydration.onset(DehydrationParams.parse({"te": 0.04}), kappa_ratio=1000.0)
     assert found.s_cr == pytest.approx(0.08054538543842547, rel=1e-6)
+
+
+def test_no_product_of_matrices_is_left_to_two_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    threads: list[int] = []
+    def looked(params: DehydrationParams, **words: Any) -> Onset:
+        threads.extend(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        raise Cancelled("seen")
+
+    monkeypatch.setattr(full, "onset_full", looked)
+    with threadpool_limits(2, user_api="blas"):
+        had = [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+        with pytest.raises(Cancelled):
+            onset(sphere(), road="full")
+    assert set(had) == {2}
+    assert set(threads) == {1}

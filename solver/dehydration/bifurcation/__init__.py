@@ -7,6 +7,10 @@ shape before the onset.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from threadpoolctl import threadpool_limits
+
 from ...contract import Context, InvalidInput
 from ..params import DehydrationParams
 from .base import BaseState, base_state
@@ -55,15 +59,22 @@ def onset(
     roads: tuple[Road, ...] = ("radial", "meridional", "full")
     if road is not None and (road not in roads or roads.index(road) < roads.index(best)):
         raise InvalidInput(f"this fruit has no {road!r} road.", advice=f"Leave it out, or take {best!r}.")
-    chosen = road or best
-    if chosen == "radial":
+    # two threads take longer for fronts of some hundreds, and round otherwise; only libraries that are loaded are held
+    find = _road(road or best)
+    with threadpool_limits(1, user_api="blas"):
+        return find(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
+
+
+def _road(road: Road) -> Callable[..., Onset]:
+    """Return what follows a road, imported when it is first taken."""
+    if road == "radial":
         from .radial import onset_radial
 
-        return onset_radial(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
-    if chosen == "meridional":
+        return onset_radial
+    if road == "meridional":
         from .meridional import onset_meridional
 
-        return onset_meridional(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
+        return onset_meridional
     from .full import onset_full
 
-    return onset_full(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
+    return onset_full
