@@ -339,6 +339,7 @@ def test_the_solver_answers_it_as_well() -> None:
 
 def test_no_product_of_matrices_is_left_to_two_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     threads: list[int] = []
+
     def looked(params: DehydrationParams, **words: Any) -> Onset:
         threads.extend(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
         raise Cancelled("seen")
