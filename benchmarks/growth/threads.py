@@ -1,9 +1,8 @@
 """What a second thread is good for in growth: python -m benchmarks.growth.threads [--vertices 100000]
 
-Seconds by the clock, the least of many, of energy and gradient on a disc that has grown a little: the solver's kernels
-on one thread, and the same kernels on two halves of the triangles and of the hinges, each with a gradient of its own,
-added up afterwards. Then what a step of growth spends by part, and what it could gain if all that two threads can share
-went as much faster: forces, second derivatives, factors and reading them (Amdahl).
+Seconds by the clock, the least of several: energy and gradient, the factors that a step takes and what reads them, on
+one thread and on two, as runs have them: with the same bytes. Then the first four steps of growth, and what share of
+them on one thread each part is.
 """
 
 from __future__ import annotations
@@ -15,101 +14,112 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import numba
 import numpy as np
+from numba import config
 from threadpoolctl import threadpool_limits
 
 from benchmarks.figures import Sheet
 from benchmarks.growth.__main__ import CASES
 from solver import shell
-from solver.arrays import Floats, Ints
+from solver.arrays import Floats
 from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
+from solver.growth.settling.tangent import Tangent
 from solver.growth.shapes import start
-from solver.shell.bending import bending
-from solver.shell.membrane import membrane
+from solver.linalg.multifrontal import factorise
+from solver.shell.inverse import Inverse, fronts_of, inverse_of
+from solver.shell.normals import normals
 
-_TIMES = 200
-#: Words in the names of files or functions of what two threads could share.
+#: Words in the names of files or functions of the parts of a step.
 _PARTS = {
-    "forces": ("/shell/membrane", "/shell/bending", "/shell/mean"),
-    "second derivatives": ("/shell/hessian", "/shell/pattern"),
-    "factors": ("/linalg/cholesky", "/linalg/multifrontal", "/linalg/fronts"),
+    "energy and gradient": ("/shell/membrane", "/shell/bending", "/shell/mean"),
+    "factors": ("/linalg/cholesky", "/linalg/multifrontal", "/linalg/abreast"),
     "reading factors": ("/linalg/substitution",),
 }
 
 
-@numba.njit(parallel=True)
-def _halves(
-    x: Floats, triangles: Ints, g: Floats, hinges: Ints, rest: Floats, stiffness: Floats, lame: float, own: Floats
-) -> float:
-    """Return the energy of both halves and their gradients (2, n, 3) in `own`."""
-    energies = np.zeros(2)
-    for half in numba.prange(2):
-        a, b = half * len(triangles) // 2, (half + 1) * len(triangles) // 2
-        energies[half] = membrane(x, triangles[a:b], g[a:b], lame, own[half])
-        a, b = half * len(hinges) // 2, (half + 1) * len(hinges) // 2
-        energies[half] += bending(x, hinges[a:b], rest[a:b], stiffness[a:b], own[half])
-    return float(energies.sum())
-
-
-@numba.njit(parallel=True)
-def _together(own: Floats, gradient: Floats) -> None:
-    """Add both gradients up, and leave none."""
-    for half in numba.prange(2):
-        for i in range(half * len(gradient) // 2, (half + 1) * len(gradient) // 2):
-            for d in range(3):
-                gradient[i, d] = own[0, i, d] + own[1, i, d]
-                own[0, i, d] = own[1, i, d] = 0.0
-
-
-def _least(work: Callable[[], Any]) -> float:
+def _least(work: Callable[[], Any], times: int) -> float:
     took = []
     work()
-    for _ in range(_TIMES):
+    for _ in range(times):
         begun = time.perf_counter()
         work()
         took.append(time.perf_counter() - begun)
     return min(took)
 
 
-def kernels(vertices: int) -> dict[str, float]:
-    """Return seconds of energy and gradient on one thread and on two, and by how much their gradients differ."""
-    mesh = start("disc", vertices, 1.0)
-    top, material = shell.topology(mesh.triangles, len(mesh.x)), shell.Material(0.02)
-    g = 1.02 * shell.metric(mesh.x, mesh.triangles)
-    x = mesh.x + np.random.default_rng(0).normal(0, 1e-4, mesh.x.shape)
-    stiffness, rest = shell.hinge_stiffness(g, top, material.flexural), np.zeros(len(top.hinges))
-    one, two, own = np.zeros_like(x), np.zeros_like(x), np.zeros((2, *x.shape))
+class Grown:
+    """A flat disc that has grown a little, and what steps do with it."""
 
-    def alone() -> None:
-        one[:] = 0.0
-        membrane(x, mesh.triangles, g, material.lame, one)
-        bending(x, top.hinges, rest, stiffness, one)
+    def __init__(self, vertices: int) -> None:
+        mesh = start("disc", vertices, 1.0)
+        self.mesh, self.top, self.material = mesh, shell.topology(mesh.triangles, len(mesh.x)), shell.Material(0.02)
+        self.g = 1.02 * shell.metric(mesh.x, mesh.triangles)
+        self.x = mesh.x + np.random.default_rng(0).normal(0, 1e-4, mesh.x.shape)
+        self.stiffness = shell.hinge_stiffness(self.g, self.top, self.material.flexural)
+        self.sheet, self.rest = shell.Halves(self.top), np.zeros(len(self.top.hinges))
+        self.tangent, self.fronts = Tangent(self.top), fronts_of(self.top, self.x)
+        pattern = self.tangent.pattern
+        self.blocks = np.zeros((pattern.blocks, 3, 3))
+        lame, places = self.material.lame, pattern.of_triangles
+        shell.membrane_tangent(self.x, mesh.triangles, self.g, lame, places, self.blocks)
+        shell.bending_tangent(self.x, self.top.hinges, self.stiffness, pattern.of_hinges, self.blocks)
+        self.blocks[pattern.diagonal] += 1e-5 * np.eye(3)
 
-    def shared() -> None:
-        _halves(x, mesh.triangles, g, top.hinges, rest, stiffness, material.lame, own)
-        _together(own, two)
+    def gradient(self) -> Floats:
+        """Return the gradient of stretching and bending."""
+        found = np.zeros_like(self.x)
+        self.sheet(self.x, self.g, self.material.lame, None, self.rest, self.stiffness, found)
+        return found
 
-    found = {"one": _least(alone), "two": _least(shared)}
-    return found | {"apart": float(np.abs(one - two).max() / np.abs(one).max())}
+    def inverse(self) -> Inverse:
+        """Return both factors of the approximate inverse, as steps take them."""
+        work = inverse_of(
+            self.fronts, self.tangent.pattern, self.blocks, normals(self.x, self.mesh.triangles),
+            np.zeros(len(self.x), np.bool_),
+        )  # fmt: skip
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                return end.value  # type: ignore[no-any-return]
 
 
-def shares(vertices: int) -> dict[str, float]:
-    """Return the shares of a disc's first four steps, of 3 % growth at its rim, that go into each part."""
-    values, tool = CASES["leaf rim 3 %"]
+def kernels(vertices: int) -> dict[str, tuple[float, float]]:
+    """Return seconds on one thread and on two by part."""
+    sheet, took = Grown(vertices), {}
+    analysis, inverse = sheet.tangent.analysis(sheet.x), sheet.inverse()
+    work: dict[str, tuple[Callable[[], Any], int]] = {
+        "energy and gradient": (sheet.gradient, 200),
+        "factors": (sheet.inverse, 5),
+        "reading factors": (lambda: inverse.apply(sheet.x), 50),
+        "factor of the whole tangent": (lambda: factorise(analysis, sheet.blocks), 5),
+    }
+    for name, (what, times) in work.items():
+        parts = {}
+        for count in (1, 2):
+            config.NUMBA_NUM_THREADS = count
+            parts[count] = _least(what, times)
+        took[name] = parts[1], parts[2]
+    return took
+
+
+def steps(case: str, vertices: int, threads: int) -> tuple[float, dict[str, float]]:
+    """Return the seconds of a case's first four steps by the clock, and the share of the processor's in each part."""
+    config.NUMBA_NUM_THREADS = threads
+    values, tool = CASES[case]
     params = GrowthParams.parse({**values, "tools": [tool], "step": 1.0, "remesh": 1.3})
     Engine(params, 9000).advance(1e9, until=1.0)  # compile
-    engine, profile = Engine(params, vertices), cProfile.Profile(time.process_time)
+    engine, profile = Engine(params, vertices), cProfile.Profile()
+    begun = time.perf_counter()
     profile.enable()
-    engine.advance(1e9, until=1.0)
-    while engine.steps < 4:
-        engine.advance(1e9, until=engine.steps + 1.0)
+    for step in range(4):
+        engine.advance(1e9, until=step + 1.0)
     profile.disable()
+    took = time.perf_counter() - begun
     spent = pstats.Stats(profile).stats  # type: ignore[attr-defined]
-    whole = sum(row[2] for row in spent.values())
-    return {
-        part: sum(row[2] for (file, _, _), row in spent.items() if any(word in file for word in words)) / whole
+    return took, {
+        part: sum(row[2] for (file, _, _), row in spent.items() if any(word in file for word in words)) / took
         for part, words in _PARTS.items()
     }
 
@@ -118,20 +128,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--vertices", type=int, default=100_000)
     asked = parser.parse_args()
-    sheet = Sheet("growth-threads", ("part", "share of four steps", "faster on two threads"), "growth")
-    numba.set_num_threads(2)
-    found = kernels(asked.vertices)
-    faster = found["one"] / found["two"]
+    head = ("what", "share of four steps of a disc", "one thread [s]", "two threads [s]", "faster")
+    sheet = Sheet("growth-threads", head, "growth")
     with threadpool_limits(1, user_api="blas"):
-        parts = shares(asked.vertices)
-    for part, share in parts.items():
-        cells = (part, f"{share:.2f}", f"{faster:.2f}" if part == "forces" else "not tried")
-        sheet.add(cells, part=part, share=share, **(found if part == "forces" else {}))
-    shared = sum(parts.values())
-    bound = 1 / (1 - shared + shared / faster)
-    sheet.add(
-        ("a step, if all of them went so", f"{shared:.2f}", f"{bound:.2f}"), part="all", share=shared, bound=bound
-    )
+        found = kernels(asked.vertices)
+        shares: dict[str, float] = {}
+        for case in CASES:
+            (one, parts), (both, _) = steps(case, asked.vertices, 1), steps(case, asked.vertices, 2)
+            shares = shares or parts
+            found[f"four steps, {case}"] = one, both
+    for name, (one, both) in found.items():
+        share = shares.get(name)
+        cells = ("" if share is None else f"{share:.2f}", f"{one:.3g}", f"{both:.3g}")
+        sheet.add((name, *cells, f"{one / both:.2f}"), part=name, one=one, two=both, share=share)
     sheet.keep(vertices=asked.vertices)
 
 

@@ -107,7 +107,7 @@ def _take_panel(w: Floats, panel: int, end: int) -> None:
                 row[r] -= taken[r]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _eliminate(
     first: int, last: int, fronts: Fronts, indptr: Ints, indices: Ints, data: Floats,
     place: Ints, complements: Floats, kept: Ints, values: Singles,

@@ -8,8 +8,10 @@ Duff and Reid 1983 (multifrontal), George 1973 (nested dissection).
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,12 +19,18 @@ from numba import njit
 from scipy.linalg import blas, lapack
 
 from ..arrays import Floats, Ints
+from . import dense
+from .abreast import both, two
 from .dissection import dissect
 
 __all__ = ["Analysis", "Factor", "analyse", "factorise"]
 
 LEAF = 2
 """Parts in the smallest front."""
+
+#: Multiplications of the mean front from which on halves are shared by two threads: between small ones they wait for
+#: each other's Python.
+_WORTH = 1e6
 
 
 class Front(NamedTuple):
@@ -47,6 +55,23 @@ class Analysis:
     def size(self) -> int:
         """Unknowns."""
         return 3 * (len(self.indptr) - 1)
+
+    @cached_property
+    def work(self) -> float:
+        """Multiplications that a factor takes."""
+        size, own = 3.0 * np.array([(len(front.nodes), front.own) for front in self.fronts]).T
+        return float((size**3 - (size - own) ** 3).sum() / 3)
+
+    def halves(self) -> tuple[range, range]:
+        """Return the fronts of two parts that do not touch, the first from the first front on; empty without such."""
+        last = len(self.fronts) - 1
+        # depth first: what is inside a front comes right before it
+        while last >= 0 and len(self.fronts[last].children) == 1:
+            last -= 1
+        if last < 0 or len(self.fronts[last].children) != 2:
+            return range(0), range(0)
+        first, second = self.fronts[last].children
+        return range(first + 1), range(first + 1, second + 1)
 
 
 def analyse(
@@ -78,7 +103,7 @@ def analyse(
     return Analysis(tuple(fronts), indptr, indices)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _gather(
     top: Floats, below: Floats, nodes: Ints, own: int, indptr: Ints, indices: Ints, data: Floats, place: Ints
 ) -> None:
@@ -94,7 +119,7 @@ def _gather(
                         into[3 * row + i, 3 * local + k] += data[entry, k, i]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _extend(top: Floats, below: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, own: int) -> None:
     """Add a child's Schur complement (lower triangle, on `nodes`) to a front that eliminates `own` nodes."""
     for c in range(len(nodes)):
@@ -170,11 +195,11 @@ def _half(pivot: Floats, right: Floats, transposed: int) -> Floats:
 
 def _eliminate(top: Floats, below: Floats, rest: Floats) -> tuple[_Block, int]:
     """Eliminate the pivots of a front; `rest` becomes the Schur complement (lower triangle)."""
-    factor, failed = lapack.dpotrf(top, lower=1, clean=0)
-    if not failed:
+    factor = top.copy(order="F")
+    if not dense.cholesky(factor):
         if len(below):
-            below = blas.dtrsm(1.0, factor, below, side=1, lower=1, trans_a=1, overwrite_b=1)
-            blas.dsyrk(-1.0, below, beta=1.0, c=rest, lower=1, overwrite_c=1)
+            dense.right_solve(factor, below)
+            dense.take_square(below, rest)
         return _Block(factor, None, below), 0
     factor, signs, failed = lapack.dsytrf(top, lower=1)
     if failed:
@@ -184,35 +209,61 @@ def _eliminate(top: Floats, below: Floats, rest: Floats) -> tuple[_Block, int]:
     return _Block(factor, signs, below), _negatives(factor, signs)
 
 
+class _Elimination:
+    """A factorisation under way: what fronts have left so far, by number."""
+
+    def __init__(self, analysis: Analysis, data: Floats, definite: bool) -> None:
+        self._analysis, self._data, self._definite = analysis, data, definite
+        self.blocks: dict[int, _Block] = {}
+        self.negative: dict[int, int] = {}
+        self._open: dict[int, Floats] = {}
+
+    def take(self, numbers: range, watch: Callable[[], None]) -> None:
+        """Eliminate fronts, whose children have been or are among them; watch: called before each."""
+        analysis = self._analysis
+        place = np.full(len(analysis.indptr) - 1, -1)
+        for number in numbers:
+            watch()
+            front = analysis.fronts[number]
+            size, pivots = 3 * len(front.nodes), 3 * front.own
+            place[front.nodes] = np.arange(len(front.nodes))
+            top, below = np.zeros((pivots, pivots), order="F"), np.zeros((size - pivots, pivots), order="F")
+            rest = np.zeros((size - pivots, size - pivots), order="F")
+            _gather(top, below, front.nodes, front.own, analysis.indptr, analysis.indices, self._data, place)
+            for child in front.children:
+                inner = analysis.fronts[child]
+                _extend(top, below, rest, self._open.pop(child), inner.nodes[inner.own :], place, front.own)
+            place[front.nodes] = -1
+            block, below_zero = _eliminate(top, below, rest) if pivots else (_Block(top, None, below), 0)
+            if self._definite and block.signs is not None:
+                raise np.linalg.LinAlgError("the matrix is not positive definite")
+            self.blocks[number], self.negative[number], self._open[number] = block, below_zero, rest
+
+
 def factorise(
     analysis: Analysis, data: Floats, watch: Callable[[], None] | None = None, definite: bool = False
 ) -> Factor:
     """Return the factor of the symmetric matrix with blocks `data` (nnz, 3, 3) on the analysed pattern.
 
-    watch: called before each front; what it raises ends the factorisation. definite: end it where it is not.
+    watch: called before fronts; what it raises ends the factorisation. definite: end it where it is not.
 
     Raises numpy.linalg.LinAlgError if a front is exactly singular; with `definite`, if one is not positive definite.
     """
-    place = np.full(len(analysis.indptr) - 1, -1)
-    blocks: list[_Block] = []
-    open_: dict[int, Floats] = {}
-    negative = 0
-    for number, front in enumerate(analysis.fronts):
-        if watch is not None:
-            watch()
-        size, pivots = 3 * len(front.nodes), 3 * front.own
-        place[front.nodes] = np.arange(len(front.nodes))
-        top, below = np.zeros((pivots, pivots), order="F"), np.zeros((size - pivots, pivots), order="F")
-        rest = np.zeros((size - pivots, size - pivots), order="F")
-        _gather(top, below, front.nodes, front.own, analysis.indptr, analysis.indices, data, place)
-        for child in front.children:
-            inner = analysis.fronts[child]
-            _extend(top, below, rest, open_.pop(child), inner.nodes[inner.own :], place, front.own)
-        place[front.nodes] = -1
-        block, below_zero = _eliminate(top, below, rest) if pivots else (_Block(top, None, below), 0)
-        if definite and block.signs is not None:
-            raise np.linalg.LinAlgError("the matrix is not positive definite")
-        blocks.append(block)
-        negative += below_zero
-        open_[number] = rest
-    return Factor(analysis, tuple(blocks), negative)
+    watch, count = watch or _nothing, len(analysis.fronts)
+    work = _Elimination(analysis, data, definite)
+    shared = two() and analysis.work >= _WORTH * count
+    first, second = analysis.halves() if shared else (range(0), range(0))
+    if second:
+        both(lambda: work.take(first, watch), lambda ended: work.take(second, lambda: _leave(ended)))
+    work.take(range(second.stop, count), watch)
+    return Factor(analysis, tuple(work.blocks[f] for f in range(count)), sum(work.negative.values()))
+
+
+def _nothing() -> None:
+    pass
+
+
+def _leave(ended: threading.Event) -> None:
+    """Leave off where the other half has failed."""
+    if ended.is_set():
+        raise InterruptedError

@@ -22,6 +22,7 @@ from .contact import (
     within,
 )
 from .curvature import added_angles, from_angles, to_angles
+from .halves import Halves
 from .hessian import bending_hessian, membrane_hessian, volume_hessian
 from .material import Material
 from .mean import mean_bending, mean_stiffness
@@ -30,6 +31,7 @@ from .pattern import Pattern, pattern
 from .topology import Topology, part_of, topology
 
 __all__ = [
+    "Halves",
     "Material",
     "Near",
     "Pairs",

@@ -87,7 +87,7 @@ def hinge_slopes(x: Floats, hinges: Ints, t: int, slopes: Floats) -> float:
     return angle
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def bending(x: Floats, hinges: Ints, rest: Floats, stiffness: Floats, gradient: Floats) -> float:
     """Return the bending energy and add its gradient to `gradient` (n, 3); rest and stiffness (h,)."""
     energy = 0.0

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from ..arrays import Bools, Floats, Ints, Singles
+from ..linalg.abreast import abreast
 from ..linalg.cholesky import factor
 from ..linalg.dissection import Fronts, dissect
 from ..linalg.substitution import substitute
@@ -92,8 +93,10 @@ def inverse_of(
     across, within = np.empty(pattern.blocks), np.empty(pattern.blocks)
     _reduce(blocks, n, pattern.indptr, pattern.indices, held, across, within)
     yield
-    first = yield from factor(fronts, pattern.indptr, pattern.indices, across)
-    second = yield from factor(fronts, pattern.indptr, pattern.indices, within)
+    first, second = yield from abreast(
+        factor(fronts, pattern.indptr, pattern.indices, across),
+        factor(fronts, pattern.indptr, pattern.indices, within),
+    )
     return Inverse(fronts, n, first, second)
 
 

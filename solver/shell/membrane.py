@@ -46,7 +46,7 @@ def areas(g: Floats) -> Floats:
     return 0.5 * np.sqrt(np.maximum(g[:, 0] * g[:, 2] - g[:, 1] ** 2, 0.0))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def membrane(
     x: Floats, triangles: Ints, g: Floats, lame: float, gradient: Floats, thick: Floats | None = None
 ) -> float:

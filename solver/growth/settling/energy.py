@@ -78,6 +78,7 @@ class StepEnergy:
         self.following = following and bool(pressure) and not len(state.mesh.border)
         self.state, self.material, self.solids, self.tangent = state, material, solids, tangent
         self._pressure, self._gravity, self._bending, self._pushing = pressure, gravity, bending, pushing
+        self._sheet = shell.Halves(state.mesh)
         self.stiffness = shell.hinge_stiffness(state.g, state.mesh, material.flexural)
         self._mean = shell.mean_stiffness(state.g, state.mesh, material.flexural) if bending != "hinges" else None
         thick = state.matter.get("thick")
@@ -146,10 +147,11 @@ class StepEnergy:
 
     def _at(self, x: Floats) -> tuple[float, Floats]:
         state, gradient = self.state, np.zeros_like(x)
-        energy = shell.membrane(x, state.mesh.triangles, state.g, self.material.lame, gradient, self.thick)
+        sheet = state.g, self.material.lame
         if self._mean is None:
-            energy += shell.bending(x, state.mesh.hinges, state.rest, self.stiffness, gradient)
+            energy = self._sheet(x, *sheet, self.thick, state.rest, self.stiffness, gradient)
         else:
+            energy = shell.membrane(x, state.mesh.triangles, *sheet, gradient, self.thick)
             energy += shell.mean_bending(x, state.mesh.hinges, state.rest, *self._mean, gradient)
         load = self.load
         if load is not None:
