@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import threading
 import time
 from collections.abc import Generator
@@ -18,9 +19,12 @@ from solver.linalg.substitution import substitute
 from solver.shell import halves
 
 from .shell._meshes import ball
+from .shell.test_barrier import crumpled, hairpin, near_in
 from .test_linalg import order, springs
 
-MODULES = (abreast, halves, multifrontal, substitution)
+# of the function's name the package knows the function
+searching = importlib.import_module("solver.shell.contact.search")
+MODULES = (abreast, halves, multifrontal, searching, substitution)
 
 
 @pytest.fixture
@@ -31,7 +35,7 @@ def use(monkeypatch):
         for module in MODULES:
             monkeypatch.setattr(module, "two", lambda: count == 2)
         monkeypatch.setattr(multifrontal, "_WORTH", 0)
-        for module in (halves, substitution):
+        for module in (halves, searching, substitution):
             monkeypatch.setattr(module, "_MANY", 0)
 
     return choose
@@ -103,6 +107,21 @@ def test_energy_and_gradient_of_a_sheet_are_the_same(varied, use, monkeypatch):
     energy = shell.membrane(moved, triangles, g, 1.5, wanted, thick)
     energy += shell.bending(moved, mesh.hinges, rest, stiffness, wanted)
     assert found[1] == found[2] == (energy, wanted.tobytes())
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_what_a_search_for_contact_finds_is_the_same(near, use, monkeypatch):
+    """Of legs of one strip, near each other along it, and of two sheets that are not."""
+    x, *flat, mesh = hairpin() if near else crumpled()
+    beside, found = near_in(flat[0] if near else x, mesh, 0.56 if near else 0.05), {}
+    for count in (1, 2):
+        use(count)
+        names = started(monkeypatch)
+        found[count] = shell.search(x, mesh, beside, 0.05, 0.05, 0.05, 0.1)
+        assert len(names) == count - 1
+    assert len(found[1].kinds) > 50
+    assert (found[1].near > 0) == near
+    assert all(np.array_equal(one, other) for one, other in zip(*found.values(), strict=True))
 
 
 @pytest.mark.parametrize("leaf_size", [5, 40, 10_000])

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from ...arrays import Bools, Floats, Ints
+from ...linalg.abreast import both, two
 from ..topology import Topology
 from .distance import EDGES, FACE, nearest
 from .near import Near, flat
@@ -18,6 +19,8 @@ __all__ = ["Pairs", "owners", "search", "within"]
 _SHARE = 0.5
 #: Edges on a way of the mean edge's length.
 _APART = 1.3
+#: Pairs of vertices from which on two threads share what they own.
+_MANY = 5_000
 
 
 class Pairs(NamedTuple):
@@ -74,9 +77,15 @@ def search(
     of_faces, of_edges = _balls(x, near.faces), _balls(x, near.edges)
     middles, radii = np.concatenate([of_faces[0], of_edges[0]]), np.concatenate([of_faces[1], of_edges[1]])
     own = near.start, near.other, near.way, near.altitudes, near.face_start, faces + near.edge_start
-    stencils, kinds, felt, beyond, close = _stencils(
-        x, places, *own, parts, middles, radii, *balls, spans, distance, reach, change / length
-    )
+    rest = *own, parts, middles, radii, *balls, spans, distance, reach, change / length
+    if len(places) < _MANY or not two():
+        stencils, kinds, felt, beyond, close = _stencils(x, places, *rest)
+    else:  # one after the other as found: the same list
+        middle = len(places) // 2
+        halves = both(lambda: _stencils(x, places[:middle], *rest), lambda _: _stencils(x, places[middle:], *rest))
+        columns = zip(*(half[:4] for half in halves), strict=True)
+        stencils, kinds, felt, beyond = (np.concatenate(column) for column in columns)
+        close = halves[0][4] + halves[1][4]
     beyond[:close] *= length
     # near ones come first
     order = np.concatenate([_ascending(beyond[:close]), close + _ascending(beyond[close:])])
@@ -185,7 +194,7 @@ def _far_places(
     return found[:count].copy()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _stencils(
     x: Floats, places: Ints, start: Ints, other: Ints, way: Floats, altitudes: Floats, face_start: Ints,
     edge_start: Ints, parts: Ints, middles: Floats, radii: Floats, owned: Floats, sizes: Floats, spans: Floats,
