@@ -2,10 +2,10 @@
     [--quality preview] [--peer] [NAME ...]
 
 Each case is grown to time 1 with contact = 0 and with the default, CPU seconds, kernels compiled beforehand; what is
-hard for contact from five seeds of its noise, as each folds through itself in its own way where nothing holds it: means,
-and the least and the largest ratio. Crossings are counted by code of its own (`crossings`). --peer: one evaluation of
-contact where a curled strip touches, by ours and by ipctk (the IPC Toolkit), one thread each; and what either feels in
-a flat sheet that is thicker than its edges are long, where nothing touches.
+hard for contact from five seeds of its noise, as each folds through itself in its own way where nothing holds it: the
+means, and the least and the largest ratio. Crossings are counted by code of its own (`crossings`).
+--peer: one evaluation of contact where a curled strip touches, by ours and by ipctk (the IPC Toolkit), one thread each;
+and what either feels in a flat sheet that is thicker than its edges are long, where nothing touches.
 """
 
 from __future__ import annotations
