@@ -119,27 +119,40 @@ def _gather(
                         into[3 * row + i, 3 * local + k] += data[entry, k, i]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _extend(top: Floats, below: Floats, rest: Floats, inner: Floats, nodes: Ints, place: Ints, own: int) -> None:
-    """Add a child's Schur complement (lower triangle, on `nodes`) to a front that eliminates `own` nodes."""
+    """Add a child's Schur complement (lower triangle, on `nodes`) to a front that eliminates `own` nodes.
+
+    Column by column, as they lie in memory. Of either kind of nodes, those that the front eliminates and the others,
+    the child's come in the front's order; of both together they need not.
+    """
+    count = np.zeros(2, np.int64)
+    places, kinds = np.empty(len(nodes), np.int64), np.empty((2, len(nodes)), np.int64)
     for c in range(len(nodes)):
-        for r in range(c, len(nodes)):
-            row, column = place[nodes[r]], place[nodes[c]]
-            turned = row < column
-            if turned:
-                row, column = column, row
-            if row < own:
-                into = top
-            elif column < own:
-                into, row = below, row - own
-            else:
-                into, row, column = rest, row - own, column - own
+        later = 1 if place[nodes[c]] >= own else 0
+        places[c] = 3 * (place[nodes[c]] - later * own)
+        kinds[later, count[later]] = c
+        count[later] += 1
+    for kind in range(2):
+        into = rest if kind else top
+        for p in range(count[kind]):
+            c = kinds[kind, p]
             for k in range(3):
-                for i in range(k if r == c else 0, 3):
-                    if turned:
-                        into[3 * row + k, 3 * column + i] += inner[3 * r + i, 3 * c + k]
-                    else:
-                        into[3 * row + i, 3 * column + k] += inner[3 * r + i, 3 * c + k]
+                found, column = inner[:, 3 * c + k], into[:, places[c] + k]
+                for i in range(k, 3):
+                    column[places[c] + i] += found[3 * c + i]
+                for q in range(p + 1, count[kind]):
+                    r = kinds[kind, q]
+                    for i in range(3):
+                        column[places[r] + i] += found[3 * r + i]
+    for p in range(count[0]):
+        c = kinds[0, p]
+        for k in range(3):
+            found, column = inner[:, 3 * c + k], below[:, places[c] + k]
+            for q in range(count[1]):
+                r = kinds[1, q]
+                for i in range(3):
+                    column[places[r] + i] += found[3 * r + i] if r > c else inner[3 * c + k, 3 * r + i]
 
 
 class _Block(NamedTuple):
