@@ -16,6 +16,7 @@ import sqlite3
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Literal, NamedTuple
 from urllib.error import URLError
@@ -25,6 +26,7 @@ from solver import registry
 from store import tables
 from store.checking import audit
 from store.errors import NetworkFileSystem, StoreError
+from store.ledger.database import readable
 from store.ledger.filesystem import filesystem, refuse_network
 from store.store import Store
 
@@ -191,11 +193,19 @@ def _ledger(root: Path) -> Finding:
     if not path.exists():
         return Finding("ledger", "good", "none yet: it appears with the first job")
     try:
-        with sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5) as connection:
+        with closing(sqlite3.connect(readable(path), uri=True, timeout=5)) as connection:
             said = connection.execute("PRAGMA quick_check").fetchone()[0]
+            version = connection.execute("PRAGMA user_version").fetchone()[0]
             counts = dict(connection.execute("SELECT state, count(*) FROM jobs GROUP BY state")) if said == "ok" else {}
     except sqlite3.Error as error:
-        said, counts = str(error), {}
+        if getattr(error, "sqlite_errorname", "").startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
+            # nothing is known of what is in it
+            return Finding("ledger", "bad", f"{path}: {error}", "Ask as the user whose store it is.")
+        said, counts, version = str(error), {}, 0
+    known = Store(root).ledger.database.version
+    if version > known:
+        advice = "Install the wizen that wrote it, or restore a backup from before."
+        return Finding("ledger", "bad", f"{path} has version {version}, this program reads {known}", advice)
     if said != "ok":
         advice = f"Delete {path}* (three files); `wizen sweep` makes it anew from the results that are stored."
         return Finding("ledger", "bad", said, advice)
