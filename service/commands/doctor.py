@@ -10,6 +10,7 @@ import importlib
 import importlib.metadata
 import importlib.util
 import os
+import shlex
 import shutil
 import socket
 import sqlite3
@@ -213,10 +214,10 @@ def _ledger(root: Path) -> Finding:
 
 
 def _tables(root: Path, deep: bool) -> Iterator[Finding]:
-    store = Store(root)
+    store, named = Store(root), shlex.quote(str(root))
     names = store.table_names()
     if not names:
-        yield Finding("tables", "note", "none yet", f"`wizen table build --store {root}` makes one from its results.")
+        yield Finding("tables", "note", "none yet", f"`wizen table build --store {named}` makes one from its results.")
     for name in names:
         try:
             table = tables.info(store, name)
@@ -236,7 +237,7 @@ def _tables(root: Path, deep: bool) -> Iterator[Finding]:
             except StoreError as error:
                 yield Finding("bytes", "bad", f"{name}: {error.message}", error.advice)
                 continue
-            advice = f"`wizen table rebuild --store {root}` makes the table anew from its results."
+            advice = f"`wizen table rebuild --store {named}` makes the table anew from its results."
             yield from (Finding("bytes", "bad", f"{name}: {found.message}", advice) for found in wrong)
             if not wrong:
                 yield Finding(
