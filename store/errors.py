@@ -212,7 +212,7 @@ def full_disk(path: Path) -> Iterator[None]:
             raise
         raise StorageFull(
             f"there is no space left to write {path}.",
-            "Free space (`prune` removes old table generations) or move the store; then run the same command again.",
+            "Free space or move the store; then run the same command again.",
         ) from error
 
 

@@ -10,9 +10,11 @@ import errno
 import fcntl
 import os
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["hold", "remove_free"]
+__all__ = ["alone", "hold", "remove_free"]
 
 #: struct flock on 64-bit Linux: type, whence, start, length (0: to the end), process id, which must be 0.
 _WHOLE = struct.pack("hhqqi0q", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
@@ -33,6 +35,30 @@ def hold(handle: int) -> bool:
     # network file systems make one lock of both kinds: ours would shut out HDF5's
     fcntl.fcntl(handle, fcntl.F_OFD_SETLK, _NONE)
     return False
+
+
+@contextmanager
+def alone(directory: Path) -> Iterator[bool]:
+    """Hold a directory; yields whether nobody else holds it, as far as its file system can tell."""
+    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield _is_only_holder(handle, directory)
+    finally:
+        os.close(handle)
+
+
+def _is_only_holder(handle: int, directory: Path) -> bool:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True  # some network file systems lock no directories
+    try:
+        # whoever held it before may have given it another name
+        return os.path.samestat(os.fstat(handle), directory.stat())
+    except FileNotFoundError:
+        return False
 
 
 def _is_alone(handle: int) -> bool:

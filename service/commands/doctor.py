@@ -10,12 +10,14 @@ import importlib
 import importlib.metadata
 import importlib.util
 import os
+import shlex
 import shutil
 import socket
 import sqlite3
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Literal, NamedTuple
 from urllib.error import URLError
@@ -25,6 +27,7 @@ from solver import registry
 from store import tables
 from store.checking import audit
 from store.errors import NetworkFileSystem, StoreError
+from store.ledger.database import readable
 from store.ledger.filesystem import filesystem, refuse_network
 from store.store import Store
 
@@ -191,11 +194,19 @@ def _ledger(root: Path) -> Finding:
     if not path.exists():
         return Finding("ledger", "good", "none yet: it appears with the first job")
     try:
-        with sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5) as connection:
+        with closing(sqlite3.connect(readable(path), uri=True, timeout=5)) as connection:
             said = connection.execute("PRAGMA quick_check").fetchone()[0]
+            version = connection.execute("PRAGMA user_version").fetchone()[0]
             counts = dict(connection.execute("SELECT state, count(*) FROM jobs GROUP BY state")) if said == "ok" else {}
     except sqlite3.Error as error:
-        said, counts = str(error), {}
+        if getattr(error, "sqlite_errorname", "").startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
+            # nothing is known of what is in it
+            return Finding("ledger", "bad", f"{path}: {error}", "Ask as the user whose store it is.")
+        said, counts, version = str(error), {}, 0
+    known = Store(root).ledger.database.version
+    if version > known:
+        advice = "Install the wizen that wrote it, or restore a backup from before."
+        return Finding("ledger", "bad", f"{path} has version {version}, this program reads {known}", advice)
     if said != "ok":
         advice = f"Delete {path}* (three files); `wizen sweep` makes it anew from the results that are stored."
         return Finding("ledger", "bad", said, advice)
@@ -203,10 +214,10 @@ def _ledger(root: Path) -> Finding:
 
 
 def _tables(root: Path, deep: bool) -> Iterator[Finding]:
-    store = Store(root)
+    store, named = Store(root), shlex.quote(str(root))
     names = store.table_names()
     if not names:
-        yield Finding("tables", "note", "none yet", f"`wizen table build --store {root}` makes one from its results.")
+        yield Finding("tables", "note", "none yet", f"`wizen table build --store {named}` makes one from its results.")
     for name in names:
         try:
             table = tables.info(store, name)
@@ -226,7 +237,7 @@ def _tables(root: Path, deep: bool) -> Iterator[Finding]:
             except StoreError as error:
                 yield Finding("bytes", "bad", f"{name}: {error.message}", error.advice)
                 continue
-            advice = f"`wizen table rebuild --store {root}` makes the table anew from its results."
+            advice = f"`wizen table rebuild --store {named}` makes the table anew from its results."
             yield from (Finding("bytes", "bad", f"{name}: {found.message}", advice) for found in wrong)
             if not wrong:
                 yield Finding(

@@ -7,6 +7,7 @@ that starts takes some tens of microseconds; the work must be that of code which
 
 from __future__ import annotations
 
+import contextvars
 import threading
 from collections.abc import Callable, Generator
 from typing import TypeVar
@@ -27,8 +28,9 @@ def two() -> bool:
 def both(here: Callable[[], A], there: Callable[[threading.Event], B]) -> tuple[A, B]:
     """Return what both return; `there` is called on a thread of its own.
 
-    `there` is handed what is set once `here` has failed, so that it may leave off. What `here` raises goes before what
-    `there` raises.
+    `there` is handed what is set once `here` has failed, or whoever waits for `there` was interrupted, so that it may
+    leave off. What `here` raises goes before what `there` raises. Where the system has no thread left, or the
+    interpreter is about to end, one comes after the other.
     """
     ended = threading.Event()
     found: list[B] = []
@@ -40,18 +42,30 @@ def both(here: Callable[[], A], there: Callable[[threading.Event], B]) -> tuple[
         except BaseException as error:  # it is raised again where somebody waits for it
             failed.append(error)
 
-    thread = threading.Thread(target=work, name="wizen-abreast")
-    thread.start()
+    # what numpy does of an overflow is said for a context, and a thread begins with one of its own
+    thread = threading.Thread(target=contextvars.copy_context().run, args=(work,), name="wizen-abreast")
     try:
+        if not _starts(thread):
+            return here(), there(ended)
         own = here()
+        thread.join()
     except BaseException:
         ended.set()
+        if thread.is_alive():
+            thread.join()
+        failed.clear()  # an error that its own frames know keeps all that they hold
         raise
-    finally:
-        thread.join()
     if failed:
-        raise failed[0]
+        raise failed.pop()
     return own, found[0]
+
+
+def _starts(thread: threading.Thread) -> bool:
+    try:
+        thread.start()
+    except RuntimeError:
+        return False
+    return True
 
 
 def abreast(first: Generator[None, None, A], second: Generator[None, None, B]) -> Generator[None, None, tuple[A, B]]:

@@ -17,15 +17,16 @@ import secrets
 import shutil
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from solver import __version__
 
-from .. import seal
-from ..errors import CorruptBackup, MissingStore, ReadOnlyStore, full_disk
+from .. import holding, seal
+from ..errors import CorruptBackup, CorruptLedger, MissingStore, ReadOnlyStore, full_disk
+from ..ledger.database import readable
 from ..store import Store
 
 __all__ = ["Copied", "backup", "restore"]
@@ -54,14 +55,13 @@ def backup(store: Store, to: Path) -> Copied:
     """Copy a store into the directory `to`, which an earlier backup of it may hold already.
 
     Raises:
-        ReadOnlyStore: `to` holds something else, or may not be written.
+        ReadOnlyStore: `to` holds something else, may not be written, or another backup is written into it.
         StorageFull: there is no room; the backup before stays whole.
 
     """
     if to.resolve() == store.root.resolve() or (to.is_dir() and not (to / _LIST).exists() and _is_foreign(to)):
         raise ReadOnlyStore(f"{to} holds something else than a backup.", "Name an empty or a new directory.")
-    with full_disk(to):
-        seal.make_directory(to)
+    with full_disk(to), _alone(to):
         known = _listed(to)["files"] if (to / _LIST).exists() else {}
         for place in (to, to / "shards", to / "tables"):
             seal.clean(place)
@@ -90,34 +90,73 @@ def restore(source: Path, root: Path) -> Copied:
     Raises:
         MissingStore: `source` is no backup.
         CorruptBackup: a file of it is missing or changed.
-        ReadOnlyStore: there is something in `root` already, or it may not be written.
+        ReadOnlyStore: there is something in `root` already, it may not be written, or somebody else restores it.
         StorageFull: there is no room; nothing stays.
 
     """
     if not (source / _LIST).is_file():
         raise MissingStore(f"there is no backup in {source}.", "`wizen backup DIR --store STORE` makes one.")
-    if root.exists() and (not root.is_dir() or any(root.iterdir())):
-        raise ReadOnlyStore(f"{root} is not empty.", "Restore into a new directory; then put it in its place.")
+    root = root.resolve()  # `.` has no name, and the place of a link is not the link's
+    _check_empty(root)
     page = _listed(source)
     growing = root.with_name(f".{root.name}.restoring")
-    with full_disk(root):
-        shutil.rmtree(growing, ignore_errors=True)  # of a restore that was killed
-        for name, entry in page["files"].items():
-            try:
-                found, _ = _copy(source / entry["at"], growing, name, None, private=name in _PRIVATE)
-                if found["sha256"] != entry["sha256"]:
-                    raise CorruptBackup(f"{source / entry['at']} is not what was copied.", "Take another backup.")
-            except CorruptBackup:
-                shutil.rmtree(growing)
-                raise
-        for name in ("shards", "tables"):
-            seal.make_directory(growing / name)
-        if root.exists():
-            root.rmdir()
-        growing.rename(root)
+    with full_disk(root), _alone(growing):
+        try:
+            _empty(growing)  # of a restore that was killed
+            _grow(source, page["files"], growing)
+            _check_empty(root)  # it may have been restored meanwhile
+            if root.exists():
+                root.rmdir()
+            growing.rename(root)
+        except BaseException:
+            shutil.rmtree(growing, ignore_errors=True)
+            raise
         seal.sync(root.parent)
     sizes = [entry["bytes"] for entry in page["files"].values()]
     return Copied(len(sizes), sum(sizes), len(sizes), page["created"])
+
+
+@contextmanager
+def _alone(directory: Path) -> Iterator[None]:
+    """Make a directory, and write into it alone.
+
+    Raises:
+        ReadOnlyStore: another command does.
+
+    """
+    seal.make_directory(directory)
+    with holding.alone(directory) as is_ours:
+        if not is_ours:
+            raise ReadOnlyStore(f"another command is writing into {directory}.", "Wait until it has ended.")
+        yield
+
+
+def _check_empty(root: Path) -> None:
+    if root.exists() and (not root.is_dir() or any(root.iterdir())):
+        raise ReadOnlyStore(f"{root} is not empty.", "Restore into a new directory; then put it in its place.")
+
+
+def _empty(directory: Path) -> None:
+    for path in directory.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
+def _grow(source: Path, files: Mapping[str, Any], growing: Path) -> None:
+    """Copy what a backup lists into a directory that becomes a store.
+
+    Raises:
+        CorruptBackup: a file is missing or changed.
+
+    """
+    for name, entry in files.items():
+        found, _ = _copy(source / entry["at"], growing, name, None, private=name in _PRIVATE)
+        if found["sha256"] != entry["sha256"]:
+            raise CorruptBackup(f"{source / entry['at']} is not what was copied.", "Take another backup.")
+    for name in ("shards", "tables"):
+        seal.make_directory(growing / name)
 
 
 def _is_foreign(to: Path) -> bool:
@@ -187,13 +226,22 @@ def _copy(
 
 
 def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
-    """Copy the ledger as it is at one moment, with no job claimed."""
-    source = sqlite3.connect(f"file:{store.ledger.path}?mode=ro", uri=True)
+    """Copy the ledger as it is at one moment, with no job claimed.
+
+    Raises:
+        CorruptLedger: it cannot be read.
+
+    """
+    path = store.ledger.path
     # in memory first: SQLite's locks would wait for ours on the file
-    with closing(source), closing(sqlite3.connect(":memory:")) as copy:
-        source.backup(copy)
-        copy.execute(_FREE)
-        copy.commit()
-        data = copy.serialize()
+    try:
+        with closing(sqlite3.connect(readable(path), uri=True)) as source, closing(sqlite3.connect(":memory:")) as copy:
+            source.backup(copy)
+            copy.execute(_FREE)
+            copy.commit()
+            data = copy.serialize()
+    except sqlite3.DatabaseError as error:
+        advice = "`wizen doctor` says what is wrong with it. Who may not write there cannot read it while it is in use."
+        raise CorruptLedger(f"{path} cannot be read ({error}).", advice) from error
     seal.publish(root / at, data)
     return {"at": at, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}

@@ -13,7 +13,7 @@ from .. import seal
 from ..errors import CorruptLedger, ReadOnlyStore, StorageFailed, StorageFull
 from .filesystem import refuse_network
 
-__all__ = ["Database"]
+__all__ = ["Database", "readable"]
 
 #: Seconds to wait for another process's transaction; each lasts milliseconds.
 _PATIENCE = 60.0
@@ -22,6 +22,11 @@ _LEAST = 1 << 15
 
 #: Connections inherited through a fork: SQLite forbids to use or to close them in the child.
 _inherited: list[sqlite3.Connection] = []
+
+
+def readable(path: Path) -> str:
+    """Return the address by which SQLite opens a file to read it only, whatever its name holds: `#`, `?`, `%`."""
+    return f"{path.absolute().as_uri()}?mode=ro"
 
 
 class Database:
@@ -50,6 +55,11 @@ class Database:
     def __del__(self) -> None:
         if self._connection is not None and self._pid == os.getpid():
             self._connection.close()
+
+    @property
+    def version(self) -> int:
+        """What this program writes, and the latest that it reads."""
+        return self._version
 
     @contextmanager
     def read(self) -> Iterator[sqlite3.Connection]:
@@ -108,7 +118,11 @@ class Database:
             connection.execute("BEGIN IMMEDIATE")
             found = connection.execute("PRAGMA user_version").fetchone()[0]
             if found > self._version:
-                raise self._unreadable(f"has version {found}, this program reads {self._version}")
+                raise CorruptLedger(
+                    f"{self._path} has version {found}, this program reads {self._version}.",
+                    "Install the wizen that wrote it; or restore a backup from before, or delete it (with its -wal "
+                    "and -shm files) and rebuild it from the shards: who asked for what is lost then.",
+                )
             changes = [self._upgrades[old] for old in range(found, self._version)] if found else []
             # what is there already stays: a table that a later program added appears in older files too
             for statement in ";".join([*changes, self._schema]).split(";"):

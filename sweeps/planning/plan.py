@@ -81,6 +81,10 @@ class Plan:
         except InvalidInput as error:
             raise PlanError(f"[need]: {error.message}", error.advice) from None
         name = written.name or name
+        try:
+            name.encode()
+        except UnicodeEncodeError:  # of a file whose name is bytes of another encoding
+            raise PlanError("the plan's name is not UTF-8.", "Rename its file, or say `name` in it.") from None
         first = controls = None
         if written.pattern is not None:
             first, controls, samples = _from_pattern(written, written.pattern, solver, need, name, samples)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
+import sqlite3
 from pathlib import Path
 
 import pytest
@@ -71,6 +73,40 @@ def test_a_broken_ledger_and_a_flipped_byte(own: Store, port: int) -> None:
         assert found(own.root, port, deep=True)["bytes"].state == "bad"
         for name in ("ledger.sqlite", "ledger.sqlite-wal", "ledger.sqlite-shm"):
             (own.root / name).unlink(missing_ok=True)  # as advised
+
+
+def test_a_ledger_of_a_later_wizen_is_bad_and_not_to_be_deleted(own: Store, port: int) -> None:
+    """All other commands refuse it."""
+    own.ledger.close()
+    with contextlib.closing(sqlite3.connect(own.ledger.path)) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    seen = found(own.root, port)["ledger"]
+    assert (seen.state, "version 99" in seen.seen) == ("bad", True)
+    assert "Delete" not in seen.advice
+
+
+@pytest.mark.parametrize("name", ["a#b", "50%25", "what?mode=rwc"])
+def test_a_sound_ledger_of_any_name_is_sound(own: Store, port: int, tmp_path: Path, name: str) -> None:
+    own.ledger.close()
+    root = own.root.rename(tmp_path / name)
+    seen = found(root, port)["ledger"]
+    assert (seen.state, seen.seen) == ("good", "4 done")
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_ledger_that_this_user_cannot_open_is_not_said_to_be_broken(
+    own: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SQLite reads a file in use only where its side files may be written."""
+
+    def connect(*values: object, **named: object) -> None:
+        error = sqlite3.OperationalError("unable to open database file")
+        error.sqlite_errorname = "SQLITE_CANTOPEN"
+        raise error
+
+    monkeypatch.setattr(sqlite3, "connect", connect)
+    seen = doctor._ledger(own.root)
+    assert (seen.state, "Delete" in seen.advice) == ("bad", False)
 
 
 def test_no_store_no_table_no_room(tmp_path: Path, port: int, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import _thread
+import contextlib
+import gc
 import importlib
 import threading
 import time
+import weakref
 from collections.abc import Generator
 
 import numpy as np
@@ -200,13 +204,71 @@ def test_the_other_hears_that_one_has_failed():
 
     heard = []
     with pytest.raises(ValueError, match="no"):
-        abreast.both(fail, lambda ended: heard.append(ended.wait(10)))
+        abreast.both(fail, lambda ended: heard.append(ended.wait(60)))
     assert heard == [True]
+
+
+def test_who_is_interrupted_while_he_waits_leaves_nobody_at_work():
+    """Ctrl-C comes to the first thread, which may be done with its own half."""
+    heard = []
+
+    def there(ended: threading.Event) -> None:
+        _thread.interrupt_main()
+        heard.append(ended.wait(60))
+
+    with pytest.raises(KeyboardInterrupt):
+        abreast.both(lambda: 1, there)
+    assert heard == [True]
+    assert not [thread for thread in threading.enumerate() if thread.name == "wizen-abreast"]
+
+
+@pytest.mark.parametrize("who", ["here", "there", "both"])
+def test_what_failed_is_let_go_at_once(who):
+    """Not when the garbage collector finds a ring: a large factor's fronts are in these frames."""
+
+    class Fronts:
+        pass
+
+    kept = []
+
+    def fail(_=None):
+        fronts = Fronts()
+        kept.append(weakref.ref(fronts))
+        raise ValueError("no")
+
+    is_on = gc.isenabled()
+    gc.disable()
+    try:
+        with contextlib.suppress(ValueError):
+            abreast.both(fail if who != "there" else lambda: 1, fail if who != "here" else lambda _: 1)
+        assert kept
+        assert [fronts() for fronts in kept] == [None] * len(kept)
+    finally:
+        if is_on:
+            gc.enable()
+
+
+def test_one_comes_after_the_other_where_no_thread_can_start(monkeypatch):
+    """A container may have all the threads that it may have, and an interpreter that ends starts none."""
+
+    def start(self: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    done = []
+    assert abreast.both(lambda: done.append("here") or 1, lambda ended: done.append("there") or 2) == (1, 2)
+    assert done == ["here", "there"]
+
+
+@pytest.mark.parametrize("what", ["raise", "ignore"])
+def test_both_halves_take_an_overflow_alike(what):
+    with np.errstate(over=what):
+        assert abreast.both(np.geterr, lambda _: np.geterr()) == (np.geterr(), np.geterr())
 
 
 def test_both_run_at_once():
     """Each waits for the other."""
-    meet = threading.Barrier(2, timeout=10)
+    meet = threading.Barrier(2, timeout=60)
     assert abreast.both(lambda: meet.wait() >= 0, lambda _: meet.wait() >= 0) == (True, True)
 
 

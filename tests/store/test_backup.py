@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from solver.dehydration import SOLVER
 from store import tables
+from store.copies import backup as copies
 from store.copies.backup import backup, restore
-from store.errors import CorruptBackup, MissingStore, ReadOnlyStore
+from store.errors import CorruptBackup, CorruptLedger, MissingStore, ReadOnlyStore, StorageFull
 from store.store import Store
 from store.tokens import Tokens
 
@@ -93,6 +96,8 @@ def test_what_is_refused(own: Store, tmp_path: Path) -> None:
 COPY = """
 import sys, time
 from pathlib import Path
+from typing import Any
+from store.copies import backup as copies
 from store.copies.backup import backup, restore
 from store.store import Store
 print("go", flush=True)
@@ -129,3 +134,93 @@ def test_killed_at_any_moment(own: Store, tmp_path: Path) -> None:
         tables.open(again).close()
     backup(own, tmp_path / "copy")
     assert not list((tmp_path / "copy").rglob("*.part"))
+
+
+@pytest.mark.parametrize("name", ["a#b", "50%25", "what?mode=rwc", "a b ü"])
+def test_a_store_of_any_name_comes_back_with_its_ledger(own: Store, tmp_path: Path, name: str) -> None:
+    """SQLite takes its file for an address, in which these signs mean something."""
+    odd = Store.open(own.root.rename(tmp_path / name))
+    before = {path.name for path in tmp_path.iterdir()}
+    backup(odd, tmp_path / "copy")
+    restore(tmp_path / "copy", tmp_path / "again")
+    assert Store.open(tmp_path / "again").ledger.counts()["done"] == 2
+    assert {path.name for path in tmp_path.iterdir()} == before | {"copy", "again"}
+
+
+def test_a_ledger_that_is_none_is_said(own: Store, tmp_path: Path) -> None:
+    own.ledger.close()
+    own.ledger.path.write_bytes(b"not a database, but long enough to look at" * 100)
+    with pytest.raises(CorruptLedger, match="cannot be read"):
+        backup(own, tmp_path / "copy")
+
+
+def test_two_backups_into_one_directory_at_once(own: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A timer's and one by hand: the second is refused, for it would take away what the first has copied."""
+    copy, refused = copies._copy, []
+
+    def meanwhile(*values: Any, **named: Any) -> Any:
+        if not refused:
+            with pytest.raises(ReadOnlyStore, match="another command") as said:
+                backup(own, tmp_path / "copy")
+            refused.append(said)
+        return copy(*values, **named)
+
+    monkeypatch.setattr(copies, "_copy", meanwhile)
+    backup(own, tmp_path / "copy")
+    assert refused
+    restore(tmp_path / "copy", tmp_path / "again")
+    backup(own, tmp_path / "copy")
+
+
+def test_two_restores_of_one_store_at_once(own: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    backup(own, tmp_path / "copy")
+    copy, refused = copies._copy, []
+
+    def meanwhile(*values: Any, **named: Any) -> Any:
+        found = copy(*values, **named)
+        if not refused:
+            with pytest.raises(ReadOnlyStore, match="another command") as said:
+                restore(tmp_path / "copy", tmp_path / "again")
+            refused.append(said)
+        return found
+
+    monkeypatch.setattr(copies, "_copy", meanwhile)
+    restore(tmp_path / "copy", tmp_path / "again")
+    assert refused
+    assert len(list(Store.open(tmp_path / "again").results())) == 2
+
+
+def test_of_a_restore_that_finds_no_room_nothing_stays(
+    own: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    backup(own, tmp_path / "copy")
+    write, written = Path.write_bytes, []
+
+    def full(self: Path, data: Any) -> int:
+        written.append(self)
+        if len(written) == 3:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(self, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        with pytest.raises(StorageFull):
+            restore(tmp_path / "copy", tmp_path / "again")
+    assert len(written) == 3
+    assert {path.name for path in tmp_path.iterdir()} == {"copy", "store"}
+    restore(tmp_path / "copy", tmp_path / "again")
+
+
+def test_a_store_is_restored_where_one_stands_and_behind_a_link(
+    own: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    backup(own, tmp_path / "copy")
+    for place in ("here", "there"):
+        (tmp_path / place).mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "there")
+    monkeypatch.chdir(tmp_path / "here")
+    restore(Path("../copy"), Path())
+    restore(Path("../copy"), Path("../link"))
+    for place in ("here", "there", "link"):
+        assert len(list(Store.open(tmp_path / place).results())) == 2
+    assert (tmp_path / "link").is_symlink()

@@ -6,6 +6,7 @@ import errno
 import io
 import json
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -318,6 +319,56 @@ def test_ctrl_c_stops_and_the_same_command_goes_on(shrinking: Solves, tmp_path: 
         assert store.ledger.counts()["wanted"] == 6 - solved
     result = wizen("sweep", plan, "--store", root, "--json")
     assert document(result)["reused"] == solved
+
+
+def test_names_that_mean_something_to_others_are_names(
+    shrinking: Solves, tmp_path: Path, write_plan: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the library that prints, `[/b c]` ends something bold; to a shell, it is two words."""
+    monkeypatch.chdir(tmp_path)
+    Path("a [").mkdir()
+    root, plan = "a [/b c]", write_plan("[0.02, 0.03]", name="p[red]")
+    swept = wizen("sweep", plan, "--store", root)
+    assert swept.exit_code == 0, swept.output
+    assert "p[red]: 4 solved" in swept.stdout
+    (said,) = (line for line in swept.stdout.splitlines() if line.startswith("next: wizen "))
+    built = wizen(*shlex.split(said.removeprefix("next: wizen ")))
+    assert built.exit_code == 0, built.output
+    assert f"{root}/tables/default/" in built.stdout
+    for words in (("status",), ("table", "list"), ("table", "verify"), ("table", "info"), ("results",), ("doctor",)):
+        done = wizen(*words, "--store", root)
+        assert done.exit_code == 0, done.output
+        assert "defect" not in done.output
+    assert f"jobs in {root}" in wizen("status", "--store", root).stdout
+
+
+@pytest.mark.parametrize("closed", ["2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_sweep_without_streams_runs_all_the_same(
+    shrinking: Solves, tmp_path: Path, write_plan: Write, closed: str, workers: int
+) -> None:
+    """As some service managers and `nohup`'s users begin it: the first files opened would be in their places."""
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ['PYTHONPATH']}"}
+    command = [sys.executable, "-m", "service.cli", "sweep", str(write_plan()), "--store", str(tmp_path / "store")]
+    whole = ["sh", "-c", f'exec "$@" {closed}', "sh", *command, "--workers", str(workers)]
+    assert subprocess.run(whole, env=environment, cwd=ROOT, check=False).returncode == 0
+    assert Store.open(tmp_path / "store").ledger.counts()["done"] == 6
+
+
+def test_words_that_are_no_text_are_refused_in_a_sentence(shrinking: Solves, tmp_path: Path, write_plan: Write) -> None:
+    """Latin-1 of an older machine, say, as Python hands it on."""
+    root, odd = tmp_path / "store", write_plan(name="pl\udce4n")
+    for words in (
+        ("sweep", odd, "--store", root),
+        ("solve", "shrinking", "--set", "trouble=\udce4"),
+        ("audit", "--store", root, "--token", "\udce4"),
+        ("table", "build", "--store", root, "--plan", "\udce4"),
+    ):
+        if words[0] == "audit":
+            assert wizen("sweep", write_plan("[0.02]"), "--store", root).exit_code == 0
+        done = wizen(*words)
+        assert done.exit_code == 2, done.output
+        assert "not UTF-8" in done.output
 
 
 def test_a_reader_that_leaves_early() -> None:

@@ -31,13 +31,13 @@ def emit(document: Any, as_json: bool, show: Callable[[Console], None]) -> None:
         return
     from rich.console import Console
 
-    show(Console(highlight=False, soft_wrap=True))
+    # names are the user's: "[/a]" is a directory, not an end of something bold
+    show(Console(highlight=False, soft_wrap=True, markup=False))
 
 
 def grid(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> None:
     """Print a table for people: no word is cut, and what goes to a file or a pipe has one line for each row."""
     from rich import box
-    from rich.markup import escape
     from rich.table import Table
 
     table = Table(*head, title=title or None, title_justify="left", box=box.SIMPLE_HEAD)
@@ -47,7 +47,7 @@ def grid(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]], t
     for row in rows:
         for column, cell in zip(table.columns, row, strict=True):
             column.min_width = max(column.min_width or 0, *map(len, cell.split()), 0)
-        table.add_row(*(escape(cell) for cell in row))
+        table.add_row(*row)
     needed = console.measure(table, options=console.options.update(max_width=10_000))
     console.width = max(console.width, needed.minimum) if console.is_terminal else needed.maximum
     console.print(table)
@@ -64,11 +64,11 @@ class Root(TyperGroup):
         except Exception as error:
             if os.environ.get("WIZEN_DEBUG") == "1":
                 raise
-            sys.exit(_complain(error, "--json" in given))
+            sys.exit(_complain(error, given))
         sys.exit(code if isinstance(code, int) else 0)
 
 
-def _complain(error: Exception, as_json: bool) -> int:
+def _complain(error: Exception, given: Sequence[str]) -> int:
     if isinstance(error, BrokenPipeError):
         # the reader of our output has left (`| head`); Python must not stumble over it again at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -89,10 +89,23 @@ def _complain(error: Exception, as_json: bool) -> int:
             code = 130
         if said["code"] == "internal-error":
             said["advice"] = "This is a defect of wizen; WIZEN_DEBUG=1 shows where."
+            odd = [word for word in given if _is_odd(word)]
+            if odd:
+                said = {"code": "invalid-usage", "message": f"{odd[0]!a} is not UTF-8.", "advice": "Write it so."}
+                code = 2
     note(" ".join(f"error: {said['message']} {said['advice']}".split()))
-    if as_json:
+    if "--json" in given:
         typer.echo(json.dumps({"error": said}, indent=2))
     return code
+
+
+def _is_odd(word: str) -> bool:
+    """Return whether a word of the command line is no text: bytes of another encoding."""
+    try:
+        word.encode()
+    except UnicodeEncodeError:
+        return True
+    return False
 
 
 def _system(error: OSError) -> dict[str, Any]:

@@ -125,5 +125,5 @@ def _bars() -> Progress:
         def render(self, task: Any) -> Any:
             return super().render(task) if (task.total or 0) > 1 else TaskProgressColumn().render(task)
 
-    columns = (TextColumn("{task.description}"), BarColumn(), Count(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), Count(), TimeElapsedColumn())
     return Progress(*columns, console=Console(stderr=True), transient=True)

@@ -25,10 +25,21 @@ _heard = threading.Event()
 
 def guard() -> None:
     """Watch for signals from now on; for programs, not for libraries: this takes the process's wakeup descriptor."""
+    _open_streams()
     heard, told = os.pipe()
     os.set_blocking(told, False)
     signal.set_wakeup_fd(told, warn_on_full_buffer=False)
     threading.Thread(target=_watch, args=(heard,), name="wizen-watchdog", daemon=True).start()
+
+
+def _open_streams() -> None:
+    """Open what a program was begun without (`2>&-`): what it opens next would be in that place, and be written to."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            handle = os.open(os.devnull, os.O_RDWR)
+            if handle == number:
+                os.set_inheritable(handle, True)
+            setattr(sys, name, os.fdopen(handle, "w" if number else "r"))
 
 
 def end_soon() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -88,7 +89,9 @@ def show_report(console: Any, report: Report, store: Path, plan: Plan) -> None:
     ]
     console.print(f"{report.plan}: {', '.join(parts)} of {report.total}, in {report.seconds:.1f} s")
     if report.complete:
-        only = f" --plan {plan.name}" if plan.controls else ""
-        console.print(f"next: wizen table build --store {store}{only}", markup=False)
+        only = f" --plan {shlex.quote(plan.name)}" if plan.controls else ""
+        console.print(f"next: wizen table build --store {shlex.quote(str(store))}{only}", markup=False)
     elif report.solved or report.reused:
-        console.print(f"next: wizen results --store {store} --solver {plan.solver.name}", markup=False)
+        console.print(
+            f"next: wizen results --store {shlex.quote(str(store))} --solver {plan.solver.name}", markup=False
+        )
