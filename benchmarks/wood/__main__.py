@@ -37,7 +37,6 @@ def per_step(**values: Any) -> tuple[int, int, float, float]:
         march(
             wood.motion,
             wood.rods,
-            wood.bonds,
             wood.turns,
             wood.bodies,
             wood.pins,

@@ -41,7 +41,8 @@ def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
             strange |= not hint and len(item["loc"]) == 1
             parts.append(f"unknown name {SHORT.repr(where)}{hint}")
         else:
-            message = item["msg"].removeprefix("Value error, ")
+            # who puts findings into a sentence ends it
+            message = item["msg"].removeprefix("Value error, ").removesuffix(".")
             got = item.get("input")
             shown = f" (got {SHORT.repr(got)})" if where and not isinstance(got, dict) else ""
             parts.append(f"{where + ': ' if where else ''}{message}{shown}")

@@ -123,9 +123,12 @@ class Desk:
 
     def _do_play(self, number: int, until: Any = None, pace: Any = None) -> None:
         end, fastest = number_of("until", until), number_of("pace", pace)
-        if end <= self._engine.stage or fastest <= 0:
+        step = self._engine.step
+        # less than a step would be done at once, and nothing would have grown
+        if end < self._engine.stage + step - 1e-9 or fastest <= 0:
             raise InvalidInput(
-                f"until and pace are numbers, beyond {self._engine.stage:g} and above 0.", advice="Or leave them out."
+                f"until and pace are numbers, at least {self._engine.stage + step:g} and above 0.",
+                advice=f"It grows by steps of {step:g}. Or leave them out.",
             )
         self._engine.begin()
         self._leave_settling()

@@ -45,6 +45,25 @@ def test_a_step_without_end_waits_for_somebody_who_wants_it(brushed: tuple[Desk,
     assert desk.saved()["stage"] == pytest.approx(BALL["step"])
 
 
+def test_play_goes_by_whole_steps_and_less_than_one_is_refused() -> None:
+    """What would grow nothing is no gesture, and is not said to be done."""
+    solver, told = registry.get("growth"), list[Any]()
+    desk = Desk(solver, solver.parse(BALL, None), "preview", (), told.append, lambda frame: None)
+    desk.begin_again({})
+    desk.take({"do": "play", "id": 1, "until": 0.13})
+    desk.finish()
+    assert desk.saved()["stage"] == pytest.approx(0.1)
+    desk.take({"do": "play", "id": 2, "until": 0.14})
+    refused = next(said for said in told if said["say"] == "error")
+    assert refused["id"] == 2
+    assert "at least 0.15" in refused["problem"]["detail"]
+    assert told[-1] == refused
+    desk.take({"do": "play", "id": 3, "until": 0.15})
+    desk.finish()
+    assert desk.saved()["stage"] == pytest.approx(0.15)
+    assert max(said["undo"] for said in told if said["say"] == "state") == 2
+
+
 def test_a_step_that_has_no_end_can_be_undone(brushed: tuple[Desk, list[Any]]) -> None:
     desk, told = brushed
     while desk.is_busy:

@@ -14,7 +14,7 @@ from ..contact.posing import pose
 from ..contact.rubbing import rub
 from ..forces.internal import internal
 from ..forces.twist import carry, turn, twists
-from ..model.arrays import Bodies, Bonds, Pins, Rods, Turns
+from ..model.arrays import Bodies, Pins, Rods, Turns
 from ..model.motion import BENDING, BONDS, CONTACT, LOST, STRETCH, WORK, Motion, Scratch
 from .flying import fly, strike
 from .scaling import push, rigid
@@ -27,7 +27,6 @@ __all__ = ["forces", "march"]
 def forces(
     motion: Motion,
     rods: Rods,
-    bonds: Bonds,
     turns: Turns,
     bodies: Bodies,
     scratch: Scratch,
@@ -119,7 +118,6 @@ def _fill(
 def march(
     motion: Motion,
     rods: Rods,
-    bonds: Bonds,
     turns: Turns,
     bodies: Bodies,
     pins: Pins,

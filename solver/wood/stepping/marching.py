@@ -51,7 +51,7 @@ def broken(state: State, params: WoodParams, time: float, dt: float) -> State:
     # damage stood in the plan already; what falls apart needs another, and other fragments
     scratch = scratch_for(wood)._replace(rubbing=state.scratch.rubbing)
     books = state.books
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
+    forces(wood.motion, wood.rods, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
     found = state._replace(wood=wood, scratch=scratch, rods=state.rods + rods, bonds=state.bonds + bonds + parted)
     # what fragments that come off no longer have by their scaled mass is lost, too
     released = float(before - books[: CONTACT + 1].sum() - real(found))
@@ -65,7 +65,7 @@ def pressed(state: State, params: WoodParams, time: float, dt: float) -> State:
     if not crush(scratch.plan, wood.rods, scratch.inverse, params.crush_strain):
         return state
     before = float(books[: CONTACT + 1].sum())
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
+    forces(wood.motion, wood.rods, wood.turns, wood.bodies, scratch, wood.turning, time, dt, books)
     taken = before - float(books[: CONTACT + 1].sum())
     books[LOST] += taken
     return state._replace(crushed=state.crushed + taken)
@@ -83,7 +83,6 @@ def _advance(state: State, params: WoodParams, time: float, dt: float, steps: in
     fine = march(
         w.motion,
         w.rods,
-        w.bonds,
         w.turns,
         w.bodies,
         w.pins,
@@ -114,7 +113,7 @@ def _refreshed(listing: Listing, state: State, ahead: float, time: float, dt: fl
     if fitted is state:
         return state
     w, before = state.wood, float(state.books[: CONTACT + 1].sum())
-    forces(w.motion, w.rods, w.bonds, w.turns, w.bodies, fitted.scratch, w.turning, time, dt, state.books)
+    forces(w.motion, w.rods, w.turns, w.bodies, fitted.scratch, w.turning, time, dt, state.books)
     state.books[LOST] += before - float(state.books[: CONTACT + 1].sum())
     return fitted
 

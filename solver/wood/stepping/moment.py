@@ -78,7 +78,7 @@ def begin(wood: Wood) -> State:
     """Return the state at time 0, forces known."""
     scratch = scratch_for(wood)
     books = np.zeros(6)
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, books)
+    forces(wood.motion, wood.rods, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1e-9, books)
     return State(
         wood, scratch, books, np.zeros((len(wood.bodies.kind), 6)), np.zeros((len(wood.grips), 6)), 0.0, 0, 0, 0
     )

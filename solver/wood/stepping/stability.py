@@ -47,7 +47,7 @@ def _highest(wood: Wood, scratch: Scratch, iterations: int) -> float:
         difference = np.zeros_like(x)
         for sign in (1.0, -1.0):
             motion.x[:] = x + sign * step
-            forces(motion, wood.rods, wood.bonds, wood.turns, nobody, scratch, wood.turning, 0.0, 1.0, books)
+            forces(motion, wood.rods, wood.turns, nobody, scratch, wood.turning, 0.0, 1.0, books)
             difference -= sign * scratch.f
         q = np.where(free, difference / (2 * scale) / root, 0.0)
         along.append(float((p * q).sum()))

@@ -49,7 +49,7 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
         m.load[:] = full * (begun + goal * (factor - begun))
         norm, wanted = np.inf, max(_TOLERANCE * float(np.linalg.norm(m.load)), least)
         for _ in range(30):
-            forces(m, wood.rods, wood.bonds, wood.turns, wood.bodies, state.scratch, False, 0.0, 1.0, state.books)
+            forces(m, wood.rods, wood.turns, wood.bodies, state.scratch, False, 0.0, 1.0, state.books)
             r = state.scratch.f[free].ravel()
             last, norm = norm, float(np.linalg.norm(r))
             if norm <= wanted or not np.isfinite(norm) or norm > 1e6 * max(last, 1e-300):

@@ -109,6 +109,8 @@ def test_what_is_no_surface_is_refused(points, faces, said):
     with pytest.raises(InvalidInput) as caught:
         GrowthParams.parse(words(points, faces))
     assert said in str(caught.value)
+    assert str(caught.value).endswith(".")
+    assert not str(caught.value).endswith("..")
 
 
 def test_a_pinch_of_two_closed_bodies_is_found():

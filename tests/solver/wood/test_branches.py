@@ -27,7 +27,7 @@ def params(**values: object) -> WoodParams:
 def pushed(wood: Wood) -> tuple[np.ndarray, np.ndarray]:
     """Return energies (4,) [J] and forces (v, 3) [N]."""
     scratch, books, m = scratch_for(wood), np.zeros(6), wood.motion
-    forces(m, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
+    forces(m, wood.rods, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
     return books[:4].copy(), scratch.f.copy()
 
 
@@ -103,7 +103,7 @@ def test_sections_are_carried_along_without_spin():
 def torques(wood: Wood) -> np.ndarray:
     """Return the torques (e,) [N m] about the rods' own axes."""
     scratch, books, m = scratch_for(wood), np.zeros(6), wood.motion
-    forces(m, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
+    forces(m, wood.rods, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
     return np.where(wood.turns.inertia > 0, scratch.torque, 0.0)
 
 

@@ -145,7 +145,7 @@ def test_a_curved_rod_at_rest_bears_nothing():
     assert np.abs(state.scratch.bent).max() < 1e-9
     m = wood.motion
     m.x[:] = wood.straight
-    forces(m, wood.rods, wood.bonds, wood.turns, wood.bodies, state.scratch, True, 0.0, 1e-9, state.books)
+    forces(m, wood.rods, wood.turns, wood.bodies, state.scratch, True, 0.0, 1e-9, state.books)
     real = (wood.rods.k[wood.rods.before] > 0) & (wood.rods.k[wood.rods.after] > 0)
     assert state.scratch.bent[real] == pytest.approx(np.full(real.sum(), 6.0), rel=2e-3)
 

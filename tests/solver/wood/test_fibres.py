@@ -38,7 +38,7 @@ def params(grain: dict[str, object], **values: object) -> WoodParams:
 def pushed(wood: Wood) -> tuple[np.ndarray, np.ndarray]:
     """Return energies (4,) [J] and forces on what is free (n, 3) [N]."""
     scratch, books, m = scratch_for(wood), np.zeros(6), wood.motion
-    forces(m, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
+    forces(m, wood.rods, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
     return books[:4], scratch.f[m.held == 0]
 
 

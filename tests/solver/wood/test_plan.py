@@ -107,7 +107,6 @@ def _marched(state: State, pieces: tuple[int, ...]) -> State:
         assert march(
             w.motion,
             w.rods,
-            w.bonds,
             w.turns,
             w.bodies,
             w.pins,
@@ -169,7 +168,7 @@ def test_seats_are_computed_where_something_is_bonded(reach):
     state.scratch.seats[:, :, :6] = np.nan
     books, impulse = state.books, state.impulse
     assert march(
-        wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, wood.pins, state.scratch, False, 0.0, 1e-9, 1, 0.0,
+        wood.motion, wood.rods, wood.turns, wood.bodies, wood.pins, state.scratch, False, 0.0, 1e-9, 1, 0.0,
         books, impulse,
     )  # fmt: skip
     assert np.isnan(state.scratch.seats[:, :, :6]).all() == (reach == 0.0)

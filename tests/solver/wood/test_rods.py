@@ -24,7 +24,7 @@ PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 def energies(wood: Wood) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return energies, forces (v, 3) and torques (e,)."""
     scratch, books = scratch_for(wood), np.zeros(6)
-    forces(wood.motion, wood.rods, wood.bonds, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
+    forces(wood.motion, wood.rods, wood.turns, wood.bodies, scratch, wood.turning, 0.0, 1.0, books)
     return books[:4].copy(), scratch.f, scratch.torque
 
 

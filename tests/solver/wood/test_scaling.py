@@ -21,7 +21,6 @@ def marched(wood, dt, steps):
     assert march(
         wood.motion,
         wood.rods,
-        wood.bonds,
         wood.turns,
         wood.bodies,
         wood.pins,
