@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from store import starter, tables
 from store.store import Store
 
 from ..store.conftest import displacement, fill
+from ._asking import checked
 from ._jobs import bearer
 from .conftest import SHAPE, client_of
 
@@ -85,6 +87,16 @@ def test_what_no_family_holds_names_the_nearest_and_the_run(
     job = next(job for job in store.ledger.jobs() if run.headers["location"].endswith(job.key))
     assert (job.params["exocarp_thickness"], job.params["radii"]) == (0.03, list(RAISIN["radii"]))
     assert job.params["mirrors"] == "xz"  # the table holds that fruit: the run goes with its samples
+
+
+@pytest.mark.parametrize("said", [{"gamma": "5e-324"}, {"te": "1e308"}, {"te": "-1e308"}])
+def test_numbers_at_the_end_of_all_numbers_are_off_the_table(client: httpx.Client, said: dict[str, str]) -> None:
+    problem = checked(client.get(SHAPE, params={"preset": "raisin", "s": 0.2, **said}), 422, "outside-table")
+    (name,) = said
+    asked, nearest, distance = problem["nearest"]["parameters"][name].values()
+    assert asked == float(said[name])
+    assert nearest > 0
+    assert distance <= problem["nearest"]["distance"] < math.inf
 
 
 def test_a_fruit_that_no_table_has_is_run_whole(client: httpx.Client, house: Path, allowed: dict[str, str]) -> None:
