@@ -175,7 +175,7 @@ def _off(name: str, number: float, words: Words, numbers: Mapping[str, float]) -
     slack = _SLACK * (high - low)
     if low - slack <= number <= high + slack:
         return []
-    return [Wrong(name, f"{number:g} is off the table's {words.say(name)}", f"Take {name} from {words.say(name)}.")]
+    return [Wrong(name, f"{number:.9g} is off the table's {words.say(name)}", f"Take {name} from {words.say(name)}.")]
 
 
 def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:

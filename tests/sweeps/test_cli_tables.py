@@ -145,5 +145,9 @@ def test_presets_and_what_the_package_covers(tmp_path: Path) -> None:
     assert far.exit_code != 0
     assert "no table holds this; the nearest is" in far.stderr
     assert "wizen solve dehydration --preset raisin --set te=0.1 --stages 0.2" in far.stderr
+    off = wizen("query", "--preset", "raisin", "--stages", "10")
+    assert off.exit_code == 2
+    assert "stage 10 lies outside s = -0.3 to 0.6" in off.stderr
+    assert "wizen solve" not in off.stderr
     unknown = wizen("table", "plan", "nowhere")
     assert "there is no table 'nowhere'" in unknown.stderr
