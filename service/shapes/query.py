@@ -226,6 +226,8 @@ def _max_error(text: str, words: Words) -> dict[str, float] | Wrong:
     limits = {name or "rgh": float(value) for name, _, value in pairs} if re.fullmatch(LIMITS, text) else {}
     if not limits or not all(map(math.isfinite, limits.values())):
         return Wrong("max_error", f"{text[:40]!r} limits no error", advice)
+    if len(limits) < len(pairs):
+        return Wrong("max_error", f"{text[:40]!r} limits a measure twice", "Limit each measure once.")
     return limits
 
 

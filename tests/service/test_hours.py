@@ -31,6 +31,7 @@ def test_hours_become_stages(client: httpx.Client) -> None:
     [
         ("dehydration", {"hours": "30", "preset": "raisin", "under": "temperature:60"}, 422, "invalid-input"),
         ("dehydration", {"hours": "30"}, 422, "invalid-input"),
+        ("dehydration", {"hours": "30", "preset": "raisn", "under": "kinetics:grape"}, 422, "invalid-input"),
         ("growth", {"hours": "30"}, 422, "invalid-input"),
         ("dehydration", {"hours": "soon"}, 422, "invalid-query"),
         ("nothing", {"hours": "30"}, 404, "unknown-solver"),

@@ -94,6 +94,7 @@ def test_query_by_a_method_within_an_error(table: Path) -> None:
     assert said["method"] == "idw"
     assert "there is no look-up method 'kriging'" in wizen(*query, "--method", "kriging").stderr
     assert "limits no error" in wizen(*query, "--max-error", "rgh:little").stderr
+    assert "limits a measure twice" in wizen(*query, "--max-error", "0.01,rgh:9").stderr
     refused = wizen(*query, "--method", "idw", "--max-error", "0.5")
     assert refused.exit_code != 0
     assert "does not say how far" in refused.stderr
