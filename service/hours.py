@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
@@ -12,6 +12,7 @@ from solver.contract import InvalidInput, Solver
 
 from . import problems, vocabulary
 from .errors import InvalidQuery, Wrong
+from .shapes.query import number_of
 
 __all__ = ["NAMES", "UNDER", "router", "timed"]
 
@@ -21,6 +22,8 @@ router = APIRouter(tags=["catalogue"])
 NAMES = ("hours", "under")
 #: How conditions are written.
 UNDER = "[a-z_]+:[A-Za-z0-9.+-]+(,[a-z_]+:[A-Za-z0-9.+-]+)*"
+#: What to do where a name is given twice.
+_ONCE = {"hours": "Give it once: each answer is of one stage.", "under": "Write conditions with commas between."}
 _HOURS = r"[0-9]+(\.[0-9]+)?(,[0-9]+(\.[0-9]+)?)*"
 
 
@@ -75,20 +78,51 @@ def timed(items: Sequence[tuple[str, str]], solver: Solver, preset: str | None =
     if not said:
         return kept
     given, symbol = dict(said), solver.stages.symbol
-    if len(given) < len(said) or any(name == symbol for name, _ in kept):
-        raise InvalidQuery.of([Wrong("hours", f"stand beside {symbol}, or twice", f"Keep one of hours and {symbol}.")])
+    wrong = [Wrong(name, "is given more than once", _ONCE[name]) for name in given if _is_twice(name, said)]
+    hours = number_of(given.get("hours", ""))
+    beside = any(name == symbol for name, _ in kept)
+    if "hours" in given and beside:
+        wrong.append(Wrong("hours", f"stands beside {symbol}", f"Keep one of hours and {symbol}."))
+    elif beside:
+        advice = f"Give hours= in place of {symbol}, or leave under out."
+        wrong.append(Wrong("under", "says how hours are spent, and there are none", advice))
+    elif hours is None:
+        detail = f"{given['hours'][:40]!r} is not a number of hours" if "hours" in given else "is missing"
+        wrong.append(Wrong("hours", detail, "Write it like hours=48."))
+    if wrong or hours is None:
+        raise InvalidQuery.of(wrong)
+    under = _conditions(given.get("under", ""))
     try:
-        hours = float(given.get("hours", ""))
-    except ValueError:
-        raise InvalidQuery.of([Wrong("hours", "is not a number of hours", "Write it like hours=48.")]) from None
-    try:
-        (stage,) = solver.stages_after([hours], _conditions(given.get("under", "")), preset)
+        (stage,) = solver.stages_after([hours], under, preset)
     except InvalidInput as error:
-        raise InvalidQuery.of([Wrong("under", error.message, error.advice or "")]) from None
+        name, advice = _blamed(solver, under, preset), error.advice or "Write it like under=temperature:60."
+        raise InvalidQuery.of([Wrong(name, error.message.rstrip("."), advice)]) from None
     return [*kept, (symbol, repr(stage))]
 
 
+def _is_twice(name: str, items: Sequence[tuple[str, str]]) -> bool:
+    return sum(name == other for other, _ in items) > 1
+
+
+def _blamed(solver: Solver, under: Mapping[str, str], preset: str | None) -> str:
+    """Return which parameter to change: the hours, where those conditions know a stage after none of them."""
+    try:
+        solver.stages_after([0.0], under, preset)
+    except InvalidInput:
+        return "under" if solver.clock else "hours"
+    return "hours"
+
+
 def _conditions(text: str) -> dict[str, str]:
-    """Return conditions by name; numbers stay text, which their model reads."""
-    pairs = (part.partition(":") for part in text.split(",") if part)
-    return {name: value for name, _, value in pairs}
+    """Return conditions by name; numbers stay text, which their model reads.
+
+    Raises:
+        InvalidQuery: one is named twice.
+
+    """
+    pairs = [part.partition(":")[::2] for part in text.split(",") if part]
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        twice = next(name for name in found if sum(name == other for other, _ in pairs) > 1)
+        raise InvalidQuery.of([Wrong("under", f"{twice[:40]} is given more than once", "Give it once.")])
+    return found

@@ -25,6 +25,7 @@ from solver import contract
 from store import errors as stored
 
 from . import errors
+from .limits import findings
 
 __all__ = [
     "MEDIA_TYPE",
@@ -221,14 +222,7 @@ async def _known(request: Request, error: Exception) -> Response:
 async def _validation(request: Request, error: Exception) -> Response:
     """List every wrong value of a body or path that FastAPI validated."""
     assert isinstance(error, RequestValidationError)
-    wrong = []
-    for item in error.errors():
-        name = ".".join(str(part) for part in item["loc"][1:]) or str(item["loc"][0])
-        detail = str(item["msg"]).removeprefix("Value error, ")
-        if isinstance(item.get("input"), str | int | float):
-            detail += f" (got {item['input']!r})"
-        wrong.append(errors.Wrong(name, detail))
-    return of(errors.InvalidQuery.of(wrong), request.scope)
+    return of(errors.InvalidQuery.of(findings.wrong(error.errors(), error.body)), request.scope)
 
 
 async def _http(request: Request, error: Exception) -> Response:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from .errors import ReadOnlyStore
 
-__all__ = ["ROOT", "check_own", "own_or_starter"]
+__all__ = ["ROOT", "check_own", "is_starter", "own_or_starter"]
 
 #: The store in the package. Read only.
 ROOT = Path(__file__).parent / "starter"
@@ -20,6 +20,11 @@ def own_or_starter(root: Path | None) -> Path:
     return root if root is not None and (root / "shards").is_dir() else ROOT
 
 
+def is_starter(root: Path) -> bool:
+    """Return whether `root` is the store in the package."""
+    return root.resolve() == ROOT.resolve()
+
+
 def check_own(root: Path) -> None:
     """Refuse to write into the package.
 
@@ -27,7 +32,7 @@ def check_own(root: Path) -> None:
         ReadOnlyStore: `root` is the starter's.
 
     """
-    if root.resolve() == ROOT.resolve():
+    if is_starter(root):
         raise ReadOnlyStore(
             "the table that comes with wizen takes nothing new.", "Name a store of your own with --store DIR."
         )

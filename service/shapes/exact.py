@@ -12,14 +12,16 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import Response
 
-from solver.contract import Need, Start
+from solver.contract import InvalidInput, Need, Start
 from store.errors import TooUncertain
 from store.families.stored import document, refusal
+from store.starter import is_starter
 from sweeps.commands.terminal.tables import run_command
 
 from ..errors import OutsideRanges, Uncertain
 from ..jobs.submit import asker_of, submit
 from ..security import authorize, bearer
+from ..settings import Settings
 from ..views.addresses import link
 from .asking import Asked
 
@@ -32,6 +34,8 @@ RESPONSE: dict[str, Any] = {
 }
 
 _OFFER = "With exact=run and a token of the scope run, the service runs exactly this."
+#: The tables that come with wizen take no results.
+_BY_HAND = "Run it by the command under links: this service stores nothing new."
 
 #: Parameters that a refusal tells one by one.
 _MANY = 3
@@ -39,15 +43,9 @@ _MANY = 3
 
 def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain) -> OutsideRanges | Uncertain:
     """Return a refusal that says which table is the nearest, and how the shape can be run."""
-    advice = f"{error.advice} {_OFFER}".strip()
-    kept = [(name, text) for name, text in request.query_params.multi_items() if name != "exact"]
-    said = {name: value for name, value in asked.query.said.items() if name != asked.words.stage}
-    command = run_command(asked.solver.name, asked.found.preset, said, asked.query.stage)
-    links = {
-        "exact": f"{link(request.scope['path'].removesuffix('/info'))}?{urlencode([*kept, ('exact', 'run')])}",
-        "command": command,
-    }
-    more: dict[str, Any] = {"links": links}
+    links, offer = _ways(request, asked)
+    advice = f"{error.advice} {offer}".strip()
+    more: dict[str, Any] = {"links": links} if links else {}
     message = error.message
     if asked.found.fits:
         near = asked.found.fits[0]
@@ -55,12 +53,30 @@ def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain)
         if len(near.misses) + len(near.unusual) > _MANY:
             # refusals one by one would lead, together, to another fruit
             whole = refusal(asked.found.fits)
-            message, advice = whole.message, f"{whole.advice} {_OFFER}"
+            message, advice = whole.message, f"{whole.advice} {offer}"
         else:
             advice = f"The nearest table is {near.info.name!r}, {near.distance:.3g} away. {advice}"
     if isinstance(error, OutsideRanges):
         return OutsideRanges(message, advice=advice, wrong=error.wrong, more=more)
     return Uncertain(error.message, advice=advice, more=more)
+
+
+def _ways(request: Request, asked: Asked) -> tuple[dict[str, str], str]:
+    """Return the ways to a run of a question by their names, and which to go in words; none where no run can be."""
+    try:
+        params, preset = _run(asked)
+        values = asked.solver.parse(params, preset)
+        asked.solver.settle(_need(asked), preset, (values,))
+    except InvalidInput as error:
+        return {}, f"No run can be like that either: {error}"
+    said = {name: value for name, value in asked.query.said.items() if name != asked.words.stage}
+    links = {"command": run_command(asked.solver.name, asked.found.preset, said, asked.query.stage)}
+    settings: Settings = request.app.state.settings
+    if is_starter(settings.store):
+        return links, _BY_HAND
+    kept = [(name, text) for name, text in request.query_params.multi_items() if name != "exact"]
+    address = link(request.scope["path"].removesuffix("/info"))
+    return {"exact": f"{address}?{urlencode([*kept, ('exact', 'run')])}", **links}, _OFFER
 
 
 def redirect(request: Request, asked: Asked) -> Response:
@@ -76,9 +92,8 @@ def redirect(request: Request, asked: Asked) -> Response:
         TooCostly, QueueFull, ReadOnlyStore: as for any job.
 
     """
-    need = Need(stages=(asked.query.stage,), quality="default")
     params, preset = _run(asked)
-    return _sent(request, asked, params, need, preset)
+    return _sent(request, asked, params, _need(asked), preset)
 
 
 def relax(request: Request, asked: Asked) -> Response:
@@ -113,6 +128,16 @@ def _sent(request: Request, asked: Asked, params: Mapping[str, Any], need: Need,
     if found.job.state == "done":
         location += f"/result?{urlencode({'format': asked.chosen.name})}"
     return Response(status_code=303, headers={"Location": location, "Cache-Control": "no-store"})
+
+
+def _need(asked: Asked) -> Need:
+    """Return what is needed of the run of a question.
+
+    Raises:
+        InvalidInput: no run has such a stage.
+
+    """
+    return Need(stages=(asked.query.stage,), quality="default")
 
 
 def _run(asked: Asked) -> tuple[Mapping[str, Any], str | None]:

@@ -175,7 +175,7 @@ def _off(name: str, number: float, words: Words, numbers: Mapping[str, float]) -
     slack = _SLACK * (high - low)
     if low - slack <= number <= high + slack:
         return []
-    return [Wrong(name, f"{number:g} is off the table's {words.say(name)}", f"Take {name} from {words.say(name)}.")]
+    return [Wrong(name, f"{number:.9g} is off the table's {words.say(name)}", f"Take {name} from {words.say(name)}.")]
 
 
 def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:
@@ -226,6 +226,8 @@ def _max_error(text: str, words: Words) -> dict[str, float] | Wrong:
     limits = {name or "rgh": float(value) for name, _, value in pairs} if re.fullmatch(LIMITS, text) else {}
     if not limits or not all(map(math.isfinite, limits.values())):
         return Wrong("max_error", f"{text[:40]!r} limits no error", advice)
+    if len(limits) < len(pairs):
+        return Wrong("max_error", f"{text[:40]!r} limits a measure twice", "Limit each measure once.")
     return limits
 
 

@@ -127,9 +127,11 @@ class Solver:
         """Return the stages after hours under conditions, those of a preset if one is named.
 
         Raises:
-            InvalidInput: this solver knows no hours, or not under these conditions.
+            InvalidInput: this solver knows no hours, or not under these conditions, or has no such preset.
 
         """
+        if preset is not None and preset not in self.presets:
+            self.parse({}, preset)  # says which there are
         if self.clock is None:
             raise InvalidInput(
                 f"{self.name} does not turn hours into stages.",

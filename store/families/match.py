@@ -85,7 +85,8 @@ def apart(a: Any, b: Any) -> float:
     """Return the distance of two values of a parameter."""
     if not (_is_number(a) and _is_number(b)):
         return 0.0 if same(a, b) else 1.0
-    return abs(math.log(a / b)) if a > 0 and b > 0 else abs(a - b)
+    # not of a / b, which is nothing or infinite where the numbers are far enough apart
+    return abs(math.log(a) - math.log(b)) if a > 0 and b > 0 else abs(a - b)
 
 
 def compare(

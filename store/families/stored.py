@@ -105,7 +105,7 @@ def describe(miss: Miss, info: TableInfo) -> tuple[str, str]:
     """Return what is wrong with a parameter that a table does not hold, and what to change."""
     if miss.reach is not None:
         span = f"{miss.reach[0]:g} to {miss.reach[1]:g}"
-        return f"{_said(miss.asked)} is off the table's {span}", f"Take {miss.name} from {span}."
+        return f"{_said(miss.asked, 9)} is off the table's {span}", f"Take {miss.name} from {span}."
     if miss.name in info.tied:
         lead = info.tied[miss.name].leader
         detail = f"goes with {lead} in this table: {_said(miss.held)} there, not {_said(miss.asked)}"
@@ -118,7 +118,7 @@ def refusal(fits: Sequence[Fit]) -> OutsideTable:
     """Return the refusal of a question that no family holds; `fits` has the nearest first."""
     near = fits[0]
     said = [
-        f"{miss.name} = {_said(miss.asked)} ("
+        f"{miss.name} = {_said(miss.asked, 9)} ("
         + (f"holds {miss.reach[0]:g} to {miss.reach[1]:g}" if miss.reach else f"holds {_said(miss.held)}")
         + ")"
         for miss in (*near.misses, *near.unusual)
@@ -144,5 +144,6 @@ def document(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _said(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
+def _said(value: Any, digits: int = 4) -> str:
+    # what was asked for is told as it was: off by the last of few digits, it would read like what is held
+    return f"{value:.{digits}g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

@@ -235,16 +235,19 @@ def _limits(text: str | None) -> dict[str, float] | None:
     """Return the limits by measure that `0.05` (of the roughness) or `rgh:0.05,dB:1.5` set.
 
     Raises:
-        InvalidOption: the text sets none.
+        InvalidOption: the text sets none, or one of a measure twice.
 
     """
     if text is None:
         return None
     pairs = [part.rpartition(":") for part in text.split(",")]
     try:
-        return {name or "rgh": float(value) for name, _, value in pairs}
+        limits = {name or "rgh": float(value) for name, _, value in pairs}
     except ValueError:
         raise InvalidOption(f"--max-error {text}: limits no error.", "Write 0.05, or rgh:0.05,dB:1.5.") from None
+    if len(limits) < len(pairs):
+        raise InvalidOption(f"--max-error {text}: limits a measure twice.", "Limit each measure once.")
+    return limits
 
 
 def _document(shape: Any) -> dict[str, Any]:

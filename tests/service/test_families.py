@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from store import starter, tables
 from store.store import Store
 
 from ..store.conftest import displacement, fill
+from ._asking import checked
 from ._jobs import bearer
 from .conftest import SHAPE, client_of
 
@@ -85,6 +87,43 @@ def test_what_no_family_holds_names_the_nearest_and_the_run(
     job = next(job for job in store.ledger.jobs() if run.headers["location"].endswith(job.key))
     assert (job.params["exocarp_thickness"], job.params["radii"]) == (0.03, list(RAISIN["radii"]))
     assert job.params["mirrors"] == "xz"  # the table holds that fruit: the run goes with its samples
+
+
+@pytest.mark.parametrize("said", [{"gamma": "5e-324"}, {"te": "1e308"}, {"te": "-1e308"}])
+def test_numbers_at_the_end_of_all_numbers_are_off_the_table(client: httpx.Client, said: dict[str, str]) -> None:
+    problem = checked(client.get(SHAPE, params={"preset": "raisin", "s": 0.2, **said}), 422, "outside-table")
+    (name,) = said
+    asked, nearest, distance = problem["nearest"]["parameters"][name].values()
+    assert asked == float(said[name])
+    assert nearest > 0
+    assert distance <= problem["nearest"]["distance"] < math.inf
+
+
+@pytest.mark.parametrize("said", [{"te": -1}, {"te": 0.5}, {"s": 10}, {"te": 0.005, "rs1": 0.99}])
+def test_no_run_is_offered_of_what_no_fruit_can_be(
+    client: httpx.Client, allowed: dict[str, str], said: dict[str, Any]
+) -> None:
+    asked = {"preset": "raisin", "s": 0.2, **said}
+    problem = checked(client.get(SHAPE, params=asked), 422, "outside-table")
+    assert "links" not in problem
+    assert "exact=run" not in problem["advice"]
+    run = client.get(SHAPE, params={**asked, "exact": "run"}, headers=allowed, follow_redirects=False).json()
+    why = f"{run['detail']} {run.get('advice', '')}".strip()
+    assert problem["advice"].endswith(f"No run can be like that either: {why}")
+
+
+def test_the_package_offers_the_command_alone() -> None:
+    with client_of(starter.ROOT) as client:
+        problem = checked(client.get(SHAPE, params={"preset": "raisin", "te": 0.05, "s": 0.2}), 422, "outside-table")
+    assert set(problem["links"]) == {"command"}
+    assert "exact=run" not in problem["advice"]
+    assert "command" in problem["advice"]
+
+
+def test_what_lies_just_off_a_table_is_told_in_all_its_digits(client: httpx.Client) -> None:
+    problem = checked(client.get(SHAPE, params={"preset": "raisin", "s": 0.3000001}), 422, "outside-table")
+    assert "0.3000001" in problem["detail"]
+    assert "--stages 0.3000001 " in problem["links"]["command"]
 
 
 def test_a_fruit_that_no_table_has_is_run_whole(client: httpx.Client, house: Path, allowed: dict[str, str]) -> None:

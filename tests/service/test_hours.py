@@ -31,6 +31,7 @@ def test_hours_become_stages(client: httpx.Client) -> None:
     [
         ("dehydration", {"hours": "30", "preset": "raisin", "under": "temperature:60"}, 422, "invalid-input"),
         ("dehydration", {"hours": "30"}, 422, "invalid-input"),
+        ("dehydration", {"hours": "30", "preset": "raisn", "under": "kinetics:grape"}, 422, "invalid-input"),
         ("growth", {"hours": "30"}, 422, "invalid-input"),
         ("dehydration", {"hours": "soon"}, 422, "invalid-query"),
         ("nothing", {"hours": "30"}, 404, "unknown-solver"),
@@ -62,3 +63,34 @@ def test_a_shape_after_hours_is_the_shape_of_its_stage(client: httpx.Client) -> 
 def test_a_shape_after_hours_that_nobody_measured_is_refused(client: httpx.Client, query: dict[str, object]) -> None:
     problem = checked(client.get(SHAPE, params={**POINT, **query}), 422, "invalid-query")
     assert {wrong["name"] for wrong in problem["errors"]} <= {"hours", "under"}
+
+
+@pytest.mark.parametrize(
+    ("query", "wrong"),
+    [
+        ([("hours", "48"), ("s", "0.2")], {"hours": "stands beside s"}),
+        ([("under", "kinetics:grape"), ("s", "0.2")], {"under": "says how hours are spent, and there are none"}),
+        ([("under", "kinetics:grape")], {"hours": "is missing"}),
+        ([("hours", "24"), ("hours", "48")], {"hours": "is given more than once"}),
+        (
+            [("hours", "24"), ("under", "kinetics:grape"), ("under", "diameter:9")],
+            {"under": "is given more than once"},
+        ),
+        ([("hours", "nan"), ("under", "kinetics:grape")], {"hours": "'nan' is not a number of hours"}),
+        ([("hours", "1e400"), ("under", "kinetics:grape")], {"hours": "'1e400' is not a number of hours"}),
+        ([("hours", "-1"), ("under", "kinetics:grape")], {"hours": "hours = -1 h is outside of what was measured"}),
+        ([("hours", "48"), ("under", "kinetics:plum")], {"under": "kinetics: Input should be"}),
+        ([("hours", "48"), ("under", "kinetics:grape,kinetics:page")], {"under": "kinetics is given more than once"}),
+        ([("hours", "48"), ("under", "kinetic:grape")], {"under": "unknown name 'kinetic'"}),
+    ],
+)
+def test_the_parameter_that_has_to_change_is_named_with_what_to_change(
+    client: httpx.Client, query: list[tuple[str, str]], wrong: dict[str, str]
+) -> None:
+    asked = [*POINT.items(), *query]
+    problem = checked(client.get(SHAPE, params=asked), 422, "invalid-query")
+    assert {item["name"] for item in problem["errors"]} == set(wrong)
+    for item in problem["errors"]:
+        assert item["detail"].startswith(wrong[item["name"]])
+        assert item["advice"]
+    assert ".." not in problem["detail"]

@@ -117,6 +117,8 @@ def test_outside_the_hull_is_said(tmp_path: Path) -> None:
         ({"max_error": "nan"}, "max_error", "Write it like 0.05"),
         ({"max_error": "1e999"}, "max_error", "Write it like 0.05"),
         ({"max_error": "rough:1"}, "max_error", "measures: rgh, dB, W1"),
+        ({"max_error": "rgh:0.01,dB:3,rgh:9"}, "max_error", "each measure once"),
+        ({"max_error": "0.01,rgh:9"}, "max_error", "each measure once"),
         ({"exact": "yes"}, "exact", "exact=run"),
         ({"max_eror": "1"}, "max_eror", "Did you mean 'max_error'"),
     ],

@@ -50,6 +50,19 @@ def chosen(families: Families, said: dict[str, Any], preset: str | None = None, 
     return None if fit is None else fit.info.name
 
 
+@pytest.mark.parametrize("number", [5e-324, 1e-308, 1e308])
+def test_numbers_that_no_quotient_holds_are_a_finite_distance_apart(families: Families, number: float) -> None:
+    # gamma: 5e-324 / 5 is 0, and 1e308 / 0.02 for te infinite
+    for name, others in (("gamma", {"te": 0.01}), ("te", {"gamma": 10.0})):
+        fits = families.nearest({name: number, **others}, 0.2, "raisin")
+        distances = [fit.distance for fit in fits]
+        assert distances == sorted(distances)
+        for fit in fits:
+            (miss,) = (miss for miss in fit.misses if miss.name == name)
+            assert miss.distance == pytest.approx(abs(math.log(number) - math.log(miss.held)), rel=1e-12)
+            assert miss.distance <= fit.distance < miss.distance + 5
+
+
 def test_the_table_is_the_one_that_holds_the_fruit(families: Families) -> None:
     assert chosen(families, {"te": 0.035, "gamma": 20.0}) == "sphere"
     assert chosen(families, {}, "raisin") == "raisin"

@@ -94,6 +94,7 @@ def test_query_by_a_method_within_an_error(table: Path) -> None:
     assert said["method"] == "idw"
     assert "there is no look-up method 'kriging'" in wizen(*query, "--method", "kriging").stderr
     assert "limits no error" in wizen(*query, "--max-error", "rgh:little").stderr
+    assert "limits a measure twice" in wizen(*query, "--max-error", "0.01,rgh:9").stderr
     refused = wizen(*query, "--method", "idw", "--max-error", "0.5")
     assert refused.exit_code != 0
     assert "does not say how far" in refused.stderr
@@ -145,5 +146,9 @@ def test_presets_and_what_the_package_covers(tmp_path: Path) -> None:
     assert far.exit_code != 0
     assert "no table holds this; the nearest is" in far.stderr
     assert "wizen solve dehydration --preset raisin --set te=0.1 --stages 0.2" in far.stderr
+    off = wizen("query", "--preset", "raisin", "--stages", "10")
+    assert off.exit_code == 2
+    assert "stage 10 lies outside s = -0.3 to 0.6" in off.stderr
+    assert "wizen solve" not in off.stderr
     unknown = wizen("table", "plan", "nowhere")
     assert "there is no table 'nowhere'" in unknown.stderr

@@ -42,13 +42,14 @@ def asked_table(
 
     Raises:
         InvalidOption: tables of several solvers are there, and none is chosen.
-        InvalidInput: there is no such preset, or no fruit can be like that.
+        InvalidInput: there is no such preset, no fruit can be like that, or no run has that stage.
         OutsideTable: no table holds what is asked; which is the nearest, and what differs.
         StaleTable: the table is of another version of the solver.
         UnknownTable, CorruptTable, MissingStore: there is no such table, it is damaged, or there is no store.
 
     """
     from solver import registry
+    from solver.contract import Need
     from store.errors import OutsideTable
     from store.families import stored
     from store.lookup import ShapeTable
@@ -61,7 +62,9 @@ def asked_table(
     if name is None:
         fit = families.choose(said, stage, preset)
         if fit is None and (preset is not None or len(families.infos) > 1):
-            chosen.parse(said, preset)  # what no fruit can be is said before what no table holds
+            # what no fruit can be is said before what no table holds
+            values = chosen.parse(said, preset)
+            chosen.settle(Need(stages=() if stage is None else (stage,)), preset, (values,))
             error = stored.refusal(families.nearest(said, stage, preset))
             raise OutsideTable(
                 error.message, f"{error.advice} To run it: {run_command(chosen.name, preset, said, stage)}"
@@ -95,8 +98,8 @@ def run_command(solver: str, preset: str | None, said: Mapping[str, Any], stage:
     words = ["wizen", "solve", solver, *(["--preset", preset] if preset else [])]
     for name, value in said.items():
         shown = ",".join(map(str, value)) if isinstance(value, list | tuple) else value
-        words += ["--set", f"{name}={f'{value:g}' if isinstance(value, float) else shown}"]
-    return shlex.join([*words, *([] if stage is None else ["--stages", f"{stage:g}"]), "--out", "shape.h5"])
+        words += ["--set", f"{name}={f'{value:.15g}' if isinstance(value, float) else shown}"]
+    return shlex.join([*words, *([] if stage is None else ["--stages", f"{stage:.15g}"]), "--out", "shape.h5"])
 
 
 def _only_solver(store: Store) -> str:
