@@ -24,8 +24,8 @@ from starlette.types import Scope
 from solver import contract
 from store import errors as stored
 
-from . import errors
-from .limits import findings
+from .. import errors
+from . import findings
 
 __all__ = [
     "MEDIA_TYPE",
