@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sweeps.commands.cli import app
-from sweeps.commands.terminal import watchdog
+from sweeps.commands.terminal import kernels, watchdog
 from sweeps.commands.terminal.console import emit, note
 from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
@@ -221,7 +221,8 @@ def main() -> None:
     """Run the command line."""
     watchdog.guard()
     try:
-        app()
+        with kernels.kept():
+            app()
     finally:
         watchdog.leave()
 

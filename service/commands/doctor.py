@@ -30,6 +30,7 @@ from store.errors import NetworkFileSystem, StoreError
 from store.ledger.database import readable
 from store.ledger.filesystem import filesystem, refuse_network
 from store.store import Store
+from sweeps.commands.terminal import kernels
 
 from ..settings import Settings
 
@@ -107,15 +108,14 @@ def _kernels() -> Finding:
     import llvmlite.binding
     import numba
 
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    place = Path(chosen) if chosen else Path(__file__).resolve().parents[2] / "solver"
+    place = kernels.place()
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     processor = os.environ.get("NUMBA_CPU_NAME") or llvmlite.binding.get_host_cpu_name()
     said = f"compiled for {processor}, {cores} cores, {numba.get_num_threads()} threads"
-    if os.access(place if place.exists() else place.parent, os.W_OK):
+    if place is not None:
         return Finding("kernels", "good", f"{said}, kept in {place}")
     advice = "Set NUMBA_CACHE_DIR to a directory that lasts, or each process compiles anew, a minute or more."
-    return Finding("kernels", "note", f"{said}; {place} may not be written", advice)
+    return Finding("kernels", "note", f"{said}; no directory may be written to keep it", advice)
 
 
 def _memory() -> Finding:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import httpx
@@ -28,7 +29,10 @@ def drain(store: Store) -> int:
         return run_queue(store, workers, threading.Event(), patience=0)
 
 
-def events(client: httpx.Client, url: str, last: str = "") -> list[dict[str, Any]]:
+def events(
+    client: httpx.Client, url: str, last: str = "", then: Callable[[dict[str, Any]], object] = lambda event: None
+) -> list[dict[str, Any]]:
+    """Return all events of a job until it ends; `then` hears of each as it comes."""
     found: list[dict[str, Any]] = []
     with client.stream("GET", url, headers={"Last-Event-ID": last} if last else {}) as answer:
         if answer.status_code == 204:
@@ -41,4 +45,5 @@ def events(client: httpx.Client, url: str, last: str = "") -> list[dict[str, Any
                 entry[name] = value
             elif name == "data":
                 found.append({**entry, "job": json.loads(value)})
+                then(found[-1])
     return found

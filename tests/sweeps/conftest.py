@@ -21,6 +21,16 @@ class Solves:
     def __init__(self, path: Path) -> None:
         self._path = path
 
+    def hold(self, after: int) -> None:
+        """Let jobs with `trouble = "waits"` wait from so many solves on."""
+        self._hold().write_text(str(after))
+
+    def let_go(self) -> None:
+        self._hold().unlink(missing_ok=True)
+
+    def _hold(self) -> Path:
+        return Path(f"{self._path}.hold")
+
     def lines(self) -> list[str]:
         return self._path.read_text().splitlines() if self._path.exists() else []
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import ClassVar
 
@@ -28,7 +29,7 @@ class ShrinkingParams(Fruit):
 
     modulus_ratio: float = Field(10.0, ge=1, le=1000, description="of no consequence here")
     pause: float = Field(0.0, ge=0, description="Seconds that a stage takes")
-    trouble: str = Field("", description="What goes wrong: diverges, refuses, crashes, kills, hangs, once")
+    trouble: str = Field("", description="What goes wrong: diverges, refuses, crashes, kills, hangs, once, waits")
 
 
 def _count(word: str) -> int:
@@ -50,7 +51,19 @@ def _run(params: ShrinkingParams, need: Need, context: Context) -> xr.Dataset:
             context.check_cancelled()
             time.sleep(0.01)
         context.report((i + 1) / len(need.stages), f"stage {i}")
+        if params.trouble == "waits" and i == 0:
+            _wait(context)
     return _result(params, need, need.stages)
+
+
+def _wait(context: Context) -> None:
+    """Wait while `$SHRINKING_LOG.hold` names fewer solves than have begun: no test hangs on their seconds."""
+    log = os.environ["SHRINKING_LOG"]
+    begun, hold = len(Path(log).read_text().splitlines()), Path(f"{log}.hold")
+    with suppress(FileNotFoundError):  # it is gone: go on
+        while int(hold.read_text()) < begun:
+            context.check_cancelled()
+            time.sleep(0.01)
 
 
 def _trouble(params: ShrinkingParams, need: Need, context: Context, times: int) -> None:

@@ -289,7 +289,8 @@ def test_no_traceback_unless_asked(monkeypatch: pytest.MonkeyPatch, shrinking: S
 
 def test_ctrl_c_stops_and_the_same_command_goes_on(shrinking: Solves, tmp_path: Path, write_plan: Write) -> None:
     """A real process, a real SIGINT, two worker processes; stdout stays one JSON document."""
-    plan, root = write_plan(more="pause = 0.4"), tmp_path / "store"
+    plan, root = write_plan(more='trouble = "waits"'), tmp_path / "store"
+    shrinking.hold(3)
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ['PYTHONPATH']}"}
     command = [sys.executable, "-m", "service.cli", "sweep", str(plan), "--store", str(root), "--json"]
     running = subprocess.Popen(
@@ -317,6 +318,7 @@ def test_ctrl_c_stops_and_the_same_command_goes_on(shrinking: Solves, tmp_path: 
         assert said["solved"] == solved
         assert store.ledger.counts()["running"] == 0
         assert store.ledger.counts()["wanted"] == 6 - solved
+    shrinking.let_go()
     result = wizen("sweep", plan, "--store", root, "--json")
     assert document(result)["reused"] == solved
 

@@ -251,13 +251,15 @@ def test_killing_everything_loses_nothing_reported(
     shrinking: Solves, tmp_path: Path, write_plan: Write, store: Store
 ) -> None:
     """Kill the sweep and all its workers in the middle; no shard that was reported is computed again."""
-    path = write_plan("[0.01, 0.02, 0.03, 0.04, 0.05]", more="pause = 0.15")
+    path = write_plan("[0.01, 0.02, 0.03, 0.04, 0.05]", more='trouble = "waits"')
+    shrinking.hold(5)
     running = start(sweep_script(tmp_path), path, store)
     wait_until(lambda: store.ledger.counts()["done"] >= 3)
     os.killpg(running.pid, signal.SIGKILL)
     running.wait()
     reported, before = {job.key for job in store.ledger.jobs("done")}, len(shrinking)
     assert 3 <= len(reported) < 10
+    shrinking.let_go()
     with executors.serial() as workers:
         report = run_plan(Plan.load(path), store, workers)
     assert report.complete

@@ -117,7 +117,8 @@ def test_what_was_suspended_past_its_lease_comes_too_late(
     shrinking: Solves, tmp_path: Path, store: Store, write_plan: Write
 ) -> None:
     """Two runners, one of them stopped by SIGSTOP until its lease has run out, and woken: one result, no strife."""
-    path = write_plan("[0.03]", "[10]", "pause = 2")
+    path = write_plan("[0.03]", "[10]", 'trouble = "waits"')
+    shrinking.hold(0)
     script = tmp_path / "run.py"
     script.write_text(
         "import sys\nfrom store.store import Store\nfrom sweeps.running import executors, runner\n"
@@ -135,6 +136,7 @@ def test_what_was_suspended_past_its_lease_comes_too_late(
     first.send_signal(signal.SIGSTOP)
 
     def wake(event: Event) -> None:
+        shrinking.let_go()
         first.send_signal(signal.SIGCONT)  # the job is ours by now: the first one's lease has run out
 
     with executors.serial() as workers:

@@ -120,7 +120,7 @@ def test_nobody_waits_for_a_service_that_does_not_answer(parts: Any) -> None:
         start = time.monotonic()
         work.begin("maps", service.maps, said.append, said.append)
         assert work.settle() == 0
-        assert time.monotonic() - start < 2
+        assert time.monotonic() - start < 25  # a call that waited would have waited for 30 s
         assert work.busy == 1
         work.forget()
     with pytest.raises(parts["client"].Refused, match="wizen serve"):
