@@ -31,6 +31,8 @@ __all__ = ["exr", "png", "png_zip"]
 
 #: Time of files in an archive: the same bytes for the same result.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
+#: What has the fields of surfaces whose triangles change.
+_INSTEAD = "Ask for ply, ply-zip, usdc or animation: these hold fields by vertex."
 #: How far a share may be beyond 0 or 1 by rounding.
 _ROUND_OFF = 1e-5
 
@@ -58,7 +60,7 @@ def png(sequence: Sequence, options: Options) -> bytes:
         InvalidQuery: there is no such field, or the range is empty.
 
     """
-    sequence = sequence.unwrapped()
+    sequence = sequence.unwrapped(_INSTEAD)
     fields = _fields(sequence)
     name = _named(fields, options) or next(iter(fields))
     return _png(sequence, name, fields[name], _range(name, [fields[name]], options), options.size)
@@ -75,7 +77,7 @@ def png_zip(sequence: Sequence, options: Options) -> bytes:
         InvalidQuery: there is no such field, or the range is empty.
 
     """
-    sequence = sequence.unwrapped()
+    sequence = sequence.unwrapped(_INSTEAD)
     ones = [replace(sequence, indices=(index,)) for index in sequence.indices]
     sets = [_fields(one) for one in ones]
     only = _named(sets[0], options)
@@ -142,7 +144,7 @@ def exr(sequence: Sequence, options: Options) -> bytes:
         Unavailable: OpenEXR is not installed.
 
     """
-    sequence = sequence.unwrapped()
+    sequence = sequence.unwrapped(_INSTEAD)
     fields = _fields(sequence)
     only = _named(fields, options)
     if only is not None:

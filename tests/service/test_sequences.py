@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import zipfile
 from pathlib import Path
@@ -15,7 +16,7 @@ import xarray as xr
 from pxr import Usd, UsdGeom
 
 from service.errors import InvalidQuery, UnfitFormat
-from service.sequences import STILLS, Options, Sequence, of_run, prepared
+from service.sequences import EXPORTS, STILLS, Options, Sequence, of_run, prepared
 from solver import registry
 from solver.fruit import lattice
 from sweeps.pictures import colours
@@ -66,6 +67,16 @@ def test_changing_triangles_have_no_cache(name: str) -> None:
         made(splitting(), name)
     assert "usdc" in caught.value.advice
     assert made(splitting(), name, stage=2.0)
+
+
+@pytest.mark.parametrize("name", ["exr", "png", "png-zip", "usdz", "pc2", "mdd"])
+def test_what_is_advised_where_triangles_change_can_be_had(name: str) -> None:
+    with pytest.raises(UnfitFormat) as caught:
+        made(splitting(), name)
+    named = [other for other in EXPORTS if re.search(rf"\b{other}\b(?!-)", caught.value.advice)]
+    assert named
+    for other in named:
+        assert made(splitting(), other)
 
 
 # --- USD, by its own library -------------------------------------------------------------------------------------
