@@ -14,7 +14,7 @@ __all__ = ["QUANTITIES", "Quantity", "attrs", "register", "unit_attrs"]
 class Quantity(NamedTuple):
     """Units, long name and symbol of one variable; `volatile` ones differ between identical runs (wall time).
 
-    `share`: it runs from 0 to 1 by its meaning, so pictures of it need no other range.
+    `share`: it runs from 0 to 1 by its meaning, so pictures of it need no other range unless it goes beyond.
     """
 
     units: str

@@ -154,16 +154,20 @@ def _format(name: str | None, out: Path | None, result: str) -> tuple[Export | N
     from ..sequences import EXPORTS
 
     known = [*EXPORTS, "obj"]
+    # every .glb is an animation, of one stage or more
+    name = "animation" if name == "glb" else name
     if out is None:
         if name not in known:
             raise InvalidOption("nothing says what to write.", "Name a file (--out x.glb) or a format (--format pc2).")
         out = Path(Path(result).stem + (EXPORTS[name].suffix if name in EXPORTS else ".obj"))
+    fits = [e.name for e in EXPORTS.values() if out.name.endswith(e.suffix)] or ["obj"] * (out.suffix == ".obj")
     if name is None:
-        fits = [e.name for e in EXPORTS.values() if out.name.endswith(e.suffix)]
-        name = fits[0] if fits else "obj" if out.suffix == ".obj" else "ply-zip" if out.suffix == ".zip" else out.suffix
+        name = fits[0] if fits else "ply-zip" if out.suffix == ".zip" else out.suffix
     if name not in known:
         suffixes = ", ".join([*(e.suffix for e in EXPORTS.values()), ".obj"])
         raise InvalidOption(f"cannot write {name!r}.", f"Formats: {', '.join(known)}; suffixes: {suffixes}.")
+    if fits and name not in fits:
+        raise InvalidOption(f"--out {out} is named as {fits[0]}, and --format says {name}.", "Leave one of them out.")
     if out.is_dir() or not out.absolute().parent.is_dir():
         raise InvalidOption(f"--out {out} is no place for a file.", "Name a file in a directory that exists.")
     return EXPORTS.get(name), out

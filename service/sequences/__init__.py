@@ -26,7 +26,8 @@ __all__ = ["EXPORTS", "STILLS", "Export", "Options", "Sequence", "of_run", "prep
 class Export(NamedTuple):
     """A format of results: its name, its media type and suffix, and what it asks of the result.
 
-    single: it holds one stage. kept: all stages must have the same triangles.
+    single: it holds one stage. kept: all stages must have the same triangles. laid: so must they, and in texture
+    coordinates, even where there is one stage.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Export(NamedTuple):
     encode: Callable[[Sequence, Options], bytes]
     single: bool = False
     kept: bool = False
+    laid: bool = False
 
 
 #: In order of growing preference, as for `service.formats.FORMATS`. Parameters of a media type tell apart what is the
@@ -43,14 +45,23 @@ class Export(NamedTuple):
 EXPORTS: Mapping[str, Export] = {
     e.name: e
     for e in (
-        Export("exr", "image/x-exr", ".exr", "OpenEXR map of one stage's fields", maps.exr, single=True),
-        Export("png", "image/png", ".png", "16-bit PNG map of one field of one stage", maps.png, single=True),
-        Export("png-zip", "application/zip; of=png", ".png.zip", "16-bit PNG maps, one set per stage", maps.png_zip),
+        Export("exr", "image/x-exr", ".exr", "OpenEXR map of one stage's fields", maps.exr, single=True, laid=True),
+        Export(
+            "png", "image/png", ".png", "16-bit PNG map of one field of one stage", maps.png, single=True, laid=True
+        ),
+        Export(
+            "png-zip",
+            "application/zip; of=png",
+            ".png.zip",
+            "16-bit PNG maps, one set per stage",
+            maps.png_zip,
+            laid=True,
+        ),
         Export("obj-zip", "application/zip; of=obj", ".obj.zip", "OBJ files, one per stage", text.obj_zip),
         Export("ply-zip", "application/zip; of=ply", ".ply.zip", "PLY files, one per stage", text.ply_zip),
         Export("usda", "model/vnd.usda", ".usda", "USD as text, sampled over time", usd.usda),
         Export("usdc", "model/vnd.usdc", ".usdc", "USD, sampled over time", usd.usdc),
-        Export("usdz", "model/vnd.usdz+zip", ".usdz", "USD with baked textures in one file", usdz.usdz),
+        Export("usdz", "model/vnd.usdz+zip", ".usdz", "USD with baked textures in one file", usdz.usdz, laid=True),
         Export("mdd", "application/x-mdd", ".mdd", "MDD vertex cache", caches.mdd, kept=True),
         Export("pc2", "application/x-pc2", ".pc2", "PC2 vertex cache", caches.pc2, kept=True),
         Export("ply", "model/x-ply", ".ply", "PLY of one stage, with colours and fields", text.ply, single=True),
@@ -105,10 +116,20 @@ def write(sequence: Sequence, export: Export, options: Options) -> bytes:
         Unavailable: the format's library is not installed.
 
     """
-    if export.kept and not sequence.kept and len(sequence) > 1:
-        others = ", ".join(e.name for e in EXPORTS.values() if not e.kept and not e.single)
+    if export.kept and not sequence.kept and len(sequence) > 1 and not _stays(sequence):
+        others = ", ".join(e.name for e in EXPORTS.values() if not (e.kept or e.single or e.laid))
         raise UnfitFormat(
             f"{export.name} moves vertices that stay, and this result's triangles change from stage to stage.",
             advice=f"Ask for one of {others}.",
         )
     return export.encode(sequence, options)
+
+
+def _stays(sequence: Sequence) -> bool:
+    """Return whether triangles that might have changed are the same at all stages: nothing was cut, or asked to be."""
+    bare = iter(replace(sequence, colour="none", observe=lambda share: None))
+    first = next(bare)
+    return all(
+        len(other.vertices) == len(first.vertices) and np.array_equal(other.triangles, first.triangles)
+        for other in bare
+    )

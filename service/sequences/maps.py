@@ -1,8 +1,8 @@
 """One stage's fields as pictures on the fruit's texture coordinates: 16-bit PNG of one, OpenEXR of all of them.
 
 PNG holds round(65535 (value - low) / (high - low)); low and high stand in the file's text `wizen`. Shares go from 0 to
-1 unless told otherwise, other fields over what they take on. EXR holds the values themselves, 32-bit float, a channel
-each, so it needs no range.
+1 unless told otherwise, or as far as they go beyond, as fresh nutrient does; other fields over what they take on. EXR
+holds the values themselves, 32-bit float, a channel each, so it needs no range.
 """
 
 from __future__ import annotations
@@ -31,6 +31,10 @@ __all__ = ["exr", "png", "png_zip"]
 
 #: Time of files in an archive: the same bytes for the same result.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
+#: What has the fields of surfaces whose triangles change.
+_INSTEAD = "Ask for ply, ply-zip, usdc or animation: these hold fields by vertex."
+#: How far a share may be beyond 0 or 1 by rounding.
+_ROUND_OFF = 1e-5
 
 
 def _fields(sequence: Sequence) -> dict[str, np.ndarray]:
@@ -56,7 +60,7 @@ def png(sequence: Sequence, options: Options) -> bytes:
         InvalidQuery: there is no such field, or the range is empty.
 
     """
-    sequence = sequence.unwrapped()
+    sequence = sequence.unwrapped(_INSTEAD)
     fields = _fields(sequence)
     name = _named(fields, options) or next(iter(fields))
     return _png(sequence, name, fields[name], _range(name, [fields[name]], options), options.size)
@@ -73,7 +77,7 @@ def png_zip(sequence: Sequence, options: Options) -> bytes:
         InvalidQuery: there is no such field, or the range is empty.
 
     """
-    sequence = sequence.unwrapped()
+    sequence = sequence.unwrapped(_INSTEAD)
     ones = [replace(sequence, indices=(index,)) for index in sequence.indices]
     sets = [_fields(one) for one in ones]
     only = _named(sets[0], options)
@@ -104,9 +108,10 @@ def _named(fields: dict[str, np.ndarray], options: Options) -> str | None:
 def _range(name: str, values: list[np.ndarray], options: Options) -> tuple[float, float]:
     """Return the values that are black and white."""
     known = QUANTITIES.get(name)
-    low, high = (0.0, 1.0)
-    if not (known and known.share):
-        low, high = float(min(v.min() for v in values)), float(max(v.max() for v in values))
+    low, high = float(min(v.min() for v in values)), float(max(v.max() for v in values))
+    if known and known.share:
+        # what is beyond would be cut off without a word; a last digit is not
+        low, high = (low if low < -_ROUND_OFF else 0.0), (high if high > 1 + _ROUND_OFF else 1.0)
     low, high = (low if options.low is None else options.low), (high if options.high is None else options.high)
     if high == low and options.low is None and options.high is None:
         high = low + 1  # a field that is the same everywhere is all black
@@ -139,7 +144,7 @@ def exr(sequence: Sequence, options: Options) -> bytes:
         Unavailable: OpenEXR is not installed.
 
     """
-    sequence = sequence.unwrapped()
+    sequence = sequence.unwrapped(_INSTEAD)
     fields = _fields(sequence)
     only = _named(fields, options)
     if only is not None:

@@ -33,7 +33,7 @@ def usdz(sequence: Sequence, options: Options) -> bytes:
         Unavailable: usd-core is not installed, or xatlas for a mesh without texture coordinates.
 
     """
-    sequence = sequence.unwrapped()
+    sequence = sequence.unwrapped("Ask for usdc: colours are those of the vertices.")
     if not sequence.coloured:
         raise UnfitFormat("textures need colours, and this result has none.", advice="Ask for usdc.")
     with tempfile.TemporaryDirectory(prefix="wizen-") as text:

@@ -147,8 +147,10 @@ class Sequence:
     def _stood(self) -> dict[int, Feet]:
         return {}
 
-    def unwrapped(self) -> Sequence:
+    def unwrapped(self, instead: str = "Leave textures out: colours are those of the vertices.") -> Sequence:
         """Return the sequence with texture coordinates: its own, or else such as xatlas lays out.
+
+        instead: what to do where its triangles change.
 
         Raises:
             UnfitFormat: its triangles change.
@@ -160,7 +162,7 @@ class Sequence:
         if not self.kept:
             raise UnfitFormat(
                 "textures need triangles that stay, and this result's change from stage to stage.",
-                advice="Leave textures out: colours are those of the vertices.",
+                advice=instead,
             )
         return replace(self, run=charts.laid(self.run))
 

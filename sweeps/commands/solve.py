@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InvalidOption
-from .terminal.console import emit
+from .terminal.console import emit, note
 from .terminal.grouped import grouped
 from .terminal.options import (
     As_json,
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
     from solver.contract import Need, Solver
     from solver.contract import Params as Parameters
+
+    from ..formats import Made
 
 __all__ = ["add_to"]
 
@@ -202,7 +205,27 @@ def _save(
         key=document["key"],
         cut=cut,
     )
-    outputs.save(out, made)
+    try:
+        outputs.save(out, made)
+    except Exception:
+        _keep(out, made)
+        raise
+
+
+def _keep(out: Path, made: Made) -> None:
+    """Write a whole run beside a file that it could not be written as: what took minutes is not lost."""
+    from store.errors import StorageFull
+
+    from .. import outputs
+
+    kept = out.with_name(f"{out.stem}-{made.key[:12]}.h5")
+    if out.suffix == kept.suffix:
+        return
+    # where a disk is full or a folder is closed, why the file itself failed is what counts
+    with suppress(OSError, StorageFull):
+        if not kept.exists():
+            outputs.save(kept, made)
+        note(f"the run is kept in {kept}: `wizen export {kept}` writes it otherwise")
 
 
 def _check_cut(cut: str, out: Path | None) -> None:

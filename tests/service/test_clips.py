@@ -40,3 +40,23 @@ def test_a_format_of_one_stage_still_refuses_several(tmp_path: Path) -> None:
     done = solved(tmp_path / "still.obj")
     assert done.exit_code != 0
     assert "holds one stage, not 3" in done.output
+
+
+def test_a_run_that_does_not_fit_its_file_is_kept(tmp_path: Path) -> None:
+    """Whether triangles stay is known when it is solved; what is refused then can be written as something else."""
+    pytest.importorskip("pxr")
+    done = solved(tmp_path / "clip.usdz")
+    assert done.exit_code != 0
+    assert "Ask for usdc" in done.output
+    (kept,) = tmp_path.iterdir()
+    assert kept.name.startswith("clip-")
+    assert str(kept) in done.output.replace("\n", "")
+    other = CliRunner().invoke(app, ["export", str(kept), "--out", str(tmp_path / "clip.usdc"), "--json"])
+    assert other.exit_code == 0, other.output
+    assert json.loads(other.output)["stages"] == [1e-4, 2e-4, 3e-4]
+    # the same run again is in the same file
+    before = kept.read_bytes()
+    again = solved(tmp_path / "clip.usdz")
+    assert again.exit_code != 0
+    assert str(kept) in again.output.replace("\n", "")
+    assert kept.read_bytes() == before

@@ -58,6 +58,21 @@ def test_the_command_line_writes_by_key_and_by_file(stored: tuple[Store, str], t
     assert (tmp_path / "rot.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_a_format_goes_by_the_name_of_its_suffix_too(
+    stored: tuple[Store, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, key = stored
+    monkeypatch.chdir(tmp_path)
+    for name in ("glb", "animation"):
+        code, said = run(key, "--store", str(store.root), "--format", name, "--json")
+        assert code == 0, said
+        document = json.loads(said)
+        assert (document["format"], document["path"]) == ("animation", f"{key}.glb")
+    code, said = run(key, "--store", str(store.root), "--format", "usdc", "--out", "scene.usd", "--json")
+    assert code == 0, said
+    assert (tmp_path / "scene.usd").read_bytes()[:8] == b"PXR-USDC"
+
+
 def test_a_mesh_of_one_s_own_gets_its_cache(stored: tuple[Store, str], tmp_path: Path) -> None:
     store, key = stored
     ball = trimesh.creation.icosphere(3, radius=4)
@@ -79,6 +94,8 @@ def test_a_mesh_of_one_s_own_gets_its_cache(stored: tuple[Store, str], tmp_path:
         (["{file}", "--out", "a.doc"], "Formats"),
         (["{file}"], "--format"),
         (["{file}", "--out", "a.pc2"], "stay"),
+        (["{file}", "--out", "a.glb", "--format", "usdc"], "named as animation"),
+        (["{file}", "--out", "a.obj", "--format", "ply"], "named as obj"),
         (["{file}", "--out", "a.glb", "--stage", "3"], "no stage"),
     ],
 )

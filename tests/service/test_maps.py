@@ -88,6 +88,22 @@ def test_what_is_no_share_has_one_range_for_all_stages() -> None:
     assert tops[0] < tops[1] < tops[2] <= 65535
 
 
+@pytest.mark.parametrize("most", [1.0, 1.3])
+def test_a_share_that_goes_beyond_one_is_not_cut_off(most: float) -> None:
+    """Fresh nutrient is uneven about 1; the range is that of all stages, and still begins at 0."""
+    run = rotting(16)
+    values = 0.2 + (most - 0.2) * run["rot"] / float(run["rot"].max())
+    run = run.drop_vars(["rot", "mould", "mould_active"]).assign(nutrient=values)
+    archive = zipfile.ZipFile(io.BytesIO(made(run, "png-zip", size=40)))
+    for number in range(run.sizes["stage"]):
+        data = archive.read(f"stage_{number + 1:04d}/nutrient.png")
+        said = json.loads(Image.open(io.BytesIO(data)).text["wizen"])
+        assert (said["low"], said["high"]) == (0, pytest.approx(most, rel=1e-6))
+        levels = np.asarray(Image.open(io.BytesIO(data)))
+        wanted = baked(run["nutrient"].values[number], 40)
+        assert np.abs(levels / 65535 * said["high"] - wanted).max() < 1e-5 * most
+
+
 @pytest.mark.parametrize("name", ["png", "png-zip", "exr"])
 def test_maps_need_texture_coordinates_and_a_field(name: str) -> None:
     with pytest.raises(UnfitFormat, match="triangles that stay"):

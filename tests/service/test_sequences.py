@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import zipfile
 from pathlib import Path
@@ -15,8 +16,8 @@ import xarray as xr
 from pxr import Usd, UsdGeom
 
 from service.errors import InvalidQuery, UnfitFormat
-from service.sequences import STILLS, Options, Sequence, of_run, prepared
-from solver import registry
+from service.sequences import EXPORTS, STILLS, Options, Sequence, of_run, prepared
+from solver import meshes, registry
 from solver.fruit import lattice
 from sweeps.pictures import colours
 
@@ -66,6 +67,32 @@ def test_changing_triangles_have_no_cache(name: str) -> None:
         made(splitting(), name)
     assert "usdc" in caught.value.advice
     assert made(splitting(), name, stage=2.0)
+
+
+def test_triangles_that_could_have_changed_and_did_not_have_a_cache() -> None:
+    """A sheet that is never cut comes as one that is: with triangles of its own for each stage."""
+    ball = trimesh.creation.icosphere(2)
+    faces = np.array(ball.faces)
+    places = [np.array(ball.vertices * (1 + k), "f4") for k in range(len(STAGES))]
+    run = xr.Dataset(meshes.changing([meshes.Frame(x, faces, {}) for x in places]), {"stage": list(STAGES)})
+    run.attrs["solver"] = "growth"
+    data = made(run, "pc2")
+    assert np.array_equal(np.frombuffer(data, "<f4", offset=32).reshape(3, -1, 3), places)
+    assert np.array_equal(np.frombuffer(made(run, "mdd"), ">f4", offset=20).reshape(3, -1, 3), places)
+    turned = [faces, np.roll(faces, 1, axis=0), faces]
+    other = meshes.changing([meshes.Frame(x, f, {}) for x, f in zip(places, turned, strict=True)])
+    with pytest.raises(UnfitFormat, match="change"):
+        made(xr.Dataset(other, {"stage": list(STAGES)}, run.attrs), "pc2")
+
+
+@pytest.mark.parametrize("name", ["exr", "png", "png-zip", "usdz", "pc2", "mdd"])
+def test_what_is_advised_where_triangles_change_can_be_had(name: str) -> None:
+    with pytest.raises(UnfitFormat) as caught:
+        made(splitting(), name)
+    named = [other for other in EXPORTS if re.search(rf"\b{other}\b(?!-)", caught.value.advice)]
+    assert named
+    for other in named:
+        assert made(splitting(), other)
 
 
 # --- USD, by its own library -------------------------------------------------------------------------------------
