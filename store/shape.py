@@ -21,7 +21,8 @@ class Shape:
 
     `position` and `displacement` are (n, 2n, 3), `poles` (2, 3) the positions at colatitude 0 and pi, all in units of
     r1 and in the table's precision. Of a window there are only its rows, columns and components, and no poles but with
-    the whole lattice. `weights` says which results it was made of, `nearest` how far (scaled) the nearest one is,
+    the whole lattice. `descriptors` are the stored results' numbers, weighted as these are, and not measured on the
+    positions. `weights` says which results it was made of, `nearest` how far (scaled) the nearest one is,
     `inside` whether the query lies in the samples' convex hull, and `exact` that it is a stored result at a stored
     stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
     `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape

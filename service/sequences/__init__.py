@@ -6,6 +6,7 @@ reads its output with a reader that is not ours.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -87,7 +88,8 @@ def prepared(run: xr.Dataset, options: Options, stage: float | None = None, sing
     if stage is None:
         return whole.at(-1) if single else whole
     near = min(range(len(whole)), key=lambda i: abs(whole.stages[i] - stage))
-    if abs(whole.stages[near] - stage) > 1e-9 * max(1.0, abs(stage)):
+    # no nearness of nan and of infinite stages is more than a number
+    if not math.isclose(whole.stages[near], stage, rel_tol=1e-9, abs_tol=1e-9):
         advice = f"Take one of {', '.join(f'{s:g}' for s in whole.stages)}."
         raise InvalidQuery.of([Wrong("stage", f"the result has no stage {stage:g}", advice)])
     return whole.at(near)

@@ -54,7 +54,9 @@ class ShapePage(BaseModel):
     units: dict[str, str]
     detail: dict[str, Any] | None = Field(None, description="What was chosen of resolution, part and fields")
     lattice: Lattice
-    descriptors: dict[str, Descriptor]
+    descriptors: dict[str, Descriptor] = Field(
+        description="Numbers of the stored runs, weighted; not measured on the shape that is handed over"
+    )
     weights: dict[str, float] = Field(description="The runs that took part, by key")
     timings_ms: dict[str, float]
     links: dict[str, str] = Field(description="Addresses of the files that hold the shape")

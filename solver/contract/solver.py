@@ -12,12 +12,13 @@ import numpy as np
 
 from .. import __version__, quantities
 from ..arrays import Floats
+from ..lattice import window
 from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
 from .live import Live
 from .looks import Looks, Shade
-from .need import Need, Quality
+from .need import Need, Quality, Region
 from .params import Params
 from .surface import Extent, Fresh, Surface
 from .words import named
@@ -203,7 +204,8 @@ class Solver:
         of: the parameters that it is asked for, all of which a tolerance must hold for.
 
         Raises:
-            InvalidInput: unknown field, stage off the axis, a tolerance finer than what was measured.
+            InvalidInput: unknown field, stage off the axis, a region off the surface or between the points of the
+                lattice, a tolerance finer than what was measured.
 
         """
         unknown = [f for f in need.fields if f not in self.fields]
@@ -226,13 +228,16 @@ class Solver:
         quality: Quality = need.quality
         if need.tolerance is not None:
             quality = self._quality_for(need.tolerance, max(stages), tuple(of))
+        resolution = need.resolution or self.default_resolution[quality]
+        if need.region is not None:
+            _check_region(need.region, resolution)
         return need.model_copy(
             update={
                 "fields": tuple(sorted(need.fields or self.default_fields)),
                 "stages": tuple(sorted(set(stages))),
                 "quality": quality,
                 "tolerance": None,
-                "resolution": need.resolution or self.default_resolution[quality],
+                "resolution": resolution,
             }
         )
 
@@ -332,3 +337,19 @@ def finish(result: xr.Dataset, solver: Solver, params: Params, need: Need) -> xr
         Conventions="CF-1.11",
     )
     return result
+
+
+def _check_region(region: Region, resolution: int) -> None:
+    """Refuse a part of the surface that would be less than what is named, or nothing."""
+    about = "Stay within 0 to 360: a part on both sides of azimuth 0 is two regions."
+    for name, (low, high), whole, advice in (
+        ("colatitude", region.colatitude, 180, "Stay within 0 to 180."),
+        ("azimuth", region.azimuth, 360, about),
+    ):
+        if low < 0 or high > whole:
+            raise InvalidInput(f"region.{name} runs from {low:g} to {high:g} degrees.", advice=advice)
+    if any(part.start == part.stop for part in window(resolution, region)):
+        raise InvalidInput(
+            f"no point of the lattice of {resolution} colatitudes lies in this region.",
+            advice=f"Widen it, or raise the resolution: points are {180 / resolution:.3g} degrees apart.",
+        )

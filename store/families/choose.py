@@ -93,15 +93,18 @@ class Families:
     def nearest(self, said: Mapping[str, Any], stage: float | None, preset: str | None = None) -> list[Fit]:
         """Return all families with what each misses, the nearest first: for a question that none of them holds."""
         values = self.values(said, preset) | ({STAGE: stage} if stage is not None else {})
-        return sorted((self.fit(info, values) for info in self.infos), key=lambda fit: (fit.distance, fit.info.name))
+        named = flat(said, self._axes).keys()
+        fits = (self.fit(info, values, named) for info in self.infos)
+        return sorted(fits, key=lambda fit: (fit.distance, fit.info.name))
 
-    def fit(self, info: TableInfo, values: Mapping[str, Any]) -> Fit:
-        """Return how a table fits all that is said."""
+    def fit(self, info: TableInfo, values: Mapping[str, Any], named: Collection[str] = ()) -> Fit:
+        """Return how a table fits all that is said; what is incidental counts where it is `named`."""
+        counting = [name for name in values if name in named or name not in self._base.incidental]
         rest = {} if self._is_own(info) else {k: v for k, v in self._usual.items() if k not in values}
         unsaid = [name for name in self._counting(rest) if name not in info.axes]
         return Fit(
             info,
-            tuple(compare(info, values, self._counting(values), self._usual)),
+            tuple(compare(info, values, counting, self._usual)),
             tuple(compare(info, {**rest, **values}, unsaid, self._usual)),
             tuple(name for name in info.axes if name not in values),
         )

@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 
 __all__ = ["add_to"]
 
+#: Files that hold a part of a surface as well.
+_PARTS = (".h5", ".npz")
+
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
@@ -174,9 +177,13 @@ def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:
     from .. import outputs
 
     outputs.check_suffix(out, True, len(need.stages))
-    return solver.settle(
-        need.model_copy(update={"fields": (*need.fields, *outputs.fields_for(out, True, solver, need.fields))})
-    )
+    wanted = outputs.fields_for(out, True, solver, need.fields)
+    if need.region is not None and "position" in wanted and out.suffix not in _PARTS:
+        raise InvalidOption(
+            f"--out {out}: {out.suffix} holds whole surfaces, and --region leaves a part.",
+            f"Leave --region out, or write {' or '.join(_PARTS)}.",
+        )
+    return solver.settle(need.model_copy(update={"fields": (*need.fields, *wanted)}))
 
 
 def _save(
@@ -193,7 +200,8 @@ def _save(
     from ..formats import Made
 
     axes = {name: params.axis(name) for name in params.axes}
-    count = result.sizes["stage"] if "position" in result else 0
+    is_whole = document["need"].get("region") is None
+    count = result.sizes["stage"] if "position" in result and is_whole else 0
     made = Made(
         [outputs.of_result(result, axes, i) for i in range(count)],
         document,

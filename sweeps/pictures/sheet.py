@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,11 +15,16 @@ from solver.contract import Worn
 from .render import More, View, render, render_triangles
 from .shading import BACKGROUND
 
+if TYPE_CHECKING:
+    from matplotlib.text import Text
+
 __all__ = ["Panel", "sheet"]
 
 #: Dots per inch of a sheet; pixels and points follow from it.
 _DPI = 100
 _INK = "#3a2a24"
+#: Size [point] below which no title is made smaller to fit: it is cut.
+_LEAST = 9.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +84,10 @@ def sheet(
     paper = tuple(BACKGROUND ** (1 / 2.2))
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor=paper)
 
-    def write(x: float, y: float, text: str, size: float, **more: Any) -> None:
-        figure.text(x / width, 1 - y / height, text, fontsize=size, color=_INK, **more)
+    canvas = FigureCanvasAgg(figure)
+
+    def write(x: float, y: float, text: str, size: float, **more: Any) -> Text:
+        return figure.text(x / width, 1 - y / height, text, fontsize=size, color=_INK, **more)
 
     middle = {"ha": "center", "va": "center"}
     for i, row in enumerate(rows):
@@ -98,18 +105,30 @@ def sheet(
             if panel.note:
                 write(x + pixels / 2, y + pixels - 9, panel.note, 8.5, alpha=0.8, **middle)
     if title:
-        write(left if row_labels else 16, 32, title, 14, va="center", fontweight="bold")
+        begin = left if row_labels else 16
+        _fit(write(begin, 32, title, 14, va="center", fontweight="bold"), 14, width - begin - 8)
     if column_title:
         write(left + columns * pixels / 2, top - 48, column_title, 11, **middle)
     for j, label in enumerate(column_labels):
-        write(left + (j + 0.5) * pixels, top - 18, label, 11, **middle)
+        _fit(write(left + (j + 0.5) * pixels, top - 18, label, 11, **middle), 11, pixels)
     if row_title:
         write(22, top + len(rows) * pixels / 2, row_title, 11, rotation=90, **middle)
     for i, label in enumerate(row_labels):
         write(62, top + (i + 0.5) * pixels, label, 11, rotation=90, **middle)
     out = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(out)
+    canvas.print_png(out)
     return out.getvalue()
+
+
+def _fit(written: Text, size: float, room: float) -> None:
+    """Make a text of that size no wider than `room` [pixel]: smaller, and cut at the end where that is not enough."""
+    while written.get_window_extent().width > room and size > _LEAST:
+        size -= 0.5
+        written.set_fontsize(size)
+    text = written.get_text()
+    while written.get_window_extent().width > room and len(text) > 1:
+        text = text[:-1]
+        written.set_text(f"{text.rstrip(' ,:')} …")
 
 
 def _common(rows: Sequence[Sequence[Panel | None]], base: View) -> View:

@@ -159,3 +159,14 @@ def test_the_service_says_what_a_changing_mesh_cannot_be(tmp_path: Path) -> None
     with client_of(store.root, jobs_workers=0) as client:
         problem = checked(client.get(url, params={"format": "pc2"}), 422, "unfit-format")
         assert "usdc" in problem["advice"]
+
+
+@pytest.mark.parametrize("stage", ["nan", "inf", "-inf", "1e308"])
+def test_what_is_no_stage_is_not_the_nearest_one(stored: tuple[Store, str], tmp_path: Path, stage: str) -> None:
+    """No distance of nan, and none from infinity over its size, is more than a tolerance."""
+    store, key = stored
+    out = tmp_path / "a.glb"
+    code, said = run(key[:10], "--store", str(store.root), "--out", str(out), f"--stage={stage}")
+    assert code == 2, said
+    assert "has no stage" in said
+    assert not out.exists()

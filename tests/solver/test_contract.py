@@ -232,6 +232,26 @@ def test_region_returns_a_part_of_the_whole(solver):
         assert np.array_equal(cut[name], part[name]), name
 
 
+@pytest.mark.parametrize(
+    ("region", "words"),
+    [
+        ({"colatitude": (-10, 90)}, "colatitude runs from -10 to 90"),
+        ({"colatitude": (90, 190)}, "Stay within 0 to 180"),
+        ({"azimuth": (-40, 40)}, "two regions"),
+        ({"azimuth": (350, 370)}, "azimuth runs from 350 to 370"),
+        # between the points of the lattice
+        ({"colatitude": (0, 1e-3)}, "no point of the lattice of 16 colatitudes"),
+        ({"azimuth": (1, 2)}, "points are 11.2 degrees apart"),
+    ],
+)
+def test_a_region_that_would_lose_points_is_refused_before_any_work(region, words):
+    solver = registry.get("dehydration")
+    with pytest.raises(InvalidInput) as caught:
+        solver.settle(Need(resolution=16, region=Region(**region)))
+    assert words in str(caught.value)
+    solver.settle(Need(resolution=16, region=Region()))
+
+
 def test_a_tolerance_picks_the_cheapest_quality_that_was_measured_to_reach_it(solver):
     settled = solver.settle(Need(tolerance=max(solver.tolerances.values())))
     assert settled.quality == "preview"

@@ -63,6 +63,18 @@ def test_numbers_that_no_quotient_holds_are_a_finite_distance_apart(families: Fa
             assert miss.distance <= fit.distance < miss.distance + 5
 
 
+def test_what_is_incidental_and_named_is_what_is_missed(families: Families) -> None:
+    said = {"seed": 3, "mirrors": "xyz"}
+    assert chosen(families, {}, "raisin") == "raisin"
+    assert chosen(families, said, "raisin") is None
+    near = families.nearest(said, 0.2, "raisin")[0]
+    assert near.info.name == "raisin"
+    assert {miss.name for miss in near.misses} == set(said)
+    told = str(stored.refusal(families.nearest(said, 0.2, "raisin")))
+    assert "seed = 3 (holds 0)" in told
+    assert "mirrors = xyz (holds xz)" in told
+
+
 def test_the_table_is_the_one_that_holds_the_fruit(families: Families) -> None:
     assert chosen(families, {"te": 0.035, "gamma": 20.0}) == "sphere"
     assert chosen(families, {}, "raisin") == "raisin"

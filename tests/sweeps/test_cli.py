@@ -167,6 +167,30 @@ def test_solve_says_all_of_a_need(shrinking: Solves, tmp_path: Path) -> None:
     assert need["region"] == {"colatitude": [0.0, 90.0], "azimuth": [0.0, 180.0]}
 
 
+EIGHTH = ("solve", "dehydration", "--set", "te=0.1", "--set", "mirrors=xyz", "--quality", "preview", "--resolution", 8)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".obj", ".png", ".usdc", ".pc2", ".wzp"])
+def test_a_part_of_a_surface_is_no_closed_shape(tmp_path: Path, suffix: str) -> None:
+    """0 to 90 by 0 to 180 degrees has n by 2n points, as a whole lattice has."""
+    out = tmp_path / f"part{suffix}"
+    refused = wizen(*EIGHTH, "--stages", "0.01", "--region", "0,90,0,180", "--out", out)
+    assert refused.exit_code == 2
+    assert "--region leaves a part" in refused.stderr
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("region", ["0,90,0,180", "0,90,0,90", "45,60,0,360"])
+def test_a_part_of_a_surface_is_kept_as_fields(tmp_path: Path, region: str) -> None:
+    part, whole = tmp_path / "part.h5", tmp_path / "whole.h5"
+    document(wizen(*EIGHTH, "--stages", "0.01", "--fields", "position", "--out", whole, "--json"))
+    document(wizen(*EIGHTH, "--stages", "0.01", "--fields", "position", "--region", region, "--out", part, "--json"))
+    with xr.open_dataset(part, engine="h5netcdf") as some, xr.open_dataset(whole, engine="h5netcdf") as full:
+        cut = full["position"].sel(colatitude=some["colatitude"], azimuth=some["azimuth"])
+        assert some["position"].size
+        assert cut.equals(some["position"])
+
+
 def test_solve_without_a_file(shrinking: Solves) -> None:
     result = wizen("solve", "shrinking", "--stages", "0.1")
     assert result.exit_code == 0

@@ -131,6 +131,7 @@ def test_maps(table: Path, tmp_path: Path) -> None:
     assert out.read_bytes().startswith(b"\x89PNG")
     result = wizen("map", "--store", table, "--out", out, "--stages", "0.1,0.2", "--set", "te=0.03", "--pixels", 48)
     assert "4 shapes" in result.stdout
+    assert wizen("map", "--preset", "raisin", "--out", out, "--stage", "nan", "--pixels", 48).exit_code == 2
 
 
 def test_presets_and_what_the_package_covers(tmp_path: Path) -> None:

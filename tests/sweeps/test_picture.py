@@ -54,3 +54,15 @@ def test_a_sheet_has_room_for_all() -> None:
     assert height >= 2 * 64
     with pytest.raises(ValueError, match="nothing to draw"):
         sheet([[None]])
+
+
+@pytest.mark.parametrize("words", [4, 8, 40])
+def test_titles_end_within_the_sheet(words: int) -> None:
+    """Dehydration of core/shell fruits: plum1 is longer than one panel is wide."""
+    panel, pixels = Panel(ball()), 360
+    title = " ".join(["fruits"] * words)
+    picture = imread(io.BytesIO(sheet([[panel]], title=title, column_labels=[title], pixels=pixels)))[..., :3]
+    written = np.abs(picture - picture[0, 0]).max(axis=-1) > 0.3
+    for rows in (slice(20, 46), slice(60, 86)):
+        columns = np.flatnonzero(written[rows].any(axis=0))
+        assert 4 <= columns.min() < columns.max() < written.shape[1] - 4

@@ -64,7 +64,7 @@ def asked_table(
         if fit is None and (preset is not None or len(families.infos) > 1):
             # what no fruit can be is said before what no table holds
             values = chosen.parse(said, preset)
-            chosen.settle(Need(stages=() if stage is None else (stage,)), preset, (values,))
+            chosen.settle(Need.parse({} if stage is None else {"stages": (stage,)}), preset, (values,))
             error = stored.refusal(families.nearest(said, stage, preset))
             raise OutsideTable(
                 error.message, f"{error.advice} To run it: {run_command(chosen.name, preset, said, stage)}"
