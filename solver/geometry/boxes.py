@@ -132,16 +132,24 @@ def touching(low: Doubles, high: Doubles) -> Longs:
 
 @njit(cache=True, error_model="numpy")
 def _touching(low: Doubles, high: Doubles, leaves: Longs, leaf: int) -> Longs:
-    """Pairs of places whose boxes touch, among those of all pairs of leaves."""
-    found, count = np.empty((max(4 * len(low), 16), 2), np.int64), 0
+    """Pairs of places whose boxes touch, among those of all pairs of leaves.
+
+    Every pair is written down, and stays where it touches: no processor guesses which of six sides keeps two boxes
+    apart, and a branch for each took eight times as long.
+    """
+    found, count = np.empty((max(4 * len(low), 2 * leaf), 2), np.int64), 0
     for pair in range(len(leaves)):
         first, second = leaves[pair, 0] * leaf, leaves[pair, 1] * leaf
         for a in range(first, min(first + leaf, len(low))):
+            if count + leaf > len(found):
+                found = np.concatenate((found, np.empty_like(found)))
+            low0, low1, low2 = low[a, 0], low[a, 1], low[a, 2]
+            high0, high1, high2 = high[a, 0], high[a, 1], high[a, 2]
             for b in range(a + 1 if first == second else second, min(second + leaf, len(low))):
-                if _apart(low, high, a, b):
-                    continue
-                if count == len(found):
-                    found = np.concatenate((found, np.empty_like(found)))
                 found[count, 0], found[count, 1] = a, b
-                count += 1
+                count += 1 - (
+                    (low0 > high[b, 0]) | (low[b, 0] > high0)
+                    | (low1 > high[b, 1]) | (low[b, 1] > high1)
+                    | (low2 > high[b, 2]) | (low[b, 2] > high2)
+                )  # fmt: skip
     return found[:count]
