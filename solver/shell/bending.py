@@ -87,29 +87,42 @@ def hinge_slopes(x: Floats, hinges: Ints, t: int, slopes: Floats) -> float:
     return angle
 
 
+@njit(inline="always", error_model="numpy")
+def _pull(x: Floats, hinges: Ints, rest: Floats, stiffness: Floats, t: int) -> tuple[float, ...]:
+    """Return a hinge's energy, and its derivatives by the hinge's four points, three numbers each."""
+    angle, ax, ay, az, bx, by, bz, s, r = _hinge(x, hinges, t)
+    gap = angle - rest[t]
+    force = 2 * stiffness[t] * gap
+    u, v = 1 - s, 1 - r
+    return (
+        stiffness[t] * gap * gap,
+        force * -(u * ax + v * bx), force * -(u * ay + v * by), force * -(u * az + v * bz),
+        force * -(s * ax + r * bx), force * -(s * ay + r * by), force * -(s * az + r * bz),
+        force * ax, force * ay, force * az,
+        force * bx, force * by, force * bz,
+    )  # fmt: skip
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def bending(x: Floats, hinges: Ints, rest: Floats, stiffness: Floats, gradient: Floats) -> float:
     """Return the bending energy and add its gradient to `gradient` (n, 3); rest and stiffness (h,)."""
     energy = 0.0
     for t in range(len(hinges)):
-        angle, ax, ay, az, bx, by, bz, s, r = _hinge(x, hinges, t)
-        gap = angle - rest[t]
-        energy += stiffness[t] * gap * gap
-        force = 2 * stiffness[t] * gap
+        own, ix, iy, iz, jx, jy, jz, kx, ky, kz, mx, my, mz = _pull(x, hinges, rest, stiffness, t)
+        energy += own
         i, j, k, m = hinges[t, 0], hinges[t, 1], hinges[t, 2], hinges[t, 3]
-        u, v = 1 - s, 1 - r
-        gradient[i, 0] += force * -(u * ax + v * bx)
-        gradient[i, 1] += force * -(u * ay + v * by)
-        gradient[i, 2] += force * -(u * az + v * bz)
-        gradient[j, 0] += force * -(s * ax + r * bx)
-        gradient[j, 1] += force * -(s * ay + r * by)
-        gradient[j, 2] += force * -(s * az + r * bz)
-        gradient[k, 0] += force * ax
-        gradient[k, 1] += force * ay
-        gradient[k, 2] += force * az
-        gradient[m, 0] += force * bx
-        gradient[m, 1] += force * by
-        gradient[m, 2] += force * bz
+        gradient[i, 0] += ix
+        gradient[i, 1] += iy
+        gradient[i, 2] += iz
+        gradient[j, 0] += jx
+        gradient[j, 1] += jy
+        gradient[j, 2] += jz
+        gradient[k, 0] += kx
+        gradient[k, 1] += ky
+        gradient[k, 2] += kz
+        gradient[m, 0] += mx
+        gradient[m, 1] += my
+        gradient[m, 2] += mz
     return energy
 
 

@@ -11,7 +11,7 @@ from numba import njit
 
 from ..arrays import Floats, Ints
 from ..linalg.abreast import both, two
-from .bending import _hinge, bending
+from .bending import _pull, bending
 from .membrane import membrane
 from .topology import Topology
 
@@ -56,19 +56,12 @@ class Halves:
 def _keep(x: Floats, hinges: Ints, rest: Floats, stiffness: Floats, kept: Floats) -> None:
     """Write the energy of each hinge and what it adds to the gradient at its four points to `kept` (h, 13)."""
     for t in range(len(hinges)):
-        angle, ax, ay, az, bx, by, bz, s, r = _hinge(x, hinges, t)
-        gap = angle - rest[t]
-        kept[t, 0] = stiffness[t] * gap * gap
-        force = 2 * stiffness[t] * gap
-        u, v = 1 - s, 1 - r
-        kept[t, 1] = force * -(u * ax + v * bx)
-        kept[t, 2] = force * -(u * ay + v * by)
-        kept[t, 3] = force * -(u * az + v * bz)
-        kept[t, 4] = force * -(s * ax + r * bx)
-        kept[t, 5] = force * -(s * ay + r * by)
-        kept[t, 6] = force * -(s * az + r * bz)
-        kept[t, 7], kept[t, 8], kept[t, 9] = force * ax, force * ay, force * az
-        kept[t, 10], kept[t, 11], kept[t, 12] = force * bx, force * by, force * bz
+        energy, ix, iy, iz, jx, jy, jz, kx, ky, kz, mx, my, mz = _pull(x, hinges, rest, stiffness, t)
+        kept[t, 0] = energy
+        kept[t, 1], kept[t, 2], kept[t, 3] = ix, iy, iz
+        kept[t, 4], kept[t, 5], kept[t, 6] = jx, jy, jz
+        kept[t, 7], kept[t, 8], kept[t, 9] = kx, ky, kz
+        kept[t, 10], kept[t, 11], kept[t, 12] = mx, my, mz
 
 
 @njit(cache=True, nogil=True)
