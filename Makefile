@@ -61,8 +61,8 @@ test-clients: $(STAMP)
 
 # solvers' tests whose numbers hang on compiled kernels or on BLAS, of each solver those that compile soonest
 PROCESSOR ?= haswell
-PROCESSOR_TESTS ?= $(addprefix tests/solver/,shell growth/test_growth.py decay/test_waves.py wood/test_rods.py \
-  test_implicit.py test_onset.py test_linalg.py)
+PROCESSOR_TESTS ?= $(addprefix tests/solver/,shell growth/test_growth.py decay/test_waves.py decay/test_bowls.py \
+  wood/test_rods.py test_implicit.py test_onset.py test_linalg.py)
 
 ## test-processor: some of the solvers' tests once more, as if on a processor of ten years ago; CI runs this too. All of
 ## them, as if on one of 2011: make test-processor PROCESSOR=sandybridge PROCESSOR_TESTS=tests

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Bools, Floats
 from ...contract import Context, InvalidInput
 from ...resting import Body, Bowl, settle
 from ..params import DecayParams
@@ -18,6 +18,9 @@ __all__ = ["Ground", "Lying", "lie", "separate"]
 
 #: Facets of the shape that falls.
 _CELLS = 12
+#: Wider bowls tried for one that holds what fell beside, in times the radius; middles are to stay off the rim by
+#: a tenth, as where the last one comes to lie hangs on last digits in a bowl that is just wide enough.
+_WIDER, _ROOM = (1.1, 1.25, 1.5, 1.75, 2.0), 0.9
 #: Of the generator's children, which one throws the fruits; the first four are a single fruit's own.
 _STREAM = 7
 
@@ -52,7 +55,8 @@ def lie(params: DecayParams, lot: Lot) -> Lying:
     """Return how the heap of the parameters lies before it decays; lot: its kinds, which are thrown together.
 
     Raises:
-        InvalidInput: a fruit fell beside the bowl, where there is no floor to lie on in this model.
+        InvalidInput: a fruit fell beside the bowl, where there is no floor to lie on in this model; which bowl is wide
+            enough is in the advice.
 
     """
     heap = params.heap
@@ -69,19 +73,39 @@ def lie(params: DecayParams, lot: Lot) -> Lying:
         seed = int(random.integers(2**31))
         # who falls first lies at the bottom: several kinds fall in any order
         order = random.permutation(count) if lot.names else np.arange(count)
-        rest = settle(shapes, lot.kind[order].tolist(), size[order], bowl, seed)
         back = np.argsort(order)
-        centre, turn = rest.centre[back], _matrices(rest.turn[back])
+
+        def poured(into: Bowl | None) -> tuple[Floats, Floats]:
+            rest = settle(shapes, lot.kind[order].tolist(), size[order], into, seed)
+            return rest.centre[back], _matrices(rest.turn[back])
+
+        centre, turn = poured(bowl)
     inside = np.zeros(count, np.bool_)
-    if ground is not None and bowl is not None:
-        aside = np.hypot(centre[:, 0], centre[:, 2])
-        inside = aside < bowl.sphere
+    if bowl is not None:
+        inside = _within(centre, bowl)
         if not inside.all():
+            advice = "Put places nearer to the middle, or take a wider bowl."
+            if not heap.places:
+                wider = (round(times * heap.bowl, 1) for times in _WIDER)
+                fits = next((one for one in wider if _aside(poured(Bowl(one, WALL))[0]).max() < _ROOM * one), None)
+                what = "a wider bowl" if fits is None else f"a bowl of {fits:g} r1, which holds them"
+                advice = f"Take {what}, or fewer fruits."
             raise InvalidInput(
-                f"{int((~inside).sum())} of {count} fruits do not fit into a bowl of {heap.bowl:g} r1.",
-                advice="Take fewer fruits, or a wider bowl.",
+                f"{int((~inside).sum())} of {count} fruits do not fit into a bowl of {heap.bowl:g} r1.", advice=advice
             )
     return Lying(centre, turn, size, ground, inside.astype(float))
+
+
+def _aside(centre: Floats) -> Floats:
+    """Return how far from the bowl's axis places (b, 3) are (b)."""
+    return np.hypot(centre[:, 0], centre[:, 2])
+
+
+def _within(centre: Floats, bowl: Bowl) -> Bools:
+    """Return whether fruits at centres (b, 3) are in a bowl or heaped above it (b), not beside or under its wall."""
+    aside, up = _aside(centre), centre[:, 1] - bowl.sphere - bowl.thickness
+    hollow = np.hypot(aside, up) < bowl.sphere
+    return np.asarray((aside < bowl.sphere) & (hollow | (centre[:, 1] > bowl.rim)))
 
 
 def _matrices(quaternions: Floats) -> Floats:
