@@ -34,7 +34,7 @@ def _cost(params: DecayParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="decay",
-    version="9",
+    version="10",
     title="Decay of fruits: rot and mould",
     params=DecayParams,
     fields=ALL,

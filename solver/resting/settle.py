@@ -174,7 +174,9 @@ def _along(table: Floats, ways: Floats) -> Floats:
 
 
 def _poured(reach: Floats, opening: float, shell: Floats, random: np.random.Generator) -> Floats:
-    """Return centres above the floor, layer by layer, in which no body touches another."""
+    """Return centres above the floor, layer by layer, in which no body touches another or the bowl's `shell`: radius
+    of its inner sphere, thickness, and height of its rim.
+    """
     cell = 2.05 * float(reach.max())
     wide = max(opening * 0.7 if opening else 0.75 * cell * len(reach) ** (1 / 3), 0.5 * cell)
     span = np.arange(-int(wide / cell), int(wide / cell) + 1) * cell
@@ -185,5 +187,8 @@ def _poured(reach: Floats, opening: float, shell: Floats, random: np.random.Gene
     angle = layer * 0.7
     cos, sin = np.cos(angle), np.sin(angle)
     first = cell if not opening else float(shell[2])
+    # what begins in the wall is thrown out of the bowl: then all begin above the rim
+    if opening and np.hypot(np.hypot(x, z).max(), first - shell[0] - shell[1]) + 0.53 * cell > shell[0]:
+        first += 0.53 * cell
     found = np.stack([x[place] * cos - z[place] * sin, first + layer * cell, x[place] * sin + z[place] * cos], axis=1)
     return found + random.uniform(-0.02, 0.02, found.shape) * cell

@@ -12,6 +12,8 @@ __all__ = ["WALL", "Heap", "Kind"]
 
 #: Thickness of the bowl [r1].
 WALL = 0.15
+#: How high above the next place below a fruit may hang [r1]: it is let down to rest, not found from any height.
+_FALL = 6.0
 
 
 class Kind(BaseModel):
@@ -43,7 +45,7 @@ class Heap(BaseModel):
         "fruit of the parameters. Lengths are in that one's r1 all the same [1]",
     )
     bowl: float = Field(
-        4.0, ge=0, le=20, description="Radius of the opening of the bowl that they lie in; 0: on a floor [r1]"
+        4.5, ge=0, le=20, description="Radius of the opening of the bowl that they lie in; 0: on a floor [r1]"
     )
     spread: float = Field(0.06, ge=0, le=0.3, description="How far sizes depart from the parameters' at most [1]")
     places: tuple[tuple[float, float, float], ...] = Field(
@@ -86,12 +88,24 @@ class Heap(BaseModel):
                 raise ValueError(f"{len(self.places)} places for {several} fruits of all kinds: name as many")
             if several > 60:
                 raise ValueError(f"the kinds are {several} fruits together: a heap has 60 at most")
+        self._check_places()
         for number in self.infected:
             if not 0 <= number < count:
                 raise ValueError(f"infected names fruit {number}: they are numbered 0 to {count - 1}")
         if self.bowl and self.bowl < 1.5:
             raise ValueError("a bowl that holds a fruit opens 1.5 r1 wide at least; 0 is a floor")
         return self
+
+    def _check_places(self) -> None:
+        below = 0.0
+        for y, number in sorted((place[1], number) for number, place in enumerate(self.places)):
+            if y <= 0:
+                raise ValueError(f"places.{number} lies at y = {y:g}, below the floor: middles are some 1 above it")
+            if y > below + _FALL:
+                raise ValueError(
+                    f"places.{number} hangs at y = {y:g}, {y - below:g} above the next below: bring it down"
+                )
+            below = y
 
     @property
     def count(self) -> int:

@@ -21,6 +21,8 @@ _CELLS = 12
 #: Wider bowls tried for one that holds what fell beside, in times the radius; middles are to stay off the rim by
 #: a tenth, as where the last one comes to lie hangs on last digits in a bowl that is just wide enough.
 _WIDER, _ROOM = (1.1, 1.25, 1.5, 1.75, 2.0), 0.9
+#: Times that fruits are thrown if one of ten falls beside at most: more would not fit another time either.
+_THROWS = 6
 #: Of the generator's children, which one throws the fruits; the first four are a single fruit's own.
 _STREAM = 7
 
@@ -66,34 +68,51 @@ def lie(params: DecayParams, lot: Lot) -> Lying:
     size = lot.scales * (1 + heap.spread * random.uniform(-1, 1, count))
     bowl = Bowl(heap.bowl, WALL) if heap.bowl else None
     ground = None if bowl is None else Ground(bowl.sphere + bowl.thickness, bowl.sphere)
+    wider = None
     if heap.places:
         centre, turn = np.array(heap.places, float), np.tile(np.eye(3), (count, 1, 1))
     else:
-        shapes = [Body(lay(one, _CELLS).points) for one in lot.params]
-        seed = int(random.integers(2**31))
-        # who falls first lies at the bottom: several kinds fall in any order
-        order = random.permutation(count) if lot.names else np.arange(count)
-        back = np.argsort(order)
-
-        def poured(into: Bowl | None) -> tuple[Floats, Floats]:
-            rest = settle(shapes, lot.kind[order].tolist(), size[order], into, seed)
-            return rest.centre[back], _matrices(rest.turn[back])
-
-        centre, turn = poured(bowl)
+        pour = _Pour(lot, size, random)
+        centre, turn = pour.into(bowl)
+        for _ in range(_THROWS - 1):
+            if bowl is None or not 0 < (~_within(centre, bowl)).sum() <= max(count // 10, 1):
+                break
+            pour.seed = int(random.integers(2**31))
+            centre, turn = pour.into(bowl)
+        wider = pour.wider
     inside = np.zeros(count, np.bool_)
     if bowl is not None:
         inside = _within(centre, bowl)
         if not inside.all():
-            advice = "Put places nearer to the middle, or take a wider bowl."
-            if not heap.places:
-                wider = (round(times * heap.bowl, 1) for times in _WIDER)
-                fits = next((one for one in wider if _aside(poured(Bowl(one, WALL))[0]).max() < _ROOM * one), None)
-                what = "a wider bowl" if fits is None else f"a bowl of {fits:g} r1, which holds them"
-                advice = f"Take {what}, or fewer fruits."
             raise InvalidInput(
-                f"{int((~inside).sum())} of {count} fruits do not fit into a bowl of {heap.bowl:g} r1.", advice=advice
+                f"{int((~inside).sum())} of {count} fruits do not fit into a bowl of {heap.bowl:g} r1.",
+                advice="Put places nearer to the middle, or take a wider bowl." if wider is None else wider(bowl),
             )
     return Lying(centre, turn, size, ground, inside.astype(float))
+
+
+class _Pour:
+    """Fruits of a lot, each with its `size` (b), that fall as `seed` says; the one after it is drawn from `random`."""
+
+    def __init__(self, lot: Lot, size: Floats, random: np.random.Generator) -> None:
+        self.seed = int(random.integers(2**31))
+        # who falls first lies at the bottom: several kinds fall in any order
+        self._order = random.permutation(len(size)) if lot.names else np.arange(len(size))
+        self._shapes = [Body(lay(one, _CELLS).points) for one in lot.params]
+        self._kinds, self._size = lot.kind[self._order].tolist(), size[self._order]
+
+    def into(self, bowl: Bowl | None) -> tuple[Floats, Floats]:
+        """Return centres (b, 3) and turns (b, 3, 3)."""
+        rest = settle(self._shapes, self._kinds, self._size, bowl, self.seed)
+        back = np.argsort(self._order)
+        return rest.centre[back], _matrices(rest.turn[back])
+
+    def wider(self, bowl: Bowl) -> str:
+        """Return the advice to take a bowl that holds all, which is tried."""
+        for opening in (round(times * bowl.opening, 1) for times in _WIDER):
+            if _aside(self.into(Bowl(opening, WALL))[0]).max() < _ROOM * opening:
+                return f"Take a bowl of {opening:g} r1, which holds them, or fewer fruits."
+        return "Take a wider bowl, or fewer fruits."
 
 
 def _aside(centre: Floats) -> Floats:

@@ -53,6 +53,20 @@ def test_a_bowl_too_small_says_which_is_wide_enough():
     assert lying(example("bowl", bowl=fits)).inside.all()
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_fruits_are_thrown_again_where_one_bounces_out(seed):
+    """Four in a bowl for four: what falls beside by chance is no reason to refuse."""
+    params = SOLVER.parse({"seed": seed, "heap": {"fruits": 4, "bowl": 2.6}}, "orange")
+    assert lying(params).inside.all()
+
+
+def test_places_in_the_floor_or_in_the_air_are_refused():
+    with pytest.raises(InvalidInput, match=r"places\.1 lies at y = -5, below the floor"):
+        SOLVER.parse({"heap": {"places": [(0, 1, 0), (3, -5, 0)]}}, "orange")
+    with pytest.raises(InvalidInput, match=r"places\.0 hangs at y = 30, 29 above"):
+        SOLVER.parse({"heap": {"places": [(0, 30, 0), (3, 1, 0)]}}, "orange")
+
+
 def test_under_the_wall_is_not_in_the_bowl():
     middle, under = (0.0, 1.2, 0.0), (4.4, 1.0, 0.0)
     with pytest.raises(InvalidInput, match="1 of 2 fruits do not fit") as refused:

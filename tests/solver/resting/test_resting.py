@@ -98,6 +98,14 @@ def test_turning_is_what_scipy_does() -> None:
     np.testing.assert_allclose(rotate(turn.as_quat(), v, True), turn.inv().apply(v), atol=1e-14)
 
 
+@pytest.mark.parametrize("opening", [2.8, 2.95, 3.1, 3.3, 3.5, 3.8])
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_is_thrown_out_of_a_bowl_with_room(opening: float, seed: int) -> None:
+    """Five balls start beside each other where the bowl is wide enough for that, and not in its wall."""
+    rest = settle(BODIES[:1], [0] * 5, np.ones(5), Bowl(opening, 0.15), seed)
+    assert np.hypot(rest.centre[:, 0], rest.centre[:, 2]).max() < opening
+
+
 def test_a_pile_of_too_many_is_refused() -> None:
     with pytest.raises(InvalidInput, match="several piles"):
         settle(BODIES[:1], [0] * (MOST + 1), np.ones(MOST + 1), None, 0)
