@@ -30,10 +30,11 @@ def asker_of(request: Request, token: Token) -> Asker:
 
 
 class Submitted(NamedTuple):
-    """A job in the queue, and whether it waits now and did not before."""
+    """A job in the queue, whether it waits now and did not before, and what its solver remarks."""
 
     job: Job
     new: bool
+    note: str
 
     @property
     def location(self) -> str:
@@ -79,13 +80,15 @@ def submit(
     if not unlimited:
         _weigh(solver, values, settled, settings)
     store: Store = state.tables.store
+    # what the run would refuse at once is refused here, and not as a job that failed
+    said = "" if solver.remarks is None else solver.remarks(values, settled)
     spec = JobSpec.of(solver, values, settled)
     spending = Spending(settings.max_seconds_per_token, settings.max_seconds_per_client, 3600 * settings.quota_hours)
     quota = None if unlimited else Quota(settings.max_jobs, settings.max_jobs_per_token, spending)
     expected = solver.cost(values, settled).seconds
     lost = not store.has(spec.key)
     job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=expected)
-    return Submitted(job, new)
+    return Submitted(job, new, said)
 
 
 def _weigh(solver: Solver, params: Params, need: Need, settings: Settings) -> None:

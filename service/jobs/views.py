@@ -82,6 +82,7 @@ class JobView(BaseModel):
         description="Parameters too long for lists and events, as meshes: the job itself has them",
     )
     need: dict[str, Any] = Field(description="All that is needed")
+    note: str = Field("", description="What is worth knowing of its run beforehand; lists leave it out")
     problem: Failure | None = Field(None, description="Why it failed, or why its last attempt did")
     links: dict[str, str] = Field(description="Addresses of the job, its events, and its result once it is done")
 
@@ -93,8 +94,11 @@ class JobList(BaseModel):
     next: str | None = Field(None, description="Address of the next page, if there is one")
 
 
-def view(job: Job, whole: bool = True) -> JobView:
-    """Return what is said of a job, without its longest parameters unless the whole is asked for."""
+def view(job: Job, whole: bool = True, note: str | None = None) -> JobView:
+    """Return what is said of a job, without its note and its longest parameters unless the whole is asked for.
+
+    note: what its solver remarks, where that is known already.
+    """
     own = link(f"/v1/jobs/{job.key}")
     links = {"self": own, "events": f"{own}/events"}
     if job.state == "done":
@@ -114,6 +118,7 @@ def view(job: Job, whole: bool = True) -> JobView:
         params={name: value for name, value in job.params.items() if name not in omitted},
         omitted=omitted,
         need=dict(job.need),
+        note=(_note(job) if note is None else note) if whole else "",
         problem=_failure(job.error),
         links=links,
     )
@@ -160,6 +165,22 @@ def _cost(solver: str, version: str, params: bytes, need: bytes) -> Cost | None:
         return found.cost(found.params.model_validate_json(params), Need.model_validate_json(need))
     except (SolverError, ValueError):
         return None
+
+
+def _note(job: Job) -> str:
+    return _remarks(job.solver, job.version, canonical(job.params), canonical(job.need))
+
+
+@lru_cache(maxsize=64)
+def _remarks(solver: str, version: str, params: bytes, need: bytes) -> str:
+    """Return what a solver says of a run before it begins; nothing for one that is gone or has changed since."""
+    try:
+        found = registry.get(solver)
+        if found.version != version or found.remarks is None:
+            return ""
+        return found.remarks(found.params.model_validate_json(params), Need.model_validate_json(need))
+    except (SolverError, ValueError):
+        return ""
 
 
 def _date(seconds: float) -> str:
