@@ -65,7 +65,7 @@ def ask(request: Request, response: Response, body: JobRequest, token: Runner) -
     response.headers["Location"] = found.location
     if found.job.state in ("done", "failed"):
         response.status_code = 200
-    return view(found.job, note=found.note)
+    return view(found.job)
 
 
 @reading.get("/v1/jobs", summary="All jobs", responses=problems.responses(422, 503))

@@ -20,6 +20,7 @@ from ..errors import TooCostly
 from ..limits.clients import address
 from ..settings import Settings
 from ..views.addresses import link
+from .views import remember
 
 __all__ = ["Submitted", "asker_of", "submit"]
 
@@ -30,11 +31,10 @@ def asker_of(request: Request, token: Token) -> Asker:
 
 
 class Submitted(NamedTuple):
-    """A job in the queue, whether it waits now and did not before, and what its solver remarks."""
+    """A job in the queue, and whether it waits now and did not before."""
 
     job: Job
     new: bool
-    note: str
 
     @property
     def location(self) -> str:
@@ -85,10 +85,11 @@ def submit(
     spec = JobSpec.of(solver, values, settled)
     spending = Spending(settings.max_seconds_per_token, settings.max_seconds_per_client, 3600 * settings.quota_hours)
     quota = None if unlimited else Quota(settings.max_jobs, settings.max_jobs_per_token, spending)
-    expected = solver.cost(values, settled).seconds
+    cost = solver.cost(values, settled)
+    remember(spec.key, cost, said)
     lost = not store.has(spec.key)
-    job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=expected)
-    return Submitted(job, new, said)
+    job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=cost.seconds)
+    return Submitted(job, new)
 
 
 def _weigh(solver: Solver, params: Params, need: Need, settings: Settings) -> None:

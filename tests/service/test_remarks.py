@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from service.cli import app
+from service.jobs import views
+from solver import registry
 from solver.growth.shapes import start
 from store.ledger.queue import Queue
 from store.store import Store
@@ -103,3 +106,30 @@ def test_a_session_says_what_its_tools_do_not_touch(live: Served) -> None:
     assert "note" not in client.ask("add", tool={**spot, "start": 50.0})
     other = live.client({"shape": "square", "tools": [], "step": 0.05})
     assert "note" not in other.opened()
+
+
+def test_what_is_said_of_a_job_is_found_out_once_and_not_for_lists(
+    queue_only: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[Any] = []
+
+    def remarks(params: Any, need: Any) -> str:
+        told.append(params)
+        return "Mind the step."
+
+    growth = registry.get("growth")
+    monkeypatch.setattr(registry, "get", lambda name: replace(growth, remarks=remarks))
+    params = {"shape": "disc", "seed": 12345}
+    asked = queue_only.post("/v1/jobs", json={"solver": "growth", "params": params, "need": NEED}).json()
+    assert asked["note"] == "Mind the step."
+    for _ in range(2):
+        assert queue_only.get(asked["links"]["self"]).json()["note"] == "Mind the step."
+    assert len(told) == 1
+    # as another process of the service, which did not hear the question
+    views._KNOWN.clear()
+    [listed] = queue_only.get("/v1/jobs").json()["jobs"]
+    assert listed["expected"] == asked["expected"]
+    assert len(told) == 1
+    assert queue_only.get(asked["links"]["self"]).json()["note"] == "Mind the step."
+    assert queue_only.delete(asked["links"]["self"]).json()["note"] == "Mind the step."
+    assert len(told) == 2
