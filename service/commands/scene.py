@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sweeps.commands.terminal.console import emit, grid, note
-from sweeps.commands.terminal.options import As_json, StoreToRead
+from sweeps.commands.terminal.options import As_json, StoreToRead, check_place
 from sweeps.errors import InvalidOption
 
 if TYPE_CHECKING:
@@ -61,6 +61,8 @@ def scene(
     formats = {suffix: name for name, (_, suffix) in FORMATS.items() if name != "json"}
     if out is not None and out.suffix not in formats:
         raise InvalidOption(f"--out {out}: no scene is written as {out.suffix!r}.", f"Take {', '.join(formats)}.")
+    if out is not None:
+        check_place("--out", out)
     understood = parse(_with_files(_toml(file), file.parent))
     to = formats[out.suffix] if out else "json"
     if solve:
@@ -103,12 +105,14 @@ def _with_files(values: dict[str, Any], folder: Path) -> dict[str, Any]:
 
     """
     from sweeps.commands.terminal import meshfile
+    from sweeps.commands.terminal.options import with_files
 
     items = values.get("items")
     for item in items if isinstance(items, list) else ():
         if isinstance(item, dict) and isinstance(item.get("params"), str):
-            own = item.get("parameters")
-            item["parameters"] = {**_toml(folder / item.pop("params")), **(own if isinstance(own, dict) else {})}
+            path, own = folder / item.pop("params"), item.get("parameters")
+            read = with_files(_toml(path), path.parent)
+            item["parameters"] = {**read, **(own if isinstance(own, dict) else {})}
     places = values.get("places")
     for place in places if isinstance(places, list) else ():
         if isinstance(place, dict) and isinstance(place.get("mesh"), str):

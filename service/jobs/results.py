@@ -258,7 +258,7 @@ def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
     shape = replace(of_result(run, {name: params.axis(name) for name in axes}, near), table=str(job.digest))
     symbol = solver.stages.symbol
     units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}
-    skin = shade(job.solver, json.dumps(job.params)) if chosen.name == "glb" else None
+    skin = shade(job.solver, json.dumps(dict(job.params))) if chosen.name == "glb" else None
     return chosen.encode(shape, About(job.solver, "", {}, symbol, units, shade=skin, reach=solver.stages.reach))
 
 

@@ -20,6 +20,7 @@ from ..errors import TooCostly
 from ..limits.clients import address
 from ..settings import Settings
 from ..views.addresses import link
+from .views import remember
 
 __all__ = ["Submitted", "asker_of", "submit"]
 
@@ -79,12 +80,15 @@ def submit(
     if not unlimited:
         _weigh(solver, values, settled, settings)
     store: Store = state.tables.store
+    # what the run would refuse at once is refused here, and not as a job that failed
+    said = "" if solver.remarks is None else solver.remarks(values, settled)
     spec = JobSpec.of(solver, values, settled)
     spending = Spending(settings.max_seconds_per_token, settings.max_seconds_per_client, 3600 * settings.quota_hours)
     quota = None if unlimited else Quota(settings.max_jobs, settings.max_jobs_per_token, spending)
-    expected = solver.cost(values, settled).seconds
+    cost = solver.cost(values, settled)
+    remember(spec.key, cost, said)
     lost = not store.has(spec.key)
-    job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=expected)
+    job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=cost.seconds)
     return Submitted(job, new)
 
 

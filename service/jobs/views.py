@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from solver import registry
 from solver.contract import Cost, Need, SolverError
-from store.canonical import canonical
 from store.ledger.jobs import Job, State
 
 from ..problems import URN
 from ..views.addresses import link
 
-__all__ = ["ENDED", "Expected", "Failure", "JobList", "JobRequest", "JobView", "view"]
+__all__ = ["ENDED", "Expected", "Failure", "JobList", "JobRequest", "JobView", "remember", "view"]
 
 #: States that a job does not leave by itself.
 ENDED: tuple[State, ...] = ("done", "failed", "cancelled")
@@ -25,6 +23,9 @@ ENDED: tuple[State, ...] = ("done", "failed", "cancelled")
 
 #: Values of one parameter that lists and events still show.
 _LONG = 2000
+#: What is known of jobs before they run, by their keys, which say all that it hangs on; and of how many.
+_KNOWN: dict[str, Beforehand] = {}
+_MANY = 2000
 
 
 class JobRequest(BaseModel):
@@ -82,6 +83,7 @@ class JobView(BaseModel):
         description="Parameters too long for lists and events, as meshes: the job itself has them",
     )
     need: dict[str, Any] = Field(description="All that is needed")
+    note: str = Field("", description="What is worth knowing of its run beforehand; lists leave it out")
     problem: Failure | None = Field(None, description="Why it failed, or why its last attempt did")
     links: dict[str, str] = Field(description="Addresses of the job, its events, and its result once it is done")
 
@@ -94,7 +96,8 @@ class JobList(BaseModel):
 
 
 def view(job: Job, whole: bool = True) -> JobView:
-    """Return what is said of a job, without its longest parameters unless the whole is asked for."""
+    """Return what is said of a job, without its note and its longest parameters unless the whole is asked for."""
+    before = _beforehand(job, whole)
     own = link(f"/v1/jobs/{job.key}")
     links = {"self": own, "events": f"{own}/events"}
     if job.state == "done":
@@ -107,13 +110,14 @@ def view(job: Job, whole: bool = True) -> JobView:
         state=job.state,
         progress=Progress(fraction=job.progress, message=job.message if job.state == "running" else ""),
         seconds=job.seconds if job.state == "done" else None,
-        expected=_expected(job),
+        expected=before.expected,
         attempts=job.attempts,
         created=_date(job.created),
         updated=_date(job.updated),
         params={name: value for name, value in job.params.items() if name not in omitted},
         omitted=omitted,
         need=dict(job.need),
+        note=(before.note or "") if whole else "",
         problem=_failure(job.error),
         links=links,
     )
@@ -145,21 +149,44 @@ def _failure(error: Mapping[str, Any] | None) -> Failure | None:
     )
 
 
-def _expected(job: Job) -> Expected | None:
-    cost = _cost(job.solver, job.version, canonical(job.params), canonical(job.need))
-    return None if cost is None else Expected(seconds=cost.seconds, bytes=cost.bytes)
+class Beforehand(NamedTuple):
+    """What can be said of a run before it begins: what it is expected to take, and what its solver remarks.
+
+    note: None where nobody has asked; to tell takes a tenth of a second.
+    """
+
+    expected: Expected | None
+    note: str | None
 
 
-@lru_cache(maxsize=1024)
-def _cost(solver: str, version: str, params: bytes, need: bytes) -> Cost | None:
-    """Return the expected cost; None for a solver that is gone or has changed since."""
+def remember(key: str, cost: Cost, note: str | None) -> Beforehand:
+    """Keep what was found out of a job, and return it."""
+    if len(_KNOWN) >= _MANY:
+        _KNOWN.clear()
+    found = _KNOWN[key] = Beforehand(Expected(seconds=cost.seconds, bytes=cost.bytes), note)
+    return found
+
+
+def _beforehand(job: Job, whole: bool) -> Beforehand:
+    """Return what can be said of a job; nothing of one whose solver is gone or has changed since."""
+    known = _KNOWN.get(job.key)
+    if known is not None and (known.note is not None or not whole):
+        return known
     try:
-        found = registry.get(solver)
-        if found.version != version:
-            return None
-        return found.cost(found.params.model_validate_json(params), Need.model_validate_json(need))
+        found = registry.get(job.solver)
+        if found.version != job.version:
+            return Beforehand(None, "")
+        params, need = found.params.model_validate(dict(job.params)), Need.model_validate(dict(job.need))
+        cost = found.cost(params, need)
     except (SolverError, ValueError):
-        return None
+        return Beforehand(None, "")
+    note: str | None = None
+    if whole:
+        try:
+            note = "" if found.remarks is None else found.remarks(params, need)
+        except SolverError:  # the run says so itself
+            note = ""
+    return remember(job.key, cost, note)
 
 
 def _date(seconds: float) -> str:

@@ -274,7 +274,7 @@ def parse(values: Any) -> Scene:
         raise InvalidScene.of([Wrong("scene", "is no object", "Write camera and items.")])
     _check_count(values.get("items"))
     try:
-        return Scene.model_validate(values)
+        scene = Scene.model_validate(values)
     except ValidationError as error:
         wrong = []
         for item in _causes(error)[:50]:
@@ -284,6 +284,9 @@ def parse(values: Any) -> Scene:
             shown = f" (got {given!r})" if isinstance(given, str | int | float) else ""
             wrong.append(Wrong(name, f"{detail}{shown}"[:400], _advice(item["type"])))
         raise InvalidScene.of(wrong) from None
+    # numbers come as 1e9 or as text as well, and transforms count themselves
+    _check_total(sum(item.instances for item in scene.items))
+    return scene
 
 
 def _causes(error: ValidationError) -> list[Any]:
@@ -303,7 +306,11 @@ def _check_count(items: Any) -> None:
         return
     counts = [item.get("count", 1) for item in items[: MOST_ITEMS + 1] if isinstance(item, dict)]
     total = len(items) + sum(max(0, c - 1) for c in counts if isinstance(c, int) and not isinstance(c, bool))
-    if total > MOST or len(items) > MOST_ITEMS:
+    _check_total(total)
+
+
+def _check_total(total: int) -> None:
+    if total > MOST:
         advice = f"Send at most {MOST}: split the scene, or leave out what is far away."
         raise SceneTooLarge.of([Wrong("items", f"{total} instances are more than {MOST}", advice)])
 

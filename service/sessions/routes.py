@@ -7,6 +7,7 @@ import contextlib
 import json
 from typing import Any, get_args
 
+import orjson
 from fastapi import APIRouter
 from fastapi.security.utils import get_authorization_scheme_param
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
@@ -140,11 +141,16 @@ async def _message(client: WebSocket) -> dict[str, Any]:
         raise WebSocketDisconnect(came.get("code", 1005))
     text = came.get("text")
     # numbers that are none would pass through to the engine
-    with contextlib.suppress(ValueError, RecursionError):
+    with contextlib.suppress(ValueError, TypeError, RecursionError):
         found = json.loads(text, parse_constant=_none) if text is not None else None
         if isinstance(found, dict):
+            # half a character, integers of more than 64 bits, depths beyond 254: no engine is told of them
+            orjson.dumps(found)
             return found
-    raise InvalidQuery("a message is one JSON object, as text.", advice="docs/sessions.md lists them.")
+    raise InvalidQuery(
+        "a message is one JSON object, as text, with whole numbers of 64 bits at most.",
+        advice="docs/sessions.md lists them.",
+    )
 
 
 def _none(constant: str) -> Any:

@@ -76,6 +76,8 @@ class Solver:
     `tolerances` are the worst of each quality over all that was. `clock` turns hours under given conditions into
     stages. `live` begins a run that is acted upon while it goes. `sizes` are lengths of r1, or of the solver's own
     unit, in metres by preset, as such fruits are when fresh. `extent` says how large what is run is at the start.
+    `remarks` says in words, before any work, what is worth knowing of a run, as its result's `note` does; it refuses
+    what the run would refuse at once.
     """
 
     name: str
@@ -101,6 +103,7 @@ class Solver:
     live: Live | None = None
     sizes: Mapping[str, float] = field(default_factory=dict)
     extent: Callable[[Any], Extent] | None = None
+    remarks: Callable[[Any, Need], str] | None = None
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.

@@ -38,6 +38,12 @@ def _cost(params: GrowthParams, need: Need) -> Cost:
     return expected_cost(params, need)
 
 
+def _remarks(params: GrowthParams, need: Need) -> str:
+    from .told import note
+
+    return note(params, need.quality)
+
+
 def _extent(params: GrowthParams) -> Extent:
     """Return the box of the start shape, in its own unit."""
     import numpy as np
@@ -66,4 +72,5 @@ SOLVER = Solver(
     cost=_cost,
     live=Live(ACTIONS, _live, ("elastic_strain", "sheet_thickness", *CHANNELS)),
     extent=_extent,
+    remarks=_remarks,
 )

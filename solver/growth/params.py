@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
 
 from ..contract import Params
@@ -184,6 +185,17 @@ class GrowthParams(Params):
         description="Whether a part that grows settles alone where the rest stays in balance; not where parts touch",
         json_schema_extra=_units("1"),
     )
+
+    @model_validator(mode="after")
+    def _in_its_unit(self) -> Self:
+        size = max(map(float, np.ptp(self.mesh.shape().x, axis=0))) if self.mesh else np.inf
+        if self.thickness > size:
+            raise ValueError(
+                f"the mesh is {size:.4g} wide, and its sheet, with {self.thickness:g}, thicker than that: is it in "
+                "another unit? Thickness and tools are meant for a shape some 2 wide: "
+                f"scale it by {float(f'{2 / size:.2g}'):.10g}, or take a smaller `thickness`"
+            )
+        return self
 
     @model_validator(mode="after")
     def _slow(self) -> Self:

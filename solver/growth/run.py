@@ -23,6 +23,7 @@ from .settling.energy import elastic
 from .settling.stage import residual
 from .shown import shown
 from .state import State
+from .told import note
 
 __all__ = ["run"]
 
@@ -33,7 +34,7 @@ def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     """Return meshes and numbers of the wanted growth times; see `solver.quantities` for units.
 
     `crossings` is always among them, counted on positions as they are handed over. Where parts pass through each other,
-    as they may with contact = 0, `note` says so.
+    as they may with contact = 0, `note` says so, beside what was known before (`told`).
 
     Raises:
         InvalidInput: a region, which a mesh of its own has not, or a factor that is not installed.
@@ -107,14 +108,16 @@ def _dataset(
         data |= changing(frames[: len(rows)], need.dtype) | textured(states[: len(rows)])
         coords["component"] = ["x", "y", "z"]
     attrs = {"path": params.solver, "factor": definite.chosen(), "up": "z"} | (named(params.mesh) if frames else {})
+    said = note(params, need.quality)
     through = [row for row in rows if row["crossings"]]
     if through:
         worst = max(through, key=lambda row: int(row["crossings"]))
-        attrs["note"] = (
+        crossed = (
             f"The sheet passes through itself at {len(through)} of {len(rows)} stages, at growth time "
             f"{worst['stage']:g} in {worst['crossings']} pairs of triangles. {_advice(params)}"
         )
-    return xr.Dataset(data, coords, attrs)
+        said = f"{said} {crossed}".strip()
+    return xr.Dataset(data, coords, attrs | ({"note": said} if said else {}))
 
 
 def _advice(params: GrowthParams) -> str:

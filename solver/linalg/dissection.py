@@ -105,7 +105,7 @@ def _sorted(order: Ints, part: Ints, bounds: Ints, ranks: Ints, axes: Ints) -> I
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _halve(parts: Ints, centres: Floats, ranks: Ints, vertices: int, depth: int, thin: bool, leaf: Ints) -> None:
     """Write the leaf of each part; ranks (3, p): of the centres along each axis."""
     count, mark = len(centres), np.zeros(vertices if thin else 0, np.int64)

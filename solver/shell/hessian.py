@@ -82,7 +82,7 @@ def hinge_hessian(points: Floats, slopes: Floats, second: Floats) -> None:
                 second[row, c] = -(-ds * slopes[2, c] + (1 - s) * third - dr * slopes[3, c] + (1 - r) * fourth)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def bending_hessian(
     x: Floats, hinges: Ints, angles: Floats, rest: Floats, stiffness: Floats, places: Ints, blocks: Floats
 ) -> None:
@@ -107,7 +107,7 @@ def bending_hessian(
                         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def membrane_hessian(
     x: Floats, triangles: Ints, g: Floats, lame: float, places: Ints, blocks: Floats, thick: Floats | None = None
 ) -> None:
@@ -164,7 +164,7 @@ def membrane_hessian(
                         blocks[at, c, d] += area * total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def volume_hessian(x: Floats, triangles: Ints, factor: float, places: Ints, blocks: Floats) -> None:
     """Add factor times the second derivative of the volume inside, sum of x_i . (x_j x x_k) / 6, to `blocks`.
 

@@ -11,7 +11,7 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid
-from .terminal.options import As_json, Preset, Quality, Set, assignments
+from .terminal.options import As_json, Preset, Quality, Set, assignments, check_place
 
 if TYPE_CHECKING:
     from solver.contract import Fresh, Solver
@@ -94,10 +94,7 @@ def onset(
 def _check(path: Path) -> None:
     if path.suffix not in (".npz", ".png"):
         raise InvalidOption(f"--mode-out {path}: cannot write {path.suffix or 'no suffix'!r}.", "Known: .npz, .png.")
-    if path.is_dir():
-        raise InvalidOption(f"--mode-out {path} is a directory.", "Name a file in it.")
-    if not path.absolute().parent.is_dir():
-        raise InvalidOption(f"--mode-out {path}: there is no directory {path.parent}.", "Create it first.")
+    check_place("--mode-out", path)
 
 
 def _solver(name: str | None) -> Solver:

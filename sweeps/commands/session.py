@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..errors import InvalidOption
+from ..errors import BAD_INPUT, InvalidOption
 from .terminal.console import note
-from .terminal.options import parameters
+from .terminal.options import check_place, parameters
 
 __all__ = ["add_to"]
 
@@ -48,6 +48,8 @@ def session(
 
     wizen session growth - --params examples/growth/c-pumpkin.toml --quality default --save pumpkin.toml
     """
+    if save is not None:
+        check_place("--save", save)
     saved = _driven(solver, list(_messages(actions)), params_file, preset, quality)
     if save is not None:
         save.write_text(saved["toml"], encoding="utf-8")
@@ -63,28 +65,30 @@ def _driven(
     from threadpoolctl import threadpool_limits
 
     from solver import registry
-    from solver.contract import Quality, SolverError
+    from solver.contract import InvalidInput, Quality, SolverError
 
     from ..live.desk import Desk
 
     chosen = registry.get(solver)
     opening = messages.pop(0) if messages and messages[0].get("do") == "open" else {}
     values = parameters(params_file) or opening.get("params") or {}
+    named = preset or opening.get("preset")
+    if named is not None and not isinstance(named, str):
+        raise InvalidOption(f"open: {named!r} names no preset.", f"Known: {', '.join(sorted(chosen.presets))}.")
     wanted = quality or opening.get("quality") or "preview"
     found: Quality | None = next((known for known in get_args(Quality) if known == wanted), None)
     if found is None:
         raise InvalidOption(f"there is no quality {wanted!r}.", f"Take {', '.join(get_args(Quality))}.")
-    failed: list[SolverError] = []
+    failed: list[Mapping[str, Any]] = []
 
     def say(told: dict[str, Any]) -> None:
         if told["say"] in ("done", "saved", "error"):
             typer.echo(json.dumps({k: v for k, v in told.items() if k != "toml"}))
         if told["say"] == "error":
-            problem = told["problem"]
-            failed.append(SolverError(f"message {told['id']}: {problem['detail']}", advice=problem["advice"]))
+            failed.append(told["problem"])
 
     with threadpool_limits(1, user_api="blas"):
-        params = chosen.parse(values, preset or opening.get("preset"))
+        params = chosen.parse(values, named)
         desk = Desk(chosen, params, found, (), say, lambda frame: None)
         for number, message in enumerate(messages, 1):
             if message.get("do") == "play" and message.get("until") is None:
@@ -92,7 +96,10 @@ def _driven(
             desk.take({**message, "id": number})
             desk.finish()
             if failed:
-                raise failed[0]
+                code = str(failed[0]["type"]).rpartition(":")[2]
+                # what was asked for is wrong, or it could not be done
+                kind = InvalidInput if code in BAD_INPUT else SolverError
+                raise kind(f"message {number}: {failed[0]['detail']}", advice=str(failed[0]["advice"]))
         return desk.saved()
 
 

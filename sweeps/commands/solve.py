@@ -164,6 +164,9 @@ def _run(solver: Solver, params: Parameters, need: Need) -> tuple[xr.Dataset, fl
     from .. import tabled
     from .terminal import progress
 
+    said = solver.remarks(params, need) if solver.remarks is not None else ""
+    if said:
+        note(f"note: {said}")
     begin = time.perf_counter()
     with progress.one_run(solver.name) as observe, progress.stopping() as stop:
         result = solver.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))

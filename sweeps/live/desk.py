@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.contract import InvalidInput, LiveEngine, OverBudget, Params, Quality, Solver, SolverError
+from solver.contract import InvalidInput, LiveEngine, Need, OverBudget, Params, Quality, Solver, SolverError
 from solver.contract.words import SHORT
 from solver.geometry.crossings import crossings
 from solver.meshes import Frame
@@ -54,6 +54,7 @@ class Desk:
             raise InvalidInput(f"no field {unknown[0]!r} can be shown.", advice=f"Known: {known}.")
         self._solver, self._live, self._fields, self._say = solver, solver.live, fields, say
         self._engine: LiveEngine = solver.live.open(params, quality)
+        self._note = "" if solver.remarks is None else solver.remarks(params, Need(quality=quality))
         self._screen = Screen(show)
         self._until, self._pace, self._since = 0.0, math.inf, (time.monotonic(), 0.0)
         self._settling: Generator[object, None, tuple[Frame, float]] | None = None
@@ -84,7 +85,7 @@ class Desk:
             "fields": list(self._fields),
             "actions": list(self._live.actions),
         }
-        self._say({**opened, **more})
+        self._say({**opened, **({"note": self._note} if self._note else {}), **more})
         self._state()
 
     def take(self, message: Mapping[str, Any]) -> None:

@@ -28,6 +28,8 @@ __all__ = ["ATTEMPTS", "Run"]
 ATTEMPTS = 2
 #: Seconds that workers get to stop when their runner does, twice a heartbeat; what they would finish the next run does.
 _LANDING = 1.0
+#: Seconds between two looks at workers that were asked to stop.
+_SOON = 0.1
 
 _LOST = {
     "code": "worker-lost",
@@ -71,7 +73,7 @@ class Run:
             self._launch()
             if not self.flying and not self._elsewhere():
                 return
-            yield beat(self._lease)
+            yield self._pause
             self._collect()
             self._attend()
 
@@ -88,9 +90,14 @@ class Run:
                 busy = self._now()
             elif self._now() - busy >= patience:
                 return
-            yield beat(self._lease)
+            yield self._pause
             self._collect()
             self._attend()
+
+    @property
+    def _pause(self) -> float:
+        """How long to wait for a result [s]; what was called off is ended on time, and not at the next heartbeat."""
+        return min(_SOON, beat(self._lease)) if self._called_off else beat(self._lease)
 
     def landing(self) -> Iterator[float]:
         """Give back what still runs and wait for its workers; those that do not stop in time are ended."""
@@ -272,7 +279,7 @@ class Run:
             total=len(self._jobs),
             solved=self.solved,
             reused=done - self.solved,
-            failed=tuple(Failure(job.key, job.params, job.error or {}) for job in failed),
+            failed=tuple(Failure(job.key, dict(job.params), job.error or {}) for job in failed),
             waiting=sum(job.state in ("wanted", "running") for job in states.values()),
             cancelled=sum(job.state == "cancelled" for job in states.values()),
             seconds=seconds,

@@ -31,7 +31,7 @@ from ..relaxing import starts
 __all__ = ["GRACE", "Hold", "Outcome", "Task", "beat", "quarantine_path", "stop_mark", "work"]
 
 #: Seconds that a solver gets to stop by itself once it was asked to.
-GRACE = 1.0
+GRACE = 0.7
 
 
 @dataclass(frozen=True)

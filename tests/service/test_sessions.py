@@ -244,7 +244,10 @@ def test_who_is_not_let_in_is_told_why(live: Served) -> None:
 
 
 def test_what_is_no_message_ends_the_connection_with_a_reason(live: Served) -> None:
-    for text in ("", "{", "[]", '{"do": NaN}', "[" * 100_000, b"bytes"):
+    half = '{"do": "open", "token": "\\ud800"}'
+    deep = '{"do": "open", "params": ' + '{"a":' * 300 + "1" + "}" * 301
+    long = '{"do": "open", "params": {"seed": ' + "9" * 30 + "}}"
+    for text in ("", "{", "[]", '{"do": NaN}', "[" * 100_000, b"bytes", half, deep, long):
         client = Client(live.url)
         client.socket.send(text)
         problem, closed = refused(client)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from store.errors import CorruptLedger, UnknownJob
-from store.ledger import clock
+from store.ledger import clock, jobs
 from store.ledger.clock import Clock
 from store.ledger.jobs import Job, JobSpec
 from store.ledger.ledger import MAX_LOST, Ledger
@@ -360,3 +360,27 @@ def test_a_ledger_of_the_first_version_is_upgraded(tmp_path: Path) -> None:
         connection.execute("PRAGMA user_version = 4")
     with pytest.raises(CorruptLedger, match="version 4"):
         Ledger(path).counts()
+
+
+def test_what_jobs_are_of_is_read_when_it_is_wanted(ledger: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mesh among the parameters takes a third of a second, and runners ask twice a second how their jobs are."""
+    ledger.want([job("a")], plan="p")
+    held = claim(ledger)
+    read: list[str] = []
+    loads = jobs.json.loads
+
+    def counted(text: str) -> object:
+        read.append(text)
+        return loads(text)
+
+    monkeypatch.setattr(jobs.json, "loads", counted)
+    [found] = ledger.running("w")
+    assert found.key == held.key
+    assert ledger.get("a").state == "running"
+    assert pickle.loads(pickle.dumps(found)).state == "running"  # as it goes to a worker
+    assert '{"te":0.04}' not in read
+    assert found.params == {"te": 0.04}
+    assert (dict(found.params), len(found.params), repr(found.params)) == ({"te": 0.04}, 1, "{'te': 0.04}")
+    assert found.params["te"] == 0.04
+    assert read.count('{"te":0.04}') == 1
+    assert pickle.loads(pickle.dumps(found)) == found

@@ -16,12 +16,14 @@ from ..engine import Engine, Undone
 from ..params import GrowthParams
 from ..settings import choose
 from ..settling.stage import residual
-from ..shapes import Mesh
+from ..shapes import Ground, Mesh
 from ..shown import shown
 from ..solids import Solid, check_outside, check_pace
 from ..state import State
+from ..told import note_of_tool
 from ..tooling.places import check_mapped
-from ..tooling.tools import HotStroke, Point, Tool
+from ..tooling.placing import border
+from ..tooling.tools import HotCurve, HotStroke, Point, Tool
 from .actions import Add, Brush, End, Lift, Put
 
 __all__ = ["GrowingLive"]
@@ -100,7 +102,7 @@ class GrowingLive:
         return len(self._undone)
 
     def do(self, action: BaseModel) -> Mapping[str, Any]:
-        """Take an action; return the number of the tool or solid that it concerns.
+        """Take an action; return the number of the tool or solid that it concerns, and a `note` where it does nothing.
 
         Raises:
             InvalidInput: too many tools, solids or dabs, a place off the surface, a solid that is too fast, or
@@ -113,7 +115,8 @@ class GrowingLive:
                 "the shape is still on its way to where it was.", advice="Wait until `until` is reached."
             )
         if isinstance(action, Brush):
-            return {"tool": self._dab(action)}
+            said = self._check_near(action)
+            return {"tool": self._dab(action)} | ({"note": said} if said else {})
         if isinstance(action, End):
             return self._end(action)
         self._stroke = None
@@ -124,8 +127,9 @@ class GrowingLive:
                     check_mapped(action.tool)
                 except ValueError as error:
                     raise InvalidGeometry(f"tool: {error}.", advice="Begin with such a mesh, or project it.") from None
+            said = self._note(action.tool)
             self.begin()
-            return {"tool": self._engine.add(action.tool)}
+            return {"tool": self._engine.add(action.tool)} | ({"note": said} if said else {})
         if isinstance(action, Put):
             _room("solids", len(self.script.solids), _MOST_SOLIDS)
             self._check_solid(action.solid)
@@ -155,7 +159,6 @@ class GrowingLive:
             raise InvalidGeometry(f"solid: {error}.", advice=advice) from None
 
     def _dab(self, brush: Brush) -> int:
-        self._check_near(brush)
         hold = brush.hold or self.step
         stroke = None if self._stroke is None else self.script.tools[self._stroke]
         if not (
@@ -180,7 +183,16 @@ class GrowingLive:
         self._engine.change(self._stroke, stroke.model_copy(update=more))
         return self._stroke
 
-    def _check_near(self, brush: Brush) -> None:
+    def _note(self, tool: Tool) -> str:
+        """Return what to say of a tool that is to be added."""
+        state, params = self._engine.state, self.script
+        if tool.start > self._engine.following + 1e-9 or (isinstance(tool, HotCurve) and tool.apex is not None):
+            return ""
+        ground = Ground(Mesh(state.x, state.mesh.triangles), border(state.mesh), state.corners.get("uv"))
+        return note_of_tool(len(params.tools), tool, params, ground)
+
+    def _check_near(self, brush: Brush) -> str:
+        """Refuse a dab that is off the surface; return what to say of one that lies between all vertices."""
         state = self._engine.state
         at = np.array(brush.at)
         there = place(at, state.x, state.mesh.triangles).at(state.x, state.mesh.triangles)[0]
@@ -191,6 +203,10 @@ class GrowingLive:
                 f"at: the surface is {away:.3g} away from there, further than the brush's radius.",
                 advice=f"Its nearest point is ({near}).",
             )
+        gap = float(np.linalg.norm(state.x - there, axis=1).min())
+        if gap < brush.radius:
+            return ""
+        return f"It touches no vertex, the nearest being {gap:.2g} away, and so does nothing: take a larger radius."
 
     def _end(self, action: End) -> Mapping[str, Any]:
         tools, solids = self.script.tools, self.script.solids

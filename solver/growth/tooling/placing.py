@@ -17,7 +17,7 @@ from .painted import laid_tensors
 from .places import share
 from .tools import Apex, HotCurve, HotSpot, HotStroke, HotSurface, HotTensors, Tool, clocked
 
-__all__ = ["border", "branched", "started"]
+__all__ = ["about", "border", "branched", "started"]
 
 
 #: Control points of a curve about an apex; and how far ahead a heading is marked, over the spot's radius.
@@ -63,7 +63,7 @@ def started(state: State, tools: Sequence[Tool], step: float, seed: int) -> Stat
             if tool.apex is None:
                 curves[number] = _on(number, "a point", np.array(tool.points), tool.radius, mesh, later)
             else:
-                curves[number] = place(_about(tool.apex, spots, mesh), *mesh)
+                curves[number] = place(about(tool.apex, spots, mesh), *mesh)
         else:
             spots[number] = (_first(number, tool, mesh, later),)
     return replace(state, shares=shares, spots=spots, curves=curves)
@@ -192,7 +192,7 @@ def _plane(normal: Floats, frame: Floats) -> tuple[Floats, Floats]:
     return side, np.cross(normal, side)
 
 
-def _about(apex: Apex, spots: Mapping[int, tuple[Spot, ...]], mesh: Mesh) -> Floats:
+def about(apex: Apex, spots: Mapping[int, tuple[Spot, ...]], mesh: Mesh) -> Floats:
     """Return the control points of a curve about an apex."""
     if apex.tool is not None:
         if not spots.get(apex.tool):

@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ...contract import Context, InvalidInput
 from ..shapes import Ground
 
-__all__ = ["UNMAPPED", "Projection", "gray_scott", "laid"]
+__all__ = ["UNMAPPED", "Projection", "gray_scott", "laid", "laid_within"]
 
 Projection = Literal["x", "y", "z", "round", "sphere", "uv"]
 #: What to do where there are no texture coordinates.
@@ -57,6 +57,19 @@ def laid(values: Floats, ground: Ground, projection: Projection, points: Floats 
     return np.asarray(map_coordinates(values, [v, u], order=1, mode="nearest"))
 
 
+def laid_within(values: Floats, ground: Ground, projection: Projection, some: Ints, weights: Floats) -> Floats:
+    """Return the texture's values (m, k) within triangles `some` (m,), at barycentric weights (k, 3); see `laid`.
+
+    Raises:
+        InvalidInput: there are no texture coordinates.
+
+    """
+    if projection == "uv" and ground.uv is not None:
+        return _by_coordinates(values, weights @ ground.uv[some]).reshape(len(some), -1)
+    points = (weights @ ground.mesh.x[ground.mesh.triangles[some]]).reshape(-1, 3)
+    return laid(values, ground, projection, points).reshape(len(some), -1)
+
+
 def _around_middle(values: Floats, x: Floats) -> Floats:
     """Return the values at the directions of points (n, 3) from the origin."""
     n, m = values.shape
@@ -68,11 +81,16 @@ def _around_middle(values: Floats, x: Floats) -> Floats:
 
 def _by_corners(values: Floats, uv: Floats, ground: Ground) -> Floats:
     """Return the means of the values at the texture coordinates (f, 3, 2) of each vertex's corners."""
-    u, v = uv.reshape(-1, 2).T
-    inside = np.where((v >= 0) & (v <= 1), v, v % 1.0)
-    found = _repeating(values, inside * len(values) - 0.5, u % 1.0 * values.shape[1])
+    found = _by_coordinates(values, uv)
     corners, count = ground.mesh.triangles.ravel(), len(ground.mesh.x)
     return np.bincount(corners, found, count) / np.maximum(np.bincount(corners, minlength=count), 1)
+
+
+def _by_coordinates(values: Floats, uv: Floats) -> Floats:
+    """Return the values at texture coordinates (..., 2), end to end."""
+    u, v = uv.reshape(-1, 2).T
+    inside = np.where((v >= 0) & (v <= 1), v, v % 1.0)
+    return _repeating(values, inside * len(values) - 0.5, u % 1.0 * values.shape[1])
 
 
 def _repeating(rows: Floats, down: Floats, along: Floats) -> Floats:

@@ -32,9 +32,11 @@ __all__ = [
     "TableName",
     "Under",
     "assignments",
+    "check_place",
     "numbers",
     "parameters",
     "stages_asked",
+    "with_files",
 ]
 
 Preset = Annotated[str | None, typer.Option("--preset", help="Named parameters to start from (`wizen presets`).")]
@@ -119,18 +121,18 @@ def parameters(path: Path | None) -> dict[str, Any]:
         raise InvalidOption(f"--params {path}: {error}.", "Write TOML, or JSON in a .json file.") from None
     if not isinstance(values, dict):
         raise InvalidOption(f"--params {path} holds no names and values.", 'Write for example {"thickness": 0.02}.')
-    return {name: _with_files(value, path.parent) for name, value in values.items()}
+    return {name: with_files(value, path.parent) for name, value in values.items()}
 
 
-def _with_files(value: Any, folder: Path, name: str = "") -> Any:
+def with_files(value: Any, folder: Path, name: str = "") -> Any:
     """Return a value of a file in `folder` in which every text "@FILE" is what that file holds.
 
     What is called `picture` is one as it is; other pictures are maps around a body.
     """
     if isinstance(value, dict):
-        return {each: _with_files(own, folder, each) for each, own in value.items()}
+        return {each: with_files(own, folder, each) for each, own in value.items()}
     if isinstance(value, list):
-        return [_with_files(each, folder, name) for each in value]
+        return [with_files(each, folder, name) for each in value]
     return _file(folder / value[1:], name) if isinstance(value, str) and value.startswith("@") else value
 
 
@@ -155,6 +157,19 @@ def _value(text: str) -> Any:
         except ValueError:  # both libraries' errors are ValueErrors
             continue
     return text
+
+
+def check_place(option: str, path: Path) -> None:
+    """Refuse, before any work, a file that could not be written after it.
+
+    Raises:
+        InvalidOption: it is a directory, or in none.
+
+    """
+    if path.is_dir():
+        raise InvalidOption(f"{option} {path} is a directory.", "Name a file in it.")
+    if not path.absolute().parent.is_dir():
+        raise InvalidOption(f"{option} {path}: there is no directory {path.parent}.", "Create it first.")
 
 
 def numbers(text: str | None, option: str = "--stages") -> tuple[float, ...]:

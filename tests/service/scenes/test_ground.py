@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 import struct
 from pathlib import Path
@@ -180,3 +181,30 @@ def test_the_command_reads_a_file_beside_the_scene(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text(text.replace("NAME", "evil.stl"))
     refused = CliRunner().invoke(app, ["scene", str(tmp_path / "bad.toml")])
     assert refused.exit_code != 0
+
+
+def test_parameters_of_an_item_bring_the_files_beside_them(tmp_path: Path) -> None:
+    folder = tmp_path / "plants"
+    folder.mkdir()
+    (folder / "bud.stl").write_bytes(HILL.export(file_type="stl"))
+    (folder / "bud.toml").write_text('mesh = "@bud.stl"\ntools = []\nthickness = 0.01\n')
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        '[camera]\nposition = [0, 0, 40]\n[[items]]\nsolver = "growth"\nparams = "plants/bud.toml"\nstage = 1\n'
+    )
+    done = CliRunner().invoke(app, ["scene", str(file), "--json"])
+    assert done.exit_code == 0, done.output
+    [item] = json.loads(done.stdout)["items"]
+    assert item["placeholder"] == "a box as large as it is at the start"
+    assert item["missing"]["why"]
+
+
+@pytest.mark.parametrize("where", ["nowhere/out.glb", "there.glb"])
+def test_where_it_is_to_be_written_is_looked_at_before_work(tmp_path: Path, where: str) -> None:
+    (tmp_path / "there.glb").mkdir()
+    file = tmp_path / "scene.toml"
+    file.write_text('[camera]\nposition = [0, 0, 40]\n[[items]]\npreset = "raisin"\nstage = 0.2\n')
+    done = CliRunner().invoke(app, ["scene", str(file), "--out", str(tmp_path / where)])
+    assert done.exit_code == 2
+    assert "Create it first." in done.stderr if "nowhere" in where else "is a directory" in done.stderr
+    assert not (tmp_path / "nowhere").exists()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from service.scenes import seen
+from service.scenes import compose, seen
 from service.scenes.compose import make
 from service.scenes.errors import InvalidScene, OverBudget
 from service.scenes.request import Camera, parse
@@ -247,6 +247,27 @@ def test_a_million_items_are_refused_at_once(client: httpx.Client) -> None:
     items = [{**RAISIN, "count": 1_000_000, "place": "pile"}]
     answer = client.post("/v1/scenes", json={"camera": CAMERA, "items": items})
     assert "20000" in checked(answer, 413, "scene-too-large")["advice"]
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"count": 1e6, "place": "row"},
+        {"count": "1000000", "place": "row"},
+        {"transforms": [{"position": [i, 0, 0]} for i in range(20_001)]},
+    ],
+    ids=["a number with a point", "text", "transforms"],
+)
+def test_however_they_are_counted_too_many_are_refused_before_they_are_placed(
+    client: httpx.Client, monkeypatch: pytest.MonkeyPatch, more: dict[str, Any]
+) -> None:
+    def placed(*given: object) -> None:
+        raise AssertionError("a million of them were placed")
+
+    monkeypatch.setattr(compose, "place", placed)
+    places = [{"name": "row", "rule": "row"}]
+    body = {"camera": CAMERA, "items": [{**RAISIN, **more}], "places": places}
+    checked(client.post("/v1/scenes", json=body), 413, "scene-too-large")
 
 
 def test_over_http_as_file_and_as_numbers(client: httpx.Client) -> None:
