@@ -92,6 +92,26 @@ def test_no_slice_is_thinner_than_a_quarter_of_an_edge():
     assert shares({"rods": 24, "cuts": [across(0.06), across(0.06 + edge / 5)]}, "default")[0] == 2
 
 
+def test_bonds_are_sawn_where_a_thin_slice_is_made():
+    """Bonds between fibres that slope pass the plane that is moved, and not the one that is asked for."""
+    for seed in range(4):
+        grain = {"spiral": 0.35, "pith": (0.0, 1.0)}
+        count, _ = shares({"rods": 24, "seed": seed, "grain": grain, "cuts": [across(0.0004)]}, "preview")
+        assert count == 2
+
+
+def test_fibres_that_wind_through_a_cut_along_are_parted_where_they_pass_it():
+    """Each at a vertex of its own, and none so near to an end that its edge shortens the step."""
+    cut = {"low": (-1, -1, 0), "high": (1, 1, 0)}
+    params = SOLVER.parse({**PLAIN, "rods": 60, "grain": {"spiral": 20.0}, "cuts": [cut]})
+    wood = lay(params, 30)
+    assert 20 < len(wood.sawn) < 120
+    straight = wood.straight[wood.sawn]
+    inner = (straight[:, 0] > 0.01) & (straight[:, 0] < 0.14)
+    assert np.abs(straight[inner, 2]).max() < 1e-4
+    assert wood.rods.rest.min() > 0.249 * 0.15 / 29
+
+
 def test_more_cuts_than_vertices_are_refused():
     cuts = [across(0.01 * n) for n in range(1, 13)]
     params = SOLVER.parse({**PLAIN, "rods": 24, "cuts": cuts})
