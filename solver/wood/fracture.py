@@ -19,9 +19,7 @@ from .model.arrays import Bonds, Rods
 from .model.bundle import SAMPLES
 from .model.joining import stretched
 from .model.motion import Motion, Scratch
-from .model.sawing import crossed
 from .model.state import Wood
-from .params import WoodParams
 
 __all__ = ["Breaks", "bows", "break_worst", "overstress", "sawed", "sever", "strained"]
 
@@ -237,12 +235,8 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float
     nothing. So they are as if laid on the curve that is left: stretch, shear and energy stay what they were.
     """
     edges = np.flatnonzero(ratio > 1)
-    rods, bonds = wood.rods, wood.bonds
-    # a break bends the curve of its own rod alone: all other bonds stay as they are
-    near = np.zeros(int(wood.rod.max()) + 1, bool)
-    near[wood.rod[edges]] = True
-    mine = np.flatnonzero(near[wood.rod[bonds.i]] | near[wood.rod[bonds.j]])
-    length, slope = stretched(wood.motion.x, rods, Bonds(*(a[mine] for a in bonds)))
+    rods = wood.rods
+    mine, length, slope = _touched(wood, edges)
     spent, broken, gone = 0.0, 0, 0
     for e in map(int, edges[np.argsort(-ratio[edges], kind="stable")]):
         strain = float(wood.strength[e, round(float(place[e]) * (len(SAMPLES) - 1))]) * float(ratio[e])
@@ -264,13 +258,30 @@ def break_worst(wood: Wood, ratio: np.ndarray, place: np.ndarray, allowed: float
             # the vertex beyond is already split or a clamp's: cut as close to it as a stub allows
             gone += sever(wood, e, _NEAR if place[e] < 0.5 else 1 - _NEAR)
             broken += 1
-    later, lean = stretched(wood.motion.x, rods, Bonds(*(a[mine] for a in bonds)))
+    _laid_again(wood, mine, length, slope)
+    return Breaks(wood, broken, gone)
+
+
+def _touched(wood: Wood, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the bonds (m,) of the rods of edges, their lengths (m,) [m] and slopes (m,).
+
+    A break bends the curve of its own rod alone: all other bonds stay as they are.
+    """
+    bonds, near = wood.bonds, np.zeros(int(wood.rod.max()) + 1, bool)
+    near[wood.rod[edges]] = True
+    mine = np.flatnonzero(near[wood.rod[bonds.i]] | near[wood.rod[bonds.j]])
+    return mine, *stretched(wood.motion.x, wood.rods, Bonds(*(a[mine] for a in bonds)))
+
+
+def _laid_again(wood: Wood, mine: np.ndarray, length: np.ndarray, slope: np.ndarray) -> None:
+    """Lay bonds (m,) on the curves that are left, as long and as sheared as they were."""
+    bonds = wood.bonds
+    later, lean = stretched(wood.motion.x, wood.rods, Bonds(*(a[mine] for a in bonds)))
     # no stiffer than the step bears
     longer = np.maximum(later / np.maximum(length, _TINY), _SHORTEST)
     bonds.rest[mine] *= longer
     bonds.k[mine] /= longer
     bonds.cosine[mine] += lean - slope
-    return Breaks(wood, broken, gone)
 
 
 def _hinge_near(rods: Rods, e: int, place: float) -> int:
@@ -284,7 +295,19 @@ def _hinge_near(rods: Rods, e: int, place: float) -> int:
     return int(found[0])
 
 
-def sawed(wood: Wood, params: WoodParams) -> Wood:
+def sawed(wood: Wood) -> Wood:
     """Return a bundle as laid with the rods parted that saw cuts pass."""
-    hit, place = crossed(params, wood.straight, wood.rods)
-    return break_worst(wood, np.where(hit, 2.0, 0.0), place, np.inf).wood if hit.any() else wood
+    if not len(wood.sawn):
+        return wood
+    rods = wood.rods
+    begins, ends = np.isin(rods.a, wood.sawn), np.isin(rods.b, wood.sawn)
+    mine, length, slope = _touched(wood, np.flatnonzero(begins))
+    for edge, share in ((wood.bonds.i, wood.bonds.at), (wood.bonds.j, wood.bonds.share)):
+        # the stub of a rod that runs out of the wood is carried from beyond the cut no more
+        _left(wood.bonds, np.flatnonzero((begins[edge] & (share < 0)) | (ends[edge] & (share > 1))))
+    for i in wood.sawn.tolist():
+        # a rod that runs out of the wood may end here
+        for h in np.flatnonzero((rods.b[rods.before] == i) & (rods.whole == 1)).tolist():
+            wood = _split(wood, h)
+    _laid_again(wood, mine, length, slope)
+    return wood

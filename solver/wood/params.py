@@ -60,7 +60,8 @@ class WoodParams(Params):
         0.3,
         ge=0,
         le=0.9,
-        description="Random part of the vertices' places; edges are within 1 +- this of their mean length",
+        description="Random part of the vertices' places; edges are within 1 +- this of their mean length, "
+        "but for those that saw cuts move",
         json_schema_extra={"units": "1"},
     )
     reach: float = Field(

@@ -92,7 +92,10 @@ def _ordered(box: Cut | Grip) -> None:
 
 
 class Cut(Part):
-    """A saw cut without width: bonds that pass the box are broken, rods that pass it where its middle is are parted."""
+    """A saw cut: bonds that pass the box are broken, rods that pass it are parted where they are halfway through.
+
+    So it takes no wood away. Slices are no thinner than a quarter of an edge.
+    """
 
     low: Vector = Field(description="Lowest corner x, y, z of a box in the unloaded straight bundle [m]")
     high: Vector = Field(description="Highest corner; a box may be flat [m]")

@@ -67,7 +67,7 @@ def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     attrs = _said(wood, params, said)
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
     strained = Stresses(params, wood, need)
-    laid, wood = wood, sawed(wood, params)
+    laid, wood = wood, sawed(wood)
     frames: list[Frame] = []
     balance = _BALANCE[need.quality]
     marching: Iterator[Reached]

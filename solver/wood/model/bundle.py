@@ -9,7 +9,7 @@ import numpy as np
 from ...contract import Context
 from ..fibres.paths import crowded, placed
 from ..fibres.timber import LEAST, hews, timber
-from ..params import WoodParams
+from ..params import Cut, WoodParams
 from ..shape.taper import tapered, thickness
 from .arrays import Rods, Turns
 from .axis import along, laid, started
@@ -20,7 +20,7 @@ from .joining import bonded
 from .motion import Motion
 from .outline import area as outlined
 from .outline import corners, covered, drawn_in, stand
-from .sawing import sawn
+from .sawing import boxes, divided, placed_on, sawn
 from .state import Wood
 
 __all__ = ["SAMPLES", "lay"]
@@ -98,6 +98,26 @@ def _layout(points: np.ndarray, area: np.ndarray, s: np.ndarray, params: WoodPar
     number = np.arange(rods * count, dtype=np.int32).reshape(rods, count)
     grid = number[:, int(ghosts[0]) : count - int(ghosts[1])]
     return _Layout(area, fibre, straight, laid(straight, points, params), number, grid, ghosts, section)
+
+
+def _on_cuts(
+    points: np.ndarray, area: np.ndarray, s: np.ndarray, cuts: tuple[Cut, ...], params: WoodParams
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return places along (k, vertices) [m] with vertices where cuts pass, and these (p, 2): rod, vertex."""
+    if not cuts:
+        return s, np.zeros((0, 2), np.int32)
+    fibre = np.concatenate([s[:, :, None], np.repeat(points[:, None, :], s.shape[1], 1)], -1)
+    return placed_on(cuts, s, tapered(_within(placed(fibre, params), area, params), params), params.length)
+
+
+def _sawn_at(s: np.ndarray, parted: np.ndarray, edges: int) -> np.ndarray:
+    """Return where along (e, c) [m] the rod of each edge is parted (p, 2), nan for nowhere; s (k, vertices) [m]."""
+    most = int(np.bincount(parted[:, 0]).max())
+    found, count = np.full((len(s), most), np.nan), np.zeros(len(s), int)
+    for rod, vertex in parted.tolist():
+        found[rod, count[rod]] = s[rod, vertex]
+        count[rod] += 1
+    return np.repeat(found, edges, 0)
 
 
 def _within(even: np.ndarray, area: np.ndarray, params: WoodParams) -> np.ndarray:
@@ -271,6 +291,8 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     log = timber(params)
     points, area, _ = stand(log, generator)
     s = along(len(points), vertices, params, generator)
+    cuts = boxes(params, vertices)
+    s, parted = _on_cuts(points, area, s, cuts, params)
     grain = Field(params.grain.along, params.grain.across, generator)
     strong = Field(params.grain.along, params.grain.across, generator)
     at = _layout(points, area, s, params)
@@ -284,7 +306,10 @@ def lay(params: WoodParams, vertices: int) -> Wood:
     bonds = bonded(params, log, points, s, course, edge[:, inner.start :], at.rest.reshape(-1, 3), rods, grain, strong)
     straight = at.straight.reshape(-1, 3)
     motion = _motion(at, rods, params)
-    sawn(params, straight, rods, bonds)
+    if len(parted):
+        where = _sawn_at(s, parted, at.number.shape[1] - 1)
+        bonds = divided(bonds, rods, straight, at.rest.reshape(-1, 3), where, params.length / (vertices - 1))
+    sawn(cuts, straight, rods, bonds)
     return Wood(
         motion,
         rods,
@@ -299,6 +324,7 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         np.full(len(real), -1.0),
         at.number.ravel(),
         straight,
+        at.grid[parted[:, 0], parted[:, 1]],
         grips,
         params.mass_scaling,
     )

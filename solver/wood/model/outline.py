@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ...contract import InvalidGeometry
 from ..params import WoodParams
+from ..shape.taper import thickness
 from .section import areas, balanced, place
 
 __all__ = ["Standing", "area", "chords", "corners", "covered", "drawn_in", "facing", "inside", "sawn_through", "stand"]
@@ -19,6 +20,8 @@ _DISK = 96
 _PER_ROD, _FEWEST, _ROUNDS = 400, 20_000, 60
 #: Rods in one line have no second moment across it, of the other, that could be put right.
 _FLAT = 1e-3
+#: Of a rod's mean section, the least part of the section that a saw divides.
+_SLIVER = 0.4
 
 
 class Standing(NamedTuple):
@@ -129,15 +132,24 @@ def stand(params: WoodParams, generator: np.random.Generator) -> Standing:
 
 
 def sawn_through(params: WoodParams) -> list[tuple[int, float]]:
-    """Return the lines (0: y, 1: z; value [m]) in the section along which saw cuts part it from rim to rim."""
+    """Return the lines (0: y, 1: z; value [m]) in the section at which saw cuts end that reach from rim to rim.
+
+    A cut along the grain parts the section along its line, one across is as deep as the line to which it goes, and one
+    with a width has a line on each side. Where fibres deviate, a cut across meets other rods than stand there.
+    """
     outline, found = corners(params), set()
     low, high = outline.min(0), outline.max(0)
     for cut in params.cuts:
+        along = cut.low[0] < cut.high[0]
+        if not along and params.grain.deviates:
+            continue
+        thin = 1.0 if along else float(thickness(np.array(cut.low[0]), params))
         for c in (0, 1):
-            at, other = cut.low[c + 1], 1 - c
-            across = cut.low[other + 1] <= low[other] and cut.high[other + 1] >= high[other]
-            if cut.low[0] < cut.high[0] and at == cut.high[c + 1] and low[c] < at < high[c] and across:
-                found.add((c, at))
+            other = 1 - c
+            across = cut.low[other + 1] <= low[other] * thin and cut.high[other + 1] >= high[other] * thin
+            faces = {cut.low[c + 1] / thin, cut.high[c + 1] / thin}
+            if across and (along or len(faces) == 2):
+                found |= {(c, at) for at in faces if low[c] < at < high[c]}
     return sorted(found)
 
 
@@ -159,7 +171,7 @@ def _even(outline: np.ndarray, rods: int, generator: np.random.Generator, lines:
     steps = np.arange(1, count + 1)[:, None] * np.array([0.7548776662466927, 0.5698402909980532])
     fine = low + wide * ((0.5 + steps) % 1)
     fine = fine[inside(outline, fine)]
-    side = sum((2**n * (fine[:, c] > at) for n, (c, at) in enumerate(lines)), np.zeros(len(fine), int))
+    side = _sides(fine, lines, _SLIVER * len(fine) / rods)
     parts = [fine[side == n] for n in np.unique(side)]
     each = area(outline) / len(fine)
     found = [
@@ -173,6 +185,18 @@ def _even(outline: np.ndarray, rods: int, generator: np.random.Generator, lines:
     least = float(np.asarray(cKDTree(points).query(points, 2)[0])[:, 1].min()) if many else float(wide.min())
     own = size * each
     return Standing(points - own @ points / own.sum(), own, least)
+
+
+def _sides(fine: np.ndarray, lines: list[tuple[int, float]], least: float) -> np.ndarray:
+    """Return which part (n,) of the section points (n, 2) are in; lines that leave one fewer than `least` do not count.
+
+    A rod as thin as a sliver between a cut and the rim would be held by bonds that are far too stiff for its mass.
+    """
+    side = np.zeros(len(fine), int)
+    for c, at in lines:
+        divided = np.unique(2 * side + (fine[:, c] > at), return_inverse=True)[1]
+        side = divided if np.bincount(divided).min() >= least else side
+    return side
 
 
 def _cells(fine: np.ndarray, rods: int, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -33,6 +33,7 @@ class Wood:
     cut: np.ndarray  # (e,) where an edge is cut, 0 to 1; -1: it is not
     parent: np.ndarray  # (v,) int32 vertex that one was split from; itself as laid
     straight: np.ndarray  # (v, 3) places in the straight bundle, as laid [m]
+    sawn: np.ndarray  # (p,) int32 vertices at which saw cuts part rods
     grips: tuple[Course, ...] = ()
     scaling: float = 1.0  # masses over real ones, see `scaling`
     least: float = 0.0  # real mass that an edge in contact needs to be stable [kg]

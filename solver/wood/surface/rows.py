@@ -81,6 +81,9 @@ def _pieces(wood: Wood, span: Spans, joined: np.ndarray, reach: float) -> _Piece
         (ends[:-1, 1] == ends[1:, 0]) & (wood.rod[first[:-1]] == wood.rod[first[1:]]) & broken[:-1, 1]
     )
     rough[facing, 1] = rough[facing + 1, 0] = np.minimum(rough[facing, 1], rough[facing + 1, 0])
+    # a saw leaves plane faces
+    rough[np.isin(wood.parent[rods.a[first]], wood.sawn), 0] = 0.0
+    rough[np.isin(wood.parent[rods.b[last]], wood.sawn), 1] = 0.0
     return _Pieces(first, last, ends, broken, rough)
 
 

@@ -74,16 +74,3 @@ def test_fragments_are_what_saw_cuts_leave():
     assert found.fragment_mass.values[0, :3] == pytest.approx([whole * 2 / 3, whole / 3, 0], rel=0.01)
     assert found.fragment_length.values[0, :2] == pytest.approx([0.1, 0.05], rel=0.03)
     assert found.fragment_place.values[0, :2, 0] == pytest.approx([0.1, 0.025], rel=0.02)
-
-
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_cut_two_thirds_of_an_edge_wide_parts_uneven_rods(seed):
-    """Rods are parted at a vertex up to a quarter of an edge away, and the longest edge is 1.3 of the mean."""
-    half = 0.15 / 14 / 3
-    cut = {"low": (0.06 - half, -1, -1), "high": (0.06 + half, 1, 1)}
-    values = {**BAR, "rods": 24, "vertices": 29, "unevenness": 0.3, "clamp": "none", "cuts": [cut], "seed": seed}
-    need = Need(stages=(0.0,), fields=("fragments", "fragment_mass"), quality="preview", dtype="float64")
-    found = SOLVER.solve(SOLVER.parse(values), need)
-    assert found.fragments.values.tolist() == [2]
-    whole = 600 * np.pi * 1e-4 * 0.15
-    assert found.fragment_mass.values[0, :2] == pytest.approx([whole * 0.6, whole * 0.4], rel=0.1)
