@@ -132,7 +132,8 @@ def _npz(batch: Batch) -> Iterator[bytes]:
     """Yield an archive: the fields first, shape by shape; what is small is gathered meanwhile."""
     patch = batch.window.on(batch.asked[0].resolution)
     size = (len(batch.asked), patch.height, patch.width, len(patch.components))
-    dtype = np.dtype(batch.table.info.dtype).newbyteorder("<")
+    # what is packed in whole numbers is looked up in single precision
+    dtype = np.dtype("<f8" if batch.table.info.dtype == "float64" else "<f4")
     pipe = _Pipe()
     rows = _Rows()
     with zipfile.ZipFile(pipe, "w", zipfile.ZIP_STORED) as archive:  # type: ignore[call-overload]
