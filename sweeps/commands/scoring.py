@@ -91,7 +91,7 @@ def score(
 
 def _check(picture: Path | None) -> None:
     """Refuse, before any work, a picture that is none."""
-    if picture is not None and picture.suffix != ".png":
+    if picture is not None and picture.suffix.lower() != ".png":
         raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
 
 
