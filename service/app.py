@@ -103,7 +103,8 @@ def create_app(settings: Settings | None = None, is_warmed: bool = False) -> Fas
     app.state.sessions = Sessions(settings)
     metrics = Metrics()
     problems.install(app)
-    guards = [Depends(refuse_others), *([] if settings.public_read else [Depends(requires("read"))])]
+    # who may not read is told that first
+    guards = [*([] if settings.public_read else [Depends(requires("read"))]), Depends(refuse_others)]
     # a query may be too long wherever it goes
     declared = problems.responses(414, 422, *(() if settings.public_read else (401, 403)))
     guarded = (

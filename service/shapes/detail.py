@@ -108,8 +108,8 @@ def parameters() -> dict[str, tuple[str, Mapping[str, Any]]]:
             {"type": "string", "pattern": "^(position|displacement)(,(position|displacement))?$"},
         ),
         "components": (
-            "Components with commas between them, sent in the order x, y, z however they are named (`detail.components` "
-            "says which); the others are not computed. npz only.",
+            "Components with commas between them, sent in the order x, y, z however they are named (`detail` says "
+            "which); the others are not computed. npz only.",
             {"type": "string", "pattern": "^[xyz](,[xyz]){0,2}$", "examples": ["y", "x,z"]},
         ),
     }

@@ -41,9 +41,7 @@ def score(
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE.png", help="Truth, the paper's and the default.")
     ] = None,
-    stage: Annotated[
-        float | None, typer.Option("--stage", help="The picture's stage: the stored one next to it; 0.2 if not given.")
-    ] = None,
+    stage: Annotated[float | None, typer.Option("--stage", help="The picture's: the stored one next to it.")] = None,
     relax: Annotated[
         int, typer.Option("--relax", min=0, metavar="COUNT", help="Relax what is looked up at so many random points.")
     ] = 0,
