@@ -19,6 +19,7 @@ from store.tokens import Tokens
 
 from . import catalogue, hours, maps, page, problems, results
 from .coding import Coding
+from .declared import refuse_others
 from .jobs import events as jobs_events
 from .jobs import fields as jobs_fields
 from .jobs import meshes as jobs_meshes
@@ -102,9 +103,10 @@ def create_app(settings: Settings | None = None, is_warmed: bool = False) -> Fas
     app.state.sessions = Sessions(settings)
     metrics = Metrics()
     problems.install(app)
-    guards = [] if settings.public_read else [Depends(requires("read"))]
+    # who may not read is told that first
+    guards = [*([] if settings.public_read else [Depends(requires("read"))]), Depends(refuse_others)]
     # a query may be too long wherever it goes
-    declared = problems.responses(414, *(() if settings.public_read else (401, 403)))
+    declared = problems.responses(414, 422, *(() if settings.public_read else (401, 403)))
     guarded = (
         catalogue.router,
         shapes.router,

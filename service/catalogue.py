@@ -18,10 +18,10 @@ from . import page, portraits, problems, vocabulary
 from .errors import UnknownPreset
 from .formats import FORMATS
 from .sequences import EXPORTS
-from .shapes.answers import matches
 from .shapes.live import LiveTables
 from .views.addresses import link
 from .views.catalogue import Health, Index, SolverList, SolverPage, TableList, TablePage
+from .views.tags import matches
 
 __all__ = ["open_router", "router"]
 

@@ -18,9 +18,9 @@ from store.tables import TableInfo
 from sweeps import families as covering
 
 from . import portraits, problems, vocabulary
-from .shapes.answers import matches
 from .shapes.live import LiveTables
 from .views.addresses import link
+from .views.tags import matches
 
 __all__ = ["listed", "router"]
 

@@ -86,7 +86,8 @@ def _file(request: Request, name: str, policy: str) -> Response:
         "ETag": f'"{hashlib.sha256(body).hexdigest()[:32]}"',
         "Vary": "Accept",
     }
-    if headers["ETag"] in request.headers.get("if-none-match", ""):
+    held = request.headers.get("if-none-match", "")
+    if headers["ETag"] in held or held.strip() == "*":
         return Response(status_code=304, headers=headers)
     return Response(body, headers=headers, media_type="text/html")
 

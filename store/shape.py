@@ -10,7 +10,7 @@ from typing import Any
 from solver.arrays import Array
 
 from .errors import OutsideTable
-from .surfaces import surface
+from .surfaces import drawn
 
 __all__ = ["Shape"]
 
@@ -22,9 +22,10 @@ class Shape:
     `position` and `displacement` are (n, 2n, 3), `poles` (2, 3) the positions at colatitude 0 and pi, all in units of
     r1 and in the table's precision. Of a window there are only its rows, columns and components, and no poles but with
     the whole lattice. `descriptors` are the stored results' numbers, weighted as these are, and not measured on the
-    positions. `weights` says which results it was made of, `nearest` how far (scaled) the nearest one is,
-    `inside` whether the query lies in the samples' convex hull, and `exact` that it is a stored result at a stored
-    stage (or fresh). `converged` is false if a stage that it was made of had not reached its residual.
+    positions; `volume`, `normals` and `crossings` are, on the closed mesh (`store.surfaces.drawn`). `weights` says
+    which results it was made of, `nearest` how far (scaled) the nearest one is, `inside` whether the query lies in the
+    samples' convex hull, and `exact` that it is a stored result at a stored stage (or fresh). `converged` is false if a
+    stage that it was made of had not reached its residual.
     `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape
     may be off the true one; None where the table does not know, as for any method but the one it was built for.
     `crossings` counts the pairs of triangles of the closed lattice that cross, on these positions; None where no
@@ -64,16 +65,38 @@ class Shape:
             "expected_error": None if self.expected_error is None else dict(self.expected_error),
         }
 
-    @cached_property
+    @property
     def normals(self) -> Array:
-        """Outward unit normals (n, 2n, 3), computed when first asked for.
+        """Outward unit normals (n, 2n, 3) of the closed mesh, computed when first asked for: at each point the mean
+        of its triangles, weighted by area.
 
         Raises:
-            OutsideTable: the positions were not asked for.
+            OutsideTable: the positions were not asked for, or not of the whole surface.
 
         """
+        return self._normals[0]
+
+    @property
+    def pole_normals(self) -> Array:
+        """Outward unit normals (2, 3) of the closed mesh at the poles.
+
+        Raises:
+            OutsideTable: the positions were not asked for, or not of the whole surface.
+
+        """
+        return self._normals[1]
+
+    @cached_property
+    def volume(self) -> float | None:
+        """Volume [r1^3] inside the closed mesh's triangles; None where there are no positions, or those of a part."""
+        if self.position is None or self.poles is None or self.poles.shape[1] != 3:
+            return None
+        return drawn.volume(self.position, self.poles)
+
+    @cached_property
+    def _normals(self) -> tuple[Array, Array]:
         if self.position is None:
             raise OutsideTable("normals follow from positions.", "Ask for the field 'position'.")
         if self.poles is None or self.poles.shape[1] != 3:
             raise OutsideTable("normals follow from the whole surface.", "Ask for it without a window.")
-        return surface.normals(self.position)
+        return drawn.normals(self.position, self.poles)

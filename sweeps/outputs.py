@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from solver.contract import Solver, Worn, dryness
+from solver.lattice import closed_lattice
 from store import seal, shards
 from store.shape import Shape
 from store.surfaces import spectra
@@ -38,9 +39,13 @@ def _npz(made: Made) -> bytes:
         np.savez_compressed(out, **arrays)
         return out.getvalue()
     first = made.shapes[0]
+    volumes = [np.nan if shape.volume is None else shape.volume for shape in made.shapes]
     np.savez_compressed(
         out,
         stage=np.array([shape.stage for shape in made.shapes]),
+        # along its diagonals crossings are counted; the poles are the last two points
+        triangles=closed_lattice(len(first.colatitude)).astype(np.int32),
+        volume=np.array(volumes),
         colatitude=first.colatitude,
         azimuth=first.azimuth,
         position=np.stack([shape.position for shape in made.shapes if shape.position is not None]),
@@ -168,11 +173,11 @@ def check_suffix(path: Path, run: bool, stages: int) -> None:
 
     """
     known = suffixes(run)
-    if path.suffix not in known:
+    if path.suffix.lower() not in known:
         raise InvalidOption(
             f"--out {path}: cannot write {path.suffix or 'no suffix'!r}.", f"Known: {', '.join(known)}."
         )
-    encoder = known[path.suffix]
+    encoder = known[path.suffix.lower()]
     if encoder is not None and encoder.single and stages > 1 and not (run and encoder.whole):
         raise InvalidOption(
             f"--out {path}: {path.suffix} holds one stage, not {stages}.",
@@ -195,7 +200,7 @@ def fields_for(
         InvalidOption: the format holds the fruit's lattice only, and the solver has none.
 
     """
-    encoder = suffixes(run).get(path.suffix) if path is not None else None
+    encoder = suffixes(run).get(path.suffix.lower()) if path is not None else None
     if encoder is None:
         return ()
     known = ("position",) if solver is None else solver.fields
@@ -219,7 +224,7 @@ def save(path: Path, made: Made) -> None:
         InvalidOption: the format holds the fruit's lattice only, and the run has a mesh of its own.
 
     """
-    encoder = suffixes(made.run is not None)[path.suffix]
+    encoder = suffixes(made.run is not None)[path.suffix.lower()]
     whole = encoder.whole if encoder is not None and made.run is not None else None
     if encoder is not None and encoder.single and "position" in encoder.fields and not made.shapes and whole is None:
         raise InvalidOption(

@@ -34,7 +34,7 @@ from store.blending import methods
 from store.ledger.jobs import JobSpec
 from store.lookup import ShapeTable
 from store.store import Store
-from store.surfaces import spectra, surface, transforms
+from store.surfaces import drawn, spectra, transforms
 from store.surfaces.apart import compiled
 
 BAND = 96
@@ -131,7 +131,7 @@ def main() -> None:
                 ms = median(lambda n=n, o=method: table.at(QUERY, STAGE, resolution=n, m=8, method=o), options.seconds)
                 rows.append({"resolution": n, "what": method, "ms": round(ms, 4)})
             shape = table.at(QUERY, STAGE, resolution=n, m=8)
-            ms = median(lambda s=shape: surface.normals(s.position), options.seconds)
+            ms = median(lambda s=shape: drawn.normals(s.position, s.poles), options.seconds)
             rows.append({"resolution": n, "what": "normals", "ms": round(ms, 4)})
         ms = median(lambda: table.at(QUERY, STAGE, m=8, fields=()), options.seconds)
         rows.append({"resolution": 0, "what": "descriptors only", "ms": round(ms, 4)})

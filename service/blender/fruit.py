@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from .client import Points, Refused
-from .lattice import quads, upright
+from .lattice import triangles, upright
 from .state import STATE
 
 __all__ = ["ask", "follow", "insert", "is_fruit", "sliders"]
@@ -90,7 +90,7 @@ def _take(name: str, found: Points) -> None:
     if not is_fruit(thing):
         return
     mesh = thing.data
-    if len(mesh.vertices) != len(found.positions) // 3:
+    if len(mesh.polygons) != 4 * found.n**2:  # of another resolution, or of the quads that older versions made
         mesh.clear_geometry()
         _lattice(mesh, found.n)
     mesh.vertices.foreach_set("co", upright(found.positions))
@@ -104,7 +104,7 @@ def _take(name: str, found: Points) -> None:
 
 def _lattice(mesh: Any, n: int) -> None:
     """Fill an empty mesh with the closed lattice as a ball."""
-    corners, counts = quads(n)
+    corners = triangles(n)
     positions = array("f")
     for i in range(n):
         theta = (i + 0.5) * math.pi / n
@@ -116,12 +116,8 @@ def _lattice(mesh: Any, n: int) -> None:
     mesh.vertices.foreach_set("co", positions)
     mesh.loops.add(len(corners))
     mesh.loops.foreach_set("vertex_index", corners)
-    mesh.polygons.add(len(counts))
-    starts, at = array("i"), 0
-    for count in counts:
-        starts.append(at)
-        at += count
-    mesh.polygons.foreach_set("loop_start", starts)
+    mesh.polygons.add(len(corners) // 3)
+    mesh.polygons.foreach_set("loop_start", array("i", range(0, len(corners), 3)))
     mesh.update(calc_edges=True)
     mesh.validate()
     mesh.shade_smooth()

@@ -5,33 +5,29 @@ from __future__ import annotations
 from array import array
 from functools import lru_cache
 
-__all__ = ["quads", "upright"]
+__all__ = ["triangles", "upright"]
 
 
 @lru_cache(maxsize=8)
-def quads(n: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the corners of all faces in a row, and how many each face has: quads, and triangles around the poles.
+def triangles(n: int) -> tuple[int, ...]:
+    """Return the corners of all triangles in a row, three each, counter-clockwise from outside.
 
-    Vertices are n rows of 2n, from the pole at the top, then the two poles; faces turn counter-clockwise from outside.
+    Vertices are n rows of 2n, from the pole at the top, then the two poles. Not quads: Blender would cut them along
+    the other diagonal, along which a folded shape crosses itself.
     """
-    wide, corners, counts = 2 * n, list[int](), list[int]()
+    wide, corners = 2 * n, list[int]()
     north, south = n * wide, n * wide + 1
     for j in range(wide):
-        k = (j + 1) % wide
-        corners += (north, k, j)
-        counts.append(3)
+        corners += (north, (j + 1) % wide, j)
     for i in range(n - 1):
         for j in range(wide):
             k = (j + 1) % wide
             a, b = i * wide, (i + 1) * wide
-            corners += (a + j, a + k, b + k, b + j)
-            counts.append(4)
+            corners += (a + j, a + k, b + j, a + k, b + k, b + j)
     last = (n - 1) * wide
     for j in range(wide):
-        k = (j + 1) % wide
-        corners += (south, last + j, last + k)
-        counts.append(3)
-    return tuple(corners), tuple(counts)
+        corners += (south, last + j, last + (j + 1) % wide)
+    return tuple(corners)
 
 
 def upright(positions: array[float]) -> array[float]:

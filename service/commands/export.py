@@ -160,9 +160,10 @@ def _format(name: str | None, out: Path | None, result: str) -> tuple[Export | N
         if name not in known:
             raise InvalidOption("nothing says what to write.", "Name a file (--out x.glb) or a format (--format pc2).")
         out = Path(Path(result).stem + (EXPORTS[name].suffix if name in EXPORTS else ".obj"))
-    fits = [e.name for e in EXPORTS.values() if out.name.endswith(e.suffix)] or ["obj"] * (out.suffix == ".obj")
+    kind = out.suffix.lower()
+    fits = [e.name for e in EXPORTS.values() if out.name.lower().endswith(e.suffix)] or ["obj"] * (kind == ".obj")
     if name is None:
-        name = fits[0] if fits else "ply-zip" if out.suffix == ".zip" else out.suffix
+        name = fits[0] if fits else "ply-zip" if kind == ".zip" else out.suffix
     if name not in known:
         suffixes = ", ".join([*(e.suffix for e in EXPORTS.values()), ".obj"])
         raise InvalidOption(f"cannot write {name!r}.", f"Formats: {', '.join(known)}; suffixes: {suffixes}.")
@@ -179,7 +180,7 @@ def _read(result: str, store: Path | None) -> xr.Dataset:
     from sweeps.results import resolve
 
     path = Path(result)
-    if path.suffix == ".h5":
+    if path.suffix.lower() == ".h5":
         if not path.is_file():
             raise InvalidOption(f"there is no file {result}.", "`wizen solve ... --out run.h5` writes one.")
         return shards.read(path)

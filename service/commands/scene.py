@@ -59,12 +59,12 @@ def scene(
     from ..scenes.request import FORMATS, parse
 
     formats = {suffix: name for name, (_, suffix) in FORMATS.items() if name != "json"}
-    if out is not None and out.suffix not in formats:
+    if out is not None and out.suffix.lower() not in formats:
         raise InvalidOption(f"--out {out}: no scene is written as {out.suffix!r}.", f"Take {', '.join(formats)}.")
     if out is not None:
         check_place("--out", out)
     understood = parse(_with_files(_toml(file), file.parent))
-    to = formats[out.suffix] if out else "json"
+    to = formats[out.suffix.lower()] if out else "json"
     if solve:
         store = _own(store)
         _solve(understood, store)

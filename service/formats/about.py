@@ -12,11 +12,18 @@ from solver.contract import Shade, Worn, dryness
 if TYPE_CHECKING:
     from store.shape import Shape
 
-__all__ = ["GENERATOR", "LENGTH_UNIT", "About", "extras"]
+__all__ = ["GENERATOR", "LENGTH_UNIT", "About", "extras", "lattice"]
 
 GENERATOR = f"wizen {__version__}"
 #: Every length in a file is in units of the fruit's reference radius; multiply by the real one to get metres.
 LENGTH_UNIT = "r1"
+#: Which points make a triangle, for formats without: `mesh.triangles`, in numbers that a client can follow. Corners are
+#: steps [rows, columns] from a point to the south and east of which a quad lies; `fans` around each pole likewise, from
+#: a point of the first row (north) and of the last (south). Columns go on at 0 after the last, where all are there.
+TRIANGLES: Mapping[str, Any] = {
+    "quads": [[[0, 0], [0, 1], [1, 0]], [[0, 1], [1, 1], [1, 0]]],
+    "fans": [["north", [0, 1], [0, 0]], ["south", [0, 0], [0, 1]]],
+}
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,17 @@ def extras(shape: Shape, about: About) -> dict[str, Any]:
         **({"made": dict(about.made)} if about.made else {}),
         "stage": {"symbol": about.stage_symbol, "value": shape.stage},
         **shape.trust(),
+        "volume": shape.volume,
         "method": shape.method,
         "units": {"length": LENGTH_UNIT, **about.units},
         **({"detail": dict(about.detail)} if about.detail else {}),
     }
+
+
+def lattice(rows: int, columns: int, about: About) -> dict[str, Any]:
+    """Return what a format without triangles says of its points: how many there are, and how they are joined.
+
+    A part of a surface has no poles.
+    """
+    joined = {**TRIANGLES, "fans": []} if "region" in about.detail else TRIANGLES
+    return {"colatitude": rows, "azimuth": columns, "triangles": joined}

@@ -22,17 +22,17 @@ def encode(shape: Shape, about: About) -> bytes:
     position, ends = mesh.surface(shape)
     n = position.shape[0]
     copies = mesh.seam(n)
-    lattice, poles = mesh.normals(position)
     indices = mesh.seam_triangles(n)
     index_type = UINT
     if len(copies) < _SHORT:
         indices, index_type = indices.astype("<u2"), USHORT
 
     points = mesh.vertices(position, ends).take(copies, axis=0)
+    upright = mesh.vertices(shape.normals, shape.pole_normals).take(copies, axis=0)
     buffer = Buffer()
     attributes = {
         "POSITION": buffer.add(points, FLOAT, "VEC3", VERTICES, bounds(points)),
-        "NORMAL": buffer.add(mesh.vertices(lattice, poles).take(copies, axis=0), FLOAT, "VEC3", VERTICES),
+        "NORMAL": buffer.add(upright, FLOAT, "VEC3", VERTICES),
         "TEXCOORD_0": buffer.add(mesh.texture(n), FLOAT, "VEC2", VERTICES),
     }
     primitive = {"attributes": attributes, "indices": buffer.add(indices.ravel(), index_type, "SCALAR", INDICES)}

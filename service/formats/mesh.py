@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Singles, Words32
+from store.surfaces.drawn import normals
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -93,40 +94,3 @@ def surface(shape: Shape) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
 def vertices(lattice: NDArray[np.floating], poles: NDArray[np.floating]) -> Singles:
     """Return a lattice field (n, 2n, 3) and its values (2, 3) at the poles as one array (2n^2 + 2, 3)."""
     return np.concatenate([lattice.reshape(-1, 3), poles], dtype=np.float32)
-
-
-def normals(position: NDArray[np.floating]) -> tuple[Singles, Singles]:
-    """Return outward unit normals of a lattice surface (n, 2n, 3), and those (2, 3) of its poles.
-
-    Central differences of the drawn mesh, where a row's neighbour across the pole is the same row half a turn further
-    on. `Shape.normals` are those of the Fourier series: half a degree better at n = 64, at ten times the cost. A point
-    where the surface has folded to nothing borrows the direction from the centre: glTF allows no zero normal.
-    """
-    n = position.shape[0]
-    across = np.concatenate([np.roll(position[:1], n, axis=1), position, np.roll(position[-1:], n, axis=1)])
-    down = across[2:] - across[:-2]
-    along = np.empty_like(position)
-    along[:, 1:-1] = position[:, 2:] - position[:, :-2]
-    along[:, 0] = position[:, 1] - position[:, -1]
-    along[:, -1] = position[:, 0] - position[:, -2]
-    lattice = _unit(_cross(along, down), position)
-    caps = np.stack([lattice[0].mean(axis=0), lattice[-1].mean(axis=0)])
-    return lattice, _unit(caps, np.array([[0, 1, 0], [0, -1, 0]], dtype=np.float32))
-
-
-def _cross(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.floating]:
-    # np.cross copies its way through moved axes and takes three times as long
-    out = np.empty_like(a)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
-    return out
-
-
-def _unit(vector: NDArray[np.floating], fallback: NDArray[np.floating]) -> Singles:
-    length = np.sqrt(np.einsum("...i,...i->...", vector, vector))[..., None]
-    tiny = length < 1e-20
-    if tiny.any():
-        vector = np.where(tiny, fallback, vector)
-        length = np.linalg.norm(vector, axis=-1, keepdims=True)
-    found: Singles = (vector / length).astype(np.float32, copy=False)
-    return found

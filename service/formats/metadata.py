@@ -8,7 +8,7 @@ import orjson
 
 from solver.quantities import QUANTITIES
 
-from .about import About, extras
+from .about import About, extras, lattice
 
 if TYPE_CHECKING:
     from store.shape import Shape
@@ -19,20 +19,24 @@ __all__ = ["encode"]
 def encode(shape: Shape, about: About) -> bytes:
     """Return descriptors with units, the results that took part with their weights, and where the files are.
 
+    `descriptors` are of the stored runs, weighted; `crossings` and `volume` are measured on the closed mesh, and null
+    where no positions were computed.
+
     `nearest` is the scaled distance to the nearest stored result, `exact` that this is a stored result itself, `inside`
     that stored results surround it, `expected_error` how far it may be off by measure, null where nobody knows.
     """
+    whose = " (of the runs)" if shape.tier == "table" else ""
     described = {
         name: {
             "value": value,
             "units": shape.units.get(name, "1"),
-            "long_name": QUANTITIES[name].long_name if name in QUANTITIES else name,
+            "long_name": f"{QUANTITIES[name].long_name if name in QUANTITIES else name}{whose}",
         }
         for name, value in shape.descriptors.items()
     }
     document = {
         **extras(shape, about),
-        "lattice": {"colatitude": len(shape.colatitude), "azimuth": len(shape.azimuth)},
+        "lattice": lattice(len(shape.colatitude), len(shape.azimuth), about),
         "descriptors": described,
         "weights": dict(shape.weights),
         "timings_ms": dict(about.timings),

@@ -27,13 +27,12 @@ def encode(shape: Shape, about: About) -> bytes:
     """Return the shape as an OBJ file; the query, the stage and the units are in its comments."""
     position, ends = mesh.surface(shape)
     n = position.shape[0]
-    lattice, poles = mesh.normals(position)
     return b"".join(
         [
             _head(shape, about),
             _lines(b"v", mesh.vertices(position, ends)),
             _texture(n),
-            _lines(b"vn", mesh.vertices(lattice, poles)),
+            _lines(b"vn", mesh.vertices(shape.normals, shape.pole_normals)),
             _faces(n),
         ]
     )

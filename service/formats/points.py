@@ -2,8 +2,8 @@
 
 Little-endian: `WIZP`, the version 1, the colatitude samples n and the length of the JSON that follows (three uint32);
 the JSON that `format=json` sends, padded with blanks to four bytes; then 2n^2 + 2 positions (float32 x, y, z) in units
-of r1: n rows of 2n lattice points, the pole at colatitude 0, the pole at pi. `service.formats.mesh.triangles(n)` says
-which of them make a triangle.
+of r1: n rows of 2n lattice points, the pole at colatitude 0, the pole at pi. `lattice.triangles` of the JSON says which
+of them make a triangle, as `service.formats.mesh.triangles(n)` does.
 """
 
 from __future__ import annotations

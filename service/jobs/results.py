@@ -26,6 +26,7 @@ from ..formats import FORMATS, About, Format
 from ..sequences import EXPORTS, STILLS, Export, Options, prepared, write
 from ..settings import Settings
 from ..views.shape import FieldsPage, ShapePage
+from ..views.tags import matches
 from . import fields as jobs_fields
 from .routes import JobId, check_done, stored_job
 
@@ -129,7 +130,8 @@ def result(
         "Wizen-Tier": "run" if job.need.get("start") is None else "relaxed",
         "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
     }
-    if tag in {part.strip().removeprefix("W/") for part in request.headers.get("if-none-match", "").split(",")}:
+    held = request.headers.get("if-none-match", "")
+    if matches(held, tag, there=chosen is None):
         return Response(status_code=304, headers=headers)
     if chosen is None:
         return _shard(store, job, headers)
@@ -140,6 +142,8 @@ def result(
         body = _scene(run, stage, chosen, options, settings)
     else:
         body = _shape(run, job, stage, chosen)
+    if matches(held, tag):  # whether there is such a file of it is known when it is made
+        return Response(status_code=304, headers=headers)
     if chosen.name != "json":
         headers["Content-Disposition"] = f'attachment; filename="{job.solver}-{job.key[:12]}{chosen.suffix}"'
     return Response(body, headers=headers, media_type=chosen.media_type.partition(";")[0])

@@ -75,7 +75,6 @@ def pack(shape: Shape, looks: Worn, reach: float | None = None) -> Packed:
     None: the shape's own.
     """
     position, ends = mesh.surface(shape)
-    lattice, poles = mesh.normals(position)
-    points, normal = mesh.vertices(position, ends), mesh.vertices(lattice, poles)
-    colour = weathered(position, lattice, looks)
+    points, normal = mesh.vertices(position, ends), mesh.vertices(shape.normals, shape.pole_normals)
+    colour = weathered(position, shape.normals, looks)
     return quantised(points, normal, colour, float(np.abs(points).max()) if reach is None else reach)

@@ -18,8 +18,9 @@ from solver.contract import Solver, SolverError
 from store.errors import StoreError
 
 from ..errors import ServiceError
+from ..views.tags import matches
 
-__all__ = ["Answer", "Answers", "Question", "Repeats", "matches"]
+__all__ = ["Answer", "Answers", "Question", "Repeats"]
 
 #: Questions in words whose answer is remembered, and the longest of them [bytes].
 _QUESTIONS, _LONGEST = 4096, 512
@@ -149,11 +150,6 @@ class Repeats:
             return
         await send({"type": "http.response.start", "status": 200, "headers": list(found.headers)})
         await send({"type": "http.response.body", "body": found.body})
-
-
-def matches(header: str, tag: str) -> bool:
-    """Return whether an If-None-Match header names the tag; the comparison is the weak one, as RFC 9110 has it."""
-    return tag.removeprefix("W/") in {part.strip().removeprefix("W/") for part in header.split(",")}
 
 
 def _question(scope: Scope) -> Question:

@@ -1,9 +1,10 @@
 """How a batch of shapes is written: piece by piece, so that its length costs no memory.
 
-`npz` is one archive: `position` and `displacement` (shape, colatitude, azimuth, component) in float32, `poles` (shape,
-pole, component) of whole surfaces, one column per axis, `stage`, descriptors and what is known of the error, and
-`about`, a JSON text; where distinct shapes are sent once, `row` (point) as well. `json` is one line per shape. Other
-formats are the parts of a multipart/mixed body.
+`npz` is one archive: `position` and `displacement` (shape, colatitude, azimuth, component) in float32, or float64 where
+the table has it, `poles` (shape, pole, component) of whole surfaces, one column per axis, `stage`, descriptors of the
+runs, crossings and volume of the mesh, what is known of the error, and `about`, a JSON text, which says under `lattice`
+which points make a triangle; where distinct shapes are sent once, `row` (point) as well. `json` is one line per shape.
+Other formats are the parts of a multipart/mixed body.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from store.shape import Shape
 from store.surfaces.window import Window
 
 from ..formats import FORMATS, About, Format, best
-from ..formats.about import GENERATOR, LENGTH_UNIT
+from ..formats.about import GENERATOR, LENGTH_UNIT, lattice
 from .batch_detail import Asked
 
 __all__ = ["MEDIA_TYPES", "Batch", "encode", "media_type", "negotiate"]
@@ -132,7 +133,8 @@ def _npz(batch: Batch) -> Iterator[bytes]:
     """Yield an archive: the fields first, shape by shape; what is small is gathered meanwhile."""
     patch = batch.window.on(batch.asked[0].resolution)
     size = (len(batch.asked), patch.height, patch.width, len(patch.components))
-    dtype = np.dtype(batch.table.info.dtype).newbyteorder("<")
+    # what is packed in whole numbers is looked up in single precision
+    dtype = np.dtype("<f8" if batch.table.info.dtype == "float64" else "<f4")
     pipe = _Pipe()
     rows = _Rows()
     with zipfile.ZipFile(pipe, "w", zipfile.ZIP_STORED) as archive:  # type: ignore[call-overload]
@@ -195,6 +197,8 @@ class _Rows:
                 "inside": shape.inside,
                 "exact": shape.exact,
                 "converged": shape.converged,
+                "crossings": np.nan if shape.crossings is None else shape.crossings,
+                "volume": np.nan if shape.volume is None else shape.volume,
                 "tier": shape.tier,
             }
         )
@@ -215,7 +219,7 @@ class _Rows:
 
 
 def _about(batch: Batch, rows: _Rows) -> str:
-    about = batch.about
+    about, patch = batch.about, batch.window.on(batch.asked[0].resolution)
     said: Mapping[str, Any] = {
         "generator": GENERATOR,
         "solver": about.solver,
@@ -228,5 +232,6 @@ def _about(batch: Batch, rows: _Rows) -> str:
         "method": rows.method,
         "units": {"length": LENGTH_UNIT, **about.units},
         "detail": dict(about.detail),
+        "lattice": lattice(patch.height, patch.width, about),
     }
     return json.dumps(said, sort_keys=True)

@@ -51,7 +51,7 @@ class BatchRequest(BaseModel):
     fov: Annotated[Positive, Field(lt=180)] | None = Field(None, description=_TEXT["fov"][0])
     region: str | None = Field(None, description=_TEXT["region"][0], examples=["45:90,350:20"])
     fields: Annotated[list[Literal["position", "displacement"]], Field(min_length=1)] | None = Field(
-        None, description="Fields of an npz; positions without it"
+        None, description="Fields of an npz; positions without it. With json, position measures the closed mesh"
     )
     components: Annotated[list[Literal["x", "y", "z"]], Field(min_length=1)] | None = Field(
         None, description="Components of an npz's fields; the others are not computed"

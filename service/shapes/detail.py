@@ -50,8 +50,8 @@ class Detail(NamedTuple):
         return (repr((self.window, self.fields, self.cells)),) if self != Detail() else ()
 
     def of(self, chosen: Format) -> tuple[str, ...]:
-        """Return the fields to look up for a format: those asked for of the ones that it holds."""
-        return chosen.fields if self.fields is None or not chosen.fields else self.fields
+        """Return the fields to look up for a format: its own, or those asked for; JSON is measured on them."""
+        return chosen.fields if self.fields is None else self.fields
 
     def refused(self, chosen: Format) -> tuple[Wrong, ...]:
         """Return what is wrong, with the parts that a format cannot hold."""
@@ -104,11 +104,12 @@ def parameters() -> dict[str, tuple[str, Mapping[str, Any]]]:
             {"type": "string", "pattern": f"^{_REGION.pattern}$", "examples": ["45:90,350:20"]},
         ),
         "fields": (
-            "Fields with commas between them. npz only.",
+            "Fields with commas between them. npz holds them; with json, position measures the closed mesh.",
             {"type": "string", "pattern": "^(position|displacement)(,(position|displacement))?$"},
         ),
         "components": (
-            "Components with commas between them; the others are not computed. npz only.",
+            "Components with commas between them, sent in the order x, y, z however they are named (`detail` says "
+            "which); the others are not computed. npz only.",
             {"type": "string", "pattern": "^[xyz](,[xyz]){0,2}$", "examples": ["y", "x,z"]},
         ),
     }

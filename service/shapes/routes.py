@@ -22,9 +22,10 @@ from ..formats import FORMATS, Format
 from ..settings import Settings
 from ..views.addresses import link
 from ..views.shape import ShapePage
+from ..views.tags import matches
 from . import asking, exact
 from . import detail as level
-from .answers import Answer, Answers, matches
+from .answers import Answer, Answers
 from .asking import Asked
 from .compiling import NotAtOnce
 from .query import ShapeQuery
@@ -59,9 +60,13 @@ async def shape(
 ) -> Response:
     """Interpolate the table at a point of its axes and a stage.
 
-    Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Every answer
-    says what error to expect (`expected_error`, by measure) and whether it lies between the runs (`inside`);
-    `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table;
+    Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Formats
+    without triangles (npz, points) say in `lattice` which points make one: a quad's corners a, b in a row and c, d in
+    the next are the triangles (a, b, c) and (b, d, c). `volume` and `crossings` are measured on that mesh,
+    `descriptors` on the runs behind it.
+
+    Every answer says what error to expect (`expected_error`, by measure) and whether it lies between the runs
+    (`inside`); `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table;
     `exact=relax` brings what is looked up into balance. `Wizen-Tier` says of each answer whether it is looked up in a
     `table`, `relaxed` from there, or a `run`.
     """
@@ -141,9 +146,11 @@ def _answer(request: Request, asked: Asked) -> Response:
         "Vary": "Accept",
         "Wizen-Tier": "table",
     }
-    if matches(request.headers.get("if-none-match", ""), tag):
-        return Response(status_code=304, headers=headers)
+    held = request.headers.get("if-none-match", "")
     kept = answers.get(tag)
+    # whether there is any shape at all is known when it is looked up
+    if matches(held, tag, there=kept is not None):
+        return Response(status_code=304, headers=headers)
     if kept is not None:
         answers.remember(request.scope, solver, name, request.app.state.tables.families(solver), table.digest, tag)
         return _whole(kept)
@@ -159,6 +166,8 @@ def _answer(request: Request, asked: Asked) -> Response:
         window=detail.window,
     )
     looked = time.perf_counter()
+    if matches(held, tag):
+        return Response(status_code=304, headers=headers)
     about = replace(
         words.about(solver.name, name),
         detail=detail.said(resolution, table.resolution),

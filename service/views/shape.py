@@ -24,11 +24,28 @@ class Descriptor(BaseModel):
     long_name: str
 
 
+class Triangles(BaseModel):
+    """Which points make a triangle: only with these do `crossings` and `volume` hold. Counter-clockwise from outside.
+
+    A corner [i, j] lies i rows south and j columns east of a point. Columns go on at 0 after the last; point (i, j) of
+    n rows of 2n is vertex 2n i + j, the north pole 2n^2, the south pole 2n^2 + 1.
+    """
+
+    quads: list[list[list[int]]] = Field(
+        description="The two triangles of each quad, from its point in the north-west: of every row but the last"
+    )
+    fans: list[list[str | list[int]]] = Field(
+        description="The triangle with the north pole, from a point of the first row, and the one with the south pole, "
+        "from a point of the last; none in a part of the surface"
+    )
+
+
 class Lattice(BaseModel):
-    """How many samples the surface has."""
+    """How many samples the surface has, and how they are joined."""
 
     colatitude: int
     azimuth: int
+    triangles: Triangles
 
 
 class ShapePage(BaseModel):
@@ -43,7 +60,13 @@ class ShapePage(BaseModel):
     stage: ShapeStage
     exact: bool = Field(description="A stored run at a stored stage, or the fresh shape")
     converged: bool = Field(description="All runs that took part did converge")
-    crossings: int | None = Field(description="Pairs of triangles that cross; null where no positions were computed")
+    crossings: int | None = Field(
+        description="Pairs of the lattice's triangles that cross; null where no positions were computed, as they are "
+        "for JSON with `fields=position` only"
+    )
+    volume: float | None = Field(
+        description="Inside the closed mesh of the lattice's triangles [r1^3]; null where no positions were computed"
+    )
     tier: str = Field(
         description="How it came about: looked up in a `table`, `relaxed` from there by its solver, or a `run`"
     )

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from .errors import InvalidInput
-from .words import say
+from .words import advise, say
 
 __all__ = ["Clock"]
 
@@ -40,5 +40,5 @@ class Clock:
         try:
             conditions = self.conditions.model_validate(dict(under))
         except ValidationError as error:
-            raise InvalidInput(f"{say(error, self.conditions.model_fields)}.") from None
+            raise InvalidInput(f"{say(error, self.conditions.model_fields)}.", advice=advise(error)) from None
         return tuple(self.stage(hour, conditions, preset) for hour in hours)

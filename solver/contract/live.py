@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from .errors import InvalidInput
 from .need import Quality
 from .params import Params
-from .words import say
+from .words import advise, say
 
 if TYPE_CHECKING:
     from ..meshes import Frame
@@ -133,4 +133,4 @@ class Live:
         try:
             return self.actions[name].model_validate(dict(values))
         except ValidationError as error:
-            raise InvalidInput(f"{say(error, self.actions[name].model_fields)}.") from None
+            raise InvalidInput(f"{say(error, self.actions[name].model_fields)}.", advice=advise(error)) from None

@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from .errors import InvalidInput
-from .words import named, say
+from .words import advise, named, say
 
 __all__ = ["Need", "Quality", "Region", "Start"]
 
@@ -99,4 +99,4 @@ class Need(BaseModel):
         try:
             return cls.model_validate(dict(named(values)))
         except ValidationError as error:
-            raise InvalidInput(f"{say(error, cls.model_fields)}.") from None
+            raise InvalidInput(f"{say(error, cls.model_fields)}.", advice=advise(error)) from None

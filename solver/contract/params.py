@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .errors import InvalidGeometry, InvalidInput
-from .words import named, say
+from .words import advise, named, say
 
 __all__ = ["Params"]
 
@@ -63,7 +63,7 @@ class Params(BaseModel):
             # findings without a place are those of the whole: valid numbers, impossible shape
             whole_only = all(not item["loc"] for item in error.errors())
             kind = InvalidGeometry if whole_only else InvalidInput
-            raise kind(f"{say(error, known)}.") from None
+            raise kind(f"{say(error, known)}.", advice=advise(error)) from None
 
     @property
     def keeps_shape(self) -> bool:

@@ -11,7 +11,10 @@ from pydantic import BaseModel, ValidationError
 
 from .errors import InvalidInput
 
-__all__ = ["SHORT", "named", "say"]
+__all__ = ["SHORT", "advise", "named", "say"]
+
+#: Bounds as pydantic names them, in words.
+_BOUNDS = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
 
 SHORT = reprlib.Repr()
 SHORT.maxstring = SHORT.maxother = SHORT.maxlong = 80
@@ -49,6 +52,23 @@ def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     if strange:
         parts.append(f"known: {', '.join(sorted(fields))}")
     return "; ".join(parts)
+
+
+def advise(error: ValidationError) -> str:
+    """Return what to give instead of what is off its bounds or no number, a sentence each; "" where a finding says so
+    itself.
+    """
+    said = []
+    for item in error.errors():
+        where, context = ".".join(str(p) for p in item["loc"]), item.get("ctx", {})
+        bound = next((f"{word} {context[name]:g}" for name, word in _BOUNDS.items() if name in context), "")
+        if bound and where:
+            said.append(f"Give {where} {bound}.")
+        elif item["type"].startswith("int_"):
+            said.append(f"Give {where} a whole number.")
+        elif item["type"] in ("float_parsing", "float_type", "finite_number"):
+            said.append(f"Give {where} a finite number.")
+    return " ".join(said)
 
 
 def _hint(fields: Mapping[str, Any], place: tuple[int | str, ...]) -> str:

@@ -83,7 +83,7 @@ def relax(
     rest, residual, drift = _balance(motion, state, velocity, rest, stage, steps or _MOST, context)
     energy, least = motion.strained(state, rest, stage)
     if least <= 0:
-        raise Unstable("elements turned inside out.", advice="Run it: `exact=run`.", residual=residual)
+        raise Unstable("elements turned inside out.", advice="Run it from the start.", residual=residual)
     whole = sector.whole(motion.surface(state))
     found = State(whole, stage, residual, drift / params.exocarp_thickness, motion.steps, least, sector.copies * energy)
     record = Record(params, need, motion.mesh, begin)

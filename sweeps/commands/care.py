@@ -218,7 +218,7 @@ def _generation(text: str, store: Path | None, name: str) -> Path:
     from store.store import Store
 
     path = Path(text)
-    if path.suffix == ".h5":
+    if path.suffix.lower() == ".h5":
         if not path.is_file():
             raise InvalidOption(f"there is no generation {text}.", "STORE/tables/NAME/ holds them.")
         return path

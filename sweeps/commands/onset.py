@@ -92,7 +92,7 @@ def onset(
 
 
 def _check(path: Path) -> None:
-    if path.suffix not in (".npz", ".png"):
+    if path.suffix.lower() not in (".npz", ".png"):
         raise InvalidOption(f"--mode-out {path}: cannot write {path.suffix or 'no suffix'!r}.", "Known: .npz, .png.")
     check_place("--mode-out", path)
 
@@ -125,7 +125,7 @@ def _write(path: Path, start: Fresh, found: Any, document: dict[str, Any], prese
     resolution = min(max(96, 4 * found.degree), _FINEST)
     fresh = start.points(*lattice(resolution))
     heights = found.mode.on(*lattice(resolution))
-    if path.suffix == ".npz":
+    if path.suffix.lower() == ".npz":
         out = io.BytesIO()
         np.savez_compressed(
             out,

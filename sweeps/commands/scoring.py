@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["add_to"]
 
+#: The picture's stage where none is named.
+_STAGE = 0.2
+
 
 def add_to(table_app: typer.Typer) -> None:
     """Add the command of this module to those about tables."""
@@ -38,7 +41,7 @@ def score(
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE.png", help="Truth, the paper's and the default.")
     ] = None,
-    stage: Annotated[float, typer.Option("--stage", help="The picture's stage: the stored one next to it.")] = 0.2,
+    stage: Annotated[float | None, typer.Option("--stage", help="The picture's: the stored one next to it.")] = None,
     relax: Annotated[
         int, typer.Option("--relax", min=0, metavar="COUNT", help="Relax what is looked up at so many random points.")
     ] = 0,
@@ -72,14 +75,14 @@ def score(
 
     from ..refining import score as scores
 
-    _check(picture)
+    _check(picture, stage)
     names = methods.NAMED if methods_ is None else [str(methods.parse(part)) for part in methods_.split(",")]
     opened = Store.open(store or starter.ROOT)
     table = ShapeTable.open(opened, name, surfaces=registry.surface)
     cases, pairs = scores.cases(opened, table, held_out)
     report = scores.score(table, cases, pairs, names, held_out is not None)
     if picture is not None:
-        near = min(table.stages, key=lambda stored: abs(stored - stage))
+        near = min(table.stages, key=lambda stored: abs(stored - (_STAGE if stage is None else stage)))
         seal.publish(picture, scores.picture(cases, near))
     document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
     moved = list(_distances(table, names, relax))
@@ -89,10 +92,16 @@ def score(
     emit(document, as_json, lambda console: _show(console, name, report, moved, symbol, picture))
 
 
-def _check(picture: Path | None) -> None:
-    """Refuse, before any work, a picture that is none."""
-    if picture is not None and picture.suffix != ".png":
+def _check(picture: Path | None, stage: float | None) -> None:
+    """Refuse, before any work, a picture that is none or could not be written, and a stage without one."""
+    if picture is None:
+        if stage is not None:
+            raise InvalidOption("--stage is the picture's.", "Name it: --picture score.png; all stages are scored.")
+        return
+    if picture.suffix.lower() != ".png":
         raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+    if not picture.absolute().parent.is_dir():
+        raise InvalidOption(f"--picture {picture}: there is no directory {picture.parent}.", "Create it first.")
 
 
 def _show(console: Any, name: str, report: Any, moved: list[Any], symbol: str, picture: Path | None) -> None:

@@ -25,9 +25,10 @@ from .terminal.options import (
     numbers,
     stages_asked,
 )
-from .terminal.tables import asked_table, open_store, solver_of
+from .terminal.tables import asked_table, open_store, run_command, solver_of
 
 if TYPE_CHECKING:
+    from solver.contract import Solver
     from store.lookup import ShapeTable
     from store.shape import Shape
 
@@ -71,19 +72,22 @@ def draw_map(asked: _Drawn) -> None:
     """
     from solver import registry
     from store import seal
+    from store.blending.asking import settle
     from store.families import stored
 
     from .. import families, outputs
     from ..pictures.maps import Map
 
     out = asked.out
-    if out.suffix != ".png":
+    if out.suffix.lower() != ".png":
         raise InvalidOption(f"--out {out}: a map is a picture.", "Name it .png.")
     if asked.stage is not None and asked.stages is not None:
         raise InvalidOption("--stage and --stages exclude each other.", "Keep one of them.")
     outputs.check_suffix(out, False, 1)
     said = assignments(asked.set_)
     table, values = asked_table(asked.store, asked.name, None, said, asked.stage, asked.preset)
+    if asked.preset is not None:
+        settle(table.info, values)  # a table that is named need not hold the preset
     name, given = table.info.name, {axis: value for axis, value in values.items() if axis in said}
     solver, store = registry.get(table.info.solver), open_store(asked.store)
     shade = families.shade(solver, table.info, stored.families(store, solver))
@@ -198,19 +202,39 @@ def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, An
     shapes = [table.at(values, stage, **told) for stage in wanted]
     notes: list[Mapping[str, Any]] = [{} for _ in shapes]
     if asked.relax:
-        from ..relaxing import relaxed
-
         known = registry.get(table.info.solver)
-        shapes, notes = map(list, zip(*(relaxed(known, table, shape) for shape in shapes), strict=True))
+        shapes, notes = map(list, zip(*(_relaxed(known, table, shape) for shape in shapes), strict=True))
     return table, shapes, notes
+
+
+def _relaxed(solver: Solver, table: ShapeTable, shape: Shape) -> tuple[Shape, Mapping[str, Any]]:
+    """Return a shape relaxed, and what is said of it.
+
+    Raises:
+        SolverError: as `relaxing.relaxed`; where the shape falls apart, with the command that runs it from the start.
+
+    """
+    from solver.contract import Unstable
+
+    from ..relaxing import relaxed
+
+    try:
+        return relaxed(solver, table, shape)
+    except Unstable as error:
+        usual, given = solver.parse({}), solver.parse(table.at_parameters(shape.parameters))
+        said = {axis: given.axis(axis) for axis in given.axes if given.axis(axis) != usual.axis(axis)}
+        advice = f"{error.advice} {run_command(solver.name, None, said, shape.stage)}"
+        raise Unstable(error.message, advice=advice.strip(), residual=error.residual) from None
 
 
 def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path | None) -> None:
     from store.surfaces import measures
 
     last = shapes[-1]
+    whose = ", of the runs" if last.tier == "table" else ""
     rows = [
-        [key, last.units.get(key, "1"), *(f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes)]
+        [key + whose, last.units.get(key, "1")]
+        + [f"{shape.descriptors.get(key, float('nan')):.4g}" for shape in shapes]
         for key in last.descriptors
     ]
     errors = [shape.expected_error for shape in shapes if shape.expected_error is not None]
@@ -224,6 +248,9 @@ def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path |
     if any(shape.crossings is not None for shape in shapes):
         told = ("unknown" if shape.crossings is None else str(shape.crossings) for shape in shapes)
         rows += [["crossing pairs as handed over", "1", *told]]
+    if any(shape.volume is not None for shape in shapes):
+        told = ("unknown" if shape.volume is None else f"{shape.volume:.4g}" for shape in shapes)
+        rows += [["volume as handed over", "r1^3", *told]]
     place = ", ".join(f"{axis} = {value:g}" for axis, value in last.parameters.items())
     head = ["", "unit", *(f"{symbol} = {shape.stage:g}" for shape in shapes)]
     grid(console, head, rows, title=f"{name}: {place}" if place else name)
@@ -254,6 +281,7 @@ def _document(shape: Any) -> dict[str, Any]:
     return {
         "stage": shape.stage,
         **shape.trust(),
+        "volume": shape.volume,
         "weights": dict(shape.weights),
         "descriptors": {
             name: {"value": value, "units": shape.units.get(name, "")} for name, value in shape.descriptors.items()

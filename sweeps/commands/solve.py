@@ -181,7 +181,7 @@ def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:
 
     outputs.check_suffix(out, True, len(need.stages))
     wanted = outputs.fields_for(out, True, solver, need.fields)
-    if need.region is not None and "position" in wanted and out.suffix not in _PARTS:
+    if need.region is not None and "position" in wanted and out.suffix.lower() not in _PARTS:
         raise InvalidOption(
             f"--out {out}: {out.suffix} holds whole surfaces, and --region leaves a part.",
             f"Leave --region out, or write {' or '.join(_PARTS)}.",
@@ -230,7 +230,7 @@ def _keep(out: Path, made: Made) -> None:
     from .. import outputs
 
     kept = out.with_name(f"{out.stem}-{made.key[:12]}.h5")
-    if out.suffix == kept.suffix:
+    if out.suffix.lower() == kept.suffix:
         return
     # where a disk is full or a folder is closed, why the file itself failed is what counts
     with suppress(OSError, StorageFull):
@@ -248,7 +248,7 @@ def _check_cut(cut: str, out: Path | None) -> None:
         opened.parsed(cut)
     else:
         section.plane(cut)
-    if out is None or out.suffix != ".png":
+    if out is None or out.suffix.lower() != ".png":
         raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
 
 

@@ -114,7 +114,7 @@ def list_(
     from ..families import covered, gallery
 
     opened = open_store(store)
-    if picture is not None and picture.suffix != ".png":
+    if picture is not None and picture.suffix.lower() != ".png":
         raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
     found = []
     for name in opened.table_names():

@@ -34,6 +34,21 @@ def test_who_asks_again_gets_the_same(own: Store) -> None:
         assert head.headers["content-length"] == str(len(first.content))
 
 
+@pytest.mark.parametrize("kind", ["npz", "json"])
+def test_whoever_takes_any_tag_has_what_is_there_and_not_what_is_refused(own: Store, kind: str) -> None:
+    anything = {"If-None-Match": "*"}
+    with client_of(own.root) as client:
+        query = {**QUERY, "format": kind}
+        for _ in range(2):  # looked up, then kept
+            answer = client.get(SHAPE, params=query, headers=anything)
+            assert (answer.status_code, answer.content) == (304, b"")
+            assert answer.headers["etag"] == client.get(SHAPE, params=query).headers["etag"]
+        for wrong in ({"max_error": "0.0000001"}, {"te": "9"}):
+            assert client.get(SHAPE, params={**query, **wrong}, headers=anything).status_code == 422
+        page = client.get("/", headers={"Accept": "text/html", **anything})
+        assert page.status_code == 304
+
+
 def test_the_accept_header_is_part_of_the_question(own: Store) -> None:
     with client_of(own.root) as client:
         for kind in ("model/gltf-binary", "application/x-npz", "model/gltf-binary", "application/x-npz"):

@@ -14,7 +14,9 @@ import pytest
 
 from service.shapes import batch as module
 from solver import registry
+from store import starter
 from store.lookup import ShapeTable
+from store.store import Store
 
 from .conftest import QUERY, SHAPE, client_of
 
@@ -39,6 +41,19 @@ def single(client: httpx.Client, row: dict[str, Any], kind: str, **more: Any) ->
     answer = client.get(SHAPE, params={**row, "resolution": 16, "format": kind, **more})
     assert answer.status_code == 200, answer.text
     return answer
+
+
+@pytest.mark.parametrize("name", Store.open(starter.ROOT).table_names())
+def test_tables_of_the_package_come_as_each_shape_alone(name: str) -> None:
+    """Those that are packed in whole numbers, too: positions are not."""
+    with client_of(starter.ROOT) as client:
+        axes = client.get(f"/v1/tables/{name}").json()["axes"]
+        row = {axis: 0.5 * (said["lowest"] + said["highest"]) for axis, said in axes.items()} | {"s": 0.1}
+        found = load(ask(client, points=[row], table=name, fields=["position", "displacement"]))
+        with np.load(io.BytesIO(single(client, row, "npz", table=name).content)) as alone:
+            for field in ("position", "displacement", "poles"):
+                assert found[field].dtype == alone[field].dtype == np.float32
+                assert np.array_equal(found[field][0], alone[field])
 
 
 def test_each_shape_is_as_it_comes_alone(client: httpx.Client) -> None:

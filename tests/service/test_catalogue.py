@@ -27,6 +27,30 @@ def test_index_links_lead_somewhere(client: httpx.Client) -> None:
     assert set(index["formats"]) == {"glb", "obj", "npz", "json", "points"}
 
 
+@pytest.mark.parametrize(
+    ("address", "hint"),
+    [
+        ("/v1/maps?solver=dehydration", "Leave it out"),
+        ("/v1/tables?limit=2", "Leave it out"),
+        ("/v1/tables/default?verbose=1", "Leave it out"),
+        ("/v1/solvers/dehydration?full=1", "Leave it out"),
+        ("/v1/results?solvr=dehydration", "Did you mean 'solver'?"),
+        ("/v1/jobs?sate=done", "Did you mean 'state'?"),
+        ("/v1/solvers/dehydration/stages?hours=24&x=1", "Known: hours, preset, under"),
+    ],
+)
+def test_a_parameter_that_an_address_does_not_know_is_refused(client: httpx.Client, address: str, hint: str) -> None:
+    name = address.rpartition("&")[2].rpartition("?")[2].partition("=")[0]
+    problem = checked(client.get(address), 422, "invalid-query")
+    assert [wrong["name"] for wrong in problem["errors"]] == [name]
+    assert hint in problem["errors"][0]["advice"]
+
+
+def test_who_watches_may_ask_with_anything(client: httpx.Client) -> None:
+    for address in ("/?utm=1", "/healthz?t=1"):
+        assert client.get(address).status_code == 200
+
+
 def test_tables(client: httpx.Client, built: Path) -> None:
     (listed,) = client.get("/v1/tables").json()["tables"]
     one = client.get("/v1/tables/default").json()

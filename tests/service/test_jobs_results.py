@@ -37,6 +37,8 @@ def test_results_by_accept(store: Store, queue_only: httpx.Client, tmp_path: Pat
         assert list(run["stage"]) == [0.1, 0.2]
     tag = {"If-None-Match": whole.headers["etag"]}
     assert queue_only.get(result, headers=tag).status_code == 304
+    for asked, status in (({}, 304), ({"format": "glb"}, 304), ({"format": "glb", "stage": 0.7}, 422)):
+        assert queue_only.get(result, params=asked, headers={"If-None-Match": "*"}).status_code == status
     mesh = queue_only.get(result, params={"stage": 0.1}, headers={"Accept": "model/obj"})
     assert mesh.headers["content-type"] == "model/obj"
     assert mesh.headers["etag"] != whole.headers["etag"]

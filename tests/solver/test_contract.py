@@ -281,6 +281,24 @@ def test_errors_carry_code_and_advice():
     assert str(InvalidInput("no.", advice="Yes.")) == "no. Yes."
 
 
+@pytest.mark.parametrize(
+    ("values", "advice"),
+    [
+        ({"te": 9}, "Give exocarp_thickness at most 0.2."),
+        ({"te": "thin", "gamma": -1}, "Give exocarp_thickness a finite number. Give modulus_ratio at least 1."),
+        ({"seed": 1.5}, "Give seed a whole number."),
+        ({"gamma": float("nan")}, "Give modulus_ratio a finite number."),
+    ],
+)
+def test_what_is_off_its_bounds_says_what_to_give(values, advice):
+    with pytest.raises(InvalidInput) as found:
+        registry.get("dehydration").parse(values)
+    assert found.value.advice == advice
+    with pytest.raises(InvalidInput) as found:
+        Need.parse({"resolution": 2})
+    assert found.value.advice == "Give resolution at least 4."
+
+
 def test_a_quantity_has_one_meaning():
     with pytest.raises(ValueError, match="already registered"):
         register(residual=Quantity("m", "something else", "r"))

@@ -142,13 +142,13 @@ def test_solve_writes_a_shard(shrinking: Solves, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.glob("*run*")] == ["run.h5"]
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".png", ".json", ".obj", ".glb"])
+@pytest.mark.parametrize("suffix", [".npz", ".png", ".json", ".obj", ".glb", ".GLB", ".H5"])
 def test_solve_writes_other_formats(shrinking: Solves, tmp_path: Path, suffix: str) -> None:
     out = tmp_path / f"run{suffix}"
     result = wizen("solve", "shrinking", "--quality", "preview", "--stages", "0.1", "--out", out)
     assert result.exit_code == 0, result.output
-    start = {".npz": b"PK", ".png": b"\x89PNG", ".json": b"{", ".obj": b"#", ".glb": b"glTF"}[suffix]
-    assert out.read_bytes().startswith(start)
+    starts = {".npz": b"PK", ".png": b"\x89PNG", ".json": b"{", ".obj": b"#", ".glb": b"glTF", ".h5": b"\x89HDF"}
+    assert out.read_bytes().startswith(starts[suffix.lower()])
     assert "mean_radius" in result.stdout
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,8 @@ import pytest
 from _command import document, wizen
 from conftest import write
 
+from solver.contract import Unstable
+from solver.dehydration import SOLVER
 from store.store import Store
 
 
@@ -84,8 +88,31 @@ def test_query(table: Path, tmp_path: Path) -> None:
     assert said["parameters"]["te"] == 0.025
     assert not said["stages"][0]["exact"]
     # every sample is a sphere that shrinks by s, so what is between them is one, too, up to the fresh shape's skin
-    radius = np.linalg.norm(np.load(out)["position"], axis=-1)
+    with np.load(out) as archive:
+        found = dict(archive)
+    radius = np.linalg.norm(found["position"], axis=-1)
     np.testing.assert_allclose(radius, 1.025 * 0.85, rtol=2e-3)
+    points = np.concatenate([found["position"][0].reshape(-1, 3), found["poles"][0]]).astype(float)
+    a, b, c = points[found["triangles"]].transpose(1, 0, 2)
+    inside = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+    assert found["volume"] == pytest.approx(inside, rel=1e-5)
+    assert said["stages"][0]["volume"] == pytest.approx(inside, rel=1e-5)
+
+
+def test_what_falls_apart_when_relaxed_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise Unstable("elements turned inside out.", advice="Run it from the start.")
+
+    monkeypatch.setattr("sweeps.relaxing.relaxed", broken)
+    found = wizen("query", "--preset", "raisin", "--stages", "0.1", "--resolution", 16, "--relax")
+    assert found.exit_code != 0
+    words = " ".join(found.stderr.split())
+    assert "Run it from the start. wizen solve dehydration" in words
+    assert "exact=run" not in words
+    command = shlex.split(words[words.index("wizen solve") :])
+    said = dict(word.split("=") for flag, word in pairwise(command) if flag == "--set")
+    raisin = SOLVER.parse({}, "raisin")
+    assert SOLVER.parse({name: float(value) for name, value in said.items()}).axis("r4") == raisin.axis("r4")
 
 
 def test_query_by_a_method_within_an_error(table: Path) -> None:
@@ -132,6 +159,11 @@ def test_maps(table: Path, tmp_path: Path) -> None:
     result = wizen("map", "--store", table, "--out", out, "--stages", "0.1,0.2", "--set", "te=0.03", "--pixels", 48)
     assert "4 shapes" in result.stdout
     assert wizen("map", "--preset", "raisin", "--out", out, "--stage", "nan", "--pixels", 48).exit_code == 2
+    other = wizen("map", "--name", "plum1", "--preset", "raisin", "--out", out, "--pixels", 48)
+    assert other.exit_code == 2
+    assert "0.88 in the whole table" in other.stderr
+    held = wizen("map", "--name", "raisin", "--preset", "raisin", "--out", tmp_path / "map.PNG", "--pixels", 32)
+    assert held.exit_code == 0
 
 
 def test_presets_and_what_the_package_covers(tmp_path: Path) -> None:

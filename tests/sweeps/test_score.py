@@ -98,6 +98,22 @@ def test_the_table_for_people() -> None:
     assert "correlation of neighbours" in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["--stage", "0.3"], "--stage is the picture's"),
+        (["--picture", "{tmp}/none/score.png"], "there is no directory"),
+        (["--picture", "{tmp}/score.jpg"], "it is a picture"),
+    ],
+)
+def test_a_picture_that_cannot_be_is_refused_before_any_work(tmp_path: Path, words: list[str], why: str) -> None:
+    said = [word.format(tmp=tmp_path) for word in words]
+    refused = CliRunner().invoke(app, ["table", "score", "--name", "nonsense", *said])
+    assert refused.exit_code == 2
+    assert why in " ".join(refused.stderr.split())
+    assert not (tmp_path / "none").exists()
+
+
 def test_what_cannot_be_scored(tmp_path: Path) -> None:
     store = Store.open(shutil.copytree(starter.ROOT, tmp_path / "store"))
     table = ShapeTable.open(store, surfaces=registry.surface)

@@ -164,17 +164,16 @@ class Looked(Kind):
         found = []
         for one, worn in zip(shapes, self._worn, strict=True):
             position, poles = mesh.surface(one)
-            lattice, ends = mesh.normals(position)
-            colour = weathered(position, lattice, worn) * worn.base / self.skin.base
-            found.append(quantised(mesh.vertices(position, poles), mesh.vertices(lattice, ends), colour, self.extent))
+            colour = weathered(position, one.normals, worn) * worn.base / self.skin.base
+            normal = mesh.vertices(one.normals, one.pole_normals)
+            found.append(quantised(mesh.vertices(position, poles), normal, colour, self.extent))
         return found
 
     def surfaces(self, n: int) -> list[tuple[Array, Array]]:
         """Return the points and normals of lattices and their poles."""
         found = []
         for shape in (self.shape(n), *self.later(n)):
-            position, poles = mesh.surface(shape)
-            found.append((mesh.vertices(position, poles), mesh.vertices(*mesh.normals(position))))
+            found.append((mesh.vertices(*mesh.surface(shape)), mesh.vertices(shape.normals, shape.pole_normals)))
         return found
 
     def colours(self, n: int) -> list[Floats]:

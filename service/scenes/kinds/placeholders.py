@@ -30,8 +30,9 @@ def placeholder(missing: Missing, name: str) -> Stored:
     worn = DUMMY[1].worn(0.0)
     if fresh is not None:
         position = fresh.points(*lattice(_ROUND)).astype(np.float32)
-        points = mesh.vertices(position, fresh.poles())
-        normal, triangles = mesh.vertices(*mesh.normals(position)), mesh.triangles(_ROUND)
+        poles = fresh.poles().astype(np.float32)
+        points, triangles = mesh.vertices(position, poles), mesh.triangles(_ROUND)
+        normal = mesh.vertices(*mesh.normals(position, poles))
         what, sides = "the fresh shape", np.ptp(points, axis=0)
     else:
         sides, metres = _sides(solver, missing.params)

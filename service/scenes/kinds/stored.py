@@ -253,8 +253,8 @@ def _coloured(
     n = stages.lattice
     if not n:
         return [np.tile(worn.ridge, (len(first.vertices), 1))], worn
-    position = first.vertices[: 2 * n * n].reshape(n, 2 * n, 3)
-    return [weathered(position, mesh.normals(position)[0], worn) * worn.base], worn
+    position, poles = first.vertices[:-2].reshape(n, 2 * n, 3), first.vertices[-2:]
+    return [weathered(position, mesh.normals(position, poles)[0], worn) * worn.base], worn
 
 
 def _standing(stages: Stages, surface: Surface) -> list[Extra]:

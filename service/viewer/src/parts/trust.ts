@@ -77,5 +77,8 @@ export function showFacts(root: HTMLElement, about: About): void {
     long_name,
     units === "1" ? digits(value) : `${digits(value)} ${units}`,
   ]);
+  // what is measured on the mesh that is shown comes first
+  if (about.crossings != null) rows.unshift(["pairs of this mesh's triangles that cross", digits(about.crossings)]);
+  if (about.volume != null) rows.unshift(["volume inside this mesh, in units of r1^3", digits(about.volume)]);
   root.replaceChildren(terms(rows));
 }

@@ -56,6 +56,9 @@ export interface About {
   descriptors: Record<string, Described>;
   lattice: { colatitude: number; azimuth: number };
   inside: boolean;
+  /** Measured on the mesh itself; null where it was not computed. */
+  crossings: number | null;
+  volume: number | null;
   expected_error: Record<string, number> | null;
   method: string;
   /** How it came about: looked up in a table, relaxed from there, or a run. */

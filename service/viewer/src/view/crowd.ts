@@ -58,7 +58,7 @@ export class Crowd implements Subject {
     const [position, normal] = ["position", "normal"].map((name) => one.geometry.getAttribute(name));
     const values = position.array as Float32Array;
     for (let k = 0; k < points.length; k++) values[k] = points[k] * one.r1;
-    normals(values, one.n, normal.array as Float32Array);
+    normals(values, one.geometry.index?.array ?? [], normal.array as Float32Array);
     position.needsUpdate = normal.needsUpdate = true;
   }
 

@@ -104,7 +104,7 @@ export class Fruit extends Mesh<BufferGeometry, SkinMaterial> implements Subject
   private shape(): void {
     const position = this.array("position");
     const heights = this.array("relief");
-    normals(position, this.n, this.array("normal"));
+    normals(position, this.geometry.index?.array ?? [], this.array("normal"));
     relief(position, this.n, REACH, heights);
     let square = 0;
     for (const h of heights) square += h * h;

@@ -2,7 +2,8 @@
 //
 // The mesh is closed as it stands: the last column joins the first, and each pole is one vertex, so no seam can show.
 // Azimuth runs from x towards z about y; triangles run along azimuth first, which makes them counter-clockwise from
-// outside (service/formats/mesh.py builds the same ones).
+// outside (service/formats/mesh.py builds the same ones). Their order and the diagonal that cuts each quad are a promise
+// of the service's: only with these triangles does `crossings` of an answer hold.
 
 export const vertexCount = (n: number): number => 2 * n * n + 2;
 
@@ -31,39 +32,26 @@ export function triangles(n: number): Uint32Array {
   return out;
 }
 
-/** Outward unit normals by central differences; across a pole the neighbour is the same row half a turn further on. */
-export function normals(p: Float32Array, n: number, out: Float32Array): void {
-  const m = 2 * n;
-  for (let i = 0; i < n; i++) {
-    const up = i > 0 ? i - 1 : 0;
-    const down = i + 1 < n ? i + 1 : n - 1;
-    for (let j = 0; j < m; j++) {
-      const e = 3 * (i * m + (j + 1 === m ? 0 : j + 1));
-      const w = 3 * (i * m + (j === 0 ? m - 1 : j - 1));
-      const u = 3 * (up * m + (i > 0 ? j : (j + n) % m));
-      const d = 3 * (down * m + (i + 1 < n ? j : (j + n) % m));
-      const ax = p[e] - p[w], ay = p[e + 1] - p[w + 1], az = p[e + 2] - p[w + 2];
-      const bx = p[d] - p[u], by = p[d + 1] - p[u + 1], bz = p[d + 2] - p[u + 2];
-      write(out, 3 * (i * m + j), ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
+/** Outward unit normals: of each vertex the mean of its triangles, weighted by area, as in the service's files. */
+export function normals(p: Float32Array, corners: ArrayLike<number>, out: Float32Array): void {
+  out.fill(0);
+  for (let k = 0; k < corners.length; k += 3) {
+    const a = 3 * corners[k], b = 3 * corners[k + 1], c = 3 * corners[k + 2];
+    const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
+    const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+    const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
+    for (const at of [a, b, c]) {
+      out[at] += x;
+      out[at + 1] += y;
+      out[at + 2] += z;
     }
   }
-  for (const [pole, row, sign] of [[n * m, 0, 1], [n * m + 1, n - 1, -1]] as const) {
-    let x = 0, y = 1e-12 * sign, z = 0;
-    for (let j = 0; j < m; j++) {
-      const k = 3 * (row * m + j);
-      x += out[k];
-      y += out[k + 1];
-      z += out[k + 2];
-    }
-    write(out, 3 * pole, x, y, z);
+  for (let k = 0; k < out.length; k += 3) {
+    const length = Math.hypot(out[k], out[k + 1], out[k + 2]) || 1;
+    out[k] /= length;
+    out[k + 1] /= length;
+    out[k + 2] /= length;
   }
-}
-
-function write(out: Float32Array, k: number, x: number, y: number, z: number): void {
-  const length = Math.hypot(x, y, z) || 1;
-  out[k] = x / length;
-  out[k + 1] = y / length;
-  out[k + 2] = z / length;
 }
 
 /** Height of each vertex over its smoothed surroundings [r1], about -0.1 in a furrow to 0.1 on a ridge. */
