@@ -154,7 +154,10 @@ def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
             allow_origins=settings.cors_origins,
             allow_methods=["GET", "POST", "DELETE"],
             allow_headers=["Authorization", "Content-Type", "If-None-Match"],
-            expose_headers=["ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID"],
+            expose_headers=[
+                *("ETag", "Location", "Retry-After", "Server-Timing", "X-Request-ID"),
+                *("Content-Disposition", "Wizen-Scene", "Wizen-Tier"),
+            ],
         )
     app.add_middleware(Telemetry, metrics=metrics)
     if settings.root_path:
