@@ -40,6 +40,11 @@ def watch(monkeypatch: Any) -> None:
             super().__init__(*values)
             made.append(self)
 
+        def advance(self) -> None:
+            # on a fast machine as well it is to take longer than its asker waits
+            time.sleep(0.05)
+            super().advance()
+
     monkeypatch.setattr(resting, "Pouring", Watched)
 
 
