@@ -11,7 +11,7 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid
-from .terminal.options import As_json, StoreToRead, TableName
+from .terminal.options import As_json, StoreToRead, TableName, check_place
 
 if TYPE_CHECKING:
     from store.lookup import ShapeTable
@@ -100,8 +100,7 @@ def _check(picture: Path | None, stage: float | None) -> None:
         return
     if picture.suffix.lower() != ".png":
         raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
-    if not picture.absolute().parent.is_dir():
-        raise InvalidOption(f"--picture {picture}: there is no directory {picture.parent}.", "Create it first.")
+    check_place("--picture", picture)
 
 
 def _show(console: Any, name: str, report: Any, moved: list[Any], symbol: str, picture: Path | None) -> None:
