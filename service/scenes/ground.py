@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from solver.arrays import Array, Floats
-from solver.contract.mesh import GivenMesh
+from solver.contract.mesh import GivenMesh, check_faces
 
 __all__ = ["Ground", "across", "corner_normals"]
 
@@ -30,9 +30,8 @@ class Ground(GivenMesh):
 
     @model_validator(mode="after")
     def _has_area(self) -> Self:
+        check_faces(len(self.points), self.faces)
         points, faces = self.arrays
-        if faces.min() < 0 or faces.max() >= len(points):
-            raise ValueError(f"a triangle names a vertex that is not there: there are 0 to {len(points) - 1}")
         size = float(np.abs(points).max())
         if size > 1e9:
             raise ValueError("a vertex is more than 1e9 away: take another unit")

@@ -24,6 +24,7 @@ class _Model(BaseModel):
 
 
 Speed = Annotated[float, Field(ge=-100, le=100)]
+Weight = Annotated[float, Field(ge=-1, le=1)]
 
 
 class Attachment(_Model):
@@ -127,7 +128,7 @@ class GrowthParams(Params):
         description="How much of its compression pushes a sheet along its normal (the paper's F_N), frozen in a step",
         json_schema_extra=_units("1/start shape's unit"),
     )
-    gravity: tuple[float, float, float] = Field(
+    gravity: tuple[Weight, Weight, Weight] = Field(
         (0.0, 0.0, 0.0),
         description="Weight of the sheet per rest area, a dead load, over mu; up to 1 each way",
         json_schema_extra=_units("1"),

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ..arrays import Floats
 from ..contract.mesh import ClosedMesh
+from ..contract.space import Direction, Position
 from .shapes import Mesh, is_closed
 
 if TYPE_CHECKING:
@@ -62,8 +63,8 @@ class Plane(_Solid):
     place: ClassVar[str] = "point"
 
     kind: Literal["plane"] = "plane"
-    point: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="A point of the plane [start shape's unit]")
-    normal: tuple[float, float, float] = Field((0.0, 0.0, 1.0), description="Out of the solid [1]")
+    point: Position = Field((0.0, 0.0, 0.0), description="A point of the plane [start shape's unit]")
+    normal: Direction = Field((0.0, 0.0, 1.0), description="Out of the solid [1]")
 
     @property
     def thick(self) -> float:
@@ -80,7 +81,7 @@ class SolidBall(_Solid):
     """A ball that the surface cannot enter."""
 
     kind: Literal["ball"] = "ball"
-    centre: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
+    centre: Position = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
     radius: float = Field(1.0, gt=0, le=100, description="Radius [start shape's unit]")
 
     @property
@@ -99,7 +100,7 @@ class SolidBox(_Solid):
     """A box with rounded edges, its sides along the axes, that the surface cannot enter."""
 
     kind: Literal["box"] = "box"
-    centre: tuple[float, float, float] = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
+    centre: Position = Field((0.0, 0.0, 0.0), description="Centre [start shape's unit]")
     size: tuple[Side, Side, Side] = Field(
         (1.0, 1.0, 1.0), description="Length along x, y and z, edges included [start shape's unit]"
     )
@@ -154,9 +155,7 @@ class SolidMesh(_Solid):
 
     kind: Literal["mesh"] = "mesh"
     mesh: SolidShape = Field(description="Points and triangles")
-    centre: tuple[float, float, float] = Field(
-        (0.0, 0.0, 0.0), description="Where the mesh's origin is [start shape's unit]"
-    )
+    centre: Position = Field((0.0, 0.0, 0.0), description="Where the mesh's origin is [start shape's unit]")
 
     @cached_property
     def thick(self) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ...contract.space import Position
 from ...painted import PaintedMap
 
 __all__ = ["Neighbour", "Place", "Pressure", "PressureMap", "Wound"]
@@ -74,7 +75,7 @@ class Neighbour(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    position: tuple[float, float, float] = Field(description="Its centre, from this fruit's [r1]")
+    position: Position = Field(description="Its centre, from this fruit's [r1]")
     radius: float = Field(1.0, gt=0, le=100, description="Its radius [r1]")
     gives: bool = Field(
         False,

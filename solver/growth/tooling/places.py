@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 
 from ...arrays import Floats
 from ...contract import Context, InvalidInput
+from ...contract.space import Position
 from ..shapes import Ground
 from .harmonic import harmonic
 from .textures import UNMAPPED, Projection, gray_scott, laid
@@ -51,7 +52,7 @@ class Ball(_Model):
     """Near a point; fades to 0 at the radius."""
 
     kind: Literal["ball"] = "ball"
-    centre: tuple[float, float, float] = Field(description="Centre [start shape's unit]")
+    centre: Position = Field(description="Centre [start shape's unit]")
     radius: float = Field(gt=0, le=100, description="Radius [start shape's unit]")
 
 
@@ -144,7 +145,7 @@ class Harmonic(_Model):
     """Shares painted at points, spread between them by Laplace's equation."""
 
     kind: Literal["harmonic"] = "harmonic"
-    points: tuple[tuple[float, float, float], ...] = Field(
+    points: tuple[Position, ...] = Field(
         min_length=1, max_length=2000, description="Where; the nearest vertex [start shape's unit]"
     )
     values: tuple[float, ...] = Field(min_length=1, max_length=2000, description="Share of each point [1]")
@@ -160,7 +161,7 @@ class Lines(_Model):
     """Along lines, such as the veins of a leaf; fades to 0 at the width."""
 
     kind: Literal["lines"] = "lines"
-    lines: tuple[tuple[tuple[float, float, float], ...], ...] = Field(
+    lines: tuple[tuple[Position, ...], ...] = Field(
         min_length=1, max_length=200, description="Points of each line, straight between [start shape's unit]"
     )
     width: float = Field(gt=0, le=100, description="Half width [start shape's unit]")

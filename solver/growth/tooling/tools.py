@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ...arrays import Floats
+from ...contract.space import Direction, Position
 from .places import Everywhere, Place
 
 __all__ = [
@@ -37,7 +38,7 @@ __all__ = [
 _AROUND = 24
 
 Stretch = Annotated[float, Field(ge=0.1, le=10)]
-Point = tuple[float, float, float]
+Point = Position
 Kernel = Literal["smooth", "flat", "cone"]
 Way = Literal["space", "surface"]
 _HOW_FAR = "How far is measured: through space, as far as the surface leads there, or along the surface"
@@ -72,7 +73,9 @@ class HotSpot(_Tool):
     kernel: Kernel = Field("smooth", description="(1 - r^2)^2, 1 or 1 - r inside the radius")
     distance: Way = Field("space", description=_HOW_FAR)
     stretch: tuple[Stretch, Stretch] = Field((1.3, 1.3), description="Along and across the frame [1]")
-    frame: Point = Field((1.0, 0.0, 0.0), description="Direction of the first stretch, as projected on the surface [1]")
+    frame: Direction = Field(
+        (1.0, 0.0, 0.0), description="Direction of the first stretch, as projected on the surface [1]"
+    )
     polar: bool = Field(
         False, description="Stretches away from the spot and around it, in place of along and across the frame [1]"
     )
@@ -118,7 +121,9 @@ class Apex(BaseModel):
     tool: int | None = Field(None, ge=0, le=199, description="Or the number, from 0, of the hot spot to follow")
     radius: float = Field(0.3, gt=0, le=100, description="Distance from the middle [start shape's unit]")
     across: bool = Field(False, description="A line through the middle in place of a circle")
-    frame: Point = Field((1.0, 0.0, 0.0), description="Direction in which it begins, as projected on the surface [1]")
+    frame: Direction = Field(
+        (1.0, 0.0, 0.0), description="Direction in which it begins, as projected on the surface [1]"
+    )
     arc: float = Field(360.0, gt=0, le=360, description="Part of the circle [degree]")
 
     @model_validator(mode="after")
@@ -163,7 +168,7 @@ class HotSurface(_Tool):
     kind: Literal["surface"] = "surface"
     where: Place = Field(description="Share of each vertex")
     stretch: tuple[Stretch, Stretch] = Field((1.2, 1.2), description="Along and across the frame [1]")
-    frame: Point | Literal["around"] = Field(
+    frame: Direction | Literal["around"] = Field(
         "around", description="Direction of the first stretch, projected on the surface; 'around' the z axis [1]"
     )
     offset: float = Field(0.0, ge=0, le=1000, description="Later start where `later` is 1 [time]")
@@ -224,7 +229,7 @@ class PaintedStroke(BaseModel):
     )
     width: float = Field(0.0, ge=0, le=100, description="Half width; 0: the nearest vertices [start shape's unit]")
     stretch: tuple[Stretch, Stretch] = Field((1.0, 1.0), description="Along and across the frame [1]")
-    frame: Point | Literal["along", "around"] = Field(
+    frame: Direction | Literal["along", "around"] = Field(
         "along",
         description="Direction of the first stretch: 'along' the stroke, 'around' the z axis, or a direction [1]",
     )

@@ -134,6 +134,7 @@ def test_usd_has_the_mesh_and_what_stands_on_it() -> None:
         ({"radius": 3.0}, "exclude"),
         ({"mesh": None}, "a radius or a mesh"),
         ({"mesh": {"points": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 3]]}}, "not there"),
+        ({"mesh": {"points": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 10**30]]}}, "not there"),
         ({"mesh": {"points": [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "faces": [[0, 1, 2]]}}, "no area"),
         ({"mesh": {"points": [[0, 0, math.nan], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}}, "finite"),
         ({"mesh": {"points": [[0, 0, 1e300], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}}, "another unit"),
