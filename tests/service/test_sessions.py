@@ -334,6 +334,11 @@ def test_a_lost_connection_is_taken_up_again_and_goes_on(live: Served) -> None:
     # a second connection takes it from the first, and a stranger does not
     problem, _ = refused(Client(live.url, **{**again, "key": "guessed"}))
     assert problem["status"] == 404
+    # nor does another token that came by the key, of whatever scope
+    for scope in ("run", "admin"):
+        other = bearer(Store.open(live.root), f"thief-{scope}", scope)["Authorization"].removeprefix("Bearer ")
+        problem, _ = refused(Client(live.url, **{**again, "token": other}))
+        assert (problem["status"], problem["type"]) == (404, "urn:wizen:problem:unknown-session")
     third = Client(live.url, **again)
     assert third.opened()["say"] == "opened"
     with pytest.raises(ConnectionClosed) as closed:
