@@ -61,7 +61,9 @@ def test_play_goes_by_whole_steps_and_less_than_one_is_refused() -> None:
     desk.take({"do": "play", "id": 2, "until": 0.14})
     refused = next(said for said in told if said["say"] == "error")
     assert refused["id"] == 2
+    assert refused["problem"]["detail"].startswith("until: growth time 0.14 does not come any more: it is 0.1, and at")
     assert "at least 0.15" in refused["problem"]["detail"]
+    assert "`undo` goes back" in refused["problem"]["advice"]
     assert told[-1] == refused
     desk.take({"do": "play", "id": 3, "until": 0.15})
     desk.finish()
