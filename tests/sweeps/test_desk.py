@@ -65,6 +65,8 @@ def test_play_goes_by_whole_steps_and_less_than_one_is_refused() -> None:
     assert "at least 0.15" in refused["problem"]["detail"]
     assert "`undo` goes back" in refused["problem"]["advice"]
     assert told[-1] == refused
+    desk.take({"do": "play", "id": 9, "until": 0.5, "pace": -1})
+    assert told[-1]["problem"]["detail"] == "pace: it is above 0."
     desk.take({"do": "play", "id": 3, "until": 0.15})
     desk.finish()
     assert desk.saved()["stage"] == pytest.approx(0.15)
