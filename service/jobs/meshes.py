@@ -82,8 +82,6 @@ def _read(data: bytes, media: str, fit: bool) -> MeshPage:
             mesh = meshfile.read(path)
         except InvalidOption as error:
             raise InvalidQuery.of([Wrong("mesh", error.message.rstrip("."), error.advice)]) from None
-    if not mesh["faces"]:
-        raise InvalidQuery.of([Wrong("mesh", "no triangle of it has three places", "Send one that has a surface.")])
     points = np.array(mesh["points"])
     sides = np.sort(np.array(mesh["faces"])[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     counts = np.unique(sides, axis=0, return_counts=True)[1]

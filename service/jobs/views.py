@@ -26,6 +26,9 @@ _LONG = 2000
 #: What is known of jobs before they run, by their keys, which say all that it hangs on; and of how many.
 _KNOWN: dict[str, Beforehand] = {}
 _MANY = 2000
+#: What lists show of jobs with parameters that are too long for them, by their keys; and of how many.
+_SHORT: dict[str, Shortened] = {}
+_FEW = 100
 
 
 class JobRequest(BaseModel):
@@ -80,7 +83,7 @@ class JobView(BaseModel):
     params: dict[str, Any] = Field(description="All parameters but those of `omitted`")
     omitted: list[str] = Field(
         default_factory=list,
-        description="Parameters too long for lists and events, as meshes: the job itself has them",
+        description="Parameters too long for lists, events and what DELETE answers, as meshes: the job has them",
     )
     need: dict[str, Any] = Field(description="All that is needed")
     note: str = Field("", description="What is worth knowing of its run beforehand; lists leave it out")
@@ -95,14 +98,16 @@ class JobList(BaseModel):
     next: str | None = Field(None, description="Address of the next page, if there is one")
 
 
-def view(job: Job, whole: bool = True) -> JobView:
-    """Return what is said of a job, without its note and its longest parameters unless the whole is asked for."""
-    before = _beforehand(job, whole)
+def view(job: Job, whole: bool = True, noted: bool = False) -> JobView:
+    """Return what is said of a job, without its note and its longest parameters unless the whole is asked for.
+
+    noted: with its note, where that is known already.
+    """
+    before, shown = _beforehand(job, whole), _shortened(job)
     own = link(f"/v1/jobs/{job.key}")
     links = {"self": own, "events": f"{own}/events"}
     if job.state == "done":
         links["result"] = f"{own}/result"
-    omitted = [] if whole else [name for name, value in job.params.items() if _size(value, _LONG) > _LONG]
     return JobView(
         id=job.key,
         solver=job.solver,
@@ -114,13 +119,34 @@ def view(job: Job, whole: bool = True) -> JobView:
         attempts=job.attempts,
         created=_date(job.created),
         updated=_date(job.updated),
-        params={name: value for name, value in job.params.items() if name not in omitted},
-        omitted=omitted,
+        params=dict(job.params) if whole else shown.params,
+        omitted=[] if whole else shown.omitted,
         need=dict(job.need),
-        note=(before.note or "") if whole else "",
+        note=(before.note or "") if whole or noted else "",
         problem=_failure(job.error),
         links=links,
     )
+
+
+class Shortened(NamedTuple):
+    """A job's parameters but those that are too long for lists, and the names of these."""
+
+    params: dict[str, Any]
+    omitted: list[str]
+
+
+def _shortened(job: Job) -> Shortened:
+    """Return what lists show of a job's parameters; a mesh is read once for it, and not at every look at the job."""
+    known = _SHORT.get(job.key)
+    if known is not None:
+        return known
+    omitted = [name for name, value in job.params.items() if _size(value, _LONG) > _LONG]
+    found = Shortened({name: value for name, value in job.params.items() if name not in omitted}, omitted)
+    if omitted:
+        if len(_SHORT) >= _FEW:
+            _SHORT.clear()
+        _SHORT[job.key] = found
+    return found
 
 
 def _size(value: object, enough: int) -> int:
@@ -168,10 +194,16 @@ def remember(key: str, cost: Cost, note: str | None) -> Beforehand:
 
 
 def _beforehand(job: Job, whole: bool) -> Beforehand:
-    """Return what can be said of a job; nothing of one whose solver is gone or has changed since."""
+    """Return what can be said of a job; nothing of one whose solver is gone or has changed since.
+
+    Of one that was cancelled, which will take nothing, only the whole has what nobody knows yet: to find it out can
+    take longer than to stop it, and whoever cancelled it waits.
+    """
     known = _KNOWN.get(job.key)
     if known is not None and (known.note is not None or not whole):
         return known
+    if job.state == "cancelled" and not whole:
+        return Beforehand(None, None)
     try:
         found = registry.get(job.solver)
         if found.version != job.version:

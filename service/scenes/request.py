@@ -6,7 +6,16 @@ import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from solver.contract import Quality
 
@@ -31,6 +40,8 @@ MOST_ITEMS = 20_000
 Vector = tuple[float, float, float]
 Etag = Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
 Length = Annotated[float, Field(gt=0, le=1e6)]
+#: The kind of what is found wrong with a size.
+_SIZE = "size"
 
 
 class _Strict(BaseModel):
@@ -144,6 +155,16 @@ class Item(_Strict):
     )
     place: str | None = Field(None, description="The place that holds it")
     transforms: tuple[Transform, ...] = Field((), description="Where the individuals are, instead of a place")
+
+    @field_validator("size", mode="wrap")
+    @classmethod
+    def _sized(cls, value: Any, check: ValidatorFunctionWrapHandler) -> Any:
+        """Say in one sentence what neither a length nor a word fits."""
+        try:
+            return check(value)
+        except ValidationError:
+            said = 'a size is a length above 0 and of 1000000 at most, or the word "real"'
+            raise PydanticCustomError(_SIZE, said) from None
 
     @model_validator(mode="after")
     def _stands(self) -> Self:
@@ -320,4 +341,5 @@ def _advice(kind: str) -> str:
         "extra_forbidden": "Leave it out; the documentation lists what there is.",
         "missing": "Add it.",
         "finite_number": "Take finite numbers.",
+        _SIZE: 'Write size = 2.5, or size = "real".',
     }.get(kind, "")

@@ -118,20 +118,10 @@ def write(sequence: Sequence, export: Export, options: Options) -> bytes:
         Unavailable: the format's library is not installed.
 
     """
-    if export.kept and not sequence.kept and len(sequence) > 1 and not _stays(sequence):
+    if export.kept and len(sequence) > 1 and not sequence.stays:
         others = ", ".join(e.name for e in EXPORTS.values() if not (e.kept or e.single or e.laid))
         raise UnfitFormat(
             f"{export.name} moves vertices that stay, and this result's triangles change from stage to stage.",
             advice=f"Ask for one of {others}.",
         )
     return export.encode(sequence, options)
-
-
-def _stays(sequence: Sequence) -> bool:
-    """Return whether triangles that might have changed are the same at all stages: nothing was cut, or asked to be."""
-    bare = iter(replace(sequence, colour="none", observe=lambda share: None))
-    first = next(bare)
-    return all(
-        len(other.vertices) == len(first.vertices) and np.array_equal(other.triangles, first.triangles)
-        for other in bare
-    )

@@ -112,7 +112,7 @@ def bind(
         InvalidQuery: the mesh has no size, or a vertex in its very centre that no direction finds.
 
     """
-    if not sequence.kept:
+    if not sequence.stays:
         raise UnfitFormat(
             "a mesh can be moved by triangles that stay, and this result's change from stage to stage.",
             advice="Ask for animation, usdc or ply-zip without a mesh.",

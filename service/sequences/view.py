@@ -107,6 +107,18 @@ class Sequence:
         return int(self.run["vertex_count"].values[list(self.indices)].sum())
 
     @cached_property
+    def stays(self) -> bool:
+        """Whether all stages have the same triangles, also where those might have changed: none was cut."""
+        if self.kept:
+            return True
+        bare = iter(replace(self, colour="none", observe=lambda share: None))
+        first = next(bare)
+        return all(
+            len(other.vertices) == len(first.vertices) and np.array_equal(other.triangles, first.triangles)
+            for other in bare
+        )
+
+    @cached_property
     def seam(self) -> Seam | None:
         """Texture coordinates, where the surface has some."""
         n = self.lattice

@@ -32,6 +32,8 @@ class Sessions:
         self._open: dict[str, Session] = {}
         self._known: LiveTally | None = None
         self._watch: asyncio.Task[None] | None = None
+        #: What sends clients away, by the sessions that end so.
+        self._leaving: dict[str, asyncio.Task[None]] = {}
 
     async def open(self, asker: Asker, unlimited: bool, asked: dict[str, object]) -> Session:
         """Begin a session, checked by the caller but for its quotas.
@@ -118,8 +120,9 @@ class Sessions:
 
     async def close_all(self) -> None:
         """End all: the service stops."""
-        if self._watch is not None:
-            self._watch.cancel()
+        for task in (self._watch, *self._leaving.values()):
+            if task is not None:
+                task.cancel()
         for session in list(self._open.values()):
             await self.close(session)
 
@@ -132,10 +135,17 @@ class Sessions:
                 renewed = time.monotonic()
                 await self._renew()
             for session in list(self._open.values()):
-                why = self._over(session)
+                why = None if session.id in self._leaving else self._over(session)
                 if why:
-                    await session.dismiss(*why)
-                    await self.close(session)
+                    self._leaving[session.id] = asyncio.create_task(self._dismissed(session, why))
+
+    async def _dismissed(self, session: Session, why: tuple[int, str]) -> None:
+        """Send a session's client away, and end it; no other one waits for what its engine takes to save."""
+        try:
+            await session.dismiss(*why)
+            await self.close(session)
+        finally:
+            del self._leaving[session.id]
 
     def _over(self, session: Session) -> tuple[int, str] | None:
         """Return status and reason where a session has to end."""

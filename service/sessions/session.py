@@ -24,8 +24,9 @@ from ..telemetry import LOGGER
 
 __all__ = ["CLOSED", "Session"]
 
-#: Seconds that a client may take to read what it was sent, and an engine to begin and to save.
-_READING, _BEGINNING, _SAVING = 10.0, 120.0, 2.0
+#: Seconds that a client may take to read what it was sent; an engine to begin, to be told that nobody looks, and to
+#: save, which of a mesh of 100,000 vertices takes some.
+_READING, _BEGINNING, _HOLDING, _SAVING = 10.0, 120.0, 2.0, 20.0
 #: Added to a problem's status, to make the code that a connection is closed with.
 CLOSED = 4000
 #: One engine keeps to one thread: its numbers must not hang on how many there are.
@@ -102,7 +103,7 @@ class Session:
         if self._client is client:
             self._client, self.left = None, time.monotonic()
             with contextlib.suppress(TimeoutError, OSError):
-                async with asyncio.timeout(_SAVING):  # an engine that is behind takes nothing in
+                async with asyncio.timeout(_HOLDING):  # an engine that is behind takes nothing in
                     await self._send(b"C", "hold")
 
     async def take(self, message: dict[str, Any]) -> None:
@@ -171,6 +172,8 @@ class Session:
                 elif self._client is not None:
                     await self._pass_on(self._client, letter, content)
         self.has_died = True
+        if self._saved is not None and not self._saved.done():
+            self._saved.set_result({})  # nobody will
         LOGGER.warning("session %s: the engine ended with %s", self.id, await self._process.wait())
 
     async def _pass_on(self, client: WebSocket, letter: bytes, content: bytes) -> None:

@@ -41,7 +41,7 @@ def _cost(params: GrowthParams, need: Need) -> Cost:
 def _remarks(params: GrowthParams, need: Need) -> str:
     from .told import note
 
-    return note(params, need.quality)
+    return note(params, need.quality, need.dtype)
 
 
 def _extent(params: GrowthParams) -> Extent:

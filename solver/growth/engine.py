@@ -24,7 +24,7 @@ from .settling.active import Habit
 from .settling.impossible import check_outward, enclosed
 from .settling.stage import settled
 from .settling.tangent import Tangent
-from .shapes import start
+from .shapes import Mesh, start
 from .solids import Solid
 from .state import State
 from .stepping import Carried, Steps
@@ -43,6 +43,18 @@ class Undone(NamedTuple):
 
     taken: list[Moment]
     present: Moment
+
+
+def _crossed(pairs: int, begun: Mesh) -> InvalidGeometry:
+    """Return what to say of a start that passes through itself, as the shape does or only its unevenness."""
+    said = f"passes through itself in {pairs} pairs of triangles."
+    if crossings(begun.x, begun.triangles).count:
+        return InvalidGeometry(f"the start shape {said}", advice="Mend the shape, or grow it with contact = 0.")
+    return InvalidGeometry(
+        f"the start shape, made uneven by `imperfection`, {said}",
+        advice="Parts of it lie nearer to each other than it is uneven: move them apart, lower `imperfection`, or grow "
+        "it with contact = 0.",
+    )
 
 
 class Engine:
@@ -72,10 +84,7 @@ class Engine:
         self.state = fresh(params, begun)
         through = crossings(self.state.x, self.state.mesh.triangles).count if params.contact != 0 else 0
         if through:
-            raise InvalidGeometry(
-                f"the start shape passes through itself in {through} pairs of triangles.",
-                advice="Mend the shape, or grow it with contact = 0.",
-            )
+            raise _crossed(through, begun)
         #: Of a closed surface.
         self._volume = 0.0 if len(self.state.mesh.border) else enclosed(begun)
         longest, largest = params.remesh * self.state.length, MOST * len(self.state.x)

@@ -23,7 +23,7 @@ from .settling.energy import elastic
 from .settling.stage import residual
 from .shown import shown
 from .state import State
-from .told import note
+from .told import check_near, note
 
 __all__ = ["run"]
 
@@ -38,6 +38,7 @@ def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
 
     Raises:
         InvalidInput: a region, which a mesh of its own has not, or a factor that is not installed.
+        InvalidGeometry: a mesh too far from the origin for the precision of its positions.
         NotConverged, Unstable: with the stages before.
         Cancelled: the observer asked to stop.
 
@@ -45,6 +46,7 @@ def run(params: GrowthParams, need: Need, context: Context) -> xr.Dataset:
     if need.region is not None:
         raise InvalidInput("growth has no lattice to cut a region from.", advice="Ask without a region.")
     definite.chosen()
+    check_near(params, need.dtype)
     # sums in BLAS depend on the number of threads, and buckling makes much of little
     with threadpool_limits(1, user_api="blas"):
         return _run(params, need, context)
@@ -108,7 +110,7 @@ def _dataset(
         data |= changing(frames[: len(rows)], need.dtype) | textured(states[: len(rows)])
         coords["component"] = ["x", "y", "z"]
     attrs = {"path": params.solver, "factor": definite.chosen(), "up": "z"} | (named(params.mesh) if frames else {})
-    said = note(params, need.quality)
+    said = note(params, need.quality, need.dtype)
     through = [row for row in rows if row["crossings"]]
     if through:
         worst = max(through, key=lambda row: int(row["crossings"]))

@@ -1,5 +1,5 @@
 """What is worth knowing of a run before it begins: places that no vertex sees, pictures that are finer than its mesh,
-a mesh of one's own in another unit than its sheet.
+a mesh of one's own in another unit than its sheet, or too far away for the digits of what is handed over.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..contract import Quality
+from ..contract import InvalidGeometry, Quality
 from .own.textured import corners_of
 from .params import GrowthParams
 from .settings import choose
@@ -19,12 +19,15 @@ from .tooling.places import Ball, Everywhere, Lines, Place
 from .tooling.seen import Seen, seen
 from .tooling.tools import Apex, HotCurve, HotSpot, HotStroke, HotSurface, HotTensors, Tool
 
-__all__ = ["note", "note_of_tool"]
+__all__ = ["check_near", "note", "note_of_tool"]
 
 #: What vertices may miss of a place: waves of two edges are still seen, a ball of four fifths of an edge hardly.
 _MISSED = 0.6
 #: Thickness over the size of a shape below which it is likely that they are in two units: the thinnest sheet of ours.
 _THINNEST = 1 / 2500
+#: Steps between two positions that can be handed over, over the mean edge: from the first on it is told, above the
+#: second nothing is left of a shape.
+_ROUGH, _LOST = 0.01, 0.05
 #: Findings that are told, and dabs of a stroke that are looked at.
 _MOST, _DABS = 5, 200
 
@@ -39,19 +42,33 @@ class _Asked(NamedTuple):
     kind: str = ""
 
 
-def note(params: GrowthParams, quality: Quality) -> str:
+def check_near(params: GrowthParams, dtype: str) -> None:
+    """Refuse a mesh so far from the origin that positions in the precision that is asked for leave nothing of it.
+
+    Raises:
+        InvalidGeometry: it is, saying by how much it is to be moved.
+
+    """
+    mesh = params.mesh.shape() if params.mesh else None
+    if mesh is not None and _step(mesh, dtype) > _LOST * _edge(mesh):
+        raise InvalidGeometry(_far(mesh, dtype), advice=_nearer(mesh, dtype))
+
+
+def note(params: GrowthParams, quality: Quality, dtype: str = "float32") -> str:
     """Return what a reader should know of a run of these parameters; nothing where there is nothing to tell.
 
     Places are looked at where they are when growth begins: of tools that start later nothing is told.
 
     Raises:
         InvalidInput: a place that the shape does not have, as the run would say.
+        InvalidGeometry: as `check_near`.
 
     """
+    check_near(params, dtype)
     mesh = params.mesh.shape() if params.mesh else start(params.shape, choose(quality).vertices, params.aspect)
     ground = Ground(mesh, _border(mesh.triangles), corners_of(params.mesh).get("uv"))
     found = list(_said(_places(params, ground), ground))
-    told = [*_of_unit(params, mesh), *found[:_MOST]]
+    told = [*_of_unit(params, mesh), *_of_place(mesh, dtype), *found[:_MOST]]
     if len(found) > _MOST:
         told.append(f"The same goes for {len(found) - _MOST} more.")
     return " ".join([*told, _advice(params, quality)] if found else told)
@@ -96,6 +113,31 @@ def _of_unit(params: GrowthParams, mesh: Mesh) -> Iterator[str]:
             "Thickness and tools are meant for a shape some 2 wide: "
             f"scale it by {float(f'{2 / size:.2g}'):g}, or take a larger `thickness`."
         )
+
+
+def _of_place(mesh: Mesh, dtype: str) -> Iterator[str]:
+    if _step(mesh, dtype) > _ROUGH * _edge(mesh):
+        yield f"{_far(mesh, dtype).capitalize()} {_nearer(mesh, dtype)}"
+
+
+def _far(mesh: Mesh, dtype: str) -> str:
+    """Return a sentence on what becomes of a mesh where it lies."""
+    return (
+        f"the mesh lies {float(np.abs(mesh.x).max()):.2g} from the origin, where positions in {dtype} are "
+        f"{_step(mesh, dtype):.2g} apart, and its vertices {_edge(mesh):.2g}."
+    )
+
+
+def _nearer(mesh: Mesh, dtype: str) -> str:
+    """Return what to do about it."""
+    by = ", ".join(f"{0.0 - x:.6g}" for x in ((mesh.x.min(axis=0) + mesh.x.max(axis=0)) / 2).tolist())
+    also = ", or ask for float64 positions" if dtype == "float32" else ""
+    return f"Move it to the origin, by ({by}){also}."
+
+
+def _step(mesh: Mesh, dtype: str) -> float:
+    """Return how far apart two positions are that can be handed over, where the mesh is furthest out."""
+    return float(np.spacing(np.abs(mesh.x).max().astype(dtype)))
 
 
 def _said(places: Iterable[_Asked], ground: Ground) -> Iterator[str]:

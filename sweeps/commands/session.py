@@ -16,6 +16,9 @@ from .terminal.options import check_place, parameters
 
 __all__ = ["add_to"]
 
+#: What the first message may say; a file that was sent over a connection may be read again, whoever its token was.
+_OPENING = ("do", "params", "preset", "quality", "fields", "token", "id")
+
 
 def add_to(app: typer.Typer) -> None:
     """Add the command to the command line."""
@@ -71,11 +74,14 @@ def _driven(
 
     chosen = registry.get(solver)
     opening = messages.pop(0) if messages and messages[0].get("do") == "open" else {}
+    strange = [name for name in opening if name not in _OPENING]
+    if strange:
+        raise InvalidOption(f"open does not take {strange[0]!r} here.", f"It takes {', '.join(_OPENING[1:4])}.")
     values = parameters(params_file) or opening.get("params") or {}
     named = preset or opening.get("preset")
     if named is not None and not isinstance(named, str):
         raise InvalidOption(f"open: {named!r} names no preset.", f"Known: {', '.join(sorted(chosen.presets))}.")
-    wanted = quality or opening.get("quality") or "preview"
+    wanted = quality or opening.get("quality", "preview")
     found: Quality | None = next((known for known in get_args(Quality) if known == wanted), None)
     if found is None:
         raise InvalidOption(f"there is no quality {wanted!r}.", f"Take {', '.join(get_args(Quality))}.")

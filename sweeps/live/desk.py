@@ -126,11 +126,14 @@ class Desk:
         end, fastest = number_of("until", until), number_of("pace", pace)
         step = self._engine.step
         # less than a step would be done at once, and nothing would have grown
-        if end < self._engine.stage + step - 1e-9 or fastest <= 0:
+        if end < self._engine.stage + step - 1e-9:
             raise InvalidInput(
-                f"until and pace are numbers, at least {self._engine.stage + step:g} and above 0.",
-                advice=f"It grows by steps of {step:g}. Or leave them out.",
+                f"until: growth time {end:g} does not come any more: it is {self._engine.stage:g}, and at least "
+                f"{self._engine.stage + step:g} after the next step.",
+                advice=f"It grows by steps of {step:g}. `undo` goes back.",
             )
+        if fastest <= 0:
+            raise InvalidInput("pace: it is above 0.", advice="Leave it out for as fast as it goes; `pause` stops it.")
         self._engine.begin()
         self._leave_settling()
         self._until, self._pace = min(end, self._solver.stages.highest), fastest

@@ -7,12 +7,14 @@ runs, or `F`, an error, where it cannot begin, and `A` the session as a paramete
 
 from __future__ import annotations
 
+import contextlib
 import json
 import queue
 import struct
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any, BinaryIO
 
 __all__ = ["main", "packet"]
@@ -28,20 +30,33 @@ def packet(letter: bytes, content: bytes) -> bytes:
     return struct.pack("<Ic", len(content), letter) + content
 
 
-def _read(stream: BinaryIO, into: queue.Queue[tuple[bytes, Any] | None]) -> None:
-    while len(head := stream.read(5)) == 5:
-        length, letter = struct.unpack("<Ic", head)
-        into.put((letter, json.loads(stream.read(length))))
+def _packet(stream: BinaryIO) -> tuple[bytes, Any] | None:
+    """Return the next packet's letter and content; None where the input has ended."""
+    if len(head := stream.read(5)) < 5:
+        return None
+    length, letter = struct.unpack("<Ic", head)
+    return letter, json.loads(stream.read(length))
+
+
+def _read(stream: BinaryIO, into: queue.Queue[tuple[bytes, Any] | None], save: Callable[[], None]) -> None:
+    """Hand on what comes; what was made is saved at once: a piece of work may take longer than anybody waits for it."""
+    while (found := _packet(stream)) is not None:
+        if found == (b"C", "save"):
+            save()
+        else:
+            into.put(found)
     into.put(None)
 
 
 class _Out:
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
+        self._lock = threading.Lock()
 
     def __call__(self, letter: bytes, content: bytes) -> None:
-        self._stream.write(packet(letter, content))
-        self._stream.flush()
+        with self._lock:
+            self._stream.write(packet(letter, content))
+            self._stream.flush()
 
     def json(self, letter: bytes, content: Any) -> None:
         self(letter, json.dumps(content).encode())
@@ -51,9 +66,7 @@ def main() -> None:
     """Begin as the first message says, then work until the input ends."""
     # what numerical code prints must not come between packets
     out, sys.stdout = _Out(sys.stdout.buffer), sys.stderr
-    came: queue.Queue[tuple[bytes, Any] | None] = queue.Queue(_MOST)
-    threading.Thread(target=_read, args=(sys.stdin.buffer, came), daemon=True).start()
-    first = came.get()
+    first = _packet(sys.stdin.buffer)
     if first is None:
         return
     from threadpoolctl import threadpool_limits
@@ -77,16 +90,25 @@ def main() -> None:
                 lambda frame: out(b"B", frame),
             )
             out.json(b"O", {})
-            _serve(desk, came, out)
+            _serve(desk, sys.stdin.buffer, out)
     except SolverError as error:
         out.json(b"F", problem(error))
     except BrokenPipeError:
         pass
 
 
-def _serve(desk: Any, came: queue.Queue[tuple[bytes, Any] | None], out: _Out) -> None:
+def _serve(desk: Any, stream: BinaryIO, out: _Out) -> None:
     """Take what comes, work in between."""
     said = -_SPENT
+    came: queue.Queue[tuple[bytes, Any] | None] = queue.Queue(_MOST)
+    # between two messages the desk holds together, also while it works
+    taking = threading.Lock()
+
+    def save() -> None:
+        with taking, contextlib.suppress(BrokenPipeError):
+            out.json(b"A", desk.saved())
+
+    threading.Thread(target=_read, args=(stream, came, save), daemon=True).start()
     while True:
         while True:
             try:
@@ -96,21 +118,20 @@ def _serve(desk: Any, came: queue.Queue[tuple[bytes, Any] | None], out: _Out) ->
                 break
             if found is None:
                 return
-            _take(desk, found, out)
+            with taking:
+                _take(desk, found)
         desk.work()
         if time.process_time() - said >= _SPENT:
             said = time.process_time()
             out.json(b"S", said)
 
 
-def _take(desk: Any, found: tuple[bytes, Any], out: _Out) -> None:
+def _take(desk: Any, found: tuple[bytes, Any]) -> None:
     letter, message = found
     if letter == b"M":
         desk.take(message)
     elif message == "hold":
         desk.held = True
-    elif message == "save":
-        out.json(b"A", desk.saved())
     else:
         desk.begin_again(message)
 

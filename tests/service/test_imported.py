@@ -103,10 +103,21 @@ def test_damaged_meshes_are_refused(text: str, tmp_path: Path) -> None:
 
 def test_changing_triangles_move_no_mesh() -> None:
     box = trimesh.creation.box()
-    frames = [meshes.Frame(np.array(box.vertices), np.array(box.faces), {})] * 2
+    points, faces = np.array(box.vertices), np.array(box.faces)
+    frames = [meshes.Frame(points, faces, {}), meshes.Frame(points, np.roll(faces, 1, axis=0), {})]
     run = xr.Dataset(meshes.changing(frames), {"stage": [0.0, 1.0]})
     with pytest.raises(UnfitFormat, match="stay"):
-        bind(np.array(box.vertices), np.array(box.faces), of_run(run))
+        bind(points, faces, of_run(run))
+
+
+def test_triangles_that_might_change_and_do_not_move_a_mesh() -> None:
+    """As growth without remeshing, whose own vertices a cache had all along."""
+    box = trimesh.creation.box()
+    points, faces = np.array(box.vertices), np.array(box.faces)
+    frames = [meshes.Frame(points, faces, {}), meshes.Frame(points * [1, 2, 3], faces, {})]
+    sequence = of_run(xr.Dataset(meshes.changing(frames), {"stage": [0.0, 1.0]}))
+    bound = bind(points / 2, faces, sequence)
+    assert np.allclose(bound.moved(list(sequence)[-1]), points / 2 * [1, 2, 3])
 
 
 def test_a_vertex_in_the_centre_has_no_direction() -> None:

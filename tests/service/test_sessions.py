@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 
 from service.app import create_app
 from service.cli import app
+from service.sessions.keeping import Sessions
 from service.settings import Settings
 from solver.meshes import frame
 from store.store import Store
@@ -333,6 +334,11 @@ def test_a_lost_connection_is_taken_up_again_and_goes_on(live: Served) -> None:
     # a second connection takes it from the first, and a stranger does not
     problem, _ = refused(Client(live.url, **{**again, "key": "guessed"}))
     assert problem["status"] == 404
+    # nor does another token that came by the key, of whatever scope
+    for scope in ("run", "admin"):
+        other = bearer(Store.open(live.root), f"thief-{scope}", scope)["Authorization"].removeprefix("Bearer ")
+        problem, _ = refused(Client(live.url, **{**again, "token": other}))
+        assert (problem["status"], problem["type"]) == (404, "urn:wizen:problem:unknown-session")
     third = Client(live.url, **again)
     assert third.opened()["say"] == "opened"
     with pytest.raises(ConnectionClosed) as closed:
@@ -468,6 +474,42 @@ def test_sessions_that_nobody_uses_end(tmp_path: Path) -> None:
         assert not engines()
         assert found.client().opened()["say"] == "opened"
     assert not engines()
+
+
+def test_nobody_waits_for_an_engine_that_does_not_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two that have had their time the one whose engine stands still holds up itself alone, and gets what it made.
+
+    An engine in a long piece of work is as one that stands still.
+    """
+    had = set[Any]()
+    monkeypatch.setattr(Sessions, "_over", lambda self, session: (408, "enough.") if session.id in had else None)
+    with serving(tmp_path / "store") as found:
+        still = found.client()
+        first = still.opened()
+        (engine,) = engines()
+        other = found.client()
+        second = other.opened()
+        other.do("brush", at=[1, 0, 0])
+        os.kill(engine, signal.SIGSTOP)
+        try:
+            had.update([first["session"], second["session"]])
+            with pytest.raises(ConnectionClosed) as closed:
+                other.until(lambda c: False)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 4408
+            assert "stroke" in other.told[-1]["toml"]
+            # an engine is given longer than the two seconds after which nobody looks on any more
+            end = time.monotonic() + 4
+            while time.monotonic() < end:
+                with suppress(TimeoutError):
+                    still.receive(0.5)
+            assert still.told[-1]["say"] != "closing"
+        finally:
+            os.kill(engine, signal.SIGCONT)
+        with pytest.raises(ConnectionClosed):
+            still.until(lambda c: False)
+        assert still.told[-1]["say"] == "closing"
+        assert "thickness = 0.1" in still.told[-1]["toml"]
 
 
 def test_seconds_of_sessions_count(tmp_path: Path) -> None:

@@ -28,6 +28,25 @@ def test_a_preset_that_is_no_name_is_refused(tmp_path: Path, preset: Any) -> Non
     assert "defect" not in done.output
 
 
+@pytest.mark.parametrize(
+    ("opening", "said"),
+    [
+        ({"prams": {}}, "open does not take 'prams' here. It takes params, preset, quality."),
+        ({"session": "s_1", "key": "k"}, "open does not take 'session' here."),
+        ({"quality": []}, "there is no quality []. Take preview, default, fine."),
+        ({"quality": ""}, "there is no quality ''."),
+        ({"quality": None}, "there is no quality None."),
+    ],
+)
+def test_what_open_does_not_take_is_refused_as_over_a_connection(tmp_path: Path, opening: Any, said: str) -> None:
+    """A misspelt name began with a sphere."""
+    done = wizen("session", "growth", messages(tmp_path, {"do": "open", **opening}))
+    assert done.exit_code == 2
+    assert said in " ".join(done.stderr.split())
+    kept = {"do": "open", "token": "t", "fields": ["elastic_strain"], "id": 1, **BEGIN}
+    assert wizen("session", "growth", messages(tmp_path, kept, DAB)).exit_code == 0
+
+
 def test_where_it_is_to_be_saved_is_looked_at_before_work(tmp_path: Path) -> None:
     acts = messages(tmp_path, BEGIN, DAB)
     done = wizen("session", "growth", acts, "--save", tmp_path / "nowhere" / "x.toml")

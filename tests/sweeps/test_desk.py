@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import os
 import struct
-from typing import Any
+import threading
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import pytest
 
 from solver import registry
 from sweeps.live import desk as desk_module
 from sweeps.live import screen as screen_module
+from sweeps.live import worker
 from sweeps.live.desk import Desk
 
 BALL = {"shape": "sphere", "thickness": 0.1, "tools": [], "step": 0.05}
@@ -56,8 +61,12 @@ def test_play_goes_by_whole_steps_and_less_than_one_is_refused() -> None:
     desk.take({"do": "play", "id": 2, "until": 0.14})
     refused = next(said for said in told if said["say"] == "error")
     assert refused["id"] == 2
+    assert refused["problem"]["detail"].startswith("until: growth time 0.14 does not come any more: it is 0.1, and at")
     assert "at least 0.15" in refused["problem"]["detail"]
+    assert "`undo` goes back" in refused["problem"]["advice"]
     assert told[-1] == refused
+    desk.take({"do": "play", "id": 9, "until": 0.5, "pace": -1})
+    assert told[-1]["problem"]["detail"] == "pace: it is above 0."
     desk.take({"do": "play", "id": 3, "until": 0.15})
     desk.finish()
     assert desk.saved()["stage"] == pytest.approx(0.15)
@@ -119,3 +128,70 @@ def test_a_client_that_takes_nothing_in_has_no_glimpses(monkeypatch: pytest.Monk
     desk.take({"do": "seen", "frame": 1})
     desk.work()
     assert struct.unpack_from("<I", frames[-1], 60) == (2,)
+
+
+class _Piece(NamedTuple):
+    """An engine's process as threads, which is in a piece of work that has no end."""
+
+    told: Any
+    answers: Any
+    free: threading.Event
+    taken: list[Any]
+
+
+@pytest.fixture
+def piece() -> Iterator[_Piece]:
+    """Its work begins with the first message, and ends when it is let go."""
+    working, free, taken = threading.Event(), threading.Event(), list[Any]()
+
+    class Deaf:
+        is_busy = is_waiting = held = False
+
+        def take(self, message: Any) -> None:
+            taken.append(message)
+            self.is_busy = True
+
+        def work(self) -> None:
+            working.set()
+            free.wait(60)
+
+        def saved(self) -> dict[str, Any]:
+            return {"toml": f"after {len(taken)}"}
+
+    (theirs, told), (answers, ours) = os.pipe(), os.pipe()
+    with (
+        os.fdopen(theirs, "rb") as stream,
+        os.fdopen(told, "wb", 0) as telling,
+        os.fdopen(answers, "rb") as hearing,
+        os.fdopen(ours, "wb") as out,
+    ):
+        serving = threading.Thread(target=worker._serve, args=(Deaf(), stream, worker._Out(out)))
+        serving.start()
+        telling.write(worker.packet(b"M", b'{"do": "settle"}'))
+        assert working.wait(60)
+        yield _Piece(telling, hearing, free, taken)
+        free.set()
+        telling.close()
+        serving.join(60)
+        assert not serving.is_alive()
+
+
+def test_what_was_made_is_saved_in_the_middle_of_a_piece_of_work(piece: _Piece) -> None:
+    """One of a large mesh takes longer than the service waits before it sends a client away with what it made."""
+    piece.told.write(worker.packet(b"M", b'{"do": "undo"}'))
+    piece.told.write(worker.packet(b"C", b'"save"'))
+    letter, length = b"", 0
+    answered = threading.Event()
+
+    def hear() -> None:
+        nonlocal letter, length
+        while letter != b"A":
+            length, letter = struct.unpack("<Ic", piece.answers.read(5))
+            said.append(json.loads(piece.answers.read(length)))
+        answered.set()
+
+    said: list[Any] = []
+    threading.Thread(target=hear, daemon=True).start()
+    assert answered.wait(30)
+    assert said[-1] == {"toml": "after 1"}  # what came meanwhile waits for its turn
+    assert piece.taken == [{"do": "settle"}]

@@ -34,6 +34,13 @@ def test_what_is_no_mesh_is_refused(tmp_path: Path) -> None:
         assignments([f"mesh=@{tmp_path}/none.obj"])
 
 
+def test_a_mesh_without_a_surface_is_refused_in_our_words(tmp_path: Path) -> None:
+    """Its triangles are lines: as parameters it was refused as a list that is too short."""
+    (tmp_path / "line.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 0\nv 0 0 0\nf 1 2 3\nf 1 2 4\n")
+    with pytest.raises(InvalidOption, match=r"^line\.obj: no triangle of it has three places\. Take one"):
+        assignments([f"mesh=@{tmp_path}/line.obj"])
+
+
 def test_a_params_file_names_meshes_beside_it(tmp_path: Path) -> None:
     """As of a body that a wood's set-up holds, at any depth, whatever the present folder."""
     points, faces = geodesic(3)

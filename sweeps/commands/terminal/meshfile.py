@@ -30,8 +30,8 @@ def read(path: Path) -> dict[str, Any]:
     those of the file's corners.
 
     Raises:
-        InvalidOption: no such kind of file, nothing that can be read in it, more groups than a mesh may have, a group
-            with a weight that is not finite, or trimesh is not installed.
+        InvalidOption: no such kind of file, nothing that can be read in it, no triangle with three places, more groups
+            than a mesh may have, a group with a weight that is not finite, or trimesh is not installed.
 
     """
     try:
@@ -39,7 +39,10 @@ def read(path: Path) -> dict[str, Any]:
         foreign.sound(path, parts.points, parts.faces)
     except SweepError as error:
         raise InvalidOption(error.message, error.advice) from None
-    return _merged(parts)
+    found = _merged(parts)
+    if not found["faces"]:
+        raise InvalidOption(f"{path.name}: no triangle of it has three places.", "Take one that has a surface.")
+    return found
 
 
 def _parts(path: Path) -> Parts:

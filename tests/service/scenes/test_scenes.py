@@ -199,6 +199,18 @@ def test_a_list_is_not_too_short_for_an_entry_that_is_wrong() -> None:
         parse({"camera": CAMERA, "items": []})
 
 
+@pytest.mark.parametrize("size", [math.inf, math.nan, -1, 0, 1e7, "big", "", [2.0], "2x"])
+def test_a_size_that_is_none_is_said_once_with_advice(size: Any) -> None:
+    with pytest.raises(InvalidScene) as caught:
+        parse({"camera": CAMERA, "items": [{**RAISIN, "size": size}]})
+    [wrong] = caught.value.wrong
+    assert wrong.name == "items.0.size"
+    assert "a length above 0" in wrong.detail
+    assert "real" in wrong.advice
+    for good in (2.5, 3, "real", None):
+        assert parse({"camera": CAMERA, "items": [{**RAISIN, "size": good}]}).items[0].size == good
+
+
 @pytest.mark.parametrize("to", ["glb", "usdc", "usda"])
 def test_as_many_bytes_come_as_are_expected(to: str) -> None:
     if to != "glb":

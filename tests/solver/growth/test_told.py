@@ -174,3 +174,47 @@ def test_lines_that_would_take_long_are_left_alone() -> None:
     lines = rng.uniform(-1, 1, (200, 50, 3)).tolist()
     assert not said(tools=[{"kind": "surface", "where": {"kind": "lines", "lines": lines, "width": 1e-3}}])
     assert said(tools=[{"kind": "surface", "where": {"kind": "lines", "lines": lines[:1], "width": 1e-3}}])
+
+
+def lying(away: float, **more: Any) -> GrowthParams:
+    """A square of two triangles, 2 wide, so far along x and z."""
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) + np.array([away, 0, away])
+    mesh = {"points": square.tolist(), "faces": [[0, 1, 2], [0, 2, 3]]}
+    return GrowthParams.parse({"mesh": mesh, "tools": [], "step": 1.0, **more})
+
+
+@pytest.mark.parametrize(("away", "dtype"), [(1e3, "float32"), (1e5, "float32"), (1e6, "float64"), (1e9, "float64")])
+def test_a_mesh_as_near_as_digits_want_it_is_as_at_the_origin(away: float, dtype: Any) -> None:
+    assert note(lying(away), "preview", dtype) == ""
+
+
+def test_a_mesh_so_far_that_its_digits_show_is_told_of() -> None:
+    told = note(lying(1e6), "preview")
+    assert told.startswith("The mesh lies 1e+06 from the origin, where positions in float32 are 0.062 apart")
+    assert told.endswith("Move it to the origin, by (-1e+06, 0, -1e+06), or ask for float64 positions.")
+
+
+@pytest.mark.parametrize(("away", "dtype"), [(1e8, "float32"), (1e15, "float64")])
+def test_a_mesh_of_which_nothing_would_be_left_is_refused_before_work(away: float, dtype: Any) -> None:
+    """At 1e9 all x of a square 2 wide came out as one number, and the run said that it had converged."""
+    need = Need(stages=(0.0,), quality="preview", dtype=dtype)
+    with pytest.raises(InvalidGeometry, match=r"the mesh lies .* from the origin") as caught:
+        GROWTH.solve(lying(away), need)
+    assert "Move it to the origin" in caught.value.advice
+    assert ("float64" in caught.value.advice) == (dtype == "float32")
+    with pytest.raises(InvalidGeometry, match="from the origin"):
+        GROWTH.remarks(lying(away), need)  # type: ignore[misc]
+
+
+def test_of_parts_that_only_unevenness_lets_cross_it_is_said_so() -> None:
+    """Two squares a thousandth apart, which pass through each other nowhere, were told to be mended."""
+    square = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 0]]
+    faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    above = [[x, y, 1e-4] for x, y, _ in square]
+    near = {"points": square + above, "faces": faces + [[a + 5, b + 5, c + 5] for a, b, c in faces]}
+    across = {**near, "points": square + [[x, 0.1 + y / 2, x] for x, y, _ in square]}
+    need = Need(stages=(0.0,), quality="preview")
+    for mesh, said, advice in ((near, "made uneven", "`imperfection`"), (across, "start shape passes", "Mend")):
+        with pytest.raises(InvalidGeometry, match=said) as caught:
+            GROWTH.solve(GrowthParams.parse({"mesh": mesh, "tools": [], "thickness": 0.3, "step": 1.0}), need)
+        assert advice in caught.value.advice
