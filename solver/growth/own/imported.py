@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...arrays import Floats, Ints
 from ...contract import InvalidGeometry
 from ...contract.mesh import GivenMesh, check_faces, check_groups, check_textures
 
@@ -63,6 +64,11 @@ class OwnMesh(GivenMesh):
         thin = int((areas <= _THIN * (sides**2).sum(-1).max(axis=1)).sum())
         if thin:
             raise ValueError(f"{thin} triangles have no area to speak of. Collapse their shortest edges.")
+        if _inside_out(points, faces):
+            raise ValueError(
+                "the mesh is inside out: pressure and outgrowth would act inwards. Turn its triangles over, so that "
+                "they are counter-clockwise from outside (Blender: Mesh, Normals, Recalculate Outside)."
+            )
         pinched = _pinched(top)
         if pinched:
             raise ValueError(f"{pinched} vertices hold parts together that share no edge there. Split them.")
@@ -74,6 +80,15 @@ class OwnMesh(GivenMesh):
 
         used, faces = np.unique(np.array(self.faces, np.int64), return_inverse=True)
         return Mesh(np.array(self.points)[used], faces.reshape(-1, 3))
+
+
+def _inside_out(points: Floats, faces: Ints) -> bool:
+    """Return whether a closed mesh encloses less than nothing; of parts, one in another, all together."""
+    from ..shapes import is_closed
+
+    about = points - points[faces].mean(axis=(0, 1))
+    a, b, c = about[faces].transpose(1, 0, 2)
+    return float(np.einsum("fi,fi->", a, np.cross(b, c))) < 0 and is_closed(faces)
 
 
 def _pinched(mesh: shell.Topology) -> int:

@@ -90,6 +90,16 @@ def test_open_and_closed_meshes_are_taken():
         )
 
 
+def test_a_closed_mesh_that_is_inside_out_is_refused():
+    """Pressure and what grows outwards would act inwards; of an open sheet there is no outside."""
+    mesh, disc = start("torus", 120, 2.0), start("disc", 120, 2.0)
+    with pytest.raises(InvalidInput, match=r"inside out.*Turn its triangles over"):
+        GrowthParams.parse(words(mesh.x + 40, mesh.triangles[:, ::-1]))
+    GrowthParams.parse(words(mesh.x + 40, mesh.triangles))
+    for triangles in (disc.triangles, disc.triangles[:, ::-1]):
+        GrowthParams.parse(words(disc.x, triangles))
+
+
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 
 
