@@ -412,9 +412,12 @@ def _synthesize(blend: Blend, patch: Patch, fresh: Fresh | None, displaced: bool
     """Return positions and displacements (height, width, c) on a patch, and the two poles of a whole surface: each
     only if wanted.
     """
-    with blend.fields(patch) as planes:
-        position = None if fresh is None else surface.add_fresh(fresh, planes, patch)
-        displacement = np.stack(list(planes), axis=-1) if displaced else None
+    if displaced:
+        with blend.fields(patch) as planes:
+            position = None if fresh is None else surface.add_fresh(fresh, planes, patch)
+            displacement = np.stack(list(planes), axis=-1)
+    else:
+        position, displacement = None if fresh is None else blend.over(fresh, patch), None
     if fresh is None or not patch.is_whole:
         return position, displacement, None
     poles = (fresh.poles() + blend.poles()).astype(blend.waves.real.dtype)

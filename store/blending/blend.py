@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.arrays import Array
+from solver.contract import Fresh
 
-from ..surfaces import alone, harmonics, window
+from ..surfaces import alone, harmonics, surface, window
 from ..surfaces.packed import Stored
 from ..surfaces.window import Patch
 from . import methods
@@ -45,6 +46,15 @@ class Blend(NamedTuple):
             if self.ratio is not None and self.low is not None:
                 envelope.apply(planes, self.ratio, self.low, patch)
             yield planes
+
+    def over(self, fresh: Fresh, patch: Patch) -> Array:
+        """Return the fresh surface with the displacement, (height, width, components), on a patch."""
+        with window.planes(self.waves, patch) as planes:
+            if self.ratio is not None and self.low is not None:
+                if patch.is_whole and patch.components == (0, 1, 2):
+                    return surface.lift(fresh, planes, *envelope.on(self.ratio, self.low, patch, planes.dtype))
+                envelope.apply(planes, self.ratio, self.low, patch)
+            return surface.add_fresh(fresh, planes, patch)
 
     def poles(self) -> Array:
         """Return the displacement (2, 3) of the two poles."""

@@ -18,6 +18,8 @@ from solver.arrays import Array
 from solver.geometry.outward import faces_outward
 from solver.lattice import azimuths, closed_lattice, colatitudes
 
+from . import steps
+
 if TYPE_CHECKING:
     from solver.geometry.apart import Topology
 
@@ -41,9 +43,13 @@ class Evened(NamedTuple):
 
 
 def compiled() -> None:
-    """Load the compiled code that folded surfaces need; where none is kept yet, make it: some 15 s of a processor."""
+    """Load the compiled code that folded surfaces need, and that of `steps`; where none is kept yet, make it: some 15 s
+    of a processor.
+    """
     from solver.geometry.apart import put_apart
     from solver.geometry.seen import seen_whole
+
+    from .steps_compiled import COMPILED, load
 
     colatitude, azimuth = np.meshgrid(colatitudes(_LEAST), azimuths(_LEAST), indexing="ij")
     x, y = np.sin(colatitude) * np.cos(azimuth), np.sin(colatitude) * np.sin(azimuth)
@@ -52,6 +58,8 @@ def compiled() -> None:
     put_apart(np.concatenate([ball, ends]), _topology(_LEAST), 0)
     for kind in (np.float32, np.float64):
         seen_whole(ball.reshape(_LEAST, 2 * _LEAST, 3).astype(kind), ends.astype(kind))
+    load()
+    steps.use(COMPILED)
 
 
 def even_out(

@@ -103,13 +103,18 @@ class Synthesis:
         n, band = self._n, planes.shape[2] - 1
         low, high = min(band, n - 1), min(band, n)
         rows = self._band + 1
-        half = self._dtype.type(0.5)  # the transforms count every wave but the constant twice
         cosines, sines = self._cosines, self._sines
-        np.multiply(planes[:, self._cosine : rows : 2, : low + 1], half, out=cosines[..., : low + 1])
-        np.multiply(planes[:, 1 - self._cosine : rows : 2, 1 : high + 1], half, out=sines[..., :high])
-        cosines[..., 0] *= 2
-        if high == n:
-            sines[..., n - 1] *= 2
+        of_cosines = planes[:, self._cosine : rows : 2, : low + 1]
+        of_sines = planes[:, 1 - self._cosine : rows : 2, 1 : high + 1]
+        if self._is_summed:
+            cosines[..., : low + 1], sines[..., :high] = of_cosines, of_sines
+        else:
+            half = self._dtype.type(0.5)  # the transforms count every wave but the constant twice
+            np.multiply(of_cosines, half, out=cosines[..., : low + 1])
+            np.multiply(of_sines, half, out=sines[..., :high])
+            cosines[..., 0] *= 2
+            if high == n:
+                sines[..., n - 1] *= 2
         if rows == n + 1:  # the last wave around
             last = cosines if n % 2 == self._cosine else sines
             last[:, -1] *= 2
@@ -217,18 +222,17 @@ class _Sums(NamedTuple):
 def _blocks(n: int, waves: int, first: int, parity: int, dtype: str, columns: int) -> Array:
     """Return the matrix (blocks, rows, waves) from every other amplitude to the northern half of the colatitudes, the
     equator among them, zero beyond: of cosines with `first` 0, k = 0.., of sines with 1, k = 1.., beginning with the
-    first (`parity` 0) or the second. All count twice but the constant and the last sine, k = n.
+    first (`parity` 0) or the second.
 
     Products with `columns` are so small by block that BLAS does not divide them among threads, which in a busy server
     would wait for each other.
     """
     k, half = np.arange(waves)[parity::2] + first, -(-n // 2)
     angle = np.outer((np.arange(half) + 0.5) * np.pi / n, k)
-    matrix = (np.sin(angle) if first else np.cos(angle)) * np.where(k == n * first, 1.0, 2.0)
     blocks = -(-half * len(k) * columns // alone.MOST) or 1
     rows = -(-half // blocks)
     found = np.zeros((blocks * rows, len(k)), dtype)
-    found[:half] = matrix
+    found[:half] = np.sin(angle) if first else np.cos(angle)
     found.flags.writeable = False
     return found.reshape(blocks, rows, len(k))
 

@@ -19,7 +19,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ...kept import Kept
-from ...surfaces import alone, harmonics
+from ...surfaces import harmonics, steps
 from . import poles
 from .weights import Samples
 
@@ -35,8 +35,8 @@ _FAINT = 1e-3
 #: No band is made stronger or weaker than this: sixteen incoherent samples lose a factor of four.
 _MOST = 4.0
 _QUANTILES = (np.arange(48) + 0.5) / 48
-#: Bytes of what leads from gains to factors that are kept over all tables: .2 MB at 64 colatitudes, 1 at 128.
-_ROOM = 32 << 20
+#: Bytes of what leads from gains to factors that are kept over all tables: 50 kB at 64 colatitudes, .2 MB at 128.
+_ROOM = 8 << 20
 
 
 class Bands:
@@ -155,18 +155,28 @@ def multiplier(gains: Array, bands: Bands, band: int) -> Array:
     is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
     """
     sharp = np.minimum(np.maximum(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST), _MOST)
-    excess = alone.total((sharp - 1).astype(np.float32), _kept_spreading(band, tuple(bands.centres.tolist())))
-    excess += np.float32(1)
-    found: Array = excess.reshape(band + 1, band + 1)
-    return found
+    values = np.zeros(len(sharp) + 1, np.float32)
+    np.subtract(sharp, 1, out=values[:-1], casting="same_kind")
+    ramp = _kept.get((band, bands.highest), lambda: _ramp(band, tuple(bands.centres.tolist())))
+    return steps.now().ramp(values, *ramp).reshape(band + 1, band + 1)
 
 
-def _kept_spreading(band: int, centres: tuple[float, ...]) -> Array:
-    """Return `_spreading` transposed, (bands, m k)."""
-    return _kept.get((band, centres), lambda: np.ascontiguousarray(_spreading(band, centres).T, np.float32))
+class _Ramp(NamedTuple):
+    """`_spreading` without its zeros: the first band (m k,) that counts at a mode, how far, and how far the next."""
+
+    place: Array
+    low: Array
+    high: Array
 
 
-_kept: Kept[tuple[int, tuple[float, ...]], Array] = Kept(_ROOM, lambda matrix: matrix.nbytes)
+def _ramp(band: int, centres: tuple[float, ...]) -> _Ramp:
+    spread = np.column_stack([_spreading(band, centres), np.zeros((band + 1) ** 2)]).astype(np.float32)
+    place = np.minimum((spread != 0).argmax(axis=1), len(centres) - 1)
+    mode = np.arange(len(place))
+    return _Ramp(place.astype(np.int32), spread[mode, place], spread[mode, place + 1])
+
+
+_kept: Kept[tuple[int, int], _Ramp] = Kept(_ROOM, lambda ramp: sum(part.nbytes for part in ramp))
 
 
 def _spreading(band: int, centres: tuple[float, ...]) -> Array:

@@ -21,7 +21,7 @@ from ...surfaces.harmonics import legendre
 from ...surfaces.window import Patch
 from .cells import COARSE
 
-__all__ = ["Total", "apply", "at_poles", "factor", "take_low"]
+__all__ = ["Total", "apply", "at_poles", "factor", "on", "take_low"]
 
 
 #: Share of the mean square below which a place counts as smooth, and the power [r1^2] of nothing.
@@ -67,14 +67,20 @@ def apply(planes: Array, ratio: Array, low: Array, patch: Patch) -> None:
     """Multiply wrinkles (c, height, width) on a patch by the factor, given as `ratio` (12, 24) on the coarse lattice,
     and add `low` (3, m, l) of the patch's components: all in place.
     """
-    kind = planes.dtype
-    planes *= _on_lattice(ratio, patch, kind)
+    factor, shape = on(ratio, low, patch, planes.dtype)
+    planes *= factor
+    planes += shape
+
+
+def on(ratio: Array, low: Array, patch: Patch, kind: np.dtype[Any]) -> tuple[Array, Array]:
+    """Return the factor (height, width) and the shape (c, height, width) on a patch, in a precision."""
     if len(patch.components) < len(low):
         low = low[list(patch.components)]
     parts = np.ascontiguousarray(low).view(float).reshape(len(low), -1).astype(kind)
     lines = alone.product(parts, _low_lines(patch.n, patch.top, patch.height, kind.str))
     around = window.around(patch.n, harmonics.LOWEST, patch.left, patch.width, kind.str)
-    planes += alone.product(lines.reshape(len(low) * patch.height, -1), around).reshape(planes.shape)
+    shape = alone.product(lines.reshape(len(low) * patch.height, -1), around)
+    return _on_lattice(ratio, patch, kind), shape.reshape(len(low), patch.height, patch.width)
 
 
 def at_poles(ratio: Array) -> Array:

@@ -1,0 +1,89 @@
+"""`store.surfaces.steps`, compiled: for who has the compiler loaded anyway."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from solver.arrays import Array
+
+from .steps import Steps
+
+__all__ = ["COMPILED", "load"]
+
+
+@njit(cache=True, nogil=True)  # a service has others to answer meanwhile
+def _ramp(values: Array, place: Array, low: Array, high: Array) -> Array:
+    found = np.empty_like(low)
+    one = values.dtype.type(1)
+    for i in range(len(place)):
+        j = place[i]
+        found[i] = values[j] * low[i] + values[j + 1] * high[i] + one
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _gather(parts: Array, factor: Array, even: Array, odd: Array) -> None:
+    one = factor.dtype.type(1)
+    for c in range(parts.shape[0]):
+        for m in range(even.shape[0]):
+            for k in range(even.shape[3]):
+                gain = factor[m, 2 * k] - one
+                even[m, c, 0, k] = parts[c, m, 2 * k, 0] * gain
+                even[m, c, 1, k] = parts[c, m, 2 * k, 1] * gain
+            for k in range(odd.shape[3]):
+                gain = factor[m, 2 * k + 1] - one
+                odd[m, c, 0, k] = parts[c, m, 2 * k + 1, 0] * gain
+                odd[m, c, 1, k] = parts[c, m, 2 * k + 1, 1] * gain
+
+
+@njit(cache=True, nogil=True)
+def _scatter(parts: Array, even: Array, odd: Array) -> None:
+    for c in range(parts.shape[0]):
+        for m in range(even.shape[0]):
+            for k in range(even.shape[3]):
+                parts[c, m, 2 * k, 0] += even[m, c, 0, k]
+                parts[c, m, 2 * k, 1] += even[m, c, 1, k]
+            for k in range(odd.shape[3]):
+                parts[c, m, 2 * k + 1, 0] += odd[m, c, 0, k]
+                parts[c, m, 2 * k + 1, 1] += odd[m, c, 1, k]
+
+
+@njit(cache=True, nogil=True)
+def _lift(planes: Array, ratio: Array, low: Array, x: Array, y: Array, z: Array, out: Array) -> None:
+    rows, columns = ratio.shape
+    # by component first: so that several points are done at once
+    row = np.empty((3, columns), planes.dtype)
+    for i in range(rows):
+        _lift_row(planes[0, i], ratio[i], low[0, i], x[i], row[0])
+        _lift_row(planes[1, i], ratio[i], low[1, i], y[i], row[1])
+        _lift_row(planes[2, i], ratio[i], low[2, i], z[i], row[2])
+        for j in range(columns):
+            out[i, j, 0] = row[0, j]
+            out[i, j, 1] = row[1, j]
+            out[i, j, 2] = row[2, j]
+
+
+@njit(cache=True)
+def _lift_row(plane: Array, ratio: Array, low: Array, fresh: Array, row: Array) -> None:
+    if len(fresh) == len(row):
+        for j in range(len(row)):
+            row[j] = plane[j] * ratio[j] + low[j] + fresh[j]
+    else:
+        for j in range(len(row)):
+            row[j] = plane[j] * ratio[j] + low[j] + fresh[0]
+
+
+COMPILED = Steps(_ramp, _gather, _scatter, _lift)
+
+
+def load() -> None:
+    """Load the code for spectra and surfaces in single and in double precision; where none is kept yet, make it."""
+    place = np.zeros(1, np.int32)
+    one = np.ones(2, np.float32)
+    for kind in (np.float32, np.float64):
+        parts, rows = np.zeros((1, 1, 2, 2), kind), np.zeros((1, 1, 2, 1), kind)
+        _gather(parts, _ramp(one, place, one[:1], one[:1]).repeat(2).reshape(1, 2), rows, rows)
+        _scatter(parts, rows, rows)
+        planes = np.zeros((3, 2, 2), kind)
+        _lift(planes, planes[0], planes, planes[0], planes[1], planes[2], np.zeros((2, 2, 3), kind))
