@@ -60,7 +60,7 @@ def factor(mean: Array, wanted: Array, total: Total | None = None) -> Array:
 def take_low(waves: Array, low: Array) -> None:
     """Subtract harmonics below `LOWEST`, `low` (3, m, l), from spectra (3, m, k)."""
     series = harmonics.low_series(waves.shape[-1] - 1)
-    waves[:, : harmonics.LOWEST] -= np.einsum("cml,mlk->cmk", low, series).astype(waves.dtype)
+    waves[:, : harmonics.LOWEST] -= np.matmul(low.transpose(1, 0, 2), series).transpose(1, 0, 2).astype(waves.dtype)
 
 
 def apply(planes: Array, ratio: Array, low: Array, patch: Patch) -> None:
