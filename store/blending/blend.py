@@ -107,14 +107,15 @@ class Blender:
         total = None
         if "LL" in method.corrections:
             mean = _form(parts, cell.power)
-            lossy = float(mixed.lossy @ shares / shares.sum())
+            lossy = float(mixed.lossy @ shares) / float(shares.sum())
             whole = targets.gains(known.scale(query), mixed.samples, mixed.weights, dict(stages), mean)
             # where patterns agree their mean has the bands it should have, and a fit to all of the table knows less
-            gains = whole**lossy
+            gains = whole if lossy == 1 else whole**lossy
             if lossy > 0:  # else all gains are 1, and a sixth of the time is for nothing
                 factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
                 poles.multiply(waves, factor, targets.highest)
-            total = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
+            found, wanted = float(gains**2 @ mean), float(whole**2 @ mean)
+            total = envelope.Total(found, wanted)
         if "env" not in method.corrections:
             return Blend(waves)
         ratio = envelope.factor(_form(parts, cell.local), alone.total(parts, cell.amplitude), total)

@@ -9,9 +9,7 @@ linearly, as displacements do, and below the onset there is no power to divide b
 
 from __future__ import annotations
 
-import itertools
 from functools import lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +69,8 @@ class Targets:
         flat = below.reshape(-1, below.shape[-1])
         quantiles = np.array([np.interp(_QUANTILES, row, self.bands.edges) for row in flat])
         # what quantiles and back do to a sample's own spectrum is undone in the same proportion
-        back = np.array([self._shares(row) for row in quantiles])
+        back = self._shares(quantiles)
+        back /= back.sum(axis=1, keepdims=True)
         true = (own + even) / (own + even).sum(axis=-1, keepdims=True)
         self._mended = np.log(true / back.reshape(true.shape))
         self._quantiles = quantiles.reshape(*true.shape[:-1], -1)
@@ -94,44 +93,47 @@ class Targets:
 
     def _powers(self, point: Array, samples: tuple[int, ...], weights: Array, stages: tuple[int, ...]) -> Array:
         """Return the powers (stages, bands) wanted at stored stages."""
-        known = self._known(samples, stages)
+        known, bands = self._known(samples, stages), len(self.bands.first)
         mean = (weights.T[:, None] @ known.rows)[:, 0]
-        points, totals, moved, mended = (mean[:, part] for part in known.parts)
-        step = np.einsum("kja,ja->kj", known.slopes, point - points)
-        total = np.exp(totals[:, 0] + step[0])
+        to_total, to_centroid = known.slopes @ point
+        total = np.exp(mean[:, 0] + to_total)
         # weights that are negative may turn quantiles round
-        moved = np.maximum.accumulate(moved, axis=1) + step[1, :, None]
-        shares = np.array([self._shares(row) for row in moved]) * np.exp(mended)
-        found: Array = np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
-        return found
+        moved = np.maximum.accumulate(mean[:, 1:-bands], axis=1)
+        moved += to_centroid[:, None]
+        shares = self._shares(moved)
+        shares *= np.exp(mean[:, -bands:])
+        shares *= (np.maximum(total - _NOTHING, 0) / shares.sum(axis=1))[:, None]
+        return shares
 
     def _known_of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> _Known:
         i, j = np.array(samples), np.array(stages)[:, None]
-        points = np.broadcast_to(self._points[i], (len(stages), *self._points[i].shape))
-        rows = [points, self._total[i, j][..., None], self._quantiles[i, j], self._mended[i, j]]
-        ends = np.cumsum([0, *(row.shape[-1] for row in rows)]).tolist()
         slopes = np.stack([self._total_slope[j[:, 0]], self._centroid_slope[j[:, 0]]])
-        return _Known(np.concatenate(rows, axis=-1), tuple(itertools.starmap(slice, pairwise(ends))), slopes)
+        own = (slopes @ self._points[i].T)[..., None]
+        rows = [self._total[i, j][..., None] - own[0], self._quantiles[i, j] - own[1], self._mended[i, j]]
+        return _Known(np.concatenate(rows, axis=-1), slopes)
 
     def _shares(self, quantiles: Array) -> Array:
-        """Return the shares (bands,) of a distribution given by its quantiles; no band is quite empty."""
-        knots = np.empty(len(quantiles) + 2)
-        knots[1:-1] = quantiles
-        knots[0], knots[-1] = 2 * quantiles[0] - quantiles[1], 2 * quantiles[-1] - quantiles[-2]
-        below = np.interp(self.bands.edges, knots, _KNOTS, left=0, right=1)
-        below[0], below[-1] = 0, 1
-        shares: Array = below[1:] - below[:-1] + 1e-4
-        shares /= shares.sum()
+        """Return the shares (count, bands), which sum to about 1, of distributions given by their quantiles; no band is
+        quite empty.
+        """
+        knots = np.empty((len(quantiles), quantiles.shape[1] + 2))
+        knots[:, 1:-1] = quantiles
+        knots[:, 0] = 2 * quantiles[:, 0] - quantiles[:, 1]
+        knots[:, -1] = 2 * quantiles[:, -1] - quantiles[:, -2]
+        below = np.array([np.interp(self.bands.edges, row, _KNOTS, left=0, right=1) for row in knots])
+        below[:, 0], below[:, -1] = 0, 1
+        shares: Array = below[:, 1:] - below[:, :-1]
+        shares += 1e-4
         return shares
 
 
 class _Known(NamedTuple):
-    """What is known at some stages of some samples: `rows` (stages, samples, ...) of which `parts` are their points,
-    totals, quantiles and mended shares; and the `slopes` (2, stages, axes) of totals and centroids.
+    """What is known at some stages of some samples: `rows` (stages, samples, ...) of their total, quantiles and mended
+    shares, the first two as they were at the points' origin; and the `slopes` (2, stages, axes) of totals and
+    centroids, which lead from there to a point.
     """
 
     rows: Array
-    parts: tuple[slice, ...]
     slopes: Array
 
 

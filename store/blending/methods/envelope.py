@@ -85,7 +85,7 @@ def on(ratio: Array, low: Array, patch: Patch, kind: np.dtype[Any]) -> tuple[Arr
 
 def at_poles(ratio: Array) -> Array:
     """Return the factor (2,) at the poles, where only its mean over the azimuth is left."""
-    found: Array = ratio.mean(axis=1) @ _to_poles()
+    found: Array = ratio.ravel() @ _to_poles()
     return found
 
 
@@ -130,9 +130,10 @@ def _series(held: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=1)
 def _to_poles() -> Array:
-    """Return the matrix (12, 2) from means over the azimuth to the poles."""
-    cosines = _series(COARSE)[0]
-    return np.stack([cosines.sum(axis=1), cosines @ (-1.0) ** np.arange(COARSE + 1)], axis=1)
+    """Return the matrix (12 * 24, 2) from the coarse lattice to the poles: only means over the azimuth count there."""
+    cosines = _series(COARSE)[0] / (2 * COARSE)
+    ends = np.stack([cosines.sum(axis=1), cosines @ (-1.0) ** np.arange(COARSE + 1)], axis=1)
+    return np.repeat(ends, 2 * COARSE, axis=0)
 
 
 @lru_cache(maxsize=16)
