@@ -26,12 +26,16 @@ class Steps(NamedTuple):
 
     `lift(planes (3, h, w), ratio (h, w), low (3, h, w), x, y, z, out (h, w, 3))` fills `out` with planes * ratio + low
     + the fresh x, y and z, each (h, w) or (h, 1).
+
+    `six(points (n, 2n, 3), poles (2, 3))` returns six times the volumes (2n,) between the origin and the quads of each
+    column, whose corners a, b and c, d in the next row are the triangles (a, b, c) and (b, d, c). A pole is a row, too.
     """
 
     ramp: Callable[[Array, Array, Array, Array], Array]
     gather: Callable[[Array, Array, Array, Array], None]
     scatter: Callable[[Array, Array, Array], None]
     lift: Callable[[Array, Array, Array, Array, Array, Array, Array], None]
+    six: Callable[[Array, Array], Array]
 
 
 def _ramp(values: Array, place: Array, low: Array, high: Array) -> Array:
@@ -61,8 +65,21 @@ def _lift(planes: Array, ratio: Array, low: Array, x: Array, y: Array, z: Array,
         np.add(moved[i], fresh, out=out[..., i])
 
 
+def _six(points: Array, poles: Array) -> Array:
+    rows, columns = points.shape[:2]
+    planes = np.empty((3, rows + 2, columns + 1), points.dtype)
+    planes[:, 1:-1, :-1] = np.moveaxis(points, -1, 0)
+    planes[:, :, -1] = planes[:, :, 0]
+    planes[:, 0], planes[:, -1] = poles[0, :, None], poles[1, :, None]
+    a, c = planes[:, :-1, :-1], planes[:, 1:, :-1]
+    b, d = planes[:, :-1, 1:], planes[:, 1:, 1:]
+    x, y, z = ((b[j] * c[k] - b[k] * c[j]) * (a[i] - d[i]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
+    found: Array = (x + y + z).sum(axis=0, dtype=np.float64)
+    return found
+
+
 #: By numpy.
-PLAIN = Steps(_ramp, _gather, _scatter, _lift)
+PLAIN = Steps(_ramp, _gather, _scatter, _lift, _six)
 
 _way = [PLAIN]
 

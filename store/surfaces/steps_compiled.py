@@ -74,7 +74,47 @@ def _lift_row(plane: Array, ratio: Array, low: Array, fresh: Array, row: Array) 
             row[j] = plane[j] * ratio[j] + low[j] + fresh[0]
 
 
-COMPILED = Steps(_ramp, _gather, _scatter, _lift)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _six(points: Array, poles: Array) -> Array:
+    rows, columns = points.shape[:2]
+    found = np.zeros(columns)
+    # two rows by component, closed in azimuth: so that several points are done at once
+    pair = np.empty((2, 3, columns + 1), points.dtype)
+    for k in range(3):
+        pair[0, k] = poles[0, k]
+    for i in range(rows + 1):
+        if i < rows:
+            _fill(pair[(i + 1) % 2], points[i])
+        else:
+            for k in range(3):
+                pair[(i + 1) % 2, k] = poles[1, k]
+        _add_six(pair[i % 2], pair[(i + 1) % 2], found)
+    return found
+
+
+@njit(cache=True)
+def _fill(row: Array, points: Array) -> None:
+    """Put points (columns, 3) into a row (3, columns + 1)."""
+    columns = len(points)
+    for j in range(columns):
+        for k in range(3):
+            row[k, j] = points[j, k]
+    for k in range(3):
+        row[k, columns] = row[k, 0]
+
+
+@njit(cache=True)
+def _add_six(upper: Array, lower: Array, found: Array) -> None:
+    for j in range(len(found)):
+        bx, by, bz = upper[0, j + 1], upper[1, j + 1], upper[2, j + 1]
+        cx, cy, cz = lower[0, j], lower[1, j], lower[2, j]
+        x = (by * cz - bz * cy) * (upper[0, j] - lower[0, j + 1])
+        y = (bz * cx - bx * cz) * (upper[1, j] - lower[1, j + 1])
+        z = (bx * cy - by * cx) * (upper[2, j] - lower[2, j + 1])
+        found[j] += x + y + z
+
+
+COMPILED = Steps(_ramp, _gather, _scatter, _lift, _six)
 
 
 def load() -> None:
@@ -86,4 +126,5 @@ def load() -> None:
         _gather(parts, _ramp(one, place, one[:1], one[:1]).repeat(2).reshape(1, 2), rows, rows)
         _scatter(parts, rows, rows)
         planes = np.zeros((3, 2, 2), kind)
+        _six(np.zeros((2, 4, 3), kind), np.zeros((2, 3), kind))
         _lift(planes, planes[0], planes, planes[0], planes[1], planes[2], np.zeros((2, 2, 3), kind))

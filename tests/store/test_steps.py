@@ -78,6 +78,13 @@ def test_positions_are_those_of_numpy(kind: type, compiled: steps.Steps) -> None
     np.testing.assert_allclose(found[0], np.moveaxis(planes * ratio + low, 0, -1) + fresh, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_volumes_are_those_of_numpy(kind: type, compiled: steps.Steps) -> None:
+    rng = np.random.default_rng(0)
+    points, poles = (rng.standard_normal(shape).astype(kind) for shape in ((9, 18, 3), (2, 3)))
+    np.testing.assert_array_equal(compiled.six(points, poles), PLAIN.six(points, poles))
+
+
 @pytest.mark.parametrize(("name", "n"), [("default", 32), ("default", 33), ("plum2", 24)])
 def test_a_look_up_gives_the_same_bytes(name: str, n: int, compiled: steps.Steps, as_it_was: None) -> None:
     """A plum is not round: its fresh surface is no product of colatitude and azimuth."""
