@@ -56,7 +56,7 @@ def normals(position: Array, poles: Array) -> tuple[Singles, Singles]:
 
 def volume(position: Array, poles: Array) -> float:
     """Return the volume [r1^3] inside the triangles of a lattice surface (n, 2n, 3) with its poles (2, 3)."""
-    return float(steps.now().six(np.require(position, requirements="CW"), poles.astype(position.dtype)).sum()) / 6
+    return float(steps.now().six(np.require(position, requirements=["C", "W"]), poles.astype(position.dtype)).sum()) / 6
 
 
 def _line(position: Array) -> Array:
