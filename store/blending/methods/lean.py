@@ -36,5 +36,6 @@ def _projected(steep: list[float]) -> list[float]:
     for count, weight in enumerate(sorted(steep, reverse=True), 1):
         falling += weight
         # what is taken off all: that of the last one that is above it
-        over = (falling - 1) / count if weight > (falling - 1) / count else over
+        most = (falling - 1) / count
+        over = most if weight > most else over
     return [max(weight - over, 0.0) for weight in steep]
