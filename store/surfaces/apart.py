@@ -23,7 +23,7 @@ from . import steps
 if TYPE_CHECKING:
     from solver.geometry.apart import Topology
 
-__all__ = ["COARSE", "Evened", "compiled", "even_out"]
+__all__ = ["COARSE", "Evened", "compiled", "crossings", "even_out"]
 
 #: Lattice on which most of the evening out is done: what tables are asked for mostly.
 COARSE = 64
@@ -60,6 +60,20 @@ def compiled() -> None:
         seen_whole(ball.reshape(_LEAST, 2 * _LEAST, 3).astype(kind), ends.astype(kind))
     load()
     steps.use(COMPILED)
+
+
+def crossings(points: Array, poles: Array) -> int:
+    """Return how many pairs of triangles of a closed lattice, points (n, 2n, 3) and poles (2, 3), cross.
+
+    What is seen whole from the centre crosses nowhere; for the others compiled code is loaded.
+    """
+    given, ends = (np.require(part, requirements=["C", "W"]) for part in (points, poles.astype(points.dtype)))
+    if _is_seen_whole(given, ends):
+        return 0
+    from solver.geometry import crossings as geometry
+
+    whole = np.concatenate([given.reshape(-1, 3), ends], dtype=np.float64)
+    return int(geometry.crossings(whole, closed_lattice(len(given))).count)
 
 
 def even_out(
