@@ -10,7 +10,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ..kept import Kept, Part
-from ..surfaces import alone
+from ..surfaces import steps
 from ..surfaces.packed import Stored
 
 __all__ = ["Stacks"]
@@ -76,7 +76,7 @@ def _total(parts: Array, waves: Array) -> Array:
     """Return the sum (n,) of waves (terms, n) times their parts (terms,): where few of these count, of those alone."""
     used = np.flatnonzero(parts).tolist()
     if not used or len(used) > _FEW:
-        return alone.total(parts, waves)
+        return steps.now().total(parts, waves)
     found: Array = waves[used[0]] * parts[used[0]]
     for i in used[1:]:
         found += waves[i] * parts[i]

@@ -13,11 +13,15 @@ import numpy as np
 
 from solver.arrays import Array
 
+from . import alone
+
 __all__ = ["PLAIN", "Steps", "now", "use"]
 
 
 class Steps(NamedTuple):
     """One way to do them.
+
+    `total(parts (t,), terms (t, n))` returns the sum (n,) of terms times their parts, the first term first.
 
     `ramp(values (v,), place (n,), low (n,), high (n,))` returns 1 + values[place] low + values[place + 1] high (n,).
 
@@ -31,6 +35,7 @@ class Steps(NamedTuple):
     column, whose corners a, b and c, d in the next row are the triangles (a, b, c) and (b, d, c). A pole is a row, too.
     """
 
+    total: Callable[[Array, Array], Array]
     ramp: Callable[[Array, Array, Array, Array], Array]
     gather: Callable[[Array, Array, Array, Array], None]
     scatter: Callable[[Array, Array, Array], None]
@@ -79,7 +84,7 @@ def _six(points: Array, poles: Array) -> Array:
 
 
 #: By numpy.
-PLAIN = Steps(_ramp, _gather, _scatter, _lift, _six)
+PLAIN = Steps(alone.total, _ramp, _gather, _scatter, _lift, _six)
 
 _way = [PLAIN]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -12,7 +14,28 @@ from .steps import Steps
 __all__ = ["COMPILED", "load"]
 
 
+#: Waves that are summed together: they stay in the processor's nearest memory.
+_AT_ONCE = 2048
+
+
 @njit(cache=True, nogil=True)  # a service has others to answer meanwhile
+def _total(parts: Array, terms: Array) -> Array:
+    count = terms.shape[1]
+    found = np.zeros(count, terms.dtype)
+    for first in range(0, count, _AT_ONCE):
+        last = min(first + _AT_ONCE, count)
+        for t in range(len(parts)):
+            _add_times(found[first:last], terms[t, first:last], parts[t])
+    return found
+
+
+@njit(cache=True)
+def _add_times(found: Array, term: Array, part: np.floating[Any]) -> None:
+    for i in range(len(found)):
+        found[i] += part * term[i]
+
+
+@njit(cache=True, nogil=True)
 def _ramp(values: Array, place: Array, low: Array, high: Array) -> Array:
     found = np.empty_like(low)
     one = values.dtype.type(1)
@@ -114,7 +137,7 @@ def _add_six(upper: Array, lower: Array, found: Array) -> None:
         found[j] += x + y + z
 
 
-COMPILED = Steps(_ramp, _gather, _scatter, _lift, _six)
+COMPILED = Steps(_total, _ramp, _gather, _scatter, _lift, _six)
 
 
 def load() -> None:
@@ -126,5 +149,6 @@ def load() -> None:
         _gather(parts, _ramp(one, place, one[:1], one[:1]).repeat(2).reshape(1, 2), rows, rows)
         _scatter(parts, rows, rows)
         planes = np.zeros((3, 2, 2), kind)
+        _total(np.zeros(1, kind), np.zeros((1, 2), kind))
         _six(np.zeros((2, 4, 3), kind), np.zeros((2, 3), kind))
         _lift(planes, planes[0], planes, planes[0], planes[1], planes[2], np.zeros((2, 2, 3), kind))

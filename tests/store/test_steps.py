@@ -34,6 +34,16 @@ def as_it_was() -> Iterator[None]:
     steps.use(way)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("terms", [0, 1, 24])
+def test_sums_are_those_of_numpy(kind: type, terms: int, compiled: steps.Steps) -> None:
+    rng = np.random.default_rng(terms)
+    parts, waves = (rng.standard_normal(shape).astype(kind) for shape in (terms, (terms, 5001)))
+    found = compiled.total(parts, waves)
+    np.testing.assert_array_equal(found, PLAIN.total(parts, waves))
+    np.testing.assert_allclose(found, parts @ waves, atol=1e-4)
+
+
 def test_a_ramp_is_that_of_numpy(compiled: steps.Steps) -> None:
     rng = np.random.default_rng(0)
     values, low, high = (rng.standard_normal(count).astype(np.float32) for count in (8, 900, 900))
