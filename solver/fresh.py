@@ -34,20 +34,18 @@ class FreshFruit(Fresh):
         Only the generatrix and the azimuth's sine and cosine are evaluated, each once; the surface is their product.
         """
         fruit = self.fruit
-        x, y = (values[rows] for values in _generatrix(fruit.radii, n))
-        cosine, sine = (values[columns] for values in _circle(n))
-        squash = fruit.radii[7] / fruit.radii[3]
+        x, y, x_along_ray, y_along_ray = (values[rows] for values in _generatrix(fruit.radii, n))
+        cosine, sine = (values[columns] for values in _circle(n, fruit.radii[7] / fruit.radii[3], kind.str))
         te = fruit.exocarp_thickness
         if fruit.is_axisymmetric:
-            stretch: Array = 1 + te / np.hypot(x, y)
-            across: Array = (x * stretch)[:, None].astype(kind)
-            along: Array = (y * stretch)[:, None].astype(kind)
+            across: Array = (x + te * x_along_ray)[:, None].astype(kind)
+            along: Array = (y + te * y_along_ray)[:, None].astype(kind)
         else:
-            flat = (x**2).astype(kind)[:, None] * (cosine**2 + (squash * sine) ** 2).astype(kind)
+            flat = (x**2).astype(kind)[:, None] * (cosine**2 + sine**2)
             stretch = 1 + kind.type(te) / np.sqrt(flat + (y**2).astype(kind)[:, None])
             across, along = stretch * x.astype(kind)[:, None], stretch * y.astype(kind)[:, None]
         for component in components:
-            yield along if component == 1 else across * (squash * sine if component else cosine).astype(kind)
+            yield along if component == 1 else across * (sine if component else cosine)
 
     def poles(self) -> Array:
         """Return the two poles (2, 3)."""
@@ -60,11 +58,13 @@ class FreshFruit(Fresh):
 
 
 @lru_cache(maxsize=64)
-def _generatrix(radii: tuple[float, ...], n: int) -> tuple[Array, Array]:
+def _generatrix(radii: tuple[float, ...], n: int) -> tuple[Array, Array, Array, Array]:
+    """Return x and y (n,) of the sarcocarp, and the unit vectors of their rays."""
     # the fruit that these radii come from has been validated
     fruit: Any = Fruit.model_construct
-    found: tuple[Array, Array] = fruit(radii=radii).generatrix(colatitudes(n))
-    return found
+    x, y = fruit(radii=radii).generatrix(colatitudes(n))
+    distance = np.hypot(x, y)
+    return x, y, x / distance, y / distance
 
 
 @lru_cache(maxsize=64)
@@ -75,10 +75,11 @@ def _ends(radii: tuple[float, ...]) -> tuple[Array, Array]:
     return inner, np.linalg.norm(inner, axis=-1, keepdims=True)
 
 
-@lru_cache(maxsize=16)
-def _circle(n: int) -> tuple[Array, Array]:
+@lru_cache(maxsize=64)
+def _circle(n: int, squash: float, kind: str) -> tuple[Array, Array]:
+    """Return x and z (2n,) of the equator's ellipse whose x axis is 1."""
     phi = azimuths(n)
-    return np.cos(phi), np.sin(phi)
+    return np.cos(phi).astype(kind), (squash * np.sin(phi)).astype(kind)
 
 
 @lru_cache(maxsize=256)

@@ -9,6 +9,7 @@ fresh shape itself is not interpolated: it follows from the parameters.
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -67,7 +68,8 @@ class ShapeTable:
         self._spectra = generation.map_spectra(path)
         opened = generation.read(path)
         columns = {name: opened[name].values for name in (*table.axes, *table.descriptors)}
-        self._converged = opened["converged"].values.astype(bool) if "converged" in opened else None
+        converged = opened["converged"].values.astype(bool) if "converged" in opened else np.ones(1, bool)
+        self._converged = None if converged.all() else converged
         self._keys = [str(key) for key in opened["key"].values]
         self._units = {name: str(opened[name].attrs.get("units", "")) for name in table.descriptors}
         self._units |= dict.fromkeys(FIELDS, QUANTITIES["displacement"].units)
@@ -84,8 +86,8 @@ class ShapeTable:
             self._trust = trust.Trust(*found, self._samples)
         self._judged = None if self._trust is None else self._trust.method
         stored = {stage: j for j, stage in enumerate(table.stages)}
-        self._knots = np.array(sorted({0.0, *stored}))
-        self._stored = [stored.get(knot, _FRESH) for knot in self._knots.tolist()]
+        self._knots = sorted({0.0, *stored})
+        self._stored = [stored.get(knot, _FRESH) for knot in self._knots]
         self._surface = surface if surface and set(surface.fields) <= set(table.template) else None
         named = self._surface.fields if self._surface else ()
         self._fresh_template = {name: table.template[name] for name in named}
@@ -305,7 +307,7 @@ class ShapeTable:
 
     def _bracket(self, stage: float) -> dict[int, float]:
         """Return the stages around one with their weights: stored ones by their place, and `_FRESH`."""
-        after = int(np.searchsorted(self._knots, stage, side="left"))
+        after = bisect.bisect_left(self._knots, stage)
         before = max(after - 1, 0)
         low, high = self._knots[before], self._knots[after]
         part = (stage - low) / (high - low) if high > low else 1.0
@@ -345,8 +347,9 @@ class ShapeTable:
         return {name: told[name] for name in known if name in told}
 
     def _has_converged(self, near: Weighted, stages: Mapping[int, float]) -> bool:
-        terms = self._terms(near, stages)
-        return self._converged is None or all(bool(self._converged[i, j]) for i, j, _ in terms)
+        if self._converged is None:
+            return True
+        return all(bool(self._converged[i, j]) for i, j, _ in self._terms(near, stages))
 
     def at_parameters(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return the solver's parameters of a point on the varying axes."""
@@ -412,9 +415,12 @@ def _synthesize(blend: Blend, patch: Patch, fresh: Fresh | None, displaced: bool
     """Return positions and displacements (height, width, c) on a patch, and the two poles of a whole surface: each
     only if wanted.
     """
-    with blend.fields(patch) as planes:
-        position = None if fresh is None else surface.add_fresh(fresh, planes, patch)
-        displacement = np.stack(list(planes), axis=-1) if displaced else None
+    if displaced:
+        with blend.fields(patch) as planes:
+            position = None if fresh is None else surface.add_fresh(fresh, planes, patch)
+            displacement = np.stack(list(planes), axis=-1)
+    else:
+        position, displacement = None if fresh is None else blend.over(fresh, patch), None
     if fresh is None or not patch.is_whole:
         return position, displacement, None
     poles = (fresh.poles() + blend.poles()).astype(blend.waves.real.dtype)

@@ -18,7 +18,7 @@ from solver.contract import Solver, Worn, dryness
 from solver.lattice import closed_lattice
 from store import seal, shards
 from store.shape import Shape
-from store.surfaces import spectra
+from store.surfaces import apart, spectra
 
 from .errors import InvalidOption
 from .formats import Encoder, Made, added
@@ -241,8 +241,11 @@ def save(path: Path, made: Made) -> None:
 
 
 def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Shape:
-    """Return one stage of a run with the field `position` as a shape; its poles come from the spectrum."""
+    """Return one stage of a run with the field `position` as a shape; its poles come from the spectrum, and its
+    `crossings` are counted with them: a run's own `lattice_crossings` are of the lattice closed by its rings' means.
+    """
     position = result["position"].isel(stage=index).values
+    poles = spectra.poles(spectra.spectrum(position))
     numbers = {
         str(name): float(variable[index])
         for name, variable in result.data_vars.items()
@@ -253,7 +256,7 @@ def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Sh
         azimuth=result["azimuth"].values,
         position=position,
         displacement=result["displacement"].isel(stage=index).values if "displacement" in result else None,
-        poles=spectra.poles(spectra.spectrum(position)),
+        poles=poles,
         stage=float(result["stage"][index]),
         parameters=params,
         descriptors=numbers,
@@ -261,6 +264,7 @@ def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Sh
         nearest=0.0,
         exact=True,
         converged=bool(result["converged"][index]),
+        crossings=apart.crossings(position, poles),
         table="",
         tier="relaxed" if result.attrs.get("path") == "relaxed" else "run",
     )

@@ -40,8 +40,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("start", "load", "batch", "memory", "swaps")
 #: Its points take as many bytes as the peer's chunk of 50000 numbers.
 RESOLUTION = 90
-#: Load before the first round [s].
-_WARM_S = 2.0
+#: Load before the first round [s]: on busy cores it takes so long until the compiled code is loaded aside.
+_WARM_S = 10.0
 #: A shape of the table in the package, as long as there has been one.
 STARTER = "/v1/shapes/dehydration?te=0.035&gamma=20&s=0.2&resolution=64&format=points"
 QUERY = "/v1/shapes/dehydration?te={te:.6f}&gamma={gamma:.4f}&s=0.17&resolution={n}&format=points"

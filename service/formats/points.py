@@ -12,6 +12,8 @@ import struct
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from . import mesh, metadata
 from .about import About
 
@@ -29,6 +31,6 @@ def encode(shape: Shape, about: About) -> bytes:
     position, ends = mesh.surface(shape)
     text = metadata.encode(shape, replace(about, timings={}, links={}))
     text += b" " * (-len(text) % 4)
-    points = mesh.vertices(position, ends)
     head = struct.pack("<4sIII", MAGIC, _VERSION, position.shape[0], len(text))
-    return b"".join([head, text, points.astype("<f4", copy=False).tobytes()])
+    # joined at once: no copy of all points before
+    return b"".join([head, text, *(np.ascontiguousarray(points, "<f4").data for points in (position, ends))])

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .errors import InvalidGeometry, InvalidInput
-from .words import advise, named, say
+from .words import Place, advise, named, say
 
 __all__ = ["Params"]
 
@@ -63,7 +63,12 @@ class Params(BaseModel):
             # findings without a place are those of the whole: valid numbers, impossible shape
             whole_only = all(not item["loc"] for item in error.errors())
             kind = InvalidGeometry if whole_only else InvalidInput
-            raise kind(f"{say(error, known)}.", advice=advise(error)) from None
+            typed: dict[Place, str] = {
+                (field,) if index is None else (field, index): name
+                for name, (field, index) in cls.axes.items()
+                if name in values and name != field
+            }
+            raise kind(f"{say(error, known, typed)}.", advice=advise(error, typed)) from None
 
     @property
     def keeps_shape(self) -> bool:

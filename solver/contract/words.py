@@ -5,13 +5,14 @@ from __future__ import annotations
 import difflib
 import reprlib
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from .errors import InvalidInput
 
-__all__ = ["SHORT", "advise", "named", "say"]
+__all__ = ["SHORT", "Place", "advise", "named", "say"]
 
 #: Bounds as pydantic names them, in words.
 _BOUNDS = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
@@ -34,11 +35,18 @@ def named(values: object) -> Mapping[str, Any]:
     return values
 
 
-def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
-    """Put pydantic's findings into one sentence per field, with the nearest name for a misspelt one."""
+#: Where pydantic finds what is wrong: names and numbers, from outside inwards.
+Place = tuple[int | str, ...]
+
+
+def say(error: ValidationError, fields: Mapping[str, Any], typed: Mapping[Place, str] = MappingProxyType({})) -> str:
+    """Put pydantic's findings into one sentence per field, with the nearest name for a misspelt one.
+
+    `typed` says by place what a value was called by whoever gave it, where that is another name than the field's.
+    """
     parts, strange = [], False
     for item in error.errors():
-        where = ".".join(str(p) for p in item["loc"])
+        where = _called(item["loc"], typed)
         if item["type"] == "extra_forbidden":
             hint = _hint(fields, item["loc"])
             strange |= not hint and len(item["loc"]) == 1
@@ -54,13 +62,13 @@ def say(error: ValidationError, fields: Mapping[str, Any]) -> str:
     return "; ".join(parts)
 
 
-def advise(error: ValidationError) -> str:
+def advise(error: ValidationError, typed: Mapping[Place, str] = MappingProxyType({})) -> str:
     """Return what to give instead of what is off its bounds or no number, a sentence each; "" where a finding says so
-    itself.
+    itself. `typed` as in `say`.
     """
     said = []
     for item in error.errors():
-        where, context = ".".join(str(p) for p in item["loc"]), item.get("ctx", {})
+        where, context = _called(item["loc"], typed), item.get("ctx", {})
         bound = next((f"{word} {context[name]:g}" for name, word in _BOUNDS.items() if name in context), "")
         if bound and where:
             said.append(f"Give {where} {bound}.")
@@ -71,7 +79,14 @@ def advise(error: ValidationError) -> str:
     return " ".join(said)
 
 
-def _hint(fields: Mapping[str, Any], place: tuple[int | str, ...]) -> str:
+def _called(place: Place, typed: Mapping[Place, str]) -> str:
+    """Return the name of a place: what was typed, and behind it the field's, which the documents have."""
+    where = ".".join(str(part) for part in place)
+    own = next((typed[place[:k]] for k in range(len(place), 0, -1) if place[:k] in typed), "")
+    return f"{own} ({where})" if own else where
+
+
+def _hint(fields: Mapping[str, Any], place: Place) -> str:
     """Return what was probably meant by a name that does not exist, or what there is where it stands."""
     name, alone = str(place[-1]), len(place) == 1
     group, _, inner = name.partition(".")
@@ -85,7 +100,7 @@ def _hint(fields: Mapping[str, Any], place: tuple[int | str, ...]) -> str:
     return f"; known there: {', '.join(within)}" if within and not alone else ""
 
 
-def _within(fields: Mapping[str, Any], place: tuple[int | str, ...]) -> list[str]:
+def _within(fields: Mapping[str, Any], place: Place) -> list[str]:
     """Return the names that there are where a wrong one was found, in a group within the fields."""
     first = fields.get(str(place[0]))
     models = _models(getattr(first, "annotation", None))

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.arrays import Array
+from solver.contract import Fresh
 
-from ..surfaces import alone, harmonics, window
+from ..surfaces import alone, harmonics, surface, window
 from ..surfaces.packed import Stored
 from ..surfaces.window import Patch
 from . import methods
@@ -45,6 +46,15 @@ class Blend(NamedTuple):
             if self.ratio is not None and self.low is not None:
                 envelope.apply(planes, self.ratio, self.low, patch)
             yield planes
+
+    def over(self, fresh: Fresh, patch: Patch) -> Array:
+        """Return the fresh surface with the displacement, (height, width, components), on a patch."""
+        with window.planes(self.waves, patch) as planes:
+            if self.ratio is not None and self.low is not None:
+                if patch.is_whole and patch.components == (0, 1, 2):
+                    return surface.lift(fresh, planes, *envelope.on(self.ratio, self.low, patch, planes.dtype))
+                envelope.apply(planes, self.ratio, self.low, patch)
+            return surface.add_fresh(fresh, planes, patch)
 
     def poles(self) -> Array:
         """Return the displacement (2, 3) of the two poles."""
@@ -97,14 +107,15 @@ class Blender:
         total = None
         if "LL" in method.corrections:
             mean = _form(parts, cell.power)
-            lossy = float(mixed.lossy @ shares / shares.sum())
+            lossy = float(mixed.lossy @ shares) / float(shares.sum())
             whole = targets.gains(known.scale(query), mixed.samples, mixed.weights, dict(stages), mean)
             # where patterns agree their mean has the bands it should have, and a fit to all of the table knows less
-            gains = whole**lossy
+            gains = whole if lossy == 1 else whole**lossy
             if lossy > 0:  # else all gains are 1, and a sixth of the time is for nothing
                 factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
                 poles.multiply(waves, factor, targets.highest)
-            total = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
+            found, wanted = float(gains**2 @ mean), float(whole**2 @ mean)
+            total = envelope.Total(found, wanted)
         if "env" not in method.corrections:
             return Blend(waves)
         ratio = envelope.factor(_form(parts, cell.local), alone.total(parts, cell.amplitude), total)

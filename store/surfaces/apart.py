@@ -18,10 +18,12 @@ from solver.arrays import Array
 from solver.geometry.outward import faces_outward
 from solver.lattice import azimuths, closed_lattice, colatitudes
 
+from . import steps
+
 if TYPE_CHECKING:
     from solver.geometry.apart import Topology
 
-__all__ = ["COARSE", "Evened", "compiled", "even_out"]
+__all__ = ["COARSE", "Evened", "compiled", "crossings", "even_out"]
 
 #: Lattice on which most of the evening out is done: what tables are asked for mostly.
 COARSE = 64
@@ -41,9 +43,13 @@ class Evened(NamedTuple):
 
 
 def compiled() -> None:
-    """Load the compiled code that folded surfaces need; where none is kept yet, make it: some 15 s of a processor."""
+    """Load the compiled code that folded surfaces need, and that of `steps`; where none is kept yet, make it: some 15 s
+    of a processor.
+    """
     from solver.geometry.apart import put_apart
     from solver.geometry.seen import seen_whole
+
+    from .steps_compiled import COMPILED, load
 
     colatitude, azimuth = np.meshgrid(colatitudes(_LEAST), azimuths(_LEAST), indexing="ij")
     x, y = np.sin(colatitude) * np.cos(azimuth), np.sin(colatitude) * np.sin(azimuth)
@@ -52,6 +58,22 @@ def compiled() -> None:
     put_apart(np.concatenate([ball, ends]), _topology(_LEAST), 0)
     for kind in (np.float32, np.float64):
         seen_whole(ball.reshape(_LEAST, 2 * _LEAST, 3).astype(kind), ends.astype(kind))
+    load()
+    steps.use(COMPILED)
+
+
+def crossings(points: Array, poles: Array) -> int:
+    """Return how many pairs of triangles of a closed lattice, points (n, 2n, 3) and poles (2, 3), cross.
+
+    What is seen whole from the centre crosses nowhere; for the others compiled code is loaded.
+    """
+    given, ends = (np.require(part, requirements=["C", "W"]) for part in (points, poles.astype(points.dtype)))
+    if _is_seen_whole(given, ends):
+        return 0
+    from solver.geometry import crossings as geometry
+
+    whole = np.concatenate([given.reshape(-1, 3), ends], dtype=np.float64)
+    return int(geometry.crossings(whole, closed_lattice(len(given))).count)
 
 
 def even_out(

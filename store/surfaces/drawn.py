@@ -13,6 +13,8 @@ import numpy as np
 
 from solver.arrays import Array, Singles
 
+from . import steps
+
 __all__ = ["normals", "volume"]
 
 #: A fan's row, and the sense of its turn as seen from outside.
@@ -54,15 +56,7 @@ def normals(position: Array, poles: Array) -> tuple[Singles, Singles]:
 
 def volume(position: Array, poles: Array) -> float:
     """Return the volume [r1^3] inside the triangles of a lattice surface (n, 2n, 3) with its poles (2, 3)."""
-    line = _line(position)
-    a, b, c, d = _corners(line)
-    six = _cross(b, c)
-    six *= a - d  # a (b x c) + b (d x c)
-    total = float(six.sum(axis=1).sum())  # pairwise along the line: single precision is enough
-    rows = line.reshape(3, len(position), -1)
-    for end, (row, turn) in enumerate(_FANS):
-        total += turn * float(_cross(rows[:, row, :-1], rows[:, row, 1:]).sum(axis=1) @ poles[end])
-    return total / 6
+    return float(steps.now().six(np.require(position, requirements=["C", "W"]), poles.astype(position.dtype)).sum()) / 6
 
 
 def _line(position: Array) -> Array:

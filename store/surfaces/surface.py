@@ -7,10 +7,10 @@ import numpy as np
 from solver.arrays import Array
 from solver.contract import Fresh
 
-from . import spectra
+from . import spectra, steps
 from .window import WHOLE, Patch
 
-__all__ = ["add_fresh", "normals"]
+__all__ = ["add_fresh", "lift", "normals"]
 
 
 def add_fresh(fresh: Fresh, displacement: Array, patch: Patch | None = None) -> Array:
@@ -22,6 +22,21 @@ def add_fresh(fresh: Fresh, displacement: Array, patch: Patch | None = None) -> 
     planes = fresh.planes(patch.n, patch.rows, patch.columns, patch.components, displacement.dtype)
     for i, plane in enumerate(planes):
         np.add(displacement[i], plane, out=position[..., i])
+    return position
+
+
+def lift(fresh: Fresh, displacement: Array, ratio: Array, low: Array) -> Array:
+    """Return X + u ratio + low as (n, 2n, 3) for displacements u and `low` (3, n, 2n) and a `ratio` (n, 2n)."""
+    size, kind = ratio.shape, displacement.dtype
+    position = np.empty((*size, 3), kind)
+    x, y, z = planes = tuple(fresh.planes(size[0], slice(None), slice(None), (0, 1, 2), kind))
+    # compiled code is made for whole arrays alone
+    arrays = (displacement, ratio, low, *planes)
+    is_plain = all(plane.shape in (size, (size[0], 1)) for plane in planes) and all(
+        one.dtype == kind and one.flags.c_contiguous for one in arrays
+    )
+    way = steps.now() if is_plain else steps.PLAIN
+    way.lift(displacement, ratio, low, x, y, z, position)
     return position
 
 

@@ -1,10 +1,9 @@
 """The transforms under `spectra`: half-cell cosine and sine series in colatitude, Fourier series in azimuth.
 
-Synthesis, which every query needs, is by pyfftw with cached plans where it is installed, else by scipy.fft, but for few
-waves in colatitude, which are summed by matrices; the environment variable WIZEN_FFT=pyfftw|scipy|auto chooses, and all
-agree to round-off. FFTW plans by estimate, not by
-measurement: the plan, and with it the last bit of every result, is then the same in every process, and planning takes
-a millisecond.
+Synthesis, which every query needs, is by pyfftw with cached plans where it is installed, else by scipy.fft, but for the
+waves in colatitude of a usual band, which are summed by matrices; the environment variable WIZEN_FFT=pyfftw|scipy|auto
+chooses, and all agree to round-off. FFTW plans by estimate, not by measurement: the plan, and with it the last bit of
+every result, is then the same in every process, and planning takes a millisecond.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -40,8 +39,9 @@ __all__ = ["Synthesis", "analyse", "backend", "borrow"]
 
 #: Bytes of idle plans that are kept, over all shapes; a plan for 256 x 512 x 3 in float32 holds 4 MB.
 _IDLE = 128 << 20
-#: Colatitudes times waves up to which sums are matrices, measured: beyond, transforms are as fast.
-_MATRICES = 12_800
+#: Waves in colatitude up to which sums are matrices, measured at 32 to 512 colatitudes: in single precision they take
+#: half of the transforms' time there, in double as much.
+_MATRICES = 129
 
 
 def backend() -> str:
@@ -90,11 +90,12 @@ class Synthesis:
         self._make = _zeros if library == "pyfftw" else np.zeros
         self._plans: list[Any] = []
         # by `put` as (count, m, k); by `run` from there
-        self._is_summed = n * min(band + 1, n) <= _MATRICES
+        self._is_summed = min(band + 1, n) <= _MATRICES
         self._cosines, self._sines = self._by_matrices() if self._is_summed else self._by_transforms()
         if library == "pyfftw":
             self._field: Array = _empty((count, n, 2 * n), dtype)
-            self._plans.append(_plan(self._lines, self._field, "FFTW_BACKWARD"))
+            # a third faster where it may spoil the lines, which are made anew by every run
+            self._plans.append(_plan(self._lines, self._field, "FFTW_BACKWARD", "FFTW_DESTROY_INPUT"))
         self.nbytes = self._cosines.nbytes + self._sines.nbytes + 2 * self._lines.nbytes
 
     def put(self, planes: Array) -> None:
@@ -102,13 +103,18 @@ class Synthesis:
         n, band = self._n, planes.shape[2] - 1
         low, high = min(band, n - 1), min(band, n)
         rows = self._band + 1
-        half = self._dtype.type(0.5)  # the transforms count every wave but the constant twice
         cosines, sines = self._cosines, self._sines
-        np.multiply(planes[:, self._cosine : rows : 2, : low + 1], half, out=cosines[..., : low + 1])
-        np.multiply(planes[:, 1 - self._cosine : rows : 2, 1 : high + 1], half, out=sines[..., :high])
-        cosines[..., 0] *= 2
-        if high == n:
-            sines[..., n - 1] *= 2
+        of_cosines = planes[:, self._cosine : rows : 2, : low + 1]
+        of_sines = planes[:, 1 - self._cosine : rows : 2, 1 : high + 1]
+        if self._is_summed:
+            cosines[..., : low + 1], sines[..., :high] = of_cosines, of_sines
+        else:
+            half = self._dtype.type(0.5)  # the transforms count every wave but the constant twice
+            np.multiply(of_cosines, half, out=cosines[..., : low + 1])
+            np.multiply(of_sines, half, out=sines[..., :high])
+            cosines[..., 0] *= 2
+            if high == n:
+                sines[..., n - 1] *= 2
         if rows == n + 1:  # the last wave around
             last = cosines if n % 2 == self._cosine else sines
             last[:, -1] *= 2
@@ -125,19 +131,17 @@ class Synthesis:
         return scipy.fft.irfft(self._lines, 2 * self._n, axis=2, norm="forward")
 
     def _by_matrices(self) -> tuple[Array, Array]:
-        """Prepare sums in colatitude by matrices: so few waves take half the time of FFTW's transforms of real fields,
-        which know no vectors. Memory: k (or a colatitude) by m.
+        """Prepare sums in colatitude by matrices: they take half the time of FFTW's transforms of real fields, which
+        know no vectors. Memory: k (or a colatitude) by m.
         """
         n, count, dtype, waves = self._n, self._count, self._dtype, min(self._band + 1, self._n)
         self._lines: Array = self._make((count, n, n + 1), _complex(dtype))
         found = []
-        self._sums: list[tuple[Array, Array, Array, Array]] = []
+        self._sums: list[_Sums] = []
         for k, first in enumerate((self._cosine, 1 - self._cosine)):
             amplitudes = np.zeros((count, waves, len(range(first, self._band + 1, 2))), _complex(dtype))
-            sums = _blocks(n, waves, k, dtype.str, 2 * amplitudes.shape[2])
-            lines = np.empty((count, *sums.shape[:2], 2 * amplitudes.shape[2]), dtype)
-            whole = lines.view(_complex(dtype)).reshape(count, -1, amplitudes.shape[2])[:, :n]
-            self._sums.append((sums, amplitudes, lines, whole))
+            to = self._lines[..., first : self._band + 1 : 2]
+            self._sums.append(_Sums.of(amplitudes, to, n, k))
             found.append(amplitudes.transpose(0, 2, 1))
         return found[0], found[1]
 
@@ -156,13 +160,12 @@ class Synthesis:
         return sides
 
     def _down(self) -> None:
-        """Sum in colatitude, where no plan of FFTW does."""
+        """Sum in colatitude, where no plan of FFTW does; waves around that there are none of are nothing."""
+        if self._plans:
+            self._lines[..., self._band + 1 :] = 0  # the last run has spoilt them
         if self._is_summed:
-            for first, (sums, amplitudes, lines, whole) in zip(
-                (self._cosine, 1 - self._cosine), self._sums, strict=True
-            ):
-                np.matmul(sums, amplitudes.view(self._dtype)[:, None], out=lines)
-                self._lines[..., first : self._band + 1 : 2] = whole
+            for sums in self._sums:
+                sums.run()
         elif self._library != "pyfftw":
             import scipy.fft
 
@@ -170,23 +173,68 @@ class Synthesis:
                 target[...] = transform(source, 3, axis=2)
 
 
+class _Half(NamedTuple):
+    """A matrix (blocks, rows, waves) from `waves` (count, waves, columns) of one parity to half of the colatitudes:
+    `lines` (count, blocks, rows, columns), of which `values` (count, rows, m) is the complex view.
+    """
+
+    matrix: Array
+    waves: Array
+    lines: Array
+    values: Array
+
+
+class _Sums(NamedTuple):
+    """Sums in colatitude of waves that are the same on both hemispheres (`even`) and of those that change their sign
+    (`odd`): each is done on the northern one alone, and the southern one is their difference.
+    """
+
+    even: _Half
+    odd: _Half
+    north: Array
+    south: Array
+
+    @classmethod
+    def of(cls, amplitudes: Array, to: Array, n: int, first: int) -> Self:
+        """Prepare sums of amplitudes (count, k, m) of cosines (`first` 0) or sines (1) into `to` (count, n, m)."""
+        count, waves, columns = amplitudes.shape
+        half, kind = -(-n // 2), amplitudes.real.dtype
+        parts = amplitudes.view(kind)
+
+        def of(parity: int) -> _Half:
+            matrix = _blocks(n, waves, first, parity, kind.str, 2 * columns)
+            lines = np.empty((count, *matrix.shape[:2], 2 * columns), kind)
+            values = lines.view(amplitudes.dtype).reshape(count, matrix.shape[0] * matrix.shape[1], columns)[:, :half]
+            return _Half(matrix, parts[:, None, parity::2], lines, values)
+
+        return cls(of(0), of(1), to[:, :half], to[:, ::-1][:, : n // 2])
+
+    def run(self) -> None:
+        """Sum."""
+        for half in (self.even, self.odd):
+            np.matmul(half.matrix, half.waves, out=half.lines)
+        even, odd, south = self.even.values, self.odd.values, self.south.shape[1]
+        np.add(even, odd, out=self.north)
+        np.subtract(even[:, :south], odd[:, :south], out=self.south)
+
+
 @lru_cache(maxsize=128)
-def _blocks(n: int, waves: int, first: int, dtype: str, columns: int) -> Array:
-    """Return the matrix (blocks, rows, waves) from amplitudes to colatitudes, zero beyond its `n` rows: of cosines with
-    `first` 0, k = 0.., of sines with 1, k = 1... All count twice but the constant and the last sine, k = n.
+def _blocks(n: int, waves: int, first: int, parity: int, dtype: str, columns: int) -> Array:
+    """Return the matrix (blocks, rows, waves) from every other amplitude to the northern half of the colatitudes, the
+    equator among them, zero beyond: of cosines with `first` 0, k = 0.., of sines with 1, k = 1.., beginning with the
+    first (`parity` 0) or the second.
 
     Products with `columns` are so small by block that BLAS does not divide them among threads, which in a busy server
     would wait for each other.
     """
-    k = np.arange(first, waves + first)
-    angle = np.outer((np.arange(n) + 0.5) * np.pi / n, k)
-    matrix = (np.sin(angle) if first else np.cos(angle)) * np.where(k == n * first, 1.0, 2.0)
-    blocks = -(-n * waves * columns // alone.MOST) or 1
-    rows = -(-n // blocks)
-    found = np.zeros((blocks * rows, waves), dtype)
-    found[:n] = matrix
+    k, half = np.arange(waves)[parity::2] + first, -(-n // 2)
+    angle = np.outer((np.arange(half) + 0.5) * np.pi / n, k)
+    blocks = -(-half * len(k) * columns // alone.MOST) or 1
+    rows = -(-half // blocks)
+    found = np.zeros((blocks * rows, len(k)), dtype)
+    found[:half] = np.sin(angle) if first else np.cos(angle)
     found.flags.writeable = False
-    return found.reshape(blocks, rows, waves)
+    return found.reshape(blocks, rows, len(k))
 
 
 _free: OrderedDict[tuple[Any, ...], list[Synthesis]] = OrderedDict()
@@ -233,6 +281,6 @@ def _zeros(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Array:
 _planning = threading.Lock()
 
 
-def _plan(source: Array, target: Array, direction: str | tuple[str]) -> Any:
+def _plan(source: Array, target: Array, direction: str | tuple[str], *flags: str) -> Any:
     with _planning:  # FFTW's planner is not thread-safe, its plans are
-        return pyfftw.FFTW(source, target, axes=(2,), direction=direction, flags=("FFTW_ESTIMATE",), threads=1)
+        return pyfftw.FFTW(source, target, axes=(2,), direction=direction, flags=("FFTW_ESTIMATE", *flags), threads=1)

@@ -66,7 +66,7 @@ def refine(asked: _Asked) -> None:
 
     from ..planning.plan import Plan
     from ..refining import refine as refining
-    from ..refining.rounds import rounds
+    from ..refining.rounds import held_out_error, rounds
     from ..running import executors
     from .terminal import progress
     from .terminal.words import readers
@@ -75,9 +75,9 @@ def refine(asked: _Asked) -> None:
     if asked.dry_run:
         refining.check(read, tables.info(opened, asked.name))
         state = refining.read(opened, asked.name, measure)
-        _show_proposals(
-            list(itertools.islice(refining.propose(read, state), max(asked.count, _LOOKED_AT))), state, asked
-        )
+        error = None if asked.held_out is None else held_out_error(opened, asked.name, asked.held_out, measure)
+        proposals = list(itertools.islice(refining.propose(read, state), max(asked.count, _LOOKED_AT)))
+        _show_proposals(proposals, state, error, asked)
         return
     done: list[Round] = []
     with executors.choose(asked.workers, asked.dask, asked.scheduler) as pool:
@@ -125,7 +125,7 @@ def _show_rounds(console: Any, done: list[Round], asked: _Asked, failed: int, st
         console.print("nothing more fits into --count (a grid grows by whole lines)", markup=False)
 
 
-def _show_proposals(found: list[Any], state: Any, asked: _Asked) -> None:
+def _show_proposals(found: list[Any], state: Any, held: tuple[float, int] | None, asked: _Asked) -> None:
     measure, left, kept = asked.measure, asked.count, []
     for proposal in found:
         if len(proposal.points) <= left:
@@ -135,11 +135,13 @@ def _show_proposals(found: list[Any], state: Any, asked: _Asked) -> None:
         "table": state.table.name,
         "measure": measure,
         "left_out": state.mean,
+        **({} if held is None else {"held_out": held[0], "held_runs": held[1]}),
         "proposals": [{"points": list(p.points), "error": p.expected} for p in kept],
     }
 
     def show(console: Any) -> None:
-        console.print(f"table {state.table.name}: {measure} left out {state.mean:.4g}", markup=False)
+        also = "" if held is None else f", held out {held[0]:.4g} ({held[1]} runs)"
+        console.print(f"table {state.table.name}: {measure} left out {state.mean:.4g}{also}", markup=False)
         if not kept:
             fewest = min((len(p.points) for p in found), default=0)
             advice = f"a grid grows by whole lines: give at least --count {fewest}" if fewest else "no fruit is missing"

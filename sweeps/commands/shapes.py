@@ -211,10 +211,12 @@ def _relaxed(solver: Solver, table: ShapeTable, shape: Shape) -> tuple[Shape, Ma
     """Return a shape relaxed, and what is said of it.
 
     Raises:
-        SolverError: as `relaxing.relaxed`; where the shape falls apart, with the command that runs it from the start.
+        SolverError: as `relaxing.relaxed`; where the shape falls apart, with the command that runs it from the start
+            as the table's runs are done, but for what only their plan can have them start from.
 
     """
     from solver.contract import Unstable
+    from store.families import stored
 
     from ..relaxing import relaxed
 
@@ -223,8 +225,16 @@ def _relaxed(solver: Solver, table: ShapeTable, shape: Shape) -> tuple[Shape, Ma
     except Unstable as error:
         usual, given = solver.parse({}), solver.parse(table.at_parameters(shape.parameters))
         said = {axis: given.axis(axis) for axis in given.axes if given.axis(axis) != usual.axis(axis)}
-        advice = f"{error.advice} {run_command(solver.name, None, said, shape.stage)}"
+        done = stored.made(table.info, solver)
+        said |= {name: value for name, value in done.items() if not isinstance(value, Mapping)}
+        told = [error.advice, *(_beyond(name, table) for name, value in done.items() if isinstance(value, Mapping))]
+        advice = " ".join([*told, run_command(solver.name, None, said, shape.stage)])
         raise Unstable(error.message, advice=advice.strip(), residual=error.residual) from None
+
+
+def _beyond(name: str, table: ShapeTable) -> str:
+    """Return what is said of something that the table's runs have and one run alone, without a store, cannot."""
+    return f"Without the {name} of the table's runs, which `wizen table plan {table.info.name}` has:"
 
 
 def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path | None) -> None:

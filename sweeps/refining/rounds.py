@@ -73,12 +73,15 @@ def rounds(
 
     Raises:
         PlanError, MixedSamples: the plan and the table do not fit; nothing was run.
+        InvalidOption: no run of `held` lies between the table's samples; nothing was run.
         StoreError: the store is full or damaged; what is done is kept.
 
     """
     halt = stop or threading.Event()
     width = getattr(executor, "width", 1)
     refine.check(plan, tables.info(store, name))
+    if held is not None:
+        _held(store, name, held)
 
     def run(jobs: Sequence[JobSpec]) -> int:
         return len(run_jobs(jobs, store, executor, refine.name_of(plan), observe, stop=halt).failed) if jobs else 0
@@ -154,8 +157,7 @@ def held_out_error(store: Store, name: str, held: Path, measure: str) -> tuple[f
         InvalidOption: no run of `held` lies between the table's samples.
 
     """
-    table = ShapeTable.open(store, name, verify=False, surfaces=registry.surface)
-    found, _ = score.cases(store, table, held)
+    table, found = _held(store, name, held)
     errors = [
         trust.errors(compare(Surface(case.fresh, case.found(methods.DEFAULT, s)), Surface(case.fresh, case.truth(s))))[
             measure
@@ -164,3 +166,8 @@ def held_out_error(store: Store, name: str, held: Path, measure: str) -> tuple[f
         for s in table.stages
     ]
     return float(np.mean(errors)), len(found)
+
+
+def _held(store: Store, name: str, held: Path) -> tuple[ShapeTable, list[score.Case]]:
+    table = ShapeTable.open(store, name, verify=False, surfaces=registry.surface)
+    return table, score.cases(store, table, held)[0]

@@ -284,10 +284,15 @@ def test_errors_carry_code_and_advice():
 @pytest.mark.parametrize(
     ("values", "advice"),
     [
-        ({"te": 9}, "Give exocarp_thickness at most 0.2."),
-        ({"te": "thin", "gamma": -1}, "Give exocarp_thickness a finite number. Give modulus_ratio at least 1."),
+        ({"te": 9}, "Give te (exocarp_thickness) at most 0.2."),
+        ({"exocarp_thickness": 9}, "Give exocarp_thickness at most 0.2."),
+        ({"r4": -1}, "Give r4 (radii.3) at least 0.2."),
+        (
+            {"te": "thin", "gamma": -1},
+            "Give te (exocarp_thickness) a finite number. Give gamma (modulus_ratio) at least 1.",
+        ),
         ({"seed": 1.5}, "Give seed a whole number."),
-        ({"gamma": float("nan")}, "Give modulus_ratio a finite number."),
+        ({"gamma": float("nan")}, "Give gamma (modulus_ratio) a finite number."),
     ],
 )
 def test_what_is_off_its_bounds_says_what_to_give(values, advice):

@@ -156,7 +156,8 @@ def test_only_what_is_asked_for_is_computed(table: ShapeTable, monkeypatch: pyte
     def unwanted(*_: Any) -> None:
         raise AssertionError("nobody asked for this")
 
-    monkeypatch.setattr("store.lookup.surface.add_fresh", unwanted)
+    for name in ("add_fresh", "lift"):
+        monkeypatch.setattr(f"store.surfaces.surface.{name}", unwanted)
     query = {"te": 0.033, "gamma": 20.0}
     assert table.at(query, 0.2, fields=("displacement",)).displacement is not None
     monkeypatch.setattr("store.surfaces.window.transforms.borrow", unwanted)

@@ -18,7 +18,7 @@ from solver import registry
 from store import tables
 from store.errors import MixedSamples
 from store.store import Store
-from sweeps.errors import PlanError
+from sweeps.errors import InvalidOption, PlanError
 from sweeps.planning.plan import Plan
 from sweeps.refining import refine
 from sweeps.refining.refine import Proposal, State
@@ -91,6 +91,10 @@ def test_the_same_command_goes_on_and_then_has_nothing_to_do(site: None, tmp_pat
     state = refine.read(store, "default", "L2nr")
     third = next(refine.propose(plan, state))
     store.ledger.want(refine.with_samples(plan, third.samples).jobs(), refine.name_of(plan))
+    # runs to measure by are looked for before anything is run
+    with pytest.raises(InvalidOption):
+        refined(store, plan, 3, Store.open(tmp_path / "empty", create=True).root)
+    assert len(store.ledger.jobs("wanted", refine.name_of(plan))) == 1
     again = refined(store, plan, 3)
     assert [one.added for one in [*first, *again]] == [0, 1, 2, 3]
     assert [one.added for one in refined(store, plan, 3)] == [3]
@@ -154,6 +158,17 @@ def test_plan_and_table_must_fit(site: None, tmp_path: Path) -> None:
     assert tables.info(store).samples == 8
     done = CliRunner().invoke(app, [*words[:-1], "--dry-run", "--count", "1"])
     assert "nothing fits into --count 1 (a grid grows by whole lines: give at least --count 2)" in done.output
+    Store.open(tmp_path / "empty", create=True)
+    for held in ("empty", "nowhere"):
+        wrong = CliRunner().invoke(app, [*words, "--dry-run", "--held-out", str(tmp_path / held)])
+        assert wrong.exit_code == 2, held
+    between = Store.open(tmp_path / "between", create=True)
+    sweep(between, Plan.parse({**GRID, "axes": {"te": [0.03], "gamma": [15, 100]}}))
+    done = CliRunner().invoke(app, [*words, "--dry-run", "--held-out", str(between.root)])
+    assert done.exit_code == 0, done.output
+    said = json.loads(done.stdout)
+    assert (said["held_out"], said["held_runs"]) == held_out_error(store, "default", between.root, "L2nr")
+    assert said["held_runs"] == 2
     done = CliRunner().invoke(app, [*words, "--count", "2"])
     assert json.loads(done.stdout)["added"] == 2
     assert len(store.ledger.jobs("done", refine.name_of(plan).replace("plan", "grid"))) == 2

@@ -9,9 +9,7 @@ linearly, as displacements do, and below the onset there is no power to divide b
 
 from __future__ import annotations
 
-import itertools
 from functools import lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +17,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ...kept import Kept
-from ...surfaces import alone, harmonics
+from ...surfaces import harmonics, steps
 from . import poles
 from .weights import Samples
 
@@ -35,8 +33,8 @@ _FAINT = 1e-3
 #: No band is made stronger or weaker than this: sixteen incoherent samples lose a factor of four.
 _MOST = 4.0
 _QUANTILES = (np.arange(48) + 0.5) / 48
-#: Bytes of what leads from gains to factors that are kept over all tables: .2 MB at 64 colatitudes, 1 at 128.
-_ROOM = 32 << 20
+#: Bytes of what leads from gains to factors that are kept over all tables: 50 kB at 64 colatitudes, .2 MB at 128.
+_ROOM = 8 << 20
 
 
 class Bands:
@@ -71,7 +69,8 @@ class Targets:
         flat = below.reshape(-1, below.shape[-1])
         quantiles = np.array([np.interp(_QUANTILES, row, self.bands.edges) for row in flat])
         # what quantiles and back do to a sample's own spectrum is undone in the same proportion
-        back = np.array([self._shares(row) for row in quantiles])
+        back = self._shares(quantiles)
+        back /= back.sum(axis=1, keepdims=True)
         true = (own + even) / (own + even).sum(axis=-1, keepdims=True)
         self._mended = np.log(true / back.reshape(true.shape))
         self._quantiles = quantiles.reshape(*true.shape[:-1], -1)
@@ -94,44 +93,47 @@ class Targets:
 
     def _powers(self, point: Array, samples: tuple[int, ...], weights: Array, stages: tuple[int, ...]) -> Array:
         """Return the powers (stages, bands) wanted at stored stages."""
-        known = self._known(samples, stages)
+        known, bands = self._known(samples, stages), len(self.bands.first)
         mean = (weights.T[:, None] @ known.rows)[:, 0]
-        points, totals, moved, mended = (mean[:, part] for part in known.parts)
-        step = np.einsum("kja,ja->kj", known.slopes, point - points)
-        total = np.exp(totals[:, 0] + step[0])
+        to_total, to_centroid = known.slopes @ point
+        total = np.exp(mean[:, 0] + to_total)
         # weights that are negative may turn quantiles round
-        moved = np.maximum.accumulate(moved, axis=1) + step[1, :, None]
-        shares = np.array([self._shares(row) for row in moved]) * np.exp(mended)
-        found: Array = np.maximum(total - _NOTHING, 0)[:, None] * shares / shares.sum(axis=1, keepdims=True)
-        return found
+        moved = np.maximum.accumulate(mean[:, 1:-bands], axis=1)
+        moved += to_centroid[:, None]
+        shares = self._shares(moved)
+        shares *= np.exp(mean[:, -bands:])
+        shares *= (np.maximum(total - _NOTHING, 0) / shares.sum(axis=1))[:, None]
+        return shares
 
     def _known_of(self, samples: tuple[int, ...], stages: tuple[int, ...]) -> _Known:
         i, j = np.array(samples), np.array(stages)[:, None]
-        points = np.broadcast_to(self._points[i], (len(stages), *self._points[i].shape))
-        rows = [points, self._total[i, j][..., None], self._quantiles[i, j], self._mended[i, j]]
-        ends = np.cumsum([0, *(row.shape[-1] for row in rows)]).tolist()
         slopes = np.stack([self._total_slope[j[:, 0]], self._centroid_slope[j[:, 0]]])
-        return _Known(np.concatenate(rows, axis=-1), tuple(itertools.starmap(slice, pairwise(ends))), slopes)
+        own = (slopes @ self._points[i].T)[..., None]
+        rows = [self._total[i, j][..., None] - own[0], self._quantiles[i, j] - own[1], self._mended[i, j]]
+        return _Known(np.concatenate(rows, axis=-1), slopes)
 
     def _shares(self, quantiles: Array) -> Array:
-        """Return the shares (bands,) of a distribution given by its quantiles; no band is quite empty."""
-        knots = np.empty(len(quantiles) + 2)
-        knots[1:-1] = quantiles
-        knots[0], knots[-1] = 2 * quantiles[0] - quantiles[1], 2 * quantiles[-1] - quantiles[-2]
-        below = np.interp(self.bands.edges, knots, _KNOTS, left=0, right=1)
-        below[0], below[-1] = 0, 1
-        shares: Array = below[1:] - below[:-1] + 1e-4
-        shares /= shares.sum()
+        """Return the shares (count, bands), which sum to about 1, of distributions given by their quantiles; no band is
+        quite empty.
+        """
+        knots = np.empty((len(quantiles), quantiles.shape[1] + 2))
+        knots[:, 1:-1] = quantiles
+        knots[:, 0] = 2 * quantiles[:, 0] - quantiles[:, 1]
+        knots[:, -1] = 2 * quantiles[:, -1] - quantiles[:, -2]
+        below = np.array([np.interp(self.bands.edges, row, _KNOTS, left=0, right=1) for row in knots])
+        below[:, 0], below[:, -1] = 0, 1
+        shares: Array = below[:, 1:] - below[:, :-1]
+        shares += 1e-4
         return shares
 
 
 class _Known(NamedTuple):
-    """What is known at some stages of some samples: `rows` (stages, samples, ...) of which `parts` are their points,
-    totals, quantiles and mended shares; and the `slopes` (2, stages, axes) of totals and centroids.
+    """What is known at some stages of some samples: `rows` (stages, samples, ...) of their total, quantiles and mended
+    shares, the first two as they were at the points' origin; and the `slopes` (2, stages, axes) of totals and
+    centroids, which lead from there to a point.
     """
 
     rows: Array
-    parts: tuple[slice, ...]
     slopes: Array
 
 
@@ -155,18 +157,28 @@ def multiplier(gains: Array, bands: Bands, band: int) -> Array:
     is known, and taken out beforehand. The shape of the fruit, below `LOWEST`, keeps the factor 1.
     """
     sharp = np.minimum(np.maximum(1 + _unleak(bands.highest) @ (gains - 1), 1 / _MOST), _MOST)
-    excess = alone.total((sharp - 1).astype(np.float32), _kept_spreading(band, tuple(bands.centres.tolist())))
-    excess += np.float32(1)
-    found: Array = excess.reshape(band + 1, band + 1)
-    return found
+    values = np.zeros(len(sharp) + 1, np.float32)
+    np.subtract(sharp, 1, out=values[:-1], casting="same_kind")
+    ramp = _kept.get((band, bands.highest), lambda: _ramp(band, tuple(bands.centres.tolist())))
+    return steps.now().ramp(values, *ramp).reshape(band + 1, band + 1)
 
 
-def _kept_spreading(band: int, centres: tuple[float, ...]) -> Array:
-    """Return `_spreading` transposed, (bands, m k)."""
-    return _kept.get((band, centres), lambda: np.ascontiguousarray(_spreading(band, centres).T, np.float32))
+class _Ramp(NamedTuple):
+    """`_spreading` without its zeros: the first band (m k,) that counts at a mode, how far, and how far the next."""
+
+    place: Array
+    low: Array
+    high: Array
 
 
-_kept: Kept[tuple[int, tuple[float, ...]], Array] = Kept(_ROOM, lambda matrix: matrix.nbytes)
+def _ramp(band: int, centres: tuple[float, ...]) -> _Ramp:
+    spread = np.column_stack([_spreading(band, centres), np.zeros((band + 1) ** 2)]).astype(np.float32)
+    place = np.minimum((spread != 0).argmax(axis=1), len(centres) - 1)
+    mode = np.arange(len(place))
+    return _Ramp(place.astype(np.int32), spread[mode, place], spread[mode, place + 1])
+
+
+_kept: Kept[tuple[int, int], _Ramp] = Kept(_ROOM, lambda ramp: sum(part.nbytes for part in ramp))
 
 
 def _spreading(band: int, centres: tuple[float, ...]) -> Array:

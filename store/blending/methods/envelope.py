@@ -21,7 +21,7 @@ from ...surfaces.harmonics import legendre
 from ...surfaces.window import Patch
 from .cells import COARSE
 
-__all__ = ["Total", "apply", "at_poles", "factor", "take_low"]
+__all__ = ["Total", "apply", "at_poles", "factor", "on", "take_low"]
 
 
 #: Share of the mean square below which a place counts as smooth, and the power [r1^2] of nothing.
@@ -60,26 +60,32 @@ def factor(mean: Array, wanted: Array, total: Total | None = None) -> Array:
 def take_low(waves: Array, low: Array) -> None:
     """Subtract harmonics below `LOWEST`, `low` (3, m, l), from spectra (3, m, k)."""
     series = harmonics.low_series(waves.shape[-1] - 1)
-    waves[:, : harmonics.LOWEST] -= np.einsum("cml,mlk->cmk", low, series).astype(waves.dtype)
+    waves[:, : harmonics.LOWEST] -= np.matmul(low.transpose(1, 0, 2), series).transpose(1, 0, 2).astype(waves.dtype)
 
 
 def apply(planes: Array, ratio: Array, low: Array, patch: Patch) -> None:
     """Multiply wrinkles (c, height, width) on a patch by the factor, given as `ratio` (12, 24) on the coarse lattice,
     and add `low` (3, m, l) of the patch's components: all in place.
     """
-    kind = planes.dtype
-    planes *= _on_lattice(ratio, patch, kind)
+    factor, shape = on(ratio, low, patch, planes.dtype)
+    planes *= factor
+    planes += shape
+
+
+def on(ratio: Array, low: Array, patch: Patch, kind: np.dtype[Any]) -> tuple[Array, Array]:
+    """Return the factor (height, width) and the shape (c, height, width) on a patch, in a precision."""
     if len(patch.components) < len(low):
         low = low[list(patch.components)]
     parts = np.ascontiguousarray(low).view(float).reshape(len(low), -1).astype(kind)
     lines = alone.product(parts, _low_lines(patch.n, patch.top, patch.height, kind.str))
     around = window.around(patch.n, harmonics.LOWEST, patch.left, patch.width, kind.str)
-    planes += alone.product(lines.reshape(len(low) * patch.height, -1), around).reshape(planes.shape)
+    shape = alone.product(lines.reshape(len(low) * patch.height, -1), around)
+    return _on_lattice(ratio, patch, kind), shape.reshape(len(low), patch.height, patch.width)
 
 
 def at_poles(ratio: Array) -> Array:
     """Return the factor (2,) at the poles, where only its mean over the azimuth is left."""
-    found: Array = ratio.mean(axis=1) @ _to_poles()
+    found: Array = ratio.ravel() @ _to_poles()
     return found
 
 
@@ -124,9 +130,10 @@ def _series(held: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=1)
 def _to_poles() -> Array:
-    """Return the matrix (12, 2) from means over the azimuth to the poles."""
-    cosines = _series(COARSE)[0]
-    return np.stack([cosines.sum(axis=1), cosines @ (-1.0) ** np.arange(COARSE + 1)], axis=1)
+    """Return the matrix (12 * 24, 2) from the coarse lattice to the poles: only means over the azimuth count there."""
+    cosines = _series(COARSE)[0] / (2 * COARSE)
+    ends = np.stack([cosines.sum(axis=1), cosines @ (-1.0) ** np.arange(COARSE + 1)], axis=1)
+    return np.repeat(ends, 2 * COARSE, axis=0)
 
 
 @lru_cache(maxsize=16)

@@ -25,11 +25,17 @@ def leaning(weights: Array, alike: Array) -> Array:
     """Return the weights (samples, stages) to which `weights` (samples,), which sum to 1, lean where samples are
     `alike` (stages,) by no more than that: from 0, nothing, to 1, for which they stay as they are.
     """
-    steep = np.multiply.outer(weights, 1 + _STEEPER * (1 - alike))
-    falling = -np.sort(-steep, axis=0)
-    count = np.arange(1, len(weights) + 1)[:, None]
-    over = (np.cumsum(falling, axis=0) - 1) / count
-    # the last one that is above what is taken off all
-    last = (falling > over).sum(axis=0) - 1
-    found: Array = np.maximum(steep - over[last, np.arange(len(alike))], 0)
-    return found
+    of = {a: _projected([w * (1 + _STEEPER * (1 - a)) for w in weights.tolist()]) for a in {*alike.tolist()}}
+    return np.array([of[a] for a in alike.tolist()]).reshape(len(alike), len(weights)).T
+
+
+def _projected(steep: list[float]) -> list[float]:
+    """Return the nearest weights that are none of them negative and sum to 1."""
+    # one by one: so few numbers take longer as arrays
+    falling, over = 0.0, 0.0
+    for count, weight in enumerate(sorted(steep, reverse=True), 1):
+        falling += weight
+        # what is taken off all: that of the last one that is above it
+        most = (falling - 1) / count
+        over = most if weight > most else over
+    return [max(weight - over, 0.0) for weight in steep]

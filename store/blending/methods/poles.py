@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from solver.arrays import Array
 
 from ...kept import Kept
+from ...surfaces import steps
 
 __all__ = ["highest_degree", "multiply"]
 
@@ -38,21 +39,17 @@ def multiply(waves: Array, factor: Array, degree: int) -> None:
 
     Nothing is added at latitudes where waves m of degrees up to `degree` cannot be.
     """
-    gain = (factor - 1).astype(factor.dtype)
     count, band = len(waves), waves.shape[1] - 1
     real = waves.real.dtype
-    parts = waves.view(real).reshape(count, band + 1, band + 1, 2)
+    parts, way = waves.view(real).reshape(count, band + 1, band + 1, 2), steps.now()
     # a window is the same on both hemispheres, so even and odd k do not mix: half the products
-    kept_windows = _kept.get((band, degree, real.str), lambda: _windows(band, degree, real.str))
-    for first, windows in enumerate(kept_windows):
-        kept = len(windows)
-        rows = np.empty((kept, count, 2, windows.shape[-1]), real)
-        by = gain[:kept, None, None, first::2]
-        np.multiply(parts[:, :kept, first::2].transpose(1, 0, 3, 2), by, out=rows)
-        lines = (rows.reshape(kept, 2 * count, -1) @ windows).reshape(rows.shape)
-        # part by part: numpy's innermost loop is otherwise two numbers long
-        for i, sums in enumerate((waves.real, waves.imag)):
-            sums[:, :kept, first::2] += lines[:, :, i].transpose(1, 0, 2)
+    windows = _kept.get((band, degree, real.str), lambda: _windows(band, degree, real.str))
+    rows = [np.empty((len(one), count, 2, one.shape[-1]), real) for one in windows]
+    way.gather(parts, factor, rows[0], rows[1])
+    lines = [
+        (row.reshape(len(row), 2 * count, -1) @ one).reshape(row.shape) for row, one in zip(rows, windows, strict=True)
+    ]
+    way.scatter(parts, lines[0], lines[1])
 
 
 def _windows(band: int, degree: int, dtype: str) -> tuple[Array, Array]:

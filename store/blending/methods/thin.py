@@ -34,6 +34,8 @@ _CALM, _WILD = 2.0, 3.0
 _ALL, _MOST = 16, 12
 #: Power [r1^2] below which there is no pattern to be like.
 _NOTHING = 1e-12
+#: What is left of 1 after all shares, at most, where they sum to it.
+_ROUNDED = 1e-12
 
 
 class Mixture(NamedTuple):
@@ -51,6 +53,18 @@ def outer(near: Weighted, stages: int) -> Mixture:
     return Mixture(near.samples, np.repeat(near.weights[:, None], stages, axis=1), np.ones(stages))
 
 
+class _Cell(NamedTuple):
+    """What is known of some samples at some stages: how far the splines count at them, `shares` (samples, stages); all
+    that are `taken` part of the splines and they, among which their own `places` are; and each spline, with its
+    samples' places and what it has of the shares.
+    """
+
+    shares: Array
+    taken: Array
+    places: Array
+    splines: list[tuple[_Spline, Array, Array]]
+
+
 class Thin:
     """Splines through the samples of a table with spectra (sample, stage, component, m, k, part)."""
 
@@ -62,6 +76,7 @@ class Thin:
             self._beside.setdefault(b, []).append(a)
         self._spline = lru_cache(maxsize=256)(self._spline_of)
         self._share = lru_cache(maxsize=4096)(self._share_of)
+        self._cell = lru_cache(maxsize=1024)(self._cell_of)
 
     def mix(
         self, near: Weighted, point: Array, stages: Sequence[int], without: int | None = None, lean: bool = False
@@ -72,31 +87,36 @@ class Thin:
         if len(near.samples) == 1:  # a spline passes through it
             share = np.array([self._share(int(near.samples[0]), j) for j in stages])
             return Mixture(near.samples, np.ones((1, len(stages))), 1 - share)
-        shares: dict[_Spline, Array] = {}
-        alike = np.zeros(len(stages))
-        for i, weight in zip(near.samples.tolist(), near.weights.tolist(), strict=True):
-            spline = self._spline(i, without)
-            share = weight * np.array([self._share(i, j) for j in stages])
-            alike += share
-            if spline is not None:
-                shares[spline] = shares.get(spline, 0.0) + share
+        known = self._cell(tuple(near.samples.tolist()), tuple(stages), without)
+        alike = near.weights @ known.shares
         # weights of samples that are alike stay as they are
         leans = lean and float(alike.min(initial=1.0)) < 1
         rest = leaning(near.weights, alike) if leans else outer(near, len(stages)).weights
-        found = [(spline, share) for spline, share in shares.items() if share.any()]
-        if not found:
+        if not known.splines:
             return Mixture(near.samples, rest, np.ones(len(stages)))
-        taken = sorted({*near.samples.tolist(), *(i for spline, _ in found for i in spline.samples)})
-        place = {i: k for k, i in enumerate(taken)}
-        weights, left = np.zeros((len(taken), len(stages))), np.ones(len(stages))
-        lossy = np.maximum(left - sum(share for _, share in found), 0.0)
-        for spline, share in found:
-            own = spline.weights(point)
+        weights, left = np.zeros((len(known.taken), len(stages))), np.ones(len(stages))
+        lossy = left.copy()
+        for spline, places, own_shares in known.splines:
+            share, own = near.weights @ own_shares, spline.weights(point)
             counts = share * _ramp(float(np.abs(own).sum()), _WILD, _CALM)
-            weights[[place[i] for i in spline.samples]] += np.multiply.outer(own, counts)
+            weights[places] += np.multiply.outer(own, counts)
             left -= counts
-        weights[[place[i] for i in near.samples.tolist()]] += rest * left
-        return Mixture(np.array(taken), weights, lossy)
+            lossy -= share
+        weights[known.places] += rest * left
+        # shares that are all of it sum to 1 but for round-off, for which nothing is to be given back
+        return Mixture(known.taken, weights, np.where(lossy < _ROUNDED, 0.0, lossy))
+
+    def _cell_of(self, samples: tuple[int, ...], stages: tuple[int, ...], without: int | None) -> _Cell:
+        shares = np.array([[self._share(i, j) for j in stages] for i in samples]).reshape(len(samples), -1)
+        of_spline: dict[_Spline, Array] = {}
+        for k, i in enumerate(samples):
+            spline = self._spline(i, without)
+            if spline is not None and shares[k].any():
+                of_spline.setdefault(spline, np.zeros_like(shares))[k] = shares[k]
+        taken = sorted({*samples, *(i for spline in of_spline for i in spline.samples)})
+        place = {i: k for k, i in enumerate(taken)}
+        splines = [(one, np.array([place[i] for i in one.samples]), own) for one, own in of_spline.items()]
+        return _Cell(shares, np.array(taken), np.array([place[i] for i in samples]), splines)
 
     def _spline_of(self, i: int, without: int | None) -> _Spline | None:
         distance = np.linalg.norm(self._points - self._points[i], axis=1)
