@@ -53,7 +53,7 @@ def say(error: ValidationError, fields: Mapping[str, Any], typed: Mapping[Place,
             parts.append(f"unknown name {SHORT.repr(where)}{hint}")
         else:
             # who puts findings into a sentence ends it
-            message = item["msg"].removeprefix("Value error, ").removesuffix(".")
+            message = _kind(item) or item["msg"].removeprefix("Value error, ").removesuffix(".")
             got = item.get("input")
             shown = f" (got {SHORT.repr(got)})" if where and not isinstance(got, dict) else ""
             parts.append(f"{where + ': ' if where else ''}{message}{shown}")
@@ -76,7 +76,23 @@ def advise(error: ValidationError, typed: Mapping[Place, str] = MappingProxyType
             said.append(f"Give {where} a whole number.")
         elif item["type"] in ("float_parsing", "float_type", "finite_number"):
             said.append(f"Give {where} a finite number.")
+        elif item["type"] == "union_tag_not_found":
+            said.append(f"Give {where} a {context['discriminator'].strip(chr(39))}.")
     return " ".join(said)
+
+
+def _kind(item: Mapping[str, Any]) -> str:
+    """Say what is wrong with the name that tells one kind of thing from another; "" where that is not what is."""
+    context = item.get("ctx", {})
+    name = context.get("discriminator", "").strip("'")
+    if item["type"] == "union_tag_not_found":
+        return f"it does not say of which {name} it is"
+    if item["type"] != "union_tag_invalid":
+        return ""
+    known = context["expected_tags"].replace("'", "").split(", ")
+    near = difflib.get_close_matches(context["tag"], known, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"there is no {name} {SHORT.repr(context['tag'])}; {hint}known: {', '.join(known)}"
 
 
 def _called(place: Place, typed: Mapping[Place, str]) -> str:

@@ -323,3 +323,19 @@ def test_a_path_into_a_group_is_no_name_and_gets_a_hint():
     assert "known:" not in str(found.value)
     with pytest.raises(InvalidInput, match=r"'rods\.spiral'; known: "):
         wood.parse({"rods.spiral": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("tool", "said"),
+    [
+        (
+            {"kind": "spott", "at": [0, 0, 1]},
+            r"tools\.0: there is no kind 'spott'; did you mean 'spot'\? known: spot, ",
+        ),
+        ({"at": [0, 0, 1]}, r"tools\.0: it does not say of which kind it is\. Give tools\.0 a kind\."),
+        ({"kind": "surface", "where": {"kind": "x"}}, r"where: there is no kind 'x'; known: everywhere, "),
+    ],
+)
+def test_a_wrong_kind_is_told_with_those_that_there_are(tool: dict[str, object], said: str) -> None:
+    with pytest.raises(InvalidInput, match=said):
+        registry.get("growth").parse({"tools": [tool]})

@@ -22,7 +22,7 @@ from sweeps.errors import InvalidOption, PlanError
 from sweeps.planning.plan import Plan
 from sweeps.refining import refine
 from sweeps.refining.refine import Proposal, State
-from sweeps.refining.rounds import Propose, Round, rounds
+from sweeps.refining.rounds import Propose, Round, held_out_error, rounds
 from sweeps.running import executors
 from sweeps.running.runner import run_plan
 
