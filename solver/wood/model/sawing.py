@@ -111,7 +111,7 @@ def _halfway(begun: float, ends: float, cut: Cut, length: float) -> float:
     middle = (begun + ends) / 2
     if not 0 < begun <= ends < length:
         middle = (cut.low[0] + cut.high[0]) / 2
-    return middle if 0 < middle < length and begun <= middle <= ends else math.nan
+    return middle if begun <= middle <= ends else math.nan
 
 
 def placed_on(

@@ -1,0 +1,129 @@
+"""What is said of a wood run before it begins: cuts, notches and grips that meet nothing, and wood that is no wood."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from solver.contract import Context, InvalidGeometry, Need, NotConverged
+from solver.wood import SOLVER
+
+FINE = {"fracture": "none", "rods": 20, "vertices": 12}
+ROUND = "from 0 to 0.15 m along x, -0.01 to 0.01 m along y and -0.01 to 0.01 m along z"
+
+
+def cut(low: tuple[float, float, float], high: tuple[float, float, float]) -> dict[str, Any]:
+    return {"cuts": [{"low": low, "high": high}]}
+
+
+def remarks(values: dict[str, Any], quality: str = "default") -> str:
+    need = SOLVER.settle(Need.model_validate({"quality": quality}))
+    assert SOLVER.remarks is not None
+    return SOLVER.remarks(SOLVER.parse({**FINE, **values}), need)
+
+
+@pytest.mark.parametrize(
+    ("values", "meets"),
+    [
+        (cut((0.06, -1, 0), (0.06, 1, 1)), True),
+        (cut((0.06, -1, 0.0099), (0.06, 1, 1)), True),
+        (cut((0.06, -1, 0.0102), (0.06, 1, 1)), False),
+        # in the square about the round section, and beside it
+        (cut((0.06, 0.008, 0.008), (0.06, 1, 1)), False),
+        (cut((0.06, 0.005, 0.005), (0.06, 1, 1)), True),
+        (cut((0.2, -1, -1), (0.2, 1, 1)), False),
+        # a cut at the very end cuts nothing off
+        (cut((0.0, -1, -1), (0.0, 1, 1)), False),
+        (cut((0.15, -1, -1), (0.15, 1, 1)), False),
+        (cut((-1, -1, -1), (0.15, 1, 1)), True),
+        # where it tapers to half there is nothing left so far up
+        ({**cut((0.14, -1, 0.006), (0.15, 1, 1)), "taper": 0.5}, False),
+        ({**cut((0.1, -1, 0.006), (0.15, 1, 1)), "taper": 0.5}, True),
+        # an outline's centroid becomes the axis
+        ({**cut((0.06, -1, 0.006), (0.06, 1, 1)), "outline": [(0, 0), (0.02, 0), (0.02, 0.01), (0, 0.01)]}, False),
+        ({**cut((0.06, -1, 0.004), (0.06, 1, 1)), "outline": [(0, 0), (0.02, 0), (0.02, 0.01), (0, 0.01)]}, True),
+    ],
+)
+def test_a_cut_that_meets_nothing_is_told_of(values: dict[str, Any], meets: bool) -> None:
+    said = remarks(values)
+    assert ("cuts[0] meets nothing of the branch" in said) is not meets, said
+    if "outline" not in values and not meets:
+        assert ROUND in said
+        assert "move its box into it" in said
+
+
+def test_it_is_said_before_work_and_stays_with_the_result() -> None:
+    """Also of a cut that is in the branch and passes between rods, which is known when they are laid."""
+    told: list[str] = []
+    values = {
+        "cuts": [{"low": (0.2, -1, -1), "high": (0.2, 1, 1)}, {"low": (0.06, 0, 0), "high": (0.0601, 1e-9, 1e-9)}]
+    }
+    params = SOLVER.parse({**FINE, **values})
+    run = SOLVER.solve(params, Need(stages=(0.0,), fields=("work",)), Context(lambda _, what: told.append(what)))
+    assert "cuts[0] meets nothing of the branch" in told[0]
+    assert told[1].startswith("cuts[1] passes between the ")
+    assert "larger box" in told[1]
+    assert run.attrs["note"] == f"{told[0]}; {told[1]}"
+    whole = SOLVER.solve(
+        SOLVER.parse({**FINE, **cut((0.06, -1, 0), (0.06, 1, 1))}), Need(stages=(0.0,), fields=("work",))
+    )
+    assert "note" not in whole.attrs
+
+
+def test_no_more_than_five_are_told_of_one_by_one() -> None:
+    said = remarks({"cuts": [{"low": (0.2, -1, -1), "high": (0.2, 1, 1)}] * 9})
+    assert said.count("meets nothing") == 5
+    assert said.endswith("the same goes for 4 more")
+
+
+@pytest.mark.parametrize(
+    ("notch", "more", "said"),
+    [
+        ({"depth": 0.5}, {}, ""),
+        ({"depth": 0.5}, {"fracture": "none"}, "notches[0] does nothing, as nothing breaks"),
+        ({"depth": 0.0}, {}, "notches[0] has no depth"),
+        # 29 edges of 5.2 mm, eight places each
+        ({"depth": 0.5, "width": 6.6e-4}, {}, ""),
+        ({"depth": 0.5, "width": 6.4e-4}, {}, "strengths are known every 0.647 mm, so that it misses some rods"),
+        ({"depth": 0.5}, {"fracture": "vertex"}, "strengths are known every 5.17 mm"),
+    ],
+)
+def test_a_notch_that_weakens_nothing_is_told_of(notch: dict[str, Any], more: dict[str, Any], said: str) -> None:
+    # one rod, of whose edges nothing else is said
+    values = {"rods": 1, "vertices": 30, "fracture": "stress", "notches": [{"position": 0.05, **notch}], **more}
+    found = remarks(values)
+    assert (said in found) if said else not found
+    if "misses" in said:
+        # and as many vertices as it says do
+        enough = int(found.split("or ")[-1].split(" ")[0])
+        assert enough == 31
+        assert not remarks({**values, "vertices": enough})
+
+
+def test_a_grip_beside_the_branch_is_refused_before_it_is_laid() -> None:
+    with pytest.raises(InvalidGeometry, match="grip 0 holds no vertex") as caught:
+        remarks({"grips": [{"low": (0.2, -1, -1), "high": (1, 1, 1)}]})
+    assert ROUND in caught.value.advice
+    assert not remarks({"grips": [{"low": (0.15, -1, -1), "high": (1, 1, 1)}]})
+
+
+def test_equilibria_of_a_stiffness_that_is_no_wood_s_are_told_of_and_what_would_do() -> None:
+    values = {"mode": "static", "radius": 0.005, "tip_load": (0, 0, -5.0), "stiffness": 1e3, "shear": 70.0}
+    said = remarks({**values, "transverse": 50.0})
+    # 5 N on 78.5 mm2: a tenth at 0.64 MPa
+    assert "by 64 of its length" in said
+    assert "a stiffness of 6.4e+05 Pa or more" in said
+    assert not remarks({**values, "stiffness": 6.5e5})
+    assert "by 0.64 of" in remarks({**values, "stiffness": 4e5, "taper": 0.5, "transverse": 50.0})
+    # weight hangs on the thick end
+    assert "by 0.88 of" in remarks({"mode": "static", "gravity": 9.81, "stiffness": 1e3, "taper": 0.05})
+    assert not remarks({**values, "mode": "explicit"})
+    params = SOLVER.parse({**FINE, **values, "transverse": 50.0, "vertices": 6})
+    with pytest.raises(NotConverged, match="no equilibrium was found") as caught:
+        SOLVER.solve(params, Need(stages=(1.0,), fields=("work",)))
+    assert "a greater stiffness" in caught.value.advice
+
+
+def test_what_auto_chooses_is_told_at_every_door() -> None:
+    assert "masses scaled" in remarks({"mode": "auto", "bodies": SOLVER.presets["press"]["bodies"], "clamp": "none"})
