@@ -17,10 +17,10 @@ from typing import NamedTuple
 from .params import Body, Waypoint, WoodParams
 from .shape.curve import Curve
 
-__all__ = ["Choice", "decide", "error_at"]
+__all__ = ["ERROR", "Choice", "decide", "error_at"]
 
 #: Largest error of elastic forces that scaled masses may bring.
-_ERROR = 0.02
+ERROR = 0.02
 #: The most that masses are scaled: beyond it elastic energy was measured off by more than 0.1 % (docs/wood.md).
 _MOST = 1e5
 #: Scaling that is not worth its error: steps grow by the root of it.
@@ -186,7 +186,7 @@ def decide(params: WoodParams) -> Choice:
         why = f"weight and tip load act at once and strain rods to {100 * strained:.3g} % of their limit"
         return Choice("explicit", 1.0, 0.0, f"real masses, as {why}")
     scaling = _MOST
-    while scaling > 1 and error_at(params, scaling) > _ERROR:
+    while scaling > 1 and error_at(params, scaling) > ERROR:
         scaling /= 1.1
     drives = f"what moves needs {time:.2g} s to break or bend the wood, {time / period:.3g} times the slowest period"
     if scaling < _LEAST:

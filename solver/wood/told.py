@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..contract import InvalidGeometry, Quality
-from .choosing import decide
+from .choosing import ERROR, decide, error_at
 from .model.bundle import SAMPLES
 from .model.gripping import NOTHING
 from .model.joining import longest_edge
@@ -64,7 +64,20 @@ def note(params: WoodParams, quality: Quality) -> str:
         InvalidGeometry: a grip holds nothing.
 
     """
-    return "; ".join(settled(params, choose(params, quality).vertices)[2])
+    chosen, said, notes = settled(params, choose(params, quality).vertices)
+    return "; ".join([*notes, *(() if said else _heavy(chosen))])
+
+
+def _heavy(params: WoodParams) -> Iterator[str]:
+    """Yield what to say of masses scaled by hand that loads are too fast for; of what moves freely nobody knows."""
+    if params.mass_scaling > 1 and params.mode == "explicit":
+        error = error_at(params, params.mass_scaling)
+        if error > ERROR:
+            yield (
+                f"loads are too fast for masses scaled {params.mass_scaling:g} times: forces of what is whole are off "
+                f"by some {100 * error:.0f} %. Load it more slowly, scale less, or leave mass_scaling out and set mode "
+                "auto, which chooses"
+            )
 
 
 def idle(wood: Wood, params: WoodParams) -> list[str]:
