@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from .params import Body, Waypoint, WoodParams
+from .params import Body, GripPoint, Waypoint, WoodParams
 from .shape.curve import Curve
 
-__all__ = ["ERROR", "Choice", "decide", "error_at"]
+__all__ = ["ERROR", "Choice", "decide", "error_at", "swept", "turned"]
 
 #: Largest error of elastic forces that scaled masses may bring.
 ERROR = 0.02
@@ -100,7 +100,7 @@ def _driven(params: WoodParams, held: _Held) -> float:
     turns = min(params.strain_limit * reach / r, params.shear_strength / max(params.shear, 1e-9) * reach / r)
     found = [math.inf]
     for body in params.bodies:
-        ways = [(_swept(body, a, b), b.time - a.time) for a, b in pairwise(body.path)]
+        ways = [(swept(body, a, b), b.time - a.time) for a, b in pairwise(body.path)]
         found.append(_time(ways, sags))
     for grip in params.grips:
         steps = list(pairwise(grip.path))
@@ -111,11 +111,16 @@ def _driven(params: WoodParams, held: _Held) -> float:
     return min(found)
 
 
-def _swept(body: Body, a: Waypoint, b: Waypoint) -> float:
+def swept(body: Body, a: Waypoint, b: Waypoint) -> float:
     """Return how far [m] a body's farthest point goes from one waypoint to the next, at most."""
     points = [body.size] if body.mesh is None else body.mesh.points
     arm = max(math.hypot(*p) for p in points) + (math.hypot(*body.pivot) if body.pivot is not None else 0.0)
     return math.dist(a.position, b.position) + math.dist(a.turn, b.turn) * arm
+
+
+def turned(a: GripPoint, b: GripPoint, arm: float) -> float:
+    """Return how far [m] what a grip holds, `arm` [m] long at most, goes from one point of its path to the next."""
+    return math.dist(a.shift, b.shift) + math.dist(a.turn, b.turn) * arm
 
 
 def _time(ways: list[tuple[float, float]], enough: float) -> float:

@@ -24,6 +24,7 @@ from .pieces import pieces
 from .settings import choose
 from .stepping.marching import explicit
 from .stepping.moment import Reached
+from .stepping.speeds import few_enough, slow_enough
 from .stepping.stability import longest_step, touchable
 from .stresses import BOND, ROD, Stresses
 from .surface.skin import Skin
@@ -42,7 +43,8 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     """Return energies, counts and centre lines at the wanted times; see `solver.quantities` for units.
 
     Raises:
-        InvalidInput: the need names a part of a fruit's surface.
+        InvalidInput: the need names a part of a fruit's surface, something is past the wood between two
+            steps, or these would be too many.
         Unstable: the run blew up; carries the stages before.
         NotConverged: an equilibrium was not found; carries the stages before.
         Cancelled: the observer asked to stop.
@@ -76,6 +78,8 @@ def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         contact = float(law(wood, params)[1]) if params.touching else 0.0
         longest = longest_step(wood, contact)
         dt = min(settings.courant * longest, params.step or np.inf)
+        few_enough(dt, need.stages[-1])
+        slow_enough(params, dt, params.length / (settings.vertices - 1))
         wood = touchable(wood, dt, contact)
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context, settings.courant)

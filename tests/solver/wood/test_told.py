@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from solver.contract import Context, InvalidGeometry, Need, NotConverged
+from solver.contract import Context, InvalidGeometry, InvalidInput, Need, NotConverged, Unstable
 from solver.wood import SOLVER
 
 ROOT = Path(__file__).parents[3]
@@ -121,7 +121,9 @@ def test_equilibria_of_a_stiffness_that_is_no_wood_s_are_told_of_and_what_would_
     assert "by 0.64 of" in remarks({**values, "stiffness": 4e5, "taper": 0.5, "transverse": 50.0})
     # weight hangs on the thick end
     assert "by 0.88 of" in remarks({"mode": "static", "gravity": 9.81, "stiffness": 1e3, "taper": 0.05})
-    assert not remarks({**values, "mode": "explicit"})
+    assert "by 64 of its length" in remarks({**values, "mode": "explicit"})
+    # what nothing holds, loads do not stretch
+    assert not remarks({**values, "mode": "explicit", "clamp": "none"})
     params = SOLVER.parse({**FINE, **values, "transverse": 50.0, "vertices": 6})
     with pytest.raises(NotConverged, match="no equilibrium was found") as caught:
         SOLVER.solve(params, Need(stages=(1.0,), fields=("work",)))
@@ -146,3 +148,60 @@ def test_masses_scaled_by_hand_beyond_the_loads_rate_are_told_of() -> None:
     # auto says its own error, once
     auto = {key: value for key, value in knee.items() if key != "mass_scaling"}
     assert "too fast for masses scaled" not in remarks({**auto, "mode": "auto"})
+
+
+def moved(time: float, far: float = -0.02, **more: Any) -> dict[str, Any]:
+    """Return a body that moves from above through the branch within a time [s]."""
+    path = [{"time": 0.0, "position": (0.1, 0, 0.0205)}, {"time": time, "position": (0.1, 0, far)}]
+    return {"bodies": [{"size": (0.01, 0.06, 0.02), "path": path, **more}]}
+
+
+def test_what_is_past_the_wood_between_two_steps_is_refused() -> None:
+    """It met nothing, broke nothing, and its energy balanced."""
+    for found in (lambda v: remarks(v), lambda v: SOLVER.solve(SOLVER.parse({**FINE, **v}), Need(stages=(1e-3,)))):
+        with pytest.raises(InvalidInput, match=r"bodies\.0 moves by") as caught:
+            found(moved(1e-8))
+        assert "times as long or more" in caught.value.advice
+        jump = [{"time": 0}, {"time": 1e-9, "shift": (0, 0, -1)}]
+        with pytest.raises(InvalidInput, match=r"grips\.0 moves by"):
+            found({"grips": [{"low": (0.14, -1, -1), "high": (1, 1, 1), "path": jump}]})
+    assert not remarks(moved(1e-3))
+    # the fastest part of a path counts
+    rests = moved(1e-3)
+    rests["bodies"][0]["path"] += [
+        {"time": 1.0, "position": (0.1, 0, -0.02)},
+        {"time": 1 + 1e-8, "position": (0.1, 0, 1)},
+    ]
+    with pytest.raises(InvalidInput, match=r"bodies\.0 moves by"):
+        remarks(rests)
+
+
+def test_the_run_knows_its_step_better_than_what_is_said_before() -> None:
+    """How long steps are is known when rods are laid; as slow as it is told to be then, the body meets the wood."""
+    quick = moved(1e-6)
+    assert not remarks(quick)
+    with pytest.raises(InvalidInput, match="past what is") as caught:
+        SOLVER.solve(SOLVER.parse({**FINE, **quick}), Need(stages=(1e-3,)))
+    times = int(caught.value.advice.split(" times")[0].split(" ")[-1])
+    assert times >= 2
+    slow = SOLVER.parse({**FINE, **moved(times * 1e-6)})
+    assert abs(float(SOLVER.solve(slow, Need(stages=(times * 1e-6 / 2,))).body_impulse[0, 0, 2])) > 0
+
+
+def test_steps_without_end_are_refused() -> None:
+    """A body of next to no mass, for which steps got as short; at 1e-300 kg a division by 0 was all that was said."""
+    for mass in (1e-20, 1e-300):
+        body = {"size": (0.01, 0.06, 0.01), "mass": mass, "path": [{"time": 0, "position": (0.1, 0, 0.0155)}]}
+        with pytest.raises(InvalidInput, match="no steps longer than") as caught:
+            SOLVER.solve(SOLVER.parse({**FINE, "bodies": [body]}), Need(stages=(1e-2,)))
+        assert "heavier bodies" in caught.value.advice
+
+
+def test_a_run_that_blows_up_names_what_is_there() -> None:
+    """A load that no rod bears was told of a contact where nothing touched."""
+    values = {**FINE, "tip_load": (0, 0, -1e7)}
+    assert "give loads 32 times smaller" in remarks(values)
+    with pytest.raises(Unstable) as caught:
+        SOLVER.solve(SOLVER.parse(values), Need(stages=(2e-3,)))
+    assert "smaller loads" in caught.value.advice
+    assert "contact" not in caught.value.advice
