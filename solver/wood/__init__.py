@@ -32,7 +32,7 @@ def _cost(params: WoodParams, need: Need) -> Cost:
 def _remarks(params: WoodParams, need: Need) -> str:
     from .told import note
 
-    return note(params, need.quality)
+    return note(params, need)
 
 
 def _extent(params: WoodParams) -> Extent:

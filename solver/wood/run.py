@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
-from ..contract import Context, InvalidInput, Need, SolverError
+from ..contract import Context, Need, SolverError
 from ..meshes import Frame, changing
 from .contact.listing import law
 from .fibres.hewing import hewn
@@ -29,7 +29,7 @@ from .stepping.stability import longest_step, touchable
 from .stresses import BOND, ROD, Stresses
 from .surface.skin import Skin
 from .surface.solids import among, shown
-from .told import idle, settled
+from .told import idle, settled, whole
 
 __all__ = ["run"]
 
@@ -50,8 +50,7 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         Cancelled: the observer asked to stop.
 
     """
-    if need.region is not None:
-        raise InvalidInput("wood has no colatitude and azimuth.", advice="Leave the region out.")
+    whole(need)
     # two threads take twice as long for fronts of some hundreds, and round otherwise: the net's shares as well as steps
     with threadpool_limits(1, user_api="blas"):
         return _run(params, need, context)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..contract import InvalidGeometry, Quality
+from ..contract import InvalidGeometry, InvalidInput, Need
 from .choosing import ERROR, decide, error_at
 from .model.bundle import SAMPLES
 from .model.gripping import NOTHING
@@ -20,7 +20,7 @@ from .settings import choose
 from .shape.taper import thickness
 from .stepping.speeds import slow_enough
 
-__all__ = ["idle", "note", "settled"]
+__all__ = ["idle", "note", "settled", "whole"]
 
 #: Sections of a taper at which a box may meet it; findings that are told.
 _SECTIONS, _MOST = 9, 5
@@ -63,16 +63,34 @@ def settled(params: WoodParams, vertices: int) -> tuple[WoodParams, dict[str, fl
     return params, said, notes + _short(found)
 
 
-def note(params: WoodParams, quality: Quality) -> str:
+def note(params: WoodParams, need: Need) -> str:
     """Return what a reader should know of a run of these parameters; nothing where there is nothing to tell.
 
     Raises:
         InvalidGeometry: a grip holds nothing.
-        InvalidInput: something is past the wood between two steps.
+        InvalidInput: the need names a part of a fruit's surface, or something is past the wood between two steps.
 
     """
-    chosen, said, notes = settled(params, choose(params, quality).vertices)
+    whole(need)
+    chosen, said, notes = settled(params, choose(params, need.quality).vertices)
+    last = max(need.stages, default=1.0)
+    if chosen.mode == "static" and last < 1:
+        notes.append(
+            f"loads of equilibria are full at 1 s, and the last stage, at {last:g} s, has {100 * last:.3g} % of them: "
+            "name stages up to 1"
+        )
     return "; ".join([*notes, *(() if said else _heavy(chosen))])
+
+
+def whole(need: Need) -> None:
+    """Refuse a part of a surface that wood has not.
+
+    Raises:
+        InvalidInput: see above.
+
+    """
+    if need.region is not None:
+        raise InvalidInput("wood has no colatitude and azimuth.", advice="Leave the region out.")
 
 
 def _heavy(params: WoodParams) -> Iterator[str]:

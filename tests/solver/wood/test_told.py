@@ -20,8 +20,8 @@ def cut(low: tuple[float, float, float], high: tuple[float, float, float]) -> di
     return {"cuts": [{"low": low, "high": high}]}
 
 
-def remarks(values: dict[str, Any], quality: str = "default") -> str:
-    need = SOLVER.settle(Need.model_validate({"quality": quality}))
+def remarks(values: dict[str, Any], **need_: Any) -> str:
+    need = SOLVER.settle(Need.model_validate({"stages": [1.0], **need_}))
     assert SOLVER.remarks is not None
     return SOLVER.remarks(SOLVER.parse({**FINE, **values}), need)
 
@@ -32,6 +32,8 @@ def remarks(values: dict[str, Any], quality: str = "default") -> str:
         (cut((0.06, -1, 0), (0.06, 1, 1)), True),
         (cut((0.06, -1, 0.0099), (0.06, 1, 1)), True),
         (cut((0.06, -1, 0.0102), (0.06, 1, 1)), False),
+        (cut((0.06, -1, -1), (0.06, 1, -0.0102)), False),
+        (cut((0.06, -1, -1), (0.06, 1, -0.0099)), True),
         # in the square about the round section, and beside it
         (cut((0.06, 0.008, 0.008), (0.06, 1, 1)), False),
         (cut((0.06, 0.005, 0.005), (0.06, 1, 1)), True),
@@ -205,3 +207,17 @@ def test_a_run_that_blows_up_names_what_is_there() -> None:
         SOLVER.solve(SOLVER.parse(values), Need(stages=(2e-3,)))
     assert "smaller loads" in caught.value.advice
     assert "contact" not in caught.value.advice
+
+
+def test_equilibria_under_a_share_of_their_loads_are_told_of() -> None:
+    """The stages that are usual end at 20 ms, where loads have a fiftieth of what they are."""
+    loaded = {"mode": "static", "tip_load": (0, 0, -1.0)}
+    assert "at 0.02 s, has 2 % of them: name stages up to 1" in remarks(loaded, stages=[])
+    assert "has 50 % of them" in remarks({**loaded, "mode": "auto"}, stages=[0.25, 0.5])
+    assert "of them" not in remarks({**loaded, "mode": "explicit"}, stages=[0.5])
+    assert not remarks(loaded, stages=[0.5, 1.0])
+
+
+def test_a_part_of_a_surface_is_refused_before_the_run() -> None:
+    with pytest.raises(InvalidInput, match="no colatitude"):
+        remarks({}, region={"colatitude": [0, 90], "azimuth": [0, 90]})
