@@ -29,6 +29,12 @@ def _cost(params: WoodParams, need: Need) -> Cost:
     return expected_cost(params, need)
 
 
+def _remarks(params: WoodParams, need: Need) -> str:
+    from .told import note
+
+    return note(params, need)
+
+
 def _extent(params: WoodParams) -> Extent:
     """Return the box of the bundle as it lies: along x, its section's y across and z upwards; in metres."""
     import numpy as np
@@ -96,4 +102,5 @@ SOLVER = Solver(
     error=expected_error,
     looks=LOOKS,
     extent=_extent,
+    remarks=_remarks,
 )

@@ -14,13 +14,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from .params import Body, Waypoint, WoodParams
+from .params import Body, GripPoint, Waypoint, WoodParams
 from .shape.curve import Curve
 
-__all__ = ["Choice", "decide", "error_at"]
+__all__ = ["ERROR", "Choice", "decide", "error_at", "swept", "turned"]
 
 #: Largest error of elastic forces that scaled masses may bring.
-_ERROR = 0.02
+ERROR = 0.02
 #: The most that masses are scaled: beyond it elastic energy was measured off by more than 0.1 % (docs/wood.md).
 _MOST = 1e5
 #: Scaling that is not worth its error: steps grow by the root of it.
@@ -100,7 +100,7 @@ def _driven(params: WoodParams, held: _Held) -> float:
     turns = min(params.strain_limit * reach / r, params.shear_strength / max(params.shear, 1e-9) * reach / r)
     found = [math.inf]
     for body in params.bodies:
-        ways = [(_swept(body, a, b), b.time - a.time) for a, b in pairwise(body.path)]
+        ways = [(swept(body, a, b), b.time - a.time) for a, b in pairwise(body.path)]
         found.append(_time(ways, sags))
     for grip in params.grips:
         steps = list(pairwise(grip.path))
@@ -111,11 +111,16 @@ def _driven(params: WoodParams, held: _Held) -> float:
     return min(found)
 
 
-def _swept(body: Body, a: Waypoint, b: Waypoint) -> float:
+def swept(body: Body, a: Waypoint, b: Waypoint) -> float:
     """Return how far [m] a body's farthest point goes from one waypoint to the next, at most."""
     points = [body.size] if body.mesh is None else body.mesh.points
     arm = max(math.hypot(*p) for p in points) + (math.hypot(*body.pivot) if body.pivot is not None else 0.0)
     return math.dist(a.position, b.position) + math.dist(a.turn, b.turn) * arm
+
+
+def turned(a: GripPoint, b: GripPoint, arm: float) -> float:
+    """Return how far [m] what a grip holds, `arm` [m] long at most, goes from one point of its path to the next."""
+    return math.dist(a.shift, b.shift) + math.dist(a.turn, b.turn) * arm
 
 
 def _time(ways: list[tuple[float, float]], enough: float) -> float:
@@ -186,7 +191,7 @@ def decide(params: WoodParams) -> Choice:
         why = f"weight and tip load act at once and strain rods to {100 * strained:.3g} % of their limit"
         return Choice("explicit", 1.0, 0.0, f"real masses, as {why}")
     scaling = _MOST
-    while scaling > 1 and error_at(params, scaling) > _ERROR:
+    while scaling > 1 and error_at(params, scaling) > ERROR:
         scaling /= 1.1
     drives = f"what moves needs {time:.2g} s to break or bend the wood, {time / period:.3g} times the slowest period"
     if scaling < _LEAST:

@@ -10,9 +10,9 @@ from pydantic import Field, field_validator, model_validator
 
 from ..contract import Params
 from .bodies import Body, Newtons, Rate, Vector, Waypoint
-from .outlines import check_outline, polygon_area
 from .parts import Corner, Cut, Fork, Grain, Grip, GripPoint, Knot, Notch
 from .shape.checks import check_shape, length_of
+from .shape.outlines import check_outline, polygon_area
 
 __all__ = ["Body", "Cut", "Fork", "Grain", "Grip", "GripPoint", "Knot", "Notch", "Waypoint", "WoodParams"]
 

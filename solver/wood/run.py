@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -12,26 +11,25 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
-from ..contract import Context, InvalidInput, Need, SolverError
+from ..contract import Context, Need, SolverError
 from ..meshes import Frame, changing
-from .choosing import decide
 from .contact.listing import law
 from .fibres.hewing import hewn
 from .fracture import sawed
 from .loads import MADE, READ, measured
 from .model.bundle import lay
-from .model.joining import longest_edge
-from .model.outline import corners
 from .model.state import State, Wood
 from .params import WoodParams
 from .pieces import pieces
 from .settings import choose
 from .stepping.marching import explicit
 from .stepping.moment import Reached
+from .stepping.speeds import few_enough, slow_enough
 from .stepping.stability import longest_step, touchable
 from .stresses import BOND, ROD, Stresses
 from .surface.skin import Skin
 from .surface.solids import among, shown
+from .told import idle, settled, whole
 
 __all__ = ["run"]
 
@@ -45,14 +43,14 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     """Return energies, counts and centre lines at the wanted times; see `solver.quantities` for units.
 
     Raises:
-        InvalidInput: the need names a part of a fruit's surface.
+        InvalidInput: the need names a part of a fruit's surface, something is past the wood between two
+            steps, or these would be too many.
         Unstable: the run blew up; carries the stages before.
         NotConverged: an equilibrium was not found; carries the stages before.
         Cancelled: the observer asked to stop.
 
     """
-    if need.region is not None:
-        raise InvalidInput("wood has no colatitude and azimuth.", advice="Leave the region out.")
+    whole(need)
     # two threads take twice as long for fronts of some hundreds, and round otherwise: the net's shares as well as steps
     with threadpool_limits(1, user_api="blas"):
         return _run(params, need, context)
@@ -61,10 +59,14 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
 def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     settings = choose(params, need.quality)
     begun = time.perf_counter()
-    params, said = _settled(params, settings.vertices)
-    context.report(0.0, said.get("note", "laying the bundle"))
+    params, said, notes = settled(params, settings.vertices)
+    context.report(0.0, "; ".join(notes) or "laying the bundle")
     wood = hewn(lay(params, settings.vertices), params)
-    attrs = _said(wood, params, said)
+    missed = idle(wood, params)
+    if missed:
+        context.report(0.0, "; ".join(missed))
+    told = "; ".join([*notes, *missed])
+    attrs = _said(wood, params, said | ({"note": told} if told else {}))
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
     strained = Stresses(params, wood, need)
     laid, wood = wood, sawed(wood)
@@ -75,6 +77,8 @@ def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         contact = float(law(wood, params)[1]) if params.touching else 0.0
         longest = longest_step(wood, contact)
         dt = min(settings.courant * longest, params.step or np.inf)
+        few_enough(dt, need.stages[-1])
+        slow_enough(params, dt, params.length / (settings.vertices - 1))
         wood = touchable(wood, dt, contact)
         attrs |= {"step": dt, "longest_stable_step": longest}
         marching = explicit(wood, params, need.stages, dt, balance, context, settings.courant)
@@ -96,25 +100,6 @@ def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
             error.last_stage = rows[-1]["stage"]
         raise
     return _dataset(rows, frames, wood, params, need, attrs)
-
-
-def _settled(params: WoodParams, vertices: int) -> tuple[WoodParams, dict[str, Any]]:
-    """Return the parameters with the mode chosen, and what is to be said of the run before it begins."""
-    said: dict[str, Any] = {}
-    notes = []
-    if params.mode == "auto":
-        choice = decide(params)
-        params = params.model_copy(update={"mode": choice.mode, "mass_scaling": choice.scaling})
-        said["expected_error"] = choice.error
-        notes.append(choice.why)
-    edge, most = params.length / (vertices - 1), longest_edge(params, corners(params))
-    if params.fracture != "none" and params.rods > 1 and params.reach > 0 and edge > most:
-        wanted = math.ceil(params.length / most) + 1
-        notes.append(
-            f"edges of {1e3 * edge:.3g} mm are longer than the {1e3 * most:.3g} mm that feel a crack's tip: it splits "
-            f"at loads that are too high (by .6 at twice that), and all at once; {wanted} vertices on a rod are enough"
-        )
-    return params, said | ({"note": "; ".join(notes)} if notes else {})
 
 
 def _said(wood: Wood, params: WoodParams, said: dict[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What is worth knowing of a growth run before it begins, at every door: command line, jobs and live sessions."""
+"""What is worth knowing before a run of growth or wood, at every door: command line, jobs and live sessions."""
 
 from __future__ import annotations
 
@@ -133,3 +133,16 @@ def test_what_is_said_of_a_job_is_found_out_once_and_not_for_lists(
     assert queue_only.get(asked["links"]["self"]).json()["note"] == "Mind the step."
     assert queue_only.delete(asked["links"]["self"]).json()["note"] == "Mind the step."
     assert len(told) == 2
+
+
+def test_a_wood_job_says_which_cuts_do_nothing_and_none_begins_with_a_grip_beside_it(queue_only: httpx.Client) -> None:
+    plain = {"rods": 3, "vertices": 30}
+    cuts = [{"low": [0.2, -1, -1], "high": [0.2, 1, 1]}]
+    asked = queue_only.post("/v1/jobs", json={"solver": "wood", "params": {**plain, "cuts": cuts}, "need": NEED})
+    assert asked.status_code == 202
+    assert "cuts[0] meets nothing of the branch" in asked.json()["note"]
+    grips = [{"low": [0.2, -1, -1], "high": [1, 1, 1]}]
+    refused = queue_only.post("/v1/jobs", json={"solver": "wood", "params": {**plain, "grips": grips}, "need": NEED})
+    problem = checked(refused, 422, "invalid-geometry")
+    assert "grip 0 holds no vertex" in problem["detail"]
+    assert "Move its box into the branch" in problem["advice"]

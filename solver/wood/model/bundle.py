@@ -20,7 +20,7 @@ from .joining import bonded
 from .motion import Motion
 from .outline import area as outlined
 from .outline import corners, covered, drawn_in, stand
-from .sawing import boxes, divided, placed_on, sawn
+from .sawing import boxes, divided, loosened, placed_on, sawn
 from .state import Wood
 
 __all__ = ["SAMPLES", "lay"]
@@ -29,6 +29,9 @@ __all__ = ["SAMPLES", "lay"]
 SAMPLES = np.linspace(0.0, 1.0, 9)
 #: Share of an edge's stiffness that a contact has.
 _CONTACT = 0.1
+#: Rounds in which a vertex is moved to where a winding fibre passes a cut: each leaves an edge's turn of the way;
+#: and over the bundle's length, what is no way at all.
+_ROUNDS, _SAME = 8, 1e-12
 #: Depth over which a contact gains its stiffness, over a rod's radius.
 _EASE = 0.1
 
@@ -104,10 +107,16 @@ def _on_cuts(
     points: np.ndarray, area: np.ndarray, s: np.ndarray, cuts: tuple[Cut, ...], params: WoodParams
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return places along (k, vertices) [m] with vertices where cuts pass, and these (p, 2): rod, vertex."""
-    if not cuts:
-        return s, np.zeros((0, 2), np.int32)
-    fibre = np.concatenate([s[:, :, None], np.repeat(points[:, None, :], s.shape[1], 1)], -1)
-    return placed_on(cuts, s, tapered(_within(placed(fibre, params), area, params), params), params.length)
+    moved, parted = s, np.zeros((0, 2), np.int32)
+    # a fibre that winds does not pass a cut where the chord of an edge does: its vertex is moved until it is on both
+    for turn in range(_ROUNDS if cuts else 0):
+        fibre = np.concatenate([moved[:, :, None], np.repeat(points[:, None, :], s.shape[1], 1)], -1)
+        straight = tapered(_within(placed(fibre, params), area, params), params)
+        better, parted = placed_on(cuts, s, straight, params.length)
+        if turn and np.abs(better - moved).max() <= _SAME * params.length:
+            break
+        moved = better
+    return moved, parted
 
 
 def _sawn_at(s: np.ndarray, parted: np.ndarray, edges: int) -> np.ndarray:
@@ -310,6 +319,8 @@ def lay(params: WoodParams, vertices: int) -> Wood:
         where = _sawn_at(s, parted, at.number.shape[1] - 1)
         bonds = divided(bonds, rods, straight, at.rest.reshape(-1, 3), where, params.length / (vertices - 1))
     sawn(cuts, straight, rods, bonds)
+    if params.grain.deviates or params.taper != 1:
+        loosened(cuts, at.straight, s[parted[:, 0], parted[:, 1]], parted[:, 0], rods, bonds, params.length)
     return Wood(
         motion,
         rods,

@@ -10,7 +10,10 @@ from ...contract import InvalidGeometry
 from ..params import Cut, Grip, WoodParams
 from .arrays import Pins
 
-__all__ = ["Course", "courses", "pins_of", "within"]
+__all__ = ["NOTHING", "Course", "courses", "pins_of", "within"]
+
+#: What is said of a grip that is beside the branch, or between its vertices.
+NOTHING = "holds no vertex of a rod."
 
 
 class Course(NamedTuple):
@@ -50,7 +53,7 @@ def courses(params: WoodParams, straight: np.ndarray, x: np.ndarray, free: np.nd
         vertex = np.flatnonzero(within(straight, grip) & free)
         if not len(vertex):
             raise InvalidGeometry(
-                f"grip {n} holds no vertex of a rod.",
+                f"grip {n} {NOTHING}",
                 advice="Widen its box, or take more vertices or rods.",
             )
         pivot = np.array(grip.pivot) if grip.pivot is not None else x[vertex].mean(0)

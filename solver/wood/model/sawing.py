@@ -18,10 +18,13 @@ from .arrays import Bonds, Rods
 from .curves import held
 from .joining import lying
 
-__all__ = ["boxes", "divided", "passed", "placed_on", "sawn"]
+__all__ = ["boxes", "divided", "loosened", "meets", "passed", "placed_on", "sawn"]
 
 #: No slice is thinner than this, over the mean edge: its edges would shorten the step of all.
 _THINNEST = 0.25
+#: A rod that passes a cut nearer to an end than this share of the thinnest slice is not parted; and how near to a cut,
+#: over the bundle's length, a place is on it.
+_LEFT, _ON = 0.5, 1e-9
 #: Where on their edges the parts of a bond beside a cut sit; and how near to a cut edges are, over the mean edge: not
 #: those behind the next vertex of even rods.
 _PARTS, _NEAR = (1 / 6, 1 / 2, 5 / 6), 0.999
@@ -69,10 +72,15 @@ def sawn(cuts: tuple[Cut, ...], straight: np.ndarray, rods: Rods, bonds: Bonds) 
     second = held(straight, rods, bonds.j, bonds.share)[0]
     for cut in cuts:
         comes, leaves = _passage(first, second, cut)
-        through = comes <= leaves
-        bonds.damage[through] = 1.0
-        bonds.parted[through] = 1.0
-        bonds.on[through] = 2
+        _break(bonds, comes <= leaves)
+
+
+def meets(cut: Cut, straight: np.ndarray, rods: Rods, bonds: Bonds) -> bool:
+    """Return whether a cut passes a rod or a bond; straight (v, 3): places in the straight bundle, as laid [m]."""
+    ends = [(straight[rods.a], straight[rods.b])]
+    if len(bonds.i):
+        ends.append((held(straight, rods, bonds.i, bonds.at)[0], held(straight, rods, bonds.j, bonds.share)[0]))
+    return any(bool(np.less_equal(*_passage(one, other, cut)).any()) for one, other in ends)
 
 
 def passed(straight: np.ndarray, cut: Cut, length: float) -> list[list[float]]:
@@ -103,7 +111,7 @@ def _halfway(begun: float, ends: float, cut: Cut, length: float) -> float:
     middle = (begun + ends) / 2
     if not 0 < begun <= ends < length:
         middle = (cut.low[0] + cut.high[0]) / 2
-    return middle if 0 < middle < length and begun <= middle <= ends else math.nan
+    return middle if begun <= middle <= ends else math.nan
 
 
 def placed_on(
@@ -125,6 +133,8 @@ def placed_on(
     for rod in range(len(s)):
         wanted: list[float] = []
         for at in sorted(place for places in through for place in places[rod]):
+            if min(at, length - at) < _LEFT * least:
+                continue
             if not wanted or at - wanted[-1] >= least:
                 wanted.append(min(max(at, least), length - least))
         if not wanted:
@@ -143,6 +153,46 @@ def placed_on(
         moved[rod] = np.interp(s[rod], s[rod][knots], [0.0, *wanted, length])
         found += [(rod, int(v)) for v in vertex]
     return moved, np.array(found, np.int32).reshape(-1, 2)
+
+
+def loosened(
+    cuts: tuple[Cut, ...],
+    straight: np.ndarray,
+    places: np.ndarray,
+    owner: np.ndarray,
+    rods: Rods,
+    bonds: Bonds,
+    length: float,
+) -> None:
+    """Break the bonds that hold on to a rod between where it passes a cut and where it is parted for it.
+
+    There a rod is beyond the cut, and not parted from what is before it: no slice is thinner than a quarter of an edge.
+
+    straight (k, n, 3) [m]: vertices; places (p,) [m] along at which the rods owner (p,) are parted; length [m]: of the
+    bundle.
+    """
+    ways: list[list[tuple[float, float]]] = [[] for _ in range(len(straight))]
+    for cut in cuts:
+        for rod, found in enumerate(passed(straight, cut, length)):
+            ends = np.array([0.0, length, *places[owner == rod]])
+            for at in found:
+                nearest = float(ends[np.abs(ends - at).argmin()])
+                if abs(nearest - at) > _ON * length:
+                    ways[rod].append((min(at, nearest), max(at, nearest)))
+    x, edges = straight[..., 0].ravel(), straight.shape[1] - 1
+    for edge, share in ((bonds.i, bonds.at), (bonds.j, bonds.share)):
+        along = x[rods.a[edge]] + share * (x[rods.b[edge]] - x[rods.a[edge]])
+        for rod in np.flatnonzero([bool(way) for way in ways]).tolist():
+            mine = np.flatnonzero(edge // edges == rod)
+            for low, high in ways[rod]:
+                _break(bonds, mine[(along[mine] >= low) & (along[mine] <= high)])
+
+
+def _break(bonds: Bonds, which: np.ndarray) -> None:
+    """Break bonds, of which one says whether (b,) or which they are."""
+    bonds.damage[which] = 1.0
+    bonds.parted[which] = 1.0
+    bonds.on[which] = 2
 
 
 def divided(bonds: Bonds, rods: Rods, straight: np.ndarray, rest: np.ndarray, where: np.ndarray, near: float) -> Bonds:

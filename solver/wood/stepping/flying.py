@@ -111,5 +111,5 @@ def softest(bodies: Bodies, rods: int) -> float:
             half = np.abs(axes.T) @ (bodies.box[r] + np.abs(free.middle[r]))
             light += float((((half**2).sum() - half**2) / free.inertia[r]).sum())
         length = rods * 2 * float(np.linalg.norm(bodies.box[r]))
-        highest = max(highest, float(bodies.k[r]) * length * light)
+        highest = max(highest, float(bodies.k[r]) * length * float(light))
     return highest

@@ -106,7 +106,17 @@ def balanced(state: State, time: float, start: float, scale: float, tolerance: f
         lost = f"the energy balance is off by {100 * error:.0f} percent" if error > 0.5 else "energies are not finite"
         raise Unstable(
             f"at t = {time:.4g} s {lost}.",
-            advice="Give a shorter step, or a lower contact_stiffness"
-            + (", or less mass_scaling." if state.wood.scaling > 1 else "."),
+            advice=_advice(state),
         )
     return Reached(time, state, energy, error, error <= tolerance)
+
+
+def _advice(state: State) -> str:
+    """Return what may help, of what is there."""
+    wood = state.wood
+    found = ["a shorter step"]
+    found += ["a lower contact_stiffness, slower bodies"] if len(wood.bodies.kind) else []
+    found += ["slower grips"] if wood.grips else []
+    found += ["less mass_scaling"] if wood.scaling > 1 else []
+    found += ["smaller loads"] if np.any(wood.motion.load) else []
+    return f"Give {', or '.join(found)}."

@@ -69,7 +69,7 @@ def equilibrium(state: State, params: WoodParams, factor: float, full: np.ndarra
         if increment < 1e-4:
             raise NotConverged(
                 f"no equilibrium was found beyond {begun + done * (factor - begun):.3g} times the loads.",
-                advice="Apply smaller loads, or take the explicit mode, with damping.",
+                advice="Apply smaller loads or a greater stiffness, or take the explicit mode, with damping.",
                 residual=norm / max(wanted / _TOLERANCE, 1e-300),
             )
     return state, norm / max(float(np.linalg.norm(m.load)), least / _TOLERANCE)

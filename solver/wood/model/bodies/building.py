@@ -14,7 +14,7 @@ from ...params import Body, WoodParams
 from ..arrays import BALL, BOX, CYLINDER, MESH, WEDGE, Bodies, Depths, Flight, Free, Rods, Ways
 from .solids import pivot_of, solid_of, weight_of
 
-__all__ = ["between", "bodied", "sampled"]
+__all__ = ["between", "bodied", "sampled", "sides"]
 
 _KINDS = {"box": BOX, "cylinder": CYLINDER, "ball": BALL, "wedge": WEDGE, "mesh": MESH}
 #: Points of contact on what is as long as the narrowest body is wide; the fewest and the most on an edge. Under a
@@ -65,6 +65,11 @@ def _half(body: Body) -> np.ndarray:
         half = body.size[0] / 2 or half_width(body.size[2], body.angle, body.edge)
         return np.array([half, body.size[1] / 2, body.size[2] / 2])
     return np.asarray(np.ptp(solid_of(body)[0], axis=0) / 2)
+
+
+def sides(body: Body) -> np.ndarray:
+    """Return the sides (3,) [m] of the box about a body in its own frame."""
+    return 2 * _half(body)
 
 
 def _reach(body: Body) -> np.ndarray:
