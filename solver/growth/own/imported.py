@@ -19,6 +19,8 @@ __all__ = ["OwnMesh"]
 
 #: Least area of a triangle over the square of its longest side.
 _THIN = 1e-6
+#: A vertex farther away than this [start shape's unit] is refused: squares and single precision end somewhere beyond.
+_FAR = 1e9
 
 
 class OwnMesh(GivenMesh):
@@ -55,6 +57,8 @@ class OwnMesh(GivenMesh):
         check_textures(len(self.faces), len(self.uv), self.uv_faces, len(self.materials), self.face_materials)
         check_groups(len(self.points), self.groups)
         points, faces = np.array(self.points), np.array(self.faces, np.int64)
+        if np.abs(points).max() > _FAR:
+            raise ValueError(f"a vertex is more than {_FAR:g} away. Move the mesh to the origin, or take another unit.")
         try:
             top = shell.topology(faces, len(points))
         except InvalidGeometry as error:

@@ -110,10 +110,11 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
         (SQUARE, [[0, 1, 2], [0, 3, 2], [0, 1, 3]][:2], "Orient the mesh"),
         (SQUARE, [[0, 1, 1]], "Remove collapsed"),
         (SQUARE, [[0, 1, 4]], "not there"),
+        ([*SQUARE[:3], [0, 1e300, 0]], [[0, 1, 2], [0, 2, 3]], "more than 1e+09 away"),
         ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], "no area"),
         ([*SQUARE, [2, 1, 0], [2, 2, 0]], [[0, 1, 2], [2, 4, 5]], "Split them"),
     ],
-    ids=["non-manifold", "turned", "collapsed", "missing", "flat", "pinched"],
+    ids=["non-manifold", "turned", "collapsed", "missing", "far", "flat", "pinched"],
 )
 def test_what_is_no_surface_is_refused(points, faces, said):
     with pytest.raises(InvalidInput) as caught:
