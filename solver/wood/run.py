@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
-from ..contract import Context, Need, SolverError
+from ..contract import Context, Need, SolverError, Unstable
 from ..meshes import Frame, changing
 from .contact.listing import law
 from .fibres.hewing import hewn
@@ -42,10 +42,12 @@ _PIECES = frozenset({"fragments", "fragment_mass", "fragment_place", "fragment_l
 def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     """Return energies, counts and centre lines at the wanted times; see `solver.quantities` for units.
 
+    Where the run blows up, it begins again with steps half as long, unless its step was given.
+
     Raises:
         InvalidInput: the need names a part of a fruit's surface, something is past the wood between two
             steps, or these would be too many.
-        Unstable: the run blew up; carries the stages before.
+        Unstable: the run blew up, with half the step as well; carries the stages before.
         NotConverged: an equilibrium was not found; carries the stages before.
         Cancelled: the observer asked to stop.
 
@@ -53,10 +55,24 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     whole(need)
     # two threads take twice as long for fronts of some hundreds, and round otherwise: the net's shares as well as steps
     with threadpool_limits(1, user_api="blas"):
-        return _run(params, need, context)
+        try:
+            return _run(params, need, context)
+        except Unstable as error:
+            if params.step:
+                raise
+            blown = error
+        said = f"{blown.message.rstrip('.')}: begun again with steps half as long"
+        context.report(0.0, said)
+        try:
+            return _run(params, need, context, 0.5, said)
+        except Unstable as again:
+            if (again.last_stage or 0.0) < (blown.last_stage or 0.0):
+                again.partial, again.last_stage = blown.partial, blown.last_stage
+            raise
 
 
-def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
+def _run(params: WoodParams, need: Need, context: Context, shorter: float = 1.0, blown: str = "") -> xr.Dataset:
+    """Run with steps `shorter` by a factor; blown: what became of a run before, to be told."""
     settings = choose(params, need.quality)
     begun = time.perf_counter()
     params, said, notes = settled(params, settings.vertices)
@@ -65,7 +81,7 @@ def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     missed = idle(wood, params)
     if missed:
         context.report(0.0, "; ".join(missed))
-    told = "; ".join([*notes, *missed])
+    told = "; ".join([*notes, *missed, *([blown] if blown else [])])
     attrs = _said(wood, params, said | ({"note": told} if told else {}))
     skin = None if _MESH.isdisjoint(need.fields) else Skin(wood, params)
     strained = Stresses(params, wood, need)
@@ -76,12 +92,12 @@ def _run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
     if params.mode == "explicit":
         contact = float(law(wood, params)[1]) if params.touching else 0.0
         longest = longest_step(wood, contact)
-        dt = min(settings.courant * longest, params.step or np.inf)
+        dt = min(shorter * settings.courant * longest, params.step or np.inf)
         few_enough(dt, need.stages[-1])
         slow_enough(params, dt, params.length / (settings.vertices - 1))
         wood = touchable(wood, dt, contact)
         attrs |= {"step": dt, "longest_stable_step": longest}
-        marching = explicit(wood, params, need.stages, dt, balance, context, settings.courant)
+        marching = explicit(wood, params, need.stages, dt, balance, context, shorter * settings.courant)
     else:
         from .stepping.static import static
 

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from solver.contract import Context, InvalidGeometry, InvalidInput, Need, NotConverged, Unstable
-from solver.wood import SOLVER
+from solver.wood import SOLVER, run
+from solver.wood.stepping.stability import longest_step
 
 ROOT = Path(__file__).parents[3]
 FINE = {"fracture": "none", "rods": 20, "vertices": 12}
@@ -207,6 +208,27 @@ def test_a_run_that_blows_up_names_what_is_there() -> None:
         SOLVER.solve(SOLVER.parse(values), Need(stages=(2e-3,)))
     assert "smaller loads" in caught.value.advice
     assert "contact" not in caught.value.advice
+
+
+def test_a_run_that_blows_up_begins_again_with_half_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As some presses do whose rods touch. A step that was given is kept; what blows up with half as well, ends."""
+    values, need = {**FINE, "tip_load": (0, 0, -1.0)}, Need(stages=(1e-3, 5e-3), quality="preview")
+    calm = SOLVER.solve(SOLVER.parse(values), need)
+    share = calm.attrs["step"] / calm.attrs["longest_stable_step"]
+
+    def too_long(factor: float) -> None:
+        monkeypatch.setattr(run, "longest_step", lambda wood, contact: factor / share * longest_step(wood, contact))
+
+    too_long(1.6)
+    found = SOLVER.solve(SOLVER.parse(values), need)
+    assert found.attrs["step"] == pytest.approx(0.8 * calm.attrs["longest_stable_step"])
+    assert "begun again with steps half as long" in found.attrs["note"]
+    assert found["tip_position"].values == pytest.approx(calm["tip_position"].values, rel=1e-3)
+    with pytest.raises(Unstable):
+        SOLVER.solve(SOLVER.parse({**values, "step": 1.6 * calm.attrs["longest_stable_step"]}), need)
+    too_long(5.0)
+    with pytest.raises(Unstable):
+        SOLVER.solve(SOLVER.parse(values), need)
 
 
 def test_equilibria_under_a_share_of_their_loads_are_told_of() -> None:
