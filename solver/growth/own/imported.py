@@ -19,8 +19,8 @@ __all__ = ["OwnMesh"]
 
 #: Least area of a triangle over the square of its longest side.
 _THIN = 1e-6
-#: A vertex farther away than this [start shape's unit] is refused: squares and single precision end somewhere beyond.
-_FAR = 1e9
+#: A vertex farther away than this [start shape's unit] is refused: positions in single precision end at 3e38.
+_FAR = 1e30
 
 
 class OwnMesh(GivenMesh):
