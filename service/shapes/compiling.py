@@ -1,6 +1,6 @@
 """The compiled code that folded shapes need: whoever asks for the first of them waits for it, and nobody else does.
 
-It is made once on a machine, which takes some 15 s of a processor, and kept beside the code; from then on it is loaded
+It is made once on a machine, which takes some 20 s of a processor, and kept beside the code; from then on it is loaded
 in half a second. `wizen serve` has it made aside, by a process of low priority, as soon as it starts. Without that (or
 before that has ended) it is made in the thread of the request that needs it: never in the event loop.
 """

@@ -9,7 +9,7 @@ from numba import njit
 
 from .outward import STEEP, Field
 
-__all__ = ["seen_whole"]
+__all__ = ["fill", "seen_whole"]
 
 
 def seen_whole(points: Field, poles: Field) -> bool:
@@ -24,10 +24,10 @@ def _seen_whole(points: Field, poles: Field, steep: np.floating[Any]) -> bool:
     x = np.empty((3, 3, columns + 1), points.dtype)
     for k in range(3):
         x[0, k] = poles[0, k]
-    _fill(x[1], points[0])
+    fill(x[1], points[0])
     for i in range(rows):
         if i + 1 < rows:
-            _fill(x[(i + 2) % 3], points[i + 1])
+            fill(x[(i + 2) % 3], points[i + 1])
         else:
             for k in range(3):
                 x[(i + 2) % 3, k] = poles[1, k]
@@ -37,7 +37,7 @@ def _seen_whole(points: Field, poles: Field, steep: np.floating[Any]) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _fill(row: Field, points: Field) -> None:
+def fill(row: Field, points: Field) -> None:
     """Put points (columns, 3) into a row (3, columns + 1)."""
     columns = len(points)
     for j in range(columns):

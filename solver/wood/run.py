@@ -53,10 +53,11 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
 
     """
     whole(need)
+    begun = time.perf_counter()
     # two threads take twice as long for fronts of some hundreds, and round otherwise: the net's shares as well as steps
     with threadpool_limits(1, user_api="blas"):
         try:
-            return _run(params, need, context)
+            return _run(params, need, context, begun)
         except Unstable as error:
             if params.step:
                 raise
@@ -64,17 +65,20 @@ def run(params: WoodParams, need: Need, context: Context) -> xr.Dataset:
         said = f"{blown.message.rstrip('.')}: begun again with steps half as long"
         context.report(0.0, said)
         try:
-            return _run(params, need, context, 0.5, said)
+            return _run(params, need, context, begun, 0.5, said)
         except Unstable as again:
             if (again.last_stage or 0.0) < (blown.last_stage or 0.0):
                 again.partial, again.last_stage = blown.partial, blown.last_stage
             raise
 
 
-def _run(params: WoodParams, need: Need, context: Context, shorter: float = 1.0, blown: str = "") -> xr.Dataset:
-    """Run with steps `shorter` by a factor; blown: what became of a run before, to be told."""
+def _run(
+    params: WoodParams, need: Need, context: Context, begun: float, shorter: float = 1.0, blown: str = ""
+) -> xr.Dataset:
+    """Run with steps `shorter` by a factor; begun: when all of it began; blown: what became of a run before, to be
+    told.
+    """
     settings = choose(params, need.quality)
-    begun = time.perf_counter()
     params, said, notes = settled(params, settings.vertices)
     context.report(0.0, "; ".join(notes) or "laying the bundle")
     wood = hewn(lay(params, settings.vertices), params)

@@ -43,7 +43,7 @@ class Evened(NamedTuple):
 
 
 def compiled() -> None:
-    """Load the compiled code that folded surfaces need, and that of `steps`; where none is kept yet, make it: some 15 s
+    """Load the compiled code that folded surfaces need, and that of `steps`; where none is kept yet, make it: some 20 s
     of a processor.
     """
     from solver.geometry.apart import put_apart

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from solver.arrays import Array
+from solver.geometry.seen import fill
 
 from .steps import Steps
 
@@ -107,23 +108,12 @@ def _six(points: Array, poles: Array) -> Array:
         pair[0, k] = poles[0, k]
     for i in range(rows + 1):
         if i < rows:
-            _fill(pair[(i + 1) % 2], points[i])
+            fill(pair[(i + 1) % 2], points[i])
         else:
             for k in range(3):
                 pair[(i + 1) % 2, k] = poles[1, k]
         _add_six(pair[i % 2], pair[(i + 1) % 2], found)
     return found
-
-
-@njit(cache=True)
-def _fill(row: Array, points: Array) -> None:
-    """Put points (columns, 3) into a row (3, columns + 1)."""
-    columns = len(points)
-    for j in range(columns):
-        for k in range(3):
-            row[k, j] = points[j, k]
-    for k in range(3):
-        row[k, columns] = row[k, 0]
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from solver import registry
-from solver.contract import InvalidGeometry, InvalidInput, Need
+from solver.contract import InvalidGeometry, InvalidInput, Need, Params
 from solver.growth.params import GrowthParams
 from solver.growth.shapes import Ground, start
 from solver.growth.told import note
@@ -24,6 +24,12 @@ BETWEEN = (0.012, 0.007, 0.0)  # of no vertex of the square
 
 def said(quality: str = "preview", **values: Any) -> str:
     return note(GrowthParams.parse({"shape": "square", "tools": [], **values}), quality)  # type: ignore[arg-type]
+
+
+def told(params: Params, need: Need) -> str:
+    """Return what the solver says at the door."""
+    assert GROWTH.remarks is not None
+    return GROWTH.remarks(params, need)
 
 
 def stripes(waves: float) -> Texture:
@@ -164,7 +170,7 @@ def test_a_place_that_the_shape_does_not_have_is_refused_before_work() -> None:
     rim = {"kind": "surface", "where": {"kind": "rim", "width": 0.2}}
     params = GrowthParams.parse({"shape": "sphere", "tools": [rim]})
     with pytest.raises(InvalidInput, match="no rim"):
-        GROWTH.remarks(params, GROWTH.settle(Need()))  # type: ignore[misc]
+        told(params, GROWTH.settle(Need()))
     with pytest.raises(InvalidInput, match="no rim"):
         GROWTH.solve(params, Need.parse({"quality": "preview"}))
 
@@ -203,7 +209,7 @@ def test_a_mesh_of_which_nothing_would_be_left_is_refused_before_work(away: floa
     assert "Move it to the origin" in caught.value.advice
     assert ("float64" in caught.value.advice) == (dtype == "float32")
     with pytest.raises(InvalidGeometry, match="from the origin"):
-        GROWTH.remarks(lying(away), need)  # type: ignore[misc]
+        told(lying(away), need)
 
 
 def test_of_parts_that_only_unevenness_lets_cross_it_is_said_so() -> None:
