@@ -1,10 +1,12 @@
 """The parts of one benchmark, kept after every run; and runs in processes of their own.
 
-A run of its own process has its own peak memory and its own CPU time, and can be stopped after its time limit.
+A run of its own process has its own peak memory and its own CPU time, and can be stopped after its time limit: one call
+is python -m benchmarks.dehydration.precision.record MODULE:FUNCTION JSON.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import resource
@@ -92,5 +94,17 @@ def answer(command: Sequence[str], *, limit: float, env: Mapping[str, str] | Non
 def worker(function: str, **arguments: Any) -> Row:
     """Call `benchmarks.dehydration.precision.<module>:<function>` in a process of its own."""
     limit = float(arguments.pop("limit", 3600.0))
-    command = [sys.executable, "-m", "benchmarks.dehydration.precision.worker", function, json.dumps(arguments)]
+    command = [sys.executable, "-m", __name__, function, json.dumps(arguments)]
     return answer(command, limit=limit)
+
+
+def _called(module: str, function: str, arguments: str) -> None:
+    """Call a function of this folder and print what it returns, with the most memory that this process had [MB]."""
+    found = importlib.import_module(f"benchmarks.dehydration.precision.{module}")
+    row: Row = getattr(found, function)(**json.loads(arguments))
+    row["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(json.dumps(row))
+
+
+if __name__ == "__main__":
+    _called(*sys.argv[1].split(":"), sys.argv[2])

@@ -38,7 +38,7 @@ def main() -> None:
             asked = ("--set", f"te={te}", "--set", f"gamma={gamma}", "--quality", quality)
             for s, file in zip(_STAGES, _files(Path(folder), asked, field, n), strict=True):
                 points, triangles = _read(file)
-                pairs = sum(1 for _ in _crossing(points, triangles))
+                pairs = sum(1 for _ in crossing(points, triangles))
                 sheet.add(
                     (f"{te:g}", gamma, quality, surface, f"{s:g}", len(triangles), pairs),
                     te=te, gamma=gamma, quality=quality, surface=surface, s=s, triangles=len(triangles), pairs=pairs,
@@ -75,7 +75,7 @@ def _read(file: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points), np.array(triangles)
 
 
-def _crossing(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[int, int]]:
+def crossing(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[int, int]]:
     """Yield pairs of triangles that pass through each other."""
     corners = points[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
