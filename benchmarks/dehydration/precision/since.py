@@ -40,7 +40,7 @@ def _work(folder: str, quality: str, te: str, mirrors: str) -> None:
     clock, processor = time.perf_counter(), time.process_time()
     found = solver.solve(params, Need(stages=STAGES, quality=quality, resolution=64), Context())
     seconds, cpu = time.perf_counter() - clock, time.process_time() - processor
-    np.save(Path(folder) / "positions.npy", found["position"].values)
+    np.save(Path(folder) / "moved.npy", found["displacement"].values)
     said = {
         "seconds": seconds, "cpu": cpu, "elements": int(found.attrs["elements"]),
         "steps": int(found["iterations"].values[-1]), "converged": found["converged"].values.tolist(),
@@ -50,6 +50,8 @@ def _work(folder: str, quality: str, te: str, mirrors: str) -> None:
 
 def main() -> None:
     from benchmarks.figures import ROOT, Sheet
+    from solver.dehydration import SOLVER, DehydrationParams
+    from solver.lattice import lattice
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("before", type=Path, help="a checkout of the project")
@@ -59,13 +61,15 @@ def main() -> None:
     sheet = Sheet("dehydration-since", _HEAD, "dehydration")
     for quality, te, mirrors in CASES:
         name = f"{quality}, te {te:g}, {'eighth' if mirrors else 'whole'}"
-        first = 0.0
+        first, fruit = 0.0, SOLVER.parse({"te": te, "gamma": 10.0}, "sphere")
+        assert isinstance(fruit, DehydrationParams)
+        fresh = fruit.surface(*lattice(64))
         for which, root in ((commit, before), ("this", ROOT)):
             with tempfile.TemporaryDirectory() as folder:
                 command = [sys.executable, __file__, "--work", folder, quality, str(te), mirrors]
                 there = {**os.environ, "PYTHONPATH": str(root)}
-                done = subprocess.run(command, cwd=root, env=there, capture_output=True, text=True, check=True)
-                shapes = np.load(Path(folder) / "positions.npy")
+                done = subprocess.run(command, cwd=root, env=there, stdout=subprocess.PIPE, text=True, check=True)
+                shapes = fresh + np.load(Path(folder) / "moved.npy")
             said = json.loads(done.stdout.splitlines()[-1])
             pairs = [_pairs(shapes[STAGES.index(s)]) for s in STAGES[2:]]
             first = first or said["seconds"]
