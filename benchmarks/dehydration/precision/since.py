@@ -85,14 +85,14 @@ def main() -> None:
 
 
 def _pairs(shape: np.ndarray) -> int:
-    """Return how many triangles of a shape (n, 2n, 3), each quad cut in two, pass through another."""
+    """Return how many triangles of a shape (n, 2n, 3), each quad cut as files cut it, pass through another."""
     from benchmarks.dehydration.precision.written import crossing
 
     n, around = shape.shape[:2]
     corner = np.arange(n * around).reshape(n, around)
     right = np.roll(corner, -1, axis=1)
     a, b, c, d = corner[:-1], corner[1:], right[1:], right[:-1]
-    triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], axis=2).reshape(-1, 3)
+    triangles = np.stack([np.stack([a, b, d], -1), np.stack([d, b, c], -1)], axis=2).reshape(-1, 3)
     return sum(1 for _ in crossing(shape.reshape(-1, 3).astype(float), triangles))
 
 
