@@ -9,6 +9,7 @@ from typing import Any
 
 from benchmarks.figures import Row, markdown
 
+from . import balance
 from .claims import controls
 from .precision import order
 from .precision.buckled import STAGES, kind, summary
@@ -46,6 +47,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-skips": _skips,
         "dehydration-meshes": order.table,
         "dehydration-controls": controls.table,
+        "dehydration-score": balance.table,
     }
     return makers[f"{record['name']} {part}".strip()](record)
 
