@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks.figures import Row, markdown
 
 from . import balance
-from .claims import controls
+from .claims import controls, jumps
 from .precision import order
 from .precision.buckled import STAGES, kind, summary
 from .precision.spheres import SHIPPED, ratios
@@ -47,6 +47,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-skips": _skips,
         "dehydration-meshes": order.table,
         "dehydration-controls": controls.table,
+        "dehydration-jumps": jumps.table,
         "dehydration-score": balance.table,
     }
     return makers[f"{record['name']} {part}".strip()](record)
