@@ -56,8 +56,7 @@ def score(
 
     With --relax also the distance to equilibrium: the residual of a looked-up shape on the solver's mesh, how far 600
     steps of the solver move it (rms over its roughness), and how its roughness, bands and slopes compare with what
-    becomes of it: a second or two for each point, method and stage. Fruits keep the pattern that runs start from
-    where the store holds its run; without it what is looked up about the onset moves farther.
+    becomes of it. Fruits keep the pattern that their runs start from, if the store holds its run.
 
     [bold]Examples[/bold]
 
@@ -75,7 +74,6 @@ def score(
     from store.lookup import ShapeTable
     from store.store import Store
 
-    from ..refining import balance
     from ..refining import score as scores
 
     _check(picture, stage)
@@ -88,10 +86,9 @@ def score(
         near = min(table.stages, key=lambda stored: abs(stored - (_STAGE if stage is None else stage)))
         seal.publish(picture, scores.picture(cases, near))
     document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
-    has_begun = balance.at_hand(table, opened)
-    moved = list(_distances(table, names, relax, opened if has_begun else None))
+    moved = list(_distances(table, names, relax, begun := _begun(table, opened)))
     if relax:
-        document["relaxed"], document["with_bumps"] = [row.to_json() for row in moved], has_begun
+        document |= {"relaxed": [row.to_json() for row in moved], "with_bumps": begun is not None}
     symbol = registry.get(table.info.solver).stages.symbol
     emit(document, as_json, lambda console: _show(console, name, report, moved, symbol, picture))
 
@@ -115,6 +112,13 @@ def _show(console: Any, name: str, report: Any, moved: list[Any], symbol: str, p
         _show_distances(console, moved, symbol)
     if picture is not None:
         console.print(f"drawn to {picture}", markup=False)
+
+
+def _begun(table: ShapeTable, store: Store) -> Store | None:
+    """Return the store if it has all that the table's runs begin with."""
+    from ..refining import balance
+
+    return store if balance.at_hand(table, store) else None
 
 
 def _distances(table: ShapeTable, names: Sequence[str], count: int, store: Store | None) -> Iterator[Distance]:
