@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +27,9 @@ def test_what_is_relaxed_starts_and_ends_as_in_a_job(resolution: int | None) -> 
     begun: list[Floats] = []
     results: list[xr.Dataset] = []
 
-    def relax(params: Params, position: Floats, stage: float, need: Need, context: Context, steps: Any) -> xr.Dataset:
+    def relax(
+        _: Params, position: Floats, stage: float, need: Need, __: Context, steps: int | None, bumps: bool
+    ) -> xr.Dataset:
         begun.append(position)
         n = need.resolution or 0
         theta, phi = lattice(n)
