@@ -28,7 +28,7 @@ def test_what_is_relaxed_starts_and_ends_as_in_a_job(resolution: int | None) -> 
     results: list[xr.Dataset] = []
 
     def relax(
-        _: Params, position: Floats, stage: float, need: Need, __: Context, steps: int | None, bumps: bool
+        _: Params, position: Floats, stage: float, need: Need, __: Context, steps: int | None, kept: bool
     ) -> xr.Dataset:
         begun.append(position)
         n = need.resolution or 0
