@@ -94,6 +94,10 @@ def _score(store: Store, names: Sequence[str] | None, stages: Sequence[float], c
         for name, one in tables.items()
         if one.size > 1
     }
+    if unknown := set(names or ()) - set(about):
+        raise SystemExit(
+            f"{', '.join(sorted(unknown))}: no family of more than one sample; there are {', '.join(about)}."
+        )
     # of tables that are no more, or have changed, nothing is kept
     runs = {row["family"]: row for row in kept if _is_of(row, about.get(row["family"], {}))}
     for name in names or about:
