@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -87,7 +87,12 @@ class Coding:
 
 def _here(scope: Scope) -> bool:
     """Return whether a client sits on this machine, where bytes cost less than compressing them."""
+    return _is_loopback((scope.get("client") or ("",))[0])
+
+
+@lru_cache(maxsize=4096)
+def _is_loopback(host: str) -> bool:
     try:
-        return ipaddress.ip_address((scope.get("client") or ("",))[0]).is_loopback
+        return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return True  # a Unix socket

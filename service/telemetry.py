@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import logging
 import time
+from typing import Any
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
-from starlette.datastructures import MutableHeaders
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -38,7 +38,18 @@ class Metrics:
             "wizen_request_seconds", "Time to answer", ["route"], buckets=_BUCKETS, registry=self.registry
         )
 
+        self._of: dict[tuple[str, str, int], tuple[Any, Any]] = {}
         self.jobs = Gauge("wizen_jobs", "Jobs in the store's ledger", ["state"], registry=self.registry)
+
+    def count(self, route: str, method: str, status: int, seconds: float) -> None:
+        """Count an answer."""
+        # finding what belongs to some labels takes as long as the rest
+        found = self._of.get((route, method, status))
+        if found is None:
+            found = self.requests.labels(route, method, str(status)), self.seconds.labels(route)
+            self._of[route, method, status] = found
+        found[0].inc()
+        found[1].observe(seconds)
 
     def page(self, request: Request) -> Response:
         """Return the numbers in Prometheus' text format; jobs are counted when they are asked for."""
@@ -73,7 +84,8 @@ class Telemetry:
             nonlocal status, sent
             if message["type"] == "http.response.start":
                 status = message["status"]
-                MutableHeaders(scope=message)["X-Request-ID"] = request_id
+                others = [pair for pair in message.get("headers", ()) if pair[0] != b"x-request-id"]
+                message = {**message, "headers": [*others, (b"x-request-id", request_id.encode("latin-1"))]}
             elif message["type"] == "http.response.body":
                 if method == "HEAD":
                     message = {**message, "body": b""}
@@ -98,8 +110,9 @@ def record(metrics: Metrics, scope: Scope, method: str, status: int, sent: int, 
     # the route, not the path: what a stranger types must not become a label
     route = getattr(scope.get("route"), "path", "none")
     known = method if method in {"GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"} else "other"
-    metrics.requests.labels(route, known, str(status)).inc()
-    metrics.seconds.labels(route).observe(seconds)
+    metrics.count(route, known, status, seconds)
+    if not LOGGER.isEnabledFor(logging.INFO):
+        return
     fields = {
         "request_id": scope["state"]["request_id"],
         "method": method,

@@ -10,6 +10,7 @@ __all__ = ["canonical"]
 
 #: Integers up to here are exact as doubles, so 1 and 1.0 are one number.
 _EXACT = 2**53
+_write = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False).encode
 
 
 def canonical(value: Any) -> bytes:
@@ -20,11 +21,14 @@ def canonical(value: Any) -> bytes:
         TypeError: something that JSON has no word for, or a key that is not text.
 
     """
-    return json.dumps(_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False).encode("ascii")
+    return _write(_plain(value)).encode("ascii")
 
 
 def _plain(value: Any) -> Any:
-    if type(value).__module__ == "numpy" and getattr(value, "shape", None) == ():
+    kind = type(value)
+    if kind is str or kind is int:  # most of what there is
+        return value
+    if kind.__module__ == "numpy" and getattr(value, "shape", None) == ():
         value = value.item()
     if value is None or isinstance(value, bool | str | int):
         return value

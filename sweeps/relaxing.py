@@ -28,33 +28,44 @@ def relaxed(
     relaxing said of it: `residual`, `moved` (rms of the radial motion over the roughness), `iterations`, `seconds`.
 
     Without a quality it is that of the table's runs: on another mesh their shapes are no equilibria, and slide away.
+    It starts from the lattice that holds the table's waves, whatever lattice it is wanted on, and is closed at the
+    poles as a run's stage is (`outputs.of_result`): a job that relaxes the same shape hands over the same points.
 
     Raises:
         InvalidInput: the solver relaxes nothing, or refuses the parameters.
         SolverError: typed, where it failed.
 
     """
+    from store.surfaces import apart, spectra
+
     if shape.position is None:
         raise ValueError("look the shape up with its position")
+    start = shape.position
+    if len(start) != table.resolution:
+        asked = {axis: shape.parameters[axis] for axis in table.axes}
+        own = table.at(asked, shape.stage, method=shape.method).position
+        assert own is not None
+        start = own
     told = tuple(name for name in table.info.descriptors if name in solver.fields)
     need = Need(
-        fields=("displacement", "lattice_crossings", "position", *told),
+        fields=("displacement", "position", *told),
         quality=quality or table.info.quality,
         resolution=len(shape.position),
         dtype="float64" if table.info.dtype == "float64" else "float32",
     )
     params = solver.parse(table.at_parameters(shape.parameters))
-    found = solver.relaxed(params, np.asarray(shape.position, float), shape.stage, need, context).isel(stage=0)
+    found = solver.relaxed(params, np.asarray(start, float), shape.stage, need, context).isel(stage=0)
     position = found["position"].values
+    poles = spectra.poles(spectra.spectrum(position))
     made = replace(
         shape,
         position=position,
         displacement=found["displacement"].values,
-        poles=position[[0, -1]].mean(axis=1),
+        poles=poles,
         descriptors={name: float(found[name]) for name in told},
         exact=False,
         converged=bool(found["converged"]),
-        crossings=int(found["lattice_crossings"]),
+        crossings=apart.crossings(position, poles),
         expected_error=None,
         tier="relaxed",
     )

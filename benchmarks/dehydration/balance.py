@@ -1,35 +1,59 @@
 """How far look-ups are from equilibrium, and what relaxing them costs: python -m benchmarks.dehydration.balance.
 
-Of families in the package, at random points between their samples: from which residual, and how far, 600 steps of the
-solver move what each method looks up, and how its statistics compare with what becomes of it (record
-dehydration-score). Of whole fruits of the default family: the tier between table and run, with seconds by the clock and
-of the processor, on as many threads as there are, after a first one (record dehydration-relaxed).
+Of families in the package, at random points between their samples, and at some of these: from which residual, and how
+far, 600 steps of the solver move what each method looks up, and how its statistics compare with what becomes of it
+(record dehydration-score). Fruits keep the bumps and the pattern that runs begin with: runs whose pattern others share
+are made in --store where they are missing, and left out where they come out otherwise. The record is kept after each
+family, and what it has is not done again.
+
+With --tier, of whole fruits of the default family instead: the tier between table and run, with seconds by the clock
+and of the processor, on as many threads as there are, after a first one (record dehydration-relaxed).
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import get_num_threads
 
-from benchmarks.figures import Sheet
+from benchmarks import figures
+from benchmarks.figures import Row, Sheet, markdown
 from solver import registry
+from solver.contract import Context
+from solver.dehydration import SOLVER
+from solver.dehydration.fresh.pattern import pattern_heights
+from solver.dehydration.measures.harmonics import remove_low
+from solver.dehydration.params import DehydrationParams
 from solver.geometry.crossings import crossings
-from solver.lattice import closed_lattice
+from solver.lattice import closed_lattice, directions, lattice
 from store.blending import methods
 from store.lookup import ShapeTable
 from store.starter import ROOT
+from store.store import Store
+from sweeps.planning.plan import Plan
 from sweeps.refining import balance
+from sweeps.refining.balance import Distance
 from sweeps.relaxing import relaxed
+from sweeps.running import executors
+from sweeps.running.runner import run_jobs
 
-_METHODS = {methods.DEFAULT: "default", "nearest": "nearest", "idw": "the paper's, `idw`"}
-_SCORE = (
-    *("family", "method", "s", "residual, looked up", "after 600 steps", "moved", "roughness"),
-    *("bands [dB]", "slopes W1 [degree]", "correlation"),
-)
+__all__ = ["table"]
+
+NAME = "dehydration-score"
+_OTHERS = ("nearest", "idw")
+#: A run of the table itself, put on the mesh as what is looked up is: what of the distance is the mesh's doing.
+_SAMPLE = "sample"
+_METHODS = (methods.DEFAULT, *_OTHERS)
+#: By measure, what the default is wanted to keep to s = 0.2, and from there to 0.3.
+_WANTED = {"moved": (0.15, 0.25), "rgh": (0.02, 0.04), "dB": (1.2, 2.4), "W1": (1.0, 2.0)}
+_CALLED = {"moved": "moved", "rgh": "roughness", "dB": "bands [dB]", "W1": "slopes W1 [degree]"}
 _RELAXED = (
     *("te", "gamma", "s", "residual", "steps", "moved", "correlation", "crossing pairs"),
     *("volume over exact, looked up", "relaxed", "seconds", "processor seconds"),
@@ -40,37 +64,154 @@ _FRUITS = (
     *((0.03, 10.0, 0.3), (0.04, 50.0, 0.3)),
 )
 _LATTICE = 64
+#: Correlation from which on a pattern is the one that a table began with (others are .6 alike at most), and the least
+#: degree of wrinkles.
+_SAME, _LOWEST = 0.9, 5
+#: Last stage of the narrower goals.
+_EARLY = 0.2
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--families", nargs="+", default=["default", "stone-radius", "prolate", "plum2"])
+    parser.add_argument("--store", type=Path, default=Path("maps/patterns"), help="where the patterns are, or are made")
+    parser.add_argument("--families", nargs="+", help="without: all of more than one sample")
     parser.add_argument("--stages", nargs="+", type=float, default=[0.1, 0.2, 0.3])
     parser.add_argument("--points", type=int, default=3, help="of each family")
     parser.add_argument("--tier", action="store_true", help="the tier between table and run alone")
     asked = parser.parse_args()
-    _tier()
-    if not asked.tier:
-        _score(asked.families, asked.stages, asked.points)
+    if asked.tier:
+        _tier()
+    else:
+        _score(Store.open(asked.store, create=True), asked.families, asked.stages, asked.points)
 
 
-def _score(families: Sequence[str], stages: Sequence[float], count: int) -> None:
-    solver, sheet = registry.get("dehydration"), Sheet("dehydration-score", _SCORE, "dehydration")
-    digests = {}
-    for name in families:
-        table = ShapeTable.open(ROOT, name, surfaces=registry.surface)
-        digests[name], points = table.digest, balance.between(table, count)
-        for stage in stages:
-            for method, said in _METHODS.items():
-                rows = [row for p in points if (row := balance.distance(solver, table, p, stage, method)) is not None]
-                m = balance.mean(rows)
-                residuals = f"{m.residual_placed:.2f}", f"{m.residual:.1e}"
-                alike = f"{m.rgh:.3f}", f"{m.dB:.2f}", f"{m.W1:.2f}", f"{m.corr:.2f}"
-                sheet.add(
-                    (name, said, f"{stage:g}", *residuals, f"{m.moved:.2f}", *alike),
-                    family=name, points=points, failed=count - len(rows), each=[row.to_json() for row in rows],
-                )  # fmt: skip
-    sheet.keep(digests=digests, steps=balance.STEPS)
+def _score(store: Store, names: Sequence[str] | None, stages: Sequence[float], count: int) -> None:
+    """Fill in what the record lacks, family by family."""
+    tables = {name: ShapeTable.open(ROOT, name, surfaces=registry.surface) for name in Store.open(ROOT).table_names()}
+    kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
+    about = {
+        name: {"version": SOLVER.version, "family": name, "digest": one.digest, "stages": [*stages], "points": count}
+        for name, one in tables.items()
+        if one.size > 1
+    }
+    if unknown := set(names or ()) - set(about):
+        raise SystemExit(
+            f"{', '.join(sorted(unknown))}: no family of more than one sample; there are {', '.join(about)}."
+        )
+    # of tables that are no more, or have changed, nothing is kept
+    runs = {row["family"]: row for row in kept if _is_of(row, about.get(row["family"], {}))}
+    for name in names or about:
+        if name in runs:
+            continue
+        table_ = tables[name]
+        _make_pattern(store, table_)
+        begin = time.process_time()
+        alike = _alike(table_, store)
+        begun = store if alike >= _SAME else None
+        runs[name] = {**about[name], "alike": alike, "each": list(_measured(table_, begun, stages, count))}
+        figures.keep(NAME, [runs[k] for k in about if k in runs], "dehydration", steps=balance.STEPS)
+        print(f"{name}: {time.process_time() - begin:.0f} s of the processor", file=sys.stderr, flush=True)
+
+
+def _is_of(row: Row, about: Mapping[str, Any]) -> bool:
+    return bool(about) and all(row.get(name) == value for name, value in about.items())
+
+
+def _make_pattern(store: Store, table_: ShapeTable) -> None:
+    """Run what all runs of a table start from, if anything, where the store has it not yet."""
+    if balance.at_hand(table_, store):
+        return
+    plan = Plan.parse(tomllib.loads(table_.info.plan), table_.info.name)
+    assert plan.first is not None
+    with executors.serial() as workers:
+        run_jobs(plan.first.jobs(), store, workers, plan.first.name)
+    if not balance.at_hand(table_, store):
+        raise SystemExit(
+            f"what {table_.info.name} starts from is another run now: `wizen table plan {table_.info.name}`"
+        )
+
+
+def _alike(table_: ShapeTable, store: Store) -> float:
+    """Return how the pattern in the store correlates with a sample's wrinkles at the first stage: it lies below them.
+
+    What comes out otherwise, as a cold run about its onset may, is not what the runs began with.
+    """
+    params = DehydrationParams.model_validate(table_.at_parameters(table_.sample(0)))
+    if params.pattern is None:
+        return 1.0
+    angles = lattice(_LATTICE)
+    heights = pattern_heights(params, directions(*angles).reshape(-1, 3), Context(library=store.find))
+    shape = table_.at(table_.sample(0), table_.stages[0], resolution=_LATTICE, fields=("displacement",))
+    fresh = table_.fresh(table_.sample(0)).points(*angles)
+    assert shape.displacement is not None
+    rays = fresh / np.linalg.norm(fresh, axis=-1, keepdims=True)
+    wrinkles = remove_low(np.einsum("ijk,ijk->ij", np.asarray(shape.displacement, float), rays), _LOWEST)
+    area = np.sin(angles[0])
+    a, b = wrinkles, heights.reshape(wrinkles.shape)
+    return float((area * a * b).sum() / np.sqrt((area * a * a).sum() * (area * b * b).sum()))
+
+
+def _measured(table_: ShapeTable, store: Store | None, stages: Sequence[float], count: int) -> Iterator[Row]:
+    """Yield the distance of each method at each point and stage, and that of some samples."""
+    points = balance.between(table_, count)
+    samples = np.random.default_rng(0).permutation(table_.size)[:count].tolist()
+    asked = [(point, method, method) for method in _METHODS for point in points]
+    asked += [(table_.sample(i), "nearest", _SAMPLE) for i in samples]
+    for stage in stages:
+        for point, method, said in asked:
+            found = balance.distance(SOLVER, table_, point, stage, method, store)
+            failed = {"method": said, "stage": stage, "failed": True}
+            yield {"point": point, **(failed if found is None else {**found.to_json(), "method": said})}
+
+
+def table(record: Row) -> str:
+    """Return, by family and stage, the default's figures over those of the others, which goals it misses, and where
+    another does better.
+    """
+    head = ("family", "s", "residual", *_CALLED.values(), "missed", "worse than")
+    lines = []
+    for run in record["runs"]:
+        for stage in run["stages"]:
+            found = {said: _mean(run["each"], stage, said) for said in (*_METHODS, _SAMPLE)}
+            own = found[methods.DEFAULT]
+            cells = [_cell(name, [getattr(one, name) for one in found.values()]) for name in _WANTED]
+            residual = f"{own.residual_placed:.2f} to {own.residual:.0e}"
+            missed = ", ".join(_short(name) for name in _WANTED if not _is_met(own, name)) or "-"
+            worse = "; ".join(filter(None, (_worse(own, found[other], other) for other in _OTHERS))) or "-"
+            said = run["family"] + " *" * (run["alike"] < _SAME)
+            lines.append([said, f"{stage:g}", residual, *cells, missed, worse])
+    return markdown(head, lines)
+
+
+def _mean(each: Sequence[Row], stage: float, method: str) -> Distance:
+    rows = [row for row in each if row["stage"] == stage and row["method"] == method and not row.get("failed")]
+    return balance.mean([Distance(**{k: v for k, v in row.items() if k != "point"}) for row in rows])
+
+
+def _cell(name: str, values: Sequence[float]) -> str:
+    form = "{:.3f}" if name == "rgh" else "{:.2f}"
+    own, *others, sample = (form.format(value) for value in values)
+    return f"{own}; {', '.join(others)}; {sample}"
+
+
+def _short(name: str) -> str:
+    return _CALLED[name].split(" [")[0]
+
+
+def _off(found: Distance, name: str) -> float:
+    value = float(getattr(found, name))
+    return abs(value - 1) if name == "rgh" else value
+
+
+def _is_met(own: Distance, name: str) -> bool:
+    """Return whether a goal is met; what is as good as it when rounded is."""
+    return round(_off(own, name), 3) <= _WANTED[name][own.stage > _EARLY]
+
+
+def _worse(own: Distance, other: Distance, called: str) -> str:
+    """Return which measures are worse than another method's, by more than a tenth of what is wanted."""
+    names = [n for n in _WANTED if _off(own, n) > _off(other, n) + 0.1 * _WANTED[n][own.stage > _EARLY]]
+    return f"{called}: {', '.join(map(_short, names))}" if names else ""
 
 
 def _tier() -> None:

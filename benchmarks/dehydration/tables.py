@@ -9,7 +9,8 @@ from typing import Any
 
 from benchmarks.figures import Row, markdown
 
-from .claims import controls
+from . import balance
+from .claims import controls, jumps
 from .precision import order
 from .precision.buckled import STAGES, kind, summary
 from .precision.spheres import SHIPPED, ratios
@@ -46,6 +47,8 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-skips": _skips,
         "dehydration-meshes": order.table,
         "dehydration-controls": controls.table,
+        "dehydration-jumps": jumps.table,
+        "dehydration-score": balance.table,
     }
     return makers[f"{record['name']} {part}".strip()](record)
 

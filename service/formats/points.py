@@ -29,7 +29,7 @@ _VERSION = 1
 def encode(shape: Shape, about: About) -> bytes:
     """Return header, JSON and positions; equal shapes give equal bytes: timings and links are left out."""
     position, ends = mesh.surface(shape)
-    text = metadata.encode(shape, replace(about, timings={}, links={}))
+    text = metadata.encode(shape, replace(about, timings={}, links={}) if about.timings or about.links else about)
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sIII", MAGIC, _VERSION, position.shape[0], len(text))
     # joined at once: no copy of all points before

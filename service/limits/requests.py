@@ -6,10 +6,8 @@ Plain ASGI, so that nothing is buffered and nothing is copied on the way through
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
-from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from .. import problems
@@ -43,7 +41,7 @@ class Limits:
             )
             await problems.of(error, scope)(scope, receive, send)
             return
-        declared = Headers(scope=scope).get("content-length", "0")
+        declared = next((value for name, value in scope["headers"] if name == b"content-length"), b"0")
         if declared.isdigit() and int(declared) > limit.max_body:
             await problems.of(self._too_large(), scope)(scope, receive, send)
             return
@@ -77,13 +75,16 @@ class Limits:
             if failure and not begun:
                 return  # whoever read the body took it for a bad one
             begun = True
-            timer.reschedule(None)  # a long answer may take its time once it has begun
+            patience.end()  # a long answer may take its time once it has begun
             await send(message)
 
         try:
-            async with asyncio.timeout(self.settings.timeout) as timer:
-                with self._patience(timer):
+            async with asyncio.timeout(None) as timer:
+                patience = _Patience(timer, self.settings.timeout, self.is_patient)
+                try:
                     await self.app(scope, counted, watched)
+                finally:
+                    patience.stop()
         except TimeoutError:
             if begun or not timer.expired():
                 raise
@@ -91,33 +92,46 @@ class Limits:
                 f"no answer began within {self.settings.timeout:g} s.",
                 advice=wait.advice or "Try again, or ask for less resolution.",
             )
-            wait.over.set()
+            wait.over = True
             await problems.of(error, scope)(scope, receive, send)
         if failure and not begun:
             await problems.of(failure, scope)(scope, receive, send)
-
-    @contextmanager
-    def _patience(self, timer: asyncio.Timeout) -> Iterator[None]:
-        """Put a timer off as long as `is_patient`: what happens once on a machine is no reason to send anybody away."""
-        loop, limit = asyncio.get_running_loop(), self.settings.timeout
-        next_look: asyncio.TimerHandle
-
-        def look() -> None:
-            nonlocal next_look
-            if timer.when() is None:
-                return  # the answer has begun
-            if self.is_patient():
-                timer.reschedule(loop.time() + limit)
-            next_look = loop.call_later(limit / _LOOKS, look)
-
-        next_look = loop.call_later(limit / _LOOKS, look)
-        try:
-            yield
-        finally:
-            next_look.cancel()
 
     def _too_slow(self) -> SlowBody:
         return SlowBody(f"the body did not arrive within {self.settings.body_timeout:g} s.", advice="Send it at once.")
 
     def _too_large(self) -> BodyTooLarge:
         return BodyTooLarge(f"the body is larger than {self.settings.max_body} bytes.", advice="Send less.")
+
+
+class _Patience:
+    """Lets a timer go off after `limit` seconds, put off as long as `is_patient`: what happens once on a machine is no
+    reason to send anybody away.
+
+    One timer of the loop looks and ends the wait: nearly every answer begins before its first look.
+    """
+
+    def __init__(self, timer: asyncio.Timeout, limit: float, is_patient: Callable[[], bool]) -> None:
+        self._timer, self._limit, self._is_patient = timer, limit, is_patient
+        self._loop = loop = asyncio.get_running_loop()
+        self._until = loop.time() + limit
+        self._next = loop.call_later(limit / _LOOKS, self._look)
+
+    def _look(self) -> None:
+        now, limit = self._loop.time(), self._limit
+        if self._is_patient():
+            self._until = now + limit
+        if now >= self._until:
+            self._timer.reschedule(now)
+        else:
+            self._next = self._loop.call_at(min(now + limit / _LOOKS, self._until), self._look)
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._next.cancel()
+
+    def end(self) -> None:
+        """Wait as long as it takes from now on."""
+        self.stop()
+        if self._timer.when() is not None:
+            self._timer.reschedule(None)

@@ -7,11 +7,9 @@ where it runs: threads are given the context of the request that began them.
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator, Mapping, MutableMapping
-from contextlib import contextmanager
-from contextvars import ContextVar
-from typing import Any
+from collections.abc import Mapping, MutableMapping
+from contextvars import ContextVar, Token
+from typing import Any, Self
 
 from ..errors import TimedOut
 
@@ -21,31 +19,37 @@ _NAME = "wizen.wait"
 
 
 class Wait:
-    """Somebody's wait for an answer; `advice` is for him if it takes too long."""
+    """Somebody's wait for an answer, as a context: `over` once he waits no more; `advice` is for him if it takes too
+    long. Threads read what the event loop sets.
+    """
+
+    __slots__ = ("_token", "advice", "over")
 
     def __init__(self) -> None:
-        self.over, self.advice = threading.Event(), ""
+        self.over, self.advice = False, ""
+
+    def __enter__(self) -> Self:
+        self._token: Token[Wait | None] = _wait.set(self)
+        return self
+
+    def __exit__(self, *reason: object) -> None:
+        self.over = True
+        _wait.reset(self._token)
 
 
 _wait: ContextVar[Wait | None] = ContextVar("wait", default=None)
 
 
-@contextmanager
-def begin(scope: MutableMapping[str, Any]) -> Iterator[Wait]:
-    """Wait for the answer to a request."""
+def begin(scope: MutableMapping[str, Any]) -> Wait:
+    """Return a wait for the answer to a request, which begins when it is entered."""
     wait = scope[_NAME] = Wait()
-    token = _wait.set(wait)
-    try:
-        yield wait
-    finally:
-        wait.over.set()
-        _wait.reset(token)
+    return wait
 
 
 def end(scope: Mapping[str, Any]) -> None:
     """Wait no more: whoever asked has left."""
     if (wait := scope.get(_NAME)) is not None:
-        wait.over.set()
+        wait.over = True
 
 
 def check(advice: str = "") -> None:
@@ -58,5 +62,5 @@ def check(advice: str = "") -> None:
     if (wait := _wait.get()) is None:
         return
     wait.advice = advice or wait.advice
-    if wait.over.is_set():
+    if wait.over:
         raise TimedOut("nobody waits for this any more.", advice=wait.advice or "Ask again.")

@@ -6,8 +6,8 @@ The type of a problem is `urn:wizen:problem:<code>`; clients branch on it and pe
 from __future__ import annotations
 
 import difflib
+import os
 import re
-import uuid
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 from typing import Any
@@ -212,7 +212,7 @@ def install(app: FastAPI) -> None:
 def identify(scope: Scope) -> str:
     """Return the id of a request, which its log record and its answer carry: what it came with, if that is honest."""
     given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"").decode("latin-1")
-    return given if _HONEST_ID.fullmatch(given) else uuid.uuid4().hex
+    return given if _HONEST_ID.fullmatch(given) else os.urandom(16).hex()
 
 
 async def _known(request: Request, error: Exception) -> Response:

@@ -47,7 +47,7 @@ class Detail(NamedTuple):
     @property
     def key(self) -> tuple[str, ...]:
         """What tells two answers of one resolution apart."""
-        return (repr((self.window, self.fields, self.cells)),) if self != Detail() else ()
+        return (repr((self.window, self.fields, self.cells)),) if self != _ALL else ()
 
     def of(self, chosen: Format) -> tuple[str, ...]:
         """Return the fields to look up for a format: its own, or those asked for; JSON is measured on them."""
@@ -69,7 +69,7 @@ class Detail(NamedTuple):
 
     def said(self, resolution: int, band: int) -> dict[str, Any]:
         """Return what was chosen, as plain JSON values, of a table whose waves reach to `band`."""
-        if self == Detail():
+        if self == _ALL:
             return {}
         said: dict[str, Any] = {"resolution": resolution, "waves": min(band, resolution)}
         if self.cells is not None:
@@ -83,6 +83,10 @@ class Detail(NamedTuple):
         if self.window.components != WHOLE.components:
             said["components"] = ["xyz"[i] for i in self.window.components]
         return said
+
+
+#: Where nothing is asked for.
+_ALL = Detail()
 
 
 def parameters() -> dict[str, tuple[str, Mapping[str, Any]]]:
@@ -117,6 +121,8 @@ def parameters() -> dict[str, tuple[str, Mapping[str, Any]]]:
 
 def read(given: Mapping[str, str]) -> Detail:
     """Return the detail that the parameters ask for; what is wrong with them is in `wrong`."""
+    if given.keys().isdisjoint(NAMES):
+        return _ALL
     wrong: list[Wrong] = []
     cells = _cells(given, wrong)
     ranges = _region(given.get("region"), wrong)

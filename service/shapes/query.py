@@ -62,10 +62,10 @@ class Words(NamedTuple):
         """All that must be given, with its range."""
         return {**self.axes, self.stage: self.stages}
 
-    def about(self, solver: str, table: str) -> About:
-        """Return what files say of every shape of the table of that name."""
-        more: dict[str, Any] = {"made": self.made, "shade": self.shade, "reach": self.stages}
-        return About(solver, table, self.fixed, self.stage, self.units, **more)
+    def about(self, solver: str, table: str, **more: Any) -> About:
+        """Return what files say of a shape of the table of that name: of every one, and with it what is said `more`."""
+        every: dict[str, Any] = {"made": self.made, "shade": self.shade, "reach": self.stages}
+        return About(solver, table, self.fixed, self.stage, self.units, **every, **more)
 
     def say(self, name: str) -> str:
         """Return the range of an axis or of the stage with its units, in words."""
@@ -111,7 +111,7 @@ def parse(
         InvalidQuery: listing every name that is unknown, missing or repeated, and every value that cannot be used.
 
     """
-    wrong = [*_repeated(items), *also]
+    wrong, ranges = [*_repeated(items), *also], words.ranges
     outside: list[Wrong] = []
     numbers: dict[str, float] = {}
     chosen: dict[str, Any] = {"resolution": None}
@@ -123,20 +123,21 @@ def parse(
                 wrong.append(found)
             else:
                 chosen[name] = found
-        elif name in words.ranges or name in words.fixed or name in words.tied:
+        elif name in ranges or name in words.fixed or name in words.tied:
             number = number_of(text)
             if number is None:
                 wrong.append(Wrong(name, f"{text[:40]!r} is not a finite number", "Write it like 0.05."))
             else:
                 numbers[name] = number
         elif name not in RESERVED:
-            wrong.append(_unknown(name, [*words.ranges, *words.tied, *words.fixed, *RESERVED]))
+            wrong.append(_unknown(name, [*ranges, *words.tied, *words.fixed, *RESERVED]))
     said = dict(numbers)
-    known = {**words.ranges, **words.fixed, **words.tied}
-    numbers = {**{name: value for name, value in (filled or {}).items() if name in known}, **numbers}
+    if filled:
+        known = {**ranges, **words.fixed, **words.tied}
+        numbers = {**{name: value for name, value in filled.items() if name in known}, **numbers}
     for name, number in numbers.items():
-        outside += _off(name, number, words, numbers)
-    for name in words.ranges:
+        outside += _off(name, number, words, ranges, numbers)
+    for name in ranges:
         if name not in numbers and name not in given:
             wrong.append(Wrong(name, "is missing", f"Add {name}= and a number from {words.say(name)}."))
     if chosen.get("exact") == "relax" and "max_error" in given:
@@ -146,8 +147,8 @@ def parse(
     named_already = {w.name for w in outside}
     outside += [w for w in beyond if w.name not in named_already]
     point = {name: numbers[name] for name in words.axes}
-    named = {name: value for name, value in said.items() if name not in words.ranges}
-    chosen |= {"said": said, "is_elsewhere": any(w.name not in words.ranges for w in outside)}
+    named = {name: value for name, value in said.items() if name not in ranges}
+    chosen |= {"said": said, "is_elsewhere": any(w.name not in ranges for w in outside)}
     return ShapeQuery(point, numbers[words.stage], named=named, outside=tuple(outside), **chosen)
 
 
@@ -157,7 +158,9 @@ def _unknown(name: str, known: Sequence[str]) -> Wrong:
     return Wrong(name[:40], "is not a parameter of this table", advice)
 
 
-def _off(name: str, number: float, words: Words, numbers: Mapping[str, float]) -> list[Wrong]:
+def _off(
+    name: str, number: float, words: Words, ranges: Mapping[str, Range], numbers: Mapping[str, float]
+) -> list[Wrong]:
     """Return what is wrong with a number that the table does not reach, or nothing."""
     if name in words.tied:
         tie = words.tied[name]
@@ -171,7 +174,7 @@ def _off(name: str, number: float, words: Words, numbers: Mapping[str, float]) -
         if math.isclose(number, held, rel_tol=_SLACK, abs_tol=1e-12):
             return []
         return [Wrong(name, f"this table holds {name} = {held:g} only", f"Leave {name} out, or choose another table.")]
-    low, high = words.ranges[name]
+    low, high = ranges[name]
     slack = _SLACK * (high - low)
     if low - slack <= number <= high + slack:
         return []
@@ -179,6 +182,8 @@ def _off(name: str, number: float, words: Words, numbers: Mapping[str, float]) -
 
 
 def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:
+    if len({name for name, _ in items}) == len(items):
+        return []
     counts = Counter(name for name, _ in items)
     return [Wrong(name[:40], "is given more than once", "Give it once.") for name, n in counts.items() if n > 1]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Request
@@ -153,7 +152,7 @@ def _answer(request: Request, asked: Asked) -> Response:
         return Response(status_code=304, headers=headers)
     if kept is not None:
         answers.remember(request.scope, solver, name, request.app.state.tables.families(solver), table.digest, tag)
-        return _whole(kept)
+        return _Whole(kept)
 
     begin = time.perf_counter()
     shape = table.at(
@@ -168,16 +167,18 @@ def _answer(request: Request, asked: Asked) -> Response:
     looked = time.perf_counter()
     if matches(held, tag):
         return Response(status_code=304, headers=headers)
-    about = replace(
-        words.about(solver.name, name),
+    is_json = chosen.name == "json"  # its timings and its links are this request's own
+    about = words.about(
+        solver.name,
+        name,
         detail=detail.said(resolution, table.resolution),
-        links=_links(request, resolution, detail) if chosen.name == "json" else {},
-        timings={"lookup": 1e3 * (looked - begin)},
+        links=_links(request, resolution, detail) if is_json else {},
+        timings={"lookup": 1e3 * (looked - begin)} if is_json else {},
     )
     body = chosen.encode(shape, about)
     encoded = time.perf_counter()
     timing = f"lookup;dur={1e3 * (looked - begin):.3f}, encode;dur={1e3 * (encoded - looked):.3f}"
-    if chosen.name == "json":  # its timings and its links are this request's own
+    if is_json:
         return Response(body, headers={**headers, "Server-Timing": timing}, media_type=chosen.media_type)
     headers["Content-Disposition"] = f'attachment; filename="{_filename(solver.name, query, words.stage, chosen)}"'
     headers["Content-Type"], headers["Content-Length"] = chosen.media_type, str(len(body))
@@ -185,14 +186,15 @@ def _answer(request: Request, asked: Asked) -> Response:
     made = Answer(tag, (*wire, (b"server-timing", b"kept;desc=answered-before")), body)
     answers.keep(made)
     answers.remember(request.scope, solver, name, request.app.state.tables.families(solver), table.digest, tag)
-    return _whole(Answer(tag, (*wire, (b"server-timing", timing.encode("latin-1"))), body))
+    return _Whole(Answer(tag, (*wire, (b"server-timing", timing.encode("latin-1"))), body))
 
 
-def _whole(answer: Answer) -> Response:
-    """Return an answer as a response; its headers are complete."""
-    response = Response(answer.body)
-    response.raw_headers = list(answer.headers)
-    return response
+class _Whole(Response):
+    """An answer as a response, whose headers are complete: none of them is made anew."""
+
+    def __init__(self, answer: Answer) -> None:
+        self.status_code, self.background = 200, None
+        self.body, self.raw_headers = answer.body, list(answer.headers)
 
 
 def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int, *detail: str) -> str:

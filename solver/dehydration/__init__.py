@@ -54,12 +54,18 @@ def _run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
 
 
 def _relax(
-    params: DehydrationParams, position: Floats, stage: float, need: Need, context: Context, steps: int | None = None
+    params: DehydrationParams,
+    position: Floats,
+    stage: float,
+    need: Need,
+    context: Context,
+    steps: int | None = None,
+    bumps: bool = False,
 ) -> xr.Dataset:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
     from .relax import relax
 
-    return relax(params, position, stage, need, context, steps)
+    return relax(params, position, stage, need, context, steps, bumps)
 
 
 def _cost(params: DehydrationParams, need: Need) -> Cost:

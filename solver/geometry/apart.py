@@ -1,7 +1,9 @@
-"""Put a closed surface out of contact with itself, where it crosses and nowhere else, without a jump.
+"""Put a closed surface out of contact with itself, where it crosses and nowhere else, from nothing on.
 
 What crosses, or nearly does, is evened out: its corners, and theirs, move towards the mean of their neighbours, as
-far as they overlap and some gap more. So what moves grows from nothing as a gap closes.
+far as they overlap and some gap more. So what moves grows from nothing as a gap closes. But how many rounds that takes,
+and which pairs are watched between two looks at the whole, changes at once: where much folds some points jump as the
+surface given moves (record dehydration-jumps).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A looked-up surface out of contact with itself: between samples that fold, a blend of them folds into itself.
 
-What crosses on the lattice that is handed over is evened out there (`solver.geometry.apart`), without a jump as a
-parameter moves. A fine lattice first takes over what that did on the one of `COARSE` colatitudes: rounds of evening out
-reach from point to point, and points of a fine lattice lie close.
+What crosses on the lattice that is handed over is evened out there (`solver.geometry.apart`), from nothing on.
+A fine lattice first takes over what that did on the one of `COARSE` colatitudes: rounds of evening out reach from point
+to point, and points of a fine lattice lie close.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from .terminal.options import As_json, StoreToRead, TableName, check_place
 
 if TYPE_CHECKING:
     from store.lookup import ShapeTable
+    from store.store import Store
 
     from ..refining.balance import Distance
     from ..refining.score import Report
@@ -55,7 +56,7 @@ def score(
 
     With --relax also the distance to equilibrium: the residual of a looked-up shape on the solver's mesh, how far 600
     steps of the solver move it (rms over its roughness), and how its roughness, bands and slopes compare with what
-    becomes of it: a second or two for each point, method and stage.
+    becomes of it. Fruits keep the pattern that their runs start from, if the store holds its run.
 
     [bold]Examples[/bold]
 
@@ -85,9 +86,9 @@ def score(
         near = min(table.stages, key=lambda stored: abs(stored - (_STAGE if stage is None else stage)))
         seal.publish(picture, scores.picture(cases, near))
     document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
-    moved = list(_distances(table, names, relax))
+    moved = list(_distances(table, names, relax, begun := _begun(table, opened)))
     if relax:
-        document["relaxed"] = [row.to_json() for row in moved]
+        document |= {"relaxed": [row.to_json() for row in moved], "with_bumps": begun is not None}
     symbol = registry.get(table.info.solver).stages.symbol
     emit(document, as_json, lambda console: _show(console, name, report, moved, symbol, picture))
 
@@ -113,7 +114,14 @@ def _show(console: Any, name: str, report: Any, moved: list[Any], symbol: str, p
         console.print(f"drawn to {picture}", markup=False)
 
 
-def _distances(table: ShapeTable, names: Sequence[str], count: int) -> Iterator[Distance]:
+def _begun(table: ShapeTable, store: Store) -> Store | None:
+    """Return the store if it has all that the table's runs begin with."""
+    from ..refining import balance
+
+    return store if balance.at_hand(table, store) else None
+
+
+def _distances(table: ShapeTable, names: Sequence[str], count: int, store: Store | None) -> Iterator[Distance]:
     """Yield the mean distance to equilibrium of each method at each stage, and say how far that is."""
     from solver import registry
 
@@ -121,8 +129,10 @@ def _distances(table: ShapeTable, names: Sequence[str], count: int) -> Iterator[
 
     solver = registry.get(table.info.solver)
     points = balance.between(table, count) if count else []
+    if points and store is None:
+        typer.echo("relaxed without the pattern that their runs start from: the store does not hold it", err=True)
     for name, stage in itertools.product(names if points else (), table.stages):
-        found = [balance.distance(solver, table, values, stage, name) for values in points]
+        found = [balance.distance(solver, table, values, stage, name, store) for values in points]
         rows = [row for row in found if row is not None]
         typer.echo(f"relaxed {len(rows)} of {len(points)}: {name}, stage {stage:g}", err=True)
         if rows:

@@ -91,6 +91,22 @@ def test_what_is_relaxed_keeps_the_volume_of_what_does_not_shrink() -> None:
     assert volume(found["position"].values.astype(float)) / exact == pytest.approx(1, abs=0.015)
 
 
+def test_a_run_stays_where_its_fruit_keeps_its_bumps() -> None:
+    """About the onset they hold up wrinkles that a smooth fruit does not have: off it, a run in balance moves away."""
+    solver = registry.get("dehydration")
+    params, need = solver.parse({**EIGHTH, "imperfection": 0.01}), NEED.model_copy(update={"resolution": 48})
+    run = solver.solve(params, need.model_copy(update={"stages": (0.07,)})).isel(stage=0)
+    surface = run["position"].values.astype(float)
+    kept, lost = (
+        solver.relaxed(params, surface, 0.07, need, steps=600, bumps=bumps).isel(stage=0) for bumps in (True, False)
+    )
+    assert float(kept["moved"]) < 0.12
+    assert float(lost["moved"]) > 0.4
+    rough = [float(np.linalg.norm(one["position"].values, axis=-1).std()) for one in (run, kept, lost)]
+    assert rough[1] == pytest.approx(rough[0], rel=0.05)
+    assert rough[2] < 0.6 * rough[0]
+
+
 def test_so_many_steps_and_no_more() -> None:
     solver = registry.get("dehydration")
     found = solver.relaxed(solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED, steps=500).isel(stage=0)

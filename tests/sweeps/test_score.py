@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from service.cli import app
 from solver import registry
-from solver.contract import Need, finish
+from solver.contract import Need, Unstable, finish
 from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
 from store import starter
@@ -21,7 +21,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 from sweeps.errors import InvalidOption
 from sweeps.planning import plan
-from sweeps.refining import score
+from sweeps.refining import balance, score
 
 
 def test_samples_predicted_from_each_other(tmp_path: Path) -> None:
@@ -125,3 +125,24 @@ def test_what_cannot_be_scored(tmp_path: Path) -> None:
     assert "best" in wrong.stderr
     wrong = CliRunner().invoke(app, ["table", "score", "--store", str(store.root), "--picture", "score.jpg"])
     assert wrong.exit_code == 2
+
+
+def test_what_is_looked_up_keeps_what_its_runs_begin_with_where_that_is_at_hand(tmp_path: Path) -> None:
+    """Its pattern is a run of its own, which the package does not hold; bumps follow from the seed."""
+    asked: list[bool] = []
+
+    def relax(*given: object) -> xr.Dataset:
+        asked.append(bool(given[-1]))
+        raise Unstable("seen enough.")
+
+    solver, empty = dataclasses.replace(SOLVER, relax=relax), Store.open(tmp_path, create=True)
+    begun, cold = (
+        ShapeTable.open(starter.ROOT, name, surfaces=registry.surface) for name in ("stone-radius", "sphere-01")
+    )
+    assert balance.at_hand(cold, empty)
+    assert not balance.at_hand(begun, empty)
+    empty.put(begun.info.template["pattern"]["key"], xr.Dataset({"displacement": ("stage", [0.0])}))
+    assert balance.at_hand(begun, empty)
+    for store in (empty, None):
+        assert balance.distance(solver, begun, begun.sample(0), 0.1, "nearest", store) is None
+    assert asked == [True, False]

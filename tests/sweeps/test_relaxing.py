@@ -1,0 +1,62 @@
+"""What is relaxed at once and what a job relaxes are one shape: the same start, the same points, the same poles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver import registry
+from solver.arrays import Floats
+from solver.contract import Context, Need, Params
+from solver.dehydration import SOLVER
+from solver.lattice import azimuths, colatitudes, directions, lattice
+from store.lookup import ShapeTable
+from store.starter import ROOT
+from sweeps.outputs import of_result
+from sweeps.relaxing import relaxed
+
+POINT, STAGE = {"te": 0.034, "gamma": 22.0}, 0.2
+
+
+@pytest.mark.parametrize("resolution", [None, 16])
+def test_what_is_relaxed_starts_and_ends_as_in_a_job(resolution: int | None) -> None:
+    table = ShapeTable.open(ROOT, surfaces=registry.surface)
+    begun: list[Floats] = []
+    results: list[xr.Dataset] = []
+
+    def relax(
+        _: Params, position: Floats, stage: float, need: Need, __: Context, steps: int | None, kept: bool
+    ) -> xr.Dataset:
+        begun.append(position)
+        n = need.resolution or 0
+        theta, phi = lattice(n)
+        # steep at the poles, where the mean of a ring is another place than the end of the waves
+        bumps = 1 + 0.1 * np.cos(6 * theta) + 0.02 * np.cos(phi) * np.sin(theta)
+        where = (directions(theta, phi) * bumps[..., None])[None].astype(np.float32)
+        dims = ("stage", "colatitude", "azimuth", "component")
+        numbers = dict.fromkeys(
+            (*need.fields, "residual", "moved", "iterations", "seconds", "converged"), ("stage", [1.0])
+        )
+        made = {**numbers, "position": (dims, where), "displacement": (dims, 0 * where)}
+        coords = {"stage": [stage], "colatitude": colatitudes(n), "azimuth": azimuths(n), "component": ["x", "y", "z"]}
+        results.append(xr.Dataset(made, coords, {"path": "relaxed"}))
+        return results[-1]
+
+    shape = table.at(POINT, STAGE, resolution=resolution)
+    found, _ = relaxed(replace(SOLVER, relax=relax), table, shape)
+    assert np.array_equal(begun[0], np.asarray(table.at(POINT, STAGE).position, float))
+    job = of_result(results[0], shape.parameters, 0)
+    assert found.position is not None
+    assert found.poles is not None
+    assert job.position is not None
+    assert job.poles is not None
+    assert found.position.shape == (resolution or table.resolution, 2 * (resolution or table.resolution), 3)
+    assert found.position.tobytes() == job.position.tobytes()
+    assert found.poles.tobytes() == job.poles.tobytes()
+    assert found.crossings == job.crossings
+    assert found.tier == job.tier == "relaxed"
+    # the closed form of the waves, of which the rings' means are off by more than they could by rounding
+    assert np.allclose(found.poles, [[0, 1.1, 0], [0, -1.1, 0]], atol=1e-4)
