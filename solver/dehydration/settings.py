@@ -74,9 +74,9 @@ class _Quality:
 #: the fourth at gamma = 50 (s = 0.3). Below five, J stays above 0.6; one point there changes the roughness by less than
 #: another seed does.
 _QUALITIES = {
-    "preview": _Quality(4.2, 18, 48, 30.0, 2e-3, 2e-2, 5),
-    "default": _Quality(6.0, 24, 96, 30.0, 1e-3, 1e-2, 5),
-    "fine": _Quality(9.0, 36, 160, 30.0, 1e-3, 5e-3, 1000),
+    "preview": _Quality(4.2, 18, 48, 15.0, 2e-3, 2e-2, 5),
+    "default": _Quality(6.0, 24, 96, 15.0, 1e-3, 1e-2, 5),
+    "fine": _Quality(9.0, 36, 160, 15.0, 1e-3, 5e-3, 1000),
 }
 
 #: Elements a wavelength below which a mesh makes up a pattern of its own.
