@@ -1,4 +1,4 @@
-"""How a stage comes to rest: what is far from it swings on, what is near is calmed."""
+"""How a stage comes to rest: what is far from it swings on, what is near is calmed; and where the rungs stand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from solver import registry
 from solver.dehydration.kernel.march import SEARCH_EVERY
-from solver.dehydration.settings import choose
+from solver.dehydration.settings import RUNGS, choose
 from solver.dehydration.settle import settle
 
 SOLVER = registry.get("dehydration")
@@ -81,3 +81,9 @@ def test_whole_searches_for_contact_lie_between_two_looks():
     swing = [count for damping, count in settled([0.9]).turns if damping != SETTINGS.calm_damping]
     assert {count % SEARCH_EVERY for count in swing} == {0}
     assert sum(swing) == pytest.approx(SETTINGS.swing_steps, rel=0.1)
+
+
+def test_rungs_stand_wherever_a_run_may_end():
+    last = SOLVER.stages.highest
+    assert RUNGS[-1] == pytest.approx(last)
+    assert np.all(np.diff(RUNGS) > 0)
