@@ -28,7 +28,7 @@ _SLICE = 0.01
 
 #: Updates of the rest volumes before a state settles, steps between two, and their damping: what rings is gone by the
 #: next. A march's volumes lag by 0.03 of shrinkage; those of a smooth start know no pressure.
-_PRESSINGS, _PRESSINGS_AT_START, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 3, 150, 0.12
+_PRESSINGS, _PRESSINGS_AT_START, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 5, 150, 0.12
 
 #: Height of bumps (rms) below which a sphere is smooth [te], and the latest onset of other fruits over the start.
 _SMOOTH, _LATE_ONSET = 0.1, 3.0

@@ -25,7 +25,7 @@ _REST_STEPS, _CALM_LOOK = 200, 100
 
 #: Residual and drift, over those that count as settled, beyond which a state swings on after a look: it slides, and a
 #: hundred calm steps would take a few percent off its residual.
-_FAR_RESIDUAL, _FAR_DRIFT = 1.5, 3.0
+_FAR_RESIDUAL, _FAR_DRIFT = 3.0, 6.0
 
 #: Swings that a state is left to itself to show whether it is stable, and the rms way of the surface [te] after which
 #: it was not: of what is seen to be smooth, and of what may have buckles, whose soft ways are longer. 1 % past the
