@@ -83,7 +83,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="10",
+    version="11",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", "mesh_position", *_DESCRIPTORS, "strain_energy", "released_energy"),
