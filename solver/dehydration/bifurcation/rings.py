@@ -44,11 +44,11 @@ ACROSS = 0.35
 #: the wolfberry with r8 = .38, whose waves are 1.25 times as long, s_cr falls by 1.2 and .4 % from 2.9 to 4.2 to 6.2.
 PER_WAVELENGTH = {"preview": (2.0, 2.9, 4.2), "default": (2.0, 4.2, 6.2), "fine": (2.0, 6.0, 8.5)}
 #: Half of the first band's width, in wavelengths of its skin, and places this near the first are taken along.
-REACH, CLOSE = 6.0, 1.01
-#: Half of a band's width, in standard deviations of the mode's square along meridians, as it is made (on finer meshes a
-#: mode moves by up to two), and the least with which a look is believed; and the share of the mode's height that counts
-#: as none, round the axis.
-FITTED, LEAST, NONE = 5.0, 3.0, 0.03
+REACH, CLOSE = 6.0, 1.005
+#: Half of a band's width, in standard deviations of the mode's square along meridians, as it is made, and the least
+#: with which a look is believed: on finer meshes a mode moves by up to four, and an edge at three makes it .3 % late.
+#: And the share of the mode's height that counts as none, round the axis.
+FITTED, LEAST, NONE = 5.0, 4.0, 0.1
 #: Elements along meridians of the first bands and of fitted ones: 14 and 24 in place of 6 change s_cr by 2e-4.
 ROWS, FITTED_ROWS = 8, 6
 #: Layers of the flesh that waves reach: 1.75 wavelengths.

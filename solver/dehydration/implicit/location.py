@@ -110,6 +110,8 @@ def interpolate(params: DehydrationParams, mesh: QuadraticMesh, nodal: Floats, p
     """
     element, local = nominal(params, mesh, points)
     found, inside = np.zeros_like(points), np.flatnonzero(element >= 0)
+    if not len(inside):
+        return found
     shape = HEX27.shape(local[inside])[:, None]
     found[inside] = np.matmul(shape, nodal[mesh.connectivity[element[inside]]])[:, 0]
     return found
