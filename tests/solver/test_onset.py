@@ -138,14 +138,14 @@ def test_a_patch_of_plum_1() -> None:
 
 @pytest.mark.slow
 def test_bands_agree_with_the_meridional_road_where_waves_run_round_the_axis() -> None:
-    """Even waves only: the best number of all, 23 here, comes up to 1e-3 earlier."""
-    params = SOLVER.parse({"te": 0.01}, "wolfberry")
+    """To what two meshes of 2.9 and 4.2 elements leave; that road's own seven onsets lie within 1.7e-3."""
+    params = SOLVER.parse({}, "wolfberry")
     assert isinstance(params, DehydrationParams)
     truth = onset(params, kappa_ratio=1e5, quality="preview").s_cr
     model, found = full.crossings(params, quality="preview", bands=True)
     assert model.mesh.band is not None
     assert truth is not None
-    assert found[0].shrinkage == pytest.approx(truth, rel=6e-3)
+    assert found[0].shrinkage == pytest.approx(truth, rel=5e-3)
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ __all__ = ["Rings"]
 
 #: Waves round the axis from which on they are looked for in bands. Each parity about the planes has every other of
 #: these numbers; the best of all comes earlier than the best of the even ones by .4 / number^2 (wolfberry), relative.
-MANY = 24
+MANY = 20
 #: Largest cosine between crests and the circle round the axis.
 ACROSS = 0.35
 #: Quadratic elements to a wrinkle of the flat film, of the look at each place and of the two whose limit is taken. On
@@ -48,9 +48,9 @@ REACH, CLOSE = 6.0, 1.005
 #: Half of a band's width, in standard deviations of the mode's square along meridians, as it is made, and the least
 #: with which a look is believed: on finer meshes a mode moves by up to four, and an edge at three makes it .3 % late.
 #: And the share of the mode's height that counts as none, round the axis.
-FITTED, LEAST, NONE = 5.0, 4.0, 0.1
+FITTED, LEAST, NONE = 6.5, 4.0, 0.06
 #: Elements along meridians of the first bands and of fitted ones: 14 and 24 in place of 6 change s_cr by 2e-4.
-ROWS, FITTED_ROWS = 8, 6
+ROWS, FITTED_ROWS = 8, 7
 #: Layers of the flesh that waves reach: 1.75 wavelengths.
 DEEP = 3
 #: Azimuth [radian] of an element of the smooth state, at first and later.
@@ -180,7 +180,10 @@ class Rings:
         """
         self.below = NEXT * look.first.shrinkage
         for number in range(_MOVES):
-            look = self._look(self._divided(look.fitted()[0], per_wavelength, FITTED_ROWS), 0.5 + 0.04 * number, look)
+            band = look.fitted()[0]
+            # round the axis once only: sides that are cut again and again would press the mode together
+            band = band._replace(first=look.band.first, last=look.band.last) if number else band
+            look = self._look(self._divided(band, per_wavelength, FITTED_ROWS), 0.5 + 0.04 * number, look)
             if look.fitted()[1]:
                 return look
         raise NotConverged("the first mode was not held by a band of latitudes.", advice="Ask for a finer quality.")
