@@ -149,9 +149,8 @@ def build_quadratic_mesh(
     number = np.full(len(rays), -1)
     number[columns] = np.arange(len(columns))
     stacks = number[quads[kept]]
-    return _raised(
-        params, rays[columns], outer[columns], stacks, quad_of, edge[columns], core, exocarp_layers, planes, foot
-    )
+    ground = _Ground(rays[columns], outer[columns], stacks, quad_of, edge[columns], planes)
+    return _raised(params, ground, core, exocarp_layers, foot)
 
 
 def build_band_mesh(
@@ -177,16 +176,27 @@ def build_band_mesh(
     edge[-1] |= band.last < np.pi / 2
     rays, outer = meeting(params, towards.reshape(-1, 3))
     quad_of = np.arange(band.cells * band.rows).reshape(1, band.cells, band.rows)
-    return _raised(
-        params, rays, outer, stacks.reshape(-1, 9), quad_of, edge.ravel(), core, exocarp_layers, planes, foot, band
-    )
+    ground = _Ground(rays, outer, stacks.reshape(-1, 9), quad_of, edge.ravel(), planes, band)
+    return _raised(params, ground, core, exocarp_layers, foot)
+
+
+class _Ground(NamedTuple):
+    """Where columns stand: along `rays` (columns, 3), which meet the interface at `outer`; else as of the mesh."""
+
+    rays: Floats
+    outer: Floats
+    stacks: Ints
+    quad_of: Ints
+    cut: Bools
+    planes: tuple[int, ...]
+    band: Band | None = None
 
 
 def _raised(
-    params: DehydrationParams, rays: Floats, outer: Floats, stacks: Ints, quad_of: Ints, cut: Bools, core: Floats,
-    exocarp_layers: int, planes: tuple[int, ...], foot: float | None, band: Band | None = None,
-) -> QuadraticMesh:  # fmt: skip
-    """Return the mesh on columns along `rays` (columns, 3), which meet the interface at `outer`."""
+    params: DehydrationParams, ground: _Ground, core: Floats, exocarp_layers: int, foot: float | None
+) -> QuadraticMesh:
+    """Return the mesh of columns."""
+    rays, outer, stacks, quad_of, cut, planes, band = ground
     positions = along_rays(params, rays, outer, _with_middles(core), 2 * exocarp_layers)
     levels = positions.shape[1]
     layers = (levels - 1) // 2
