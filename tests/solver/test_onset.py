@@ -136,6 +136,37 @@ def test_a_patch_of_plum_1() -> None:
     assert found[0].shrinkage == pytest.approx(0.0842, rel=3e-3)
 
 
+@pytest.mark.slow
+def test_bands_agree_with_the_meridional_road_where_waves_run_round_the_axis() -> None:
+    """To what two meshes of 2.9 and 4.2 elements leave; that road's own seven onsets lie within 1.7e-3."""
+    params = SOLVER.parse({}, "wolfberry")
+    assert isinstance(params, DehydrationParams)
+    truth = onset(params, kappa_ratio=1e5, quality="preview").s_cr
+    model, found = full.crossings(params, quality="preview", bands=True)
+    assert model.mesh.band is not None
+    assert truth is not None
+    assert found[0].shrinkage == pytest.approx(truth, rel=3e-3)
+
+
+@pytest.mark.slow
+def test_bands_are_for_waves_round_the_axis_of_large_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The modes that runs start from, and fruits whose crests follow parallels, have patches."""
+    taken = list[str]()
+
+    def seen(self: Any, *_: object) -> Any:
+        taken.append(type(self).__name__)
+        raise Cancelled("seen")
+
+    monkeypatch.setattr(full.Rings, "run", seen)
+    monkeypatch.setattr(full._Search, "run", seen)
+    for preset, bands in (("wolfberry", True), ("wolfberry", False), ("plum1", True)):
+        params = SOLVER.parse({"r8": 0.38} if preset == "wolfberry" else {}, preset)
+        assert isinstance(params, DehydrationParams)
+        with pytest.raises(Cancelled):
+            onset(params, bands=bands)
+    assert taken == ["Rings", "_Search", "_Search"]
+
+
 def test_both_roads_agree_on_the_linear_method_which_misses_the_exact_onset() -> None:
     radial, meridional = (
         onset(sphere(), method="linear", road=road, quality="preview")  # type: ignore[arg-type]

@@ -54,7 +54,8 @@ def heights(params: DehydrationParams, directions: Floats, context: Context, hig
     quiet = Context(cancelled=stop)
     if params.mirrors:
         return mirrored_mode(params, context=quiet)(directions)
-    found = onset(params, quality="preview", context=quiet)
+    # bands find a mode better; runs that are stored started from what patches find
+    found = onset(params, quality="preview", context=quiet, bands=False)
     if found.mode is None:
         raise InvalidInput(
             f"there is no buckling mode to start from: {found.reason or 'the smooth shape stays stable'}.",
