@@ -15,11 +15,7 @@ from .fresh.loading import Loading
 from .fresh.mesh import flesh_span, layer_fractions
 from .params import DehydrationParams
 
-__all__ = ["RUNGS", "Settings", "choose", "expected_cost"]
-
-#: Shrinkages of the settled states on the way: near each other where buckles come up, whose number the first decides
-#: (without the one at 0.05, stiff skins had a fifth more roughness at 0.1, and fewer buckles), farther apart later.
-RUNGS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+__all__ = ["Settings", "choose", "expected_cost"]
 
 
 @dataclass(frozen=True)
@@ -33,7 +29,9 @@ class Settings:
     march. copies: mirror images that make up the whole fruit. damping: per step, while marching; swing_damping and
     calm_damping: while a stage settles (see `settle.settle`). residual, drift: at which a stage counts as settled (see
     `settle.State`). swing_steps, calm_steps: longest turn of each way of settling. settle_steps: after which a stage
-    does not settle. clearance: gap that self-contact keeps, in exocarp thicknesses.
+    does not settle. clearance: gap that self-contact keeps, in exocarp thicknesses. rungs: shrinkages of the settled
+    states on the way. calm_look: calm steps between two looks at residual and drift. near: residual over the one that
+    counts as settled beyond which a state swings on after a look. pressings: updates of a smooth start's rest volumes.
     """
 
     n: int
@@ -50,6 +48,10 @@ class Settings:
     calm_steps: int
     settle_steps: int
     start: float
+    rungs: tuple[float, ...]
+    calm_look: int
+    near: float
+    pressings: int
     clearance: float = 0.1
     full_levels: int = 1000
     copies: int = 1
@@ -69,15 +71,28 @@ class _Quality:
     residual: float
     drift: float
     full_levels: int
+    rungs: tuple[float, ...]
+    calm_look: int
+    near: float
+    pressings: int
 
 
+#: Settled states on the way along shrinkage. Where buckles come up the first decides their number (without the one at
+#: 0.05 stiff skins had a fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart.
+_RUNGS = tuple(round(0.05 * k, 2) for k in range(1, 13))
+_FEW_RUNGS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+
+#: Half of the bulk modulus allows 1.4 times the step, and a smooth start takes more updates of its rest volumes then. A
+#: preview that is far from rest after a look slides along a soft way: a hundred calm steps take a few percent off its
+#: residual, swinging takes more. At default all this together saves no steps and makes stiff skins rougher.
+#:
 #: Under deep folds core layers with one point each turn inside out: the three below the skin at gamma = 10 (s = 0.25),
 #: the fourth at gamma = 50 (s = 0.3). Below five, J stays above 0.6; one point there changes the roughness by less than
 #: another seed does.
 _QUALITIES = {
-    "preview": _Quality(4.2, 18, 48, 15.0, 2e-3, 2e-2, 5),
-    "default": _Quality(6.0, 24, 96, 15.0, 1e-3, 1e-2, 5),
-    "fine": _Quality(9.0, 36, 160, 15.0, 1e-3, 5e-3, 1000),
+    "preview": _Quality(4.2, 18, 48, 15.0, 2e-3, 2e-2, 5, _FEW_RUNGS, 100, 3.0, 5),
+    "default": _Quality(6.0, 24, 96, 30.0, 1e-3, 1e-2, 5, _RUNGS, 200, np.inf, 3),
+    "fine": _Quality(9.0, 36, 160, 30.0, 1e-3, 5e-3, 1000, _RUNGS, 200, np.inf, 3),
 }
 
 #: Elements a wavelength below which a mesh makes up a pattern of its own.
@@ -148,6 +163,10 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
         calm_steps=_CALM_STEPS,
         settle_steps=round(_SETTLE_STEPS * scale),
         start=start,
+        rungs=q.rungs,
+        calm_look=q.calm_look,
+        near=q.near,
+        pressings=q.pressings,
         full_levels=q.full_levels,
         copies=2 ** len(params.mirrors),
     )
@@ -166,7 +185,7 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     settings = choose(params, need.quality, last)
     if need.start is not None:
         return _whole_cost(settings, _RELAXING_STEPS)
-    rungs = [rung for rung in RUNGS if settings.start < rung < last + 1e-9]
+    rungs = [rung for rung in settings.rungs if settings.start < rung < last + 1e-9]
     # most settle for a sixth of the steps they may take
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
     steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 6 * states

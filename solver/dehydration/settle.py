@@ -20,12 +20,11 @@ Fixed = NDArray[np.int32]
 #: Looks at the kinetic energy per swing, about; whole searches for contact lie between two.
 _LOOKS = 15
 
-#: Steps in which a surface at rest may drift so far, and the calm steps after which it is looked at.
-_REST_STEPS, _CALM_LOOK = 200, 100
+#: Steps in which a surface at rest may drift so far.
+_REST_STEPS = 200
 
-#: Residual and drift, over those that count as settled, beyond which a state swings on after a look: it slides, and a
-#: hundred calm steps would take a few percent off its residual.
-_FAR_RESIDUAL, _FAR_DRIFT = 3.0, 6.0
+#: Drift over the one that counts as settled beyond which a state swings on, over the same of the residual.
+_FAR_DRIFT = 2.0
 
 #: Swings that a state is left to itself to show whether it is stable, and the rms way of the surface [te] after which
 #: it was not: of what is seen to be smooth, and of what may have buckles, whose soft ways are longer. 1 % past the
@@ -37,8 +36,8 @@ _TRIAL_SWINGS, _LEFT, _LEFT_BUCKLED = 4, 0.05, 0.25
 class State:
     """A settled stage: nodes of the outer surface (nc, 3), how settled it is, and the steps spent so far.
 
-    residual: out-of-balance force over internal force. drift: rms motion of the surface in 200 steps, of which the last
-    100 are looked at, in exocarp thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy
+    residual: out-of-balance force over internal force. drift: rms motion of the surface in 200 steps, by the last that
+    were looked at, in exocarp thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy
     in mu r1^3, and released: by how much settling lowered it, where that was asked for.
     """
 
@@ -116,13 +115,13 @@ def _come_to_rest(
         while (residual > settings.residual or drift > settings.drift) and is_near and rested < settings.calm_steps:
             surface = motion.surface(state)
             # rest volumes stay: under some that go on following, forces have no potential and hardly balance
-            count = min(_CALM_LOOK, max(20, motion.slice))
+            count = min(settings.calm_look, max(20, motion.slice))
             motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping)
             rested += count
             residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
             drift = _way(motion, state, surface) / count * _REST_STEPS
-            is_near = residual <= _FAR_RESIDUAL * settings.residual and drift <= _FAR_DRIFT * settings.drift
-            is_near = is_near or not swings
+            far = max(residual / settings.residual, drift / (_FAR_DRIFT * settings.drift))
+            is_near = far <= settings.near or not swings
         spent += rested
     return spent, residual, drift
 

@@ -7,7 +7,7 @@ import pytest
 
 from solver import registry
 from solver.dehydration.kernel.march import SEARCH_EVERY
-from solver.dehydration.settings import RUNGS, choose
+from solver.dehydration.settings import choose
 from solver.dehydration.settle import settle
 
 SOLVER = registry.get("dehydration")
@@ -83,7 +83,8 @@ def test_whole_searches_for_contact_lie_between_two_looks():
     assert sum(swing) == pytest.approx(SETTINGS.swing_steps, rel=0.1)
 
 
-def test_rungs_stand_wherever_a_run_may_end():
-    last = SOLVER.stages.highest
-    assert RUNGS[-1] == pytest.approx(last)
-    assert np.all(np.diff(RUNGS) > 0)
+@pytest.mark.parametrize("quality", ["preview", "default", "fine"])
+def test_rungs_stand_wherever_a_run_may_end(quality):
+    rungs = choose(PARAMS, quality).rungs
+    assert rungs[-1] == pytest.approx(SOLVER.stages.highest)
+    assert np.all(np.diff(rungs) > 0)
