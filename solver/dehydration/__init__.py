@@ -60,12 +60,11 @@ def _relax(
     need: Need,
     context: Context,
     steps: int | None = None,
-    bumps: bool = False,
 ) -> xr.Dataset:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
     from .relax import relax
 
-    return relax(params, position, stage, need, context, steps, bumps)
+    return relax(params, position, stage, need, context, steps)
 
 
 def _cost(params: DehydrationParams, need: Need) -> Cost:
