@@ -43,7 +43,7 @@ def test_a_ridged_surface_comes_to_balance() -> None:
     assert bool(found["converged"])
     assert int(found["crossings"]) == int(found["lattice_crossings"]) == 0
     radii = [np.linalg.norm(one, axis=-1).ravel() for one in (found["position"].values, given)]
-    # they move by six times their height: .33 with the march of default, .19 with that of a preview, which steps farther
+    # they move by six times their height: .33 with the march of default, .19 with the longer steps of a preview
     assert np.corrcoef(*radii)[0, 1] > 0.1
     assert float(found["moved"]) > 0
 
