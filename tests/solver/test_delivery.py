@@ -7,6 +7,7 @@ import pytest
 
 from solver import registry
 from solver.dehydration.fresh.mesh import Sampler, build_mesh
+from solver.dehydration.fresh.sector import cut
 from solver.dehydration.measures.delivery import Delivery, even_out
 from solver.dehydration.measures.facets import on_triangles
 from solver.dehydration.measures.penetration import of_lattice, of_quads
@@ -154,3 +155,24 @@ def test_evening_out_touches_what_crosses_alone():
     assert moved[12, 10]
     assert moved.mean() < 0.2
     assert np.array_equal(even_out(points)[0], points)
+
+
+@pytest.mark.parametrize("mirrors", ["y", "xz", "xyz"])
+def test_what_is_mirrored_is_handed_over_so(mirrors):
+    """Its triangles are not: each quad of a lattice is cut from one corner to the opposite one."""
+    mesh, nodes = grooved_fruit(0.0005)
+    nodes = nodes + 0.01 * np.prod(nodes, axis=1)[:, None] ** 2
+    fruit = registry.get("dehydration").parse({**FRUIT.model_dump(mode="json"), "mirrors": mirrors})
+    sector = cut(mesh, mirrors)
+    nodes = sector.whole(nodes[sector.own])
+    given = Delivery(fruit, mesh, 64, "float64")(nodes)
+    assert given.moved > 0
+    # colatitudes from the pole y > 0, azimuths from x towards z
+    n = 64
+    images = {
+        "x": lambda p: np.roll(p[:, ::-1], 1 - n, axis=1) * [-1, 1, 1],
+        "y": lambda p: p[::-1] * [1, -1, 1],
+        "z": lambda p: np.roll(p[:, ::-1], 1, axis=1) * [1, 1, -1],
+    }
+    for name in mirrors:
+        assert abs(images[name](given.position) - given.position).max() < 1e-12

@@ -16,10 +16,12 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from ...arrays import Bools, Floats, Ints
-from ...fruit import Fruit, lattice
+from ...fruit import lattice
 from ...geometry.crossings import Crossings
 from ...lattice import closed_lattice
 from ..fresh.mesh import FruitMesh, Sampler
+from ..fresh.sector import cut
+from ..params import DehydrationParams
 from .facets import on_triangles
 from .folds import Folds
 from .penetration import of_lattice
@@ -48,7 +50,7 @@ class Delivered(NamedTuple):
 class Delivery:
     """Reads surface nodes on the lattice of one resolution."""
 
-    def __init__(self, fruit: Fruit, mesh: FruitMesh, resolution: int, dtype: str) -> None:
+    def __init__(self, fruit: DehydrationParams, mesh: FruitMesh, resolution: int, dtype: str) -> None:
         self._fruit, self._mesh, self._resolution, self._dtype = fruit, mesh, resolution, dtype
         self._sampler = Sampler(mesh.sphere, resolution)
         self._fresh = fruit.surface(*lattice(resolution))
@@ -84,7 +86,8 @@ class Delivery:
 
     @cached_property
     def _folds(self) -> Folds:
-        return Folds(self._mesh.sphere, self._sampler, self._fresh, self._look)
+        image = cut(self._mesh, self._fruit.mirrors).image
+        return Folds(self._mesh.sphere, self._sampler, self._fresh, self._look, image)
 
     @cached_property
     def _coarse(self) -> Delivery:

@@ -29,10 +29,12 @@ class Folds:
     """
 
     def __init__(
-        self, sphere: CubedSphere, sampler: Sampler, fresh: Floats, look: Callable[[Floats], Crossings]
+        self, sphere: CubedSphere, sampler: Sampler, fresh: Floats, look: Callable[[Floats], Crossings], image: Ints
     ) -> None:
-        """fresh: (n, 2n, 3). look: how it is told where a surface on that lattice crosses."""
-        self._fresh, self._look = fresh, look
+        """fresh: (n, 2n, 3). look: how it is told where a surface on that lattice crosses. image: (nd,) what node each
+        is a mirror image of: all images are rounded alike, though a lattice's triangles are no images of each other.
+        """
+        self._fresh, self._look, self._image = fresh, look, image
         self._fine, self._strong = Rounded(sphere, sampler, 2), Rounded(sphere, sampler, 1)
         self._around, self._corners = _around(sphere), corners(sphere, sampler)
         # from one point of the lattice to the next there may be several elements
@@ -74,6 +76,7 @@ class Folds:
             near = np.sign(self._around @ near)
         # where no more can be done, it is done farther around
         near = np.sign(near + self._around @ (near * (level == 2)))
+        near = np.bincount(self._image, weights=near)[self._image]
         raised: Ints = np.minimum(level + (near > 0), 2)
         return raised
 
