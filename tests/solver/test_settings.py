@@ -68,6 +68,7 @@ def test_elements_of_the_skin_are_as_wide_as_it_is_thick_at_fine(quality, width)
         (0.04, 50.0, "preview", True),
         (0.01, 5.0, "preview", True),
         (0.05, 30.0, "preview", False),
+        (0.005, 10.0, "preview", False),
         (0.04, 100.0, "preview", False),
         (0.04, 3.0, "preview", False),
         (0.04, 10.0, "default", False),
