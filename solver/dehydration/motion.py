@@ -79,8 +79,10 @@ class Motion:
         self.sector = cut(self.mesh, params.mirrors)
         directions = self.mesh.sphere.directions
         # waves that the mesh cannot carry (fewer than four nodes) would be noise that depends on it
-        bumps = params.imperfection * heights(params, directions, context, highest=settings.n)
-        bumps = evened(bumps, self.sector)
+        bumps = np.zeros(len(directions))
+        if params.imperfection:
+            bumps = params.imperfection * heights(params, directions, context, highest=settings.n)
+            bumps = evened(bumps, self.sector)
         if params.pattern is not None:
             bumps = bumps + mirrored(pattern_heights(params, directions, context), self.sector)
         mesh = self.sector.mesh
@@ -276,6 +278,11 @@ class Motion:
         share = settings.march_kappa_ratio / settings.kappa_ratio
         energy = float((sheared.energy + pressure_energy(loaded, dilatation, theta, share)).sum())
         return energy, float(sheared.least_ratio.min())
+
+    def least_ratio(self, state: Fixed, shrinkage: float) -> float:
+        """Return the least J/Jd of all integration points, as `strained` does."""
+        loaded = self.drive.loaded(self.layout, shrinkage)
+        return float(element_report(loaded, state, 1 - shrinkage).least_ratio.min())
 
     def residual(self, state: Fixed, rest: Floats, shrinkage: float, damping: float) -> float:
         """Return the out-of-balance force, contact included: what one step from rest does to the momentum.

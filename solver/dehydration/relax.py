@@ -89,7 +89,10 @@ def relax(
     placed = sector.whole(motion.surface(state))
     began = motion.residual(state, rest, stage, _FREE_DAMPING)
     rest, residual, drift = _balance(motion, state, velocity, rest, stage, steps or _MOST, context)
-    energy, least = motion.strained(state, rest, stage)
+    if "strain_energy" in need.fields:
+        energy, least = motion.strained(state, rest, stage)
+    else:
+        energy, least = 0.0, motion.least_ratio(state, stage)  # a quarter less of what comes after the steps
     if least <= 0:
         raise Unstable("elements turned inside out.", advice="Run it from the start.", residual=residual)
     whole = sector.whole(motion.surface(state))
@@ -112,7 +115,8 @@ def _balance(
     for calming in _CALMING:
         rest = motion.advance(state, velocity, rest, _TURN, stage, stage, calming)
     residual, drift, is_pressed, damping = np.inf, np.inf, False, _FREE_DAMPING
-    while motion.steps < most and residual > RESIDUAL:
+    # however few steps are left, it is looked at once
+    while (motion.steps < most or np.isinf(residual)) and residual > RESIDUAL:
         if not is_pressed and residual <= _NEAR * RESIDUAL:
             # what has moved since has other pressures
             for pressing in _PRESSING:
