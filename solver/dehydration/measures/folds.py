@@ -70,7 +70,7 @@ class Folds:
         points = np.unique(closed_lattice(len(self._fresh))[found.pairs])
         # of triangles at a pole the other corners tell
         points = points[points < len(self._corners)]
-        near = np.zeros(len(level))
+        near: Floats = np.zeros(len(level))
         near[self._corners[points]] = 1
         for _ in range(self._rings):
             near = np.sign(self._around @ near)
