@@ -70,14 +70,14 @@ class Folds:
         points = np.unique(closed_lattice(len(self._fresh))[found.pairs])
         # of triangles at a pole the other corners tell
         points = points[points < len(self._corners)]
-        near: Floats = np.zeros(len(level))
+        near = np.zeros(len(level))
         near[self._corners[points]] = 1
         for _ in range(self._rings):
             near = np.sign(self._around @ near)
         # where no more can be done, it is done farther around
         near = np.sign(near + self._around @ (near * (level == 2)))
-        near = np.bincount(self._image, weights=near)[self._image]
-        raised: Ints = np.minimum(level + (near > 0), 2)
+        reached = np.bincount(self._image, near)[self._image] > 0
+        raised: Ints = np.minimum(level + reached, 2)
         return raised
 
 
