@@ -123,3 +123,18 @@ def test_what_is_no_lattice_or_relaxes_nothing_is_refused() -> None:
     wood = registry.get("wood")
     with pytest.raises(InvalidInput, match="relaxes no surfaces"):
         wood.relaxed(wood.parse({}, "twig"), np.zeros((4, 8, 3)), 0.0)
+
+
+def test_the_worst_element_is_the_same_whether_energies_are_asked_for_or_not() -> None:
+    """Least J/Jd with and without the energy, which take ways of their own."""
+    solver = registry.get("dehydration")
+    plain, more = (
+        solver.relaxed(
+            solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED.model_copy(update={"fields": fields}), steps=1
+        ).isel(stage=0)
+        for fields in (("least_jacobian",), ("least_jacobian", "strain_energy"))
+    )
+    assert float(plain["least_jacobian"]) == float(more["least_jacobian"])
+    assert 0.5 < float(plain["least_jacobian"]) < 1.0
+    assert float(more["strain_energy"]) > 0
+    assert "strain_energy" not in plain
