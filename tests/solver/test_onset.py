@@ -16,6 +16,7 @@ from solver.dehydration import SOLVER, DehydrationParams
 from solver.dehydration.bifurcation import AxisymmetricMode, Onset, base_state, full, onset
 from solver.dehydration.bifurcation.base import Meridian
 from solver.dehydration.bifurcation.meridional_elements import deformation, forces, moduli, tangents, volume_rates
+from solver.dehydration.bifurcation.mirrored import mirrored_mode
 from solver.dehydration.bifurcation.pencil import Pencil, Perturbations
 from solver.dehydration.bifurcation.radial_elements import radial_mesh, smooth
 from solver.dehydration.bifurcation.result import dominant_degree
@@ -142,7 +143,7 @@ def test_bands_agree_with_the_meridional_road_where_waves_run_round_the_axis() -
     params = SOLVER.parse({}, "wolfberry")
     assert isinstance(params, DehydrationParams)
     truth = onset(params, kappa_ratio=1e5, quality="preview").s_cr
-    model, found = full.crossings(params, quality="preview", bands=True)
+    model, found = full.crossings(params, quality="preview")
     assert model.mesh.band is not None
     assert truth is not None
     assert found[0].shrinkage == pytest.approx(truth, rel=3e-3)
@@ -150,7 +151,7 @@ def test_bands_agree_with_the_meridional_road_where_waves_run_round_the_axis() -
 
 @pytest.mark.slow
 def test_bands_are_for_waves_round_the_axis_of_large_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The modes that runs start from, and fruits whose crests follow parallels, have patches."""
+    """Also for the modes that runs start from; fruits whose crests follow parallels have patches."""
     taken = list[str]()
 
     def seen(self: Any, *_: object) -> Any:
@@ -159,12 +160,13 @@ def test_bands_are_for_waves_round_the_axis_of_large_meshes(monkeypatch: pytest.
 
     monkeypatch.setattr(full.Rings, "run", seen)
     monkeypatch.setattr(full._Search, "run", seen)
-    for preset, bands in (("wolfberry", True), ("wolfberry", False), ("plum1", True)):
-        params = SOLVER.parse({"r8": 0.38} if preset == "wolfberry" else {}, preset)
-        assert isinstance(params, DehydrationParams)
+    wolfberry, plum = SOLVER.parse({"r8": 0.38, "mirrors": "xz"}, "wolfberry"), SOLVER.parse({}, "plum1")
+    assert isinstance(wolfberry, DehydrationParams)
+    assert isinstance(plum, DehydrationParams)
+    for params, find in ((wolfberry, onset), (wolfberry, mirrored_mode), (plum, onset)):
         with pytest.raises(Cancelled):
-            onset(params, bands=bands)
-    assert taken == ["Rings", "_Search", "_Search"]
+            find(params)
+    assert taken == ["Rings", "Rings", "_Search"]
 
 
 def test_both_roads_agree_on_the_linear_method_which_misses_the_exact_onset() -> None:

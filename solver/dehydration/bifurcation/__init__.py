@@ -27,7 +27,6 @@ def onset(
     quality: str = "default",
     road: Road | None = None,
     context: Context | None = None,
-    bands: bool = True,
 ) -> Onset:
     """Return where the fruit starts to buckle, and its first mode.
 
@@ -35,8 +34,6 @@ def onset(
     eigenproblem of Liu et al. 2014, Eq. 11, linearised at the fresh shape: 11 to 33 % too high for the spheres of the
     tests, 4 to 9 % for the axisymmetric fruits of Table 1, and at about 1.5 times the degree. kappa_ratio: bulk over
     shear modulus of both layers, None for incompressible. road: None takes the cheapest one that the shape allows.
-    bands: False looks for waves round an elliptic fruit's axis in patches, too, as the modes that runs start from are
-    found.
 
     A fruit that stays smooth up to s = 0.6 is an answer, not a failure: `s_cr` is None and `reason` says so.
 
@@ -64,9 +61,8 @@ def onset(
         raise InvalidInput(f"this fruit has no {road!r} road.", advice=f"Leave it out, or take {best!r}.")
     # two threads take longer for fronts of some hundreds, and round otherwise; only libraries that are loaded are held
     find = _road(road or best)
-    more = {"bands": bands} if (road or best) == "full" else {}
     with threadpool_limits(1, user_api="blas"):
-        return find(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context, **more)
+        return find(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
 
 
 def _road(road: Road) -> Callable[..., Onset]:

@@ -78,12 +78,11 @@ def onset_full(
     kappa_ratio: float | None,
     quality: str = "default",
     context: Context | None = None,
-    bands: bool = True,
 ) -> Onset:
     """Return the onset of any fruit.
 
     method: "exact" is the first singular tangent on the shrunk state, "linear" Liu et al. 2014, Eq. 11. quality:
-    preview, default or fine (elements per wrinkle). bands: as of `crossings`.
+    preview, default or fine (elements per wrinkle).
 
     Raises:
         NotConverged: no smooth state could be reached below the onset.
@@ -92,9 +91,7 @@ def onset_full(
     """
     begin = time.perf_counter()
     context = context or Context()
-    model, found = crossings(
-        params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context, bands=bands
-    )
+    model, found = crossings(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
     n = len(model.mesh.quad_of[0])
     settings = {
         "n": n,
@@ -132,15 +129,15 @@ def _highest(params: DehydrationParams, n: int | None = None) -> int:
 
 def crossings(
     params: DehydrationParams, *, method: Method = "exact", kappa_ratio: float | None = None,
-    quality: str = "default", context: Context | None = None, bands: bool = False,
+    quality: str = "default", context: Context | None = None,
 ) -> tuple[Model, list[Crossing]]:  # fmt: skip
     """Return the mesh's model and each parity's first singular tangent up to `SEARCHED`, sorted; none where smooth.
 
-    The part of `onset_full` that costs no search for the modes' degrees. bands: waves that run round the axis of a
-    large mesh are looked for in bands of latitudes (see `rings`), and only there. Raises what it raises.
+    The part of `onset_full` that costs no search for the modes' degrees. Waves that run round the axis of a large mesh
+    are looked for in bands of latitudes (see `rings`), and only there. Raises what it raises.
     """
     search = _Search(params, method, kappa_ratio or PENALTY, context or Context())
-    if bands and method == "exact" and not search.few(PER_WAVELENGTH[quality][0]):
+    if method == "exact" and not search.few(PER_WAVELENGTH[quality][0]):
         rings = Rings(params, search.states, search.places, search.context)
         if places := rings.bands(RIVALS):
             return rings.run(places, quality)

@@ -54,8 +54,7 @@ def heights(params: DehydrationParams, directions: Floats, context: Context, hig
     quiet = Context(cancelled=stop)
     if params.mirrors:
         return mirrored_mode(params, context=quiet)(directions)
-    # bands find a mode better; runs that are stored started from what patches find
-    found = onset(params, quality="preview", context=quiet, bands=False)
+    found = onset(params, quality="preview", context=quiet)
     if found.mode is None:
         raise InvalidInput(
             f"there is no buckling mode to start from: {found.reason or 'the smooth shape stays stable'}.",
