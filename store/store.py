@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 from urllib.parse import quote
 
-from . import seal, shards
+from . import seal, shards, starter
 from .errors import CorruptShard, MissingStore, UnknownJob, full_disk
 from .keys import is_key
 from .ledger.ledger import Ledger
@@ -110,13 +110,13 @@ class Store:
         return is_key(key) and self.shard_path(key).is_file()
 
     def find(self, key: str) -> xr.Dataset | None:
-        """Return the result of `key` if there is one: the `library` of runs that start from others.
+        """Return the result of `key` if it is here or comes with the package: `library` of runs that start from others.
 
         Raises:
             CorruptShard: it is damaged, or belongs to another key.
 
         """
-        return self.get(key) if self.has(key) else None
+        return self.get(key) if self.has(key) else starter.result(key)
 
     def put(self, key: str, dataset: xr.Dataset) -> str:
         """Store a result and return its content digest. One that is there already, undamaged, is kept.

@@ -27,15 +27,17 @@ def relaxed(
     """Return the equilibrium next to a shape that was looked up with its positions, on the same lattice, and what
     relaxing said of it: `residual`, `moved` (rms of the radial motion over the roughness), `iterations`, `seconds`.
 
+    context: finds the pattern that the table's runs start from; without one only those in the package are found.
     Without a quality it is that of the table's runs: on another mesh their shapes are no equilibria, and slide away.
     It starts from the lattice that holds the table's waves, whatever lattice it is wanted on, and is closed at the
     poles as a run's stage is (`outputs.of_result`): a job that relaxes the same shape hands over the same points.
 
     Raises:
-        InvalidInput: the solver relaxes nothing, or refuses the parameters.
+        InvalidInput: the solver relaxes nothing, or refuses the parameters; or the pattern is not there.
         SolverError: typed, where it failed.
 
     """
+    from store import starter
     from store.surfaces import apart, spectra
 
     if shape.position is None:
@@ -54,6 +56,7 @@ def relaxed(
         dtype="float64" if table.info.dtype == "float64" else "float32",
     )
     params = solver.parse(table.at_parameters(shape.parameters))
+    context = context or Context(library=starter.result)
     found = solver.relaxed(params, np.asarray(start, float), shape.stage, need, context).isel(stage=0)
     position = found["position"].values
     poles = spectra.poles(spectra.spectrum(position))

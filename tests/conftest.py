@@ -68,7 +68,7 @@ FIRST = (
     "store/test_tables.py",
     "service/test_reload.py",
     "service/test_doctor.py",
-    "service/test_sessions.py",
+    "service/sessions/test_refused.py",
     "service/matching/test_match.py",
     "documents/test_figures.py",
     "solver/wood/test_bench_causes.py",

@@ -71,9 +71,8 @@ class Solver:
     can say at which stage its shape begins to lose its symmetry; `incidental`, parameters that say how a run is done
     and not what of: tables that differ in them hold the same shapes; `error(params, quality, last stage)`, the relative
     error to expect of these parameters, which refuses what was never measured; `relax(params, position, stage, need,
-    context, steps, bumps)`, which brings a surface on the lattice into the equilibrium next to it, or so many steps
-    nearer, with the bumps of the fresh shape or without, and returns what `run` returns of one stage, how far it
-    `moved` and from which residual (`residual_placed`).
+    context, steps)`, which brings a surface on the lattice into the equilibrium next to it, or so many steps nearer,
+    and returns what `run` returns of one stage, how far it `moved` and from which residual (`residual_placed`).
     `tolerances` are the worst of each quality over all that was. `clock` turns hours under given conditions into
     stages. `live` begins a run that is acted upon while it goes. `sizes` are lengths of r1, or of the solver's own
     unit, in metres by preset, as such fruits are when fresh. `extent` says how large what is run is at the start.
@@ -292,10 +291,8 @@ class Solver:
         need: Need | None = None,
         context: Context | None = None,
         steps: int | None = None,
-        bumps: bool = False,
     ) -> xr.Dataset:
-        """Relax a surface (n, 2n, 3) at a stage, for `steps` at most, and check what leaves as `solve` does; with
-        `bumps` on the fresh shape that a run has, bumps and pattern and all.
+        """Relax a surface (n, 2n, 3) at a stage, for `steps` at most, and check what leaves as `solve` does.
 
         Raises:
             InvalidInput: this solver relaxes nothing, or the need cannot be met.
@@ -306,7 +303,7 @@ class Solver:
             raise InvalidInput(f"{self.name} relaxes no surfaces.", advice="Run it: it finds its own.")
         asked = (need or Need()).model_copy(update={"stages": (stage,)})
         settled = self.settle(asked, of=(params,))
-        result = self.relax(params, position, stage, settled, context or Context(), steps, bumps)
+        result = self.relax(params, position, stage, settled, context or Context(), steps)
         return finish(result, self, params, settled)
 
 

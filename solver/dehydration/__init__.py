@@ -60,12 +60,11 @@ def _relax(
     need: Need,
     context: Context,
     steps: int | None = None,
-    bumps: bool = False,
 ) -> xr.Dataset:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
     from .relax import relax
 
-    return relax(params, position, stage, need, context, steps, bumps)
+    return relax(params, position, stage, need, context, steps)
 
 
 def _cost(params: DehydrationParams, need: Need) -> Cost:
@@ -83,7 +82,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="10",
+    version="11",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", "mesh_position", *_DESCRIPTORS, "strain_energy", "released_energy"),

@@ -1,13 +1,11 @@
 """The way along shrinkage: from a smooth start, past the onset, up a ladder of settled states.
 
-Rungs stand every 0.05 of shrinkage, whatever is asked for, and each is marched to from the one below. So buckles merge
-once on the way, not again for every stage, and a stage's folds are grown from those of the stage before. A stage
-between two rungs is settled on a copy. What else was asked for never changes a stage's shape.
+Rungs (`Settings.rungs`) stand where they do whatever is asked for, and each is marched to from the one below. So
+buckles merge once on the way, not again for every stage, and a stage's folds are grown from those of the stage before.
+A stage between two rungs is settled on a copy. What else was asked for never changes a stage's shape.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +16,7 @@ from .fresh.mesh import FruitMesh
 from .kernel import new_state
 from .motion import Motion
 from .params import DehydrationParams
-from .settings import RUNG, Settings
+from .settings import Settings
 from .settle import State, settle
 
 __all__ = ["Path", "State"]
@@ -30,7 +28,7 @@ _SLICE = 0.01
 
 #: Updates of the rest volumes before a state settles, steps between two, and their damping: what rings is gone by the
 #: next. A march's volumes lag by 0.03 of shrinkage; those of a smooth start know no pressure.
-_PRESSINGS, _PRESSINGS_AT_START, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 3, 150, 0.12
+_PRESSINGS, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 150, 0.12
 
 #: Height of bumps (rms) below which a sphere is smooth [te], and the latest onset of other fruits over the start.
 _SMOOTH, _LATE_ONSET = 0.1, 3.0
@@ -52,7 +50,7 @@ class Path:
         self._state, self._velocity = new_state(self.motion.layout)
         # where the march set out last, and the steps made since
         self._foot, self._place = settings.start, 0
-        self._rung = math.floor(settings.start / RUNG)
+        self._above = [rung for rung in settings.rungs if rung > settings.start]
         self._settled: State | None = None
         self._begun = False
 
@@ -78,17 +76,16 @@ class Path:
         if shrinkage <= settings.start:
             masses = self.motion.masses
             state, velocity = self.motion.smooth(shrinkage)
-            rest = self._pressed(state, velocity, self._rest, shrinkage, _PRESSINGS_AT_START)
+            rest = self._pressed(state, velocity, self._rest, shrinkage, settings.pressings)
             found = self._settle(state, velocity, rest, shrinkage)
             self.motion.masses = masses
             return found
         if not self._begun:
             self._state, self._velocity = self.motion.smooth(settings.start)
             self._begun = True
-        top = math.floor(shrinkage / RUNG + _ROUNDING)
-        while self._rung < top:
-            self._climb(last)
-        if self._settled is not None and abs(shrinkage - top * RUNG) < _ROUNDING:
+        while self._above and self._above[0] < shrinkage + _ROUNDING:
+            self._climb(self._above.pop(0), last)
+        if self._settled is not None and abs(shrinkage - self._settled.shrinkage) < _ROUNDING:
             return self._settled
         self._march(shrinkage, last)
         state, velocity, masses = self._state.copy(), self._velocity.copy(), self.motion.masses
@@ -96,10 +93,8 @@ class Path:
         self.motion.masses = masses
         return found
 
-    def _climb(self, last: float) -> None:
+    def _climb(self, shrinkage: float, last: float) -> None:
         """March to the next rung and settle there."""
-        self._rung += 1
-        shrinkage = round(self._rung * RUNG, 12)
         self._march(shrinkage, last)
         self._rest = self._arrived(self._state, self._velocity, shrinkage)
         self._settled = self._settle(self._state, self._velocity, self._rest, shrinkage)

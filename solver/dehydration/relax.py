@@ -59,18 +59,16 @@ def relax(
     need: Need,
     context: Context,
     steps: int | None = None,
-    bumps: bool = False,
 ) -> xr.Dataset:
     """Return what `run` returns of one stage for the equilibrium next to a surface `position` (n, 2n, 3); `moved`, how
     far relaxing moved it, rms of the radial motion over its roughness; and `residual_placed`, what it began with.
 
-    The bumps and the pattern that runs begin with are left out, the surface has its own; but with `bumps` the fresh
-    fruit keeps them, as a run's does, whose shapes are no equilibria without. It ends after about so many `steps`, in
-    balance or not; without, when in balance.
+    The fresh fruit has the bumps and the pattern that a run begins with, whose shapes are no equilibria without. It
+    ends after about so many `steps`, in balance or not; without, when in balance.
 
     Raises:
         InvalidInput: a stage at which the driest flesh would be gone, a surface that is not on a lattice, or a pattern
-            that is to be kept and is not there.
+            that is not there.
         Unstable: the state left the finite.
         Cancelled: the observer asked to stop.
 
@@ -79,9 +77,8 @@ def relax(
     if position.ndim != 3 or position.shape[1:] != (2 * len(position), 3):
         raise InvalidInput(f"{position.shape} is no lattice (n, 2n, 3).", advice="Give the position of a look-up.")
     Loading(params).check(stage)
-    fruit = params if bumps else params.model_copy(update={"imperfection": 0.0, "pattern": None})
-    settings = choose(fruit, need.quality, stage)
-    motion = Motion(fruit, settings, context)
+    settings = choose(params, need.quality, stage)
+    motion = Motion(params, settings, context)
     sector = motion.sector
     target = on_columns(np.asarray(position, np.float64), motion.mesh.sphere.directions)
     put_apart(target, Topology.of(split_quads(motion.mesh.sphere.quads), len(target)))

@@ -10,17 +10,21 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Singles
 from ..contract import Unstable
+from .kernel.march import SEARCH_EVERY
 from .motion import Motion
 
 __all__ = ["State", "settle"]
 
 Fixed = NDArray[np.int32]
 
-#: Looks at the kinetic energy per swing.
+#: Looks at the kinetic energy per swing, about; whole searches for contact lie between two.
 _LOOKS = 15
 
-#: Steps over which the surface's drift is measured.
+#: Steps in which a surface at rest may drift so far.
 _REST_STEPS = 200
+
+#: Drift over the one that counts as settled beyond which a state swings on, over the same of the residual.
+_FAR_DRIFT = 2.0
 
 #: Swings that a state is left to itself to show whether it is stable, and the rms way of the surface [te] after which
 #: it was not: of what is seen to be smooth, and of what may have buckles, whose soft ways are longer. 1 % past the
@@ -32,9 +36,9 @@ _TRIAL_SWINGS, _LEFT, _LEFT_BUCKLED = 4, 0.05, 0.25
 class State:
     """A settled stage: nodes of the outer surface (nc, 3), how settled it is, and the steps spent so far.
 
-    residual: out-of-balance force over internal force. drift: rms motion of the surface in the last 200 steps, in
-    exocarp thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy in mu r1^3, and
-    released: by how much settling lowered it, where that was asked for.
+    residual: out-of-balance force over internal force. drift: rms motion of the surface in 200 steps, by the last that
+    were looked at, in exocarp thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy
+    in mu r1^3, and released: by how much settling lowered it, where that was asked for.
     """
 
     surface: Floats
@@ -103,18 +107,21 @@ def _come_to_rest(
     settings = motion.settings
     spent, residual, drift = 0, np.inf, np.inf
     while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
-        if spent or shrinkage > settings.start:
+        swings = shrinkage > settings.start or spent > 0
+        if swings:
             _swing(motion, state, velocity, rest, shrinkage)
             spent += settings.swing_steps
-        rested = 0
-        while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
+        rested, is_near = 0, True
+        while (residual > settings.residual or drift > settings.drift) and is_near and rested < settings.calm_steps:
             surface = motion.surface(state)
             # rest volumes stay: under some that go on following, forces have no potential and hardly balance
-            count = min(_REST_STEPS, max(20, motion.slice))
+            count = min(settings.calm_look, max(20, motion.slice))
             motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping)
             rested += count
             residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
             drift = _way(motion, state, surface) / count * _REST_STEPS
+            far = max(residual / settings.residual, drift / (_FAR_DRIFT * settings.drift))
+            is_near = far <= settings.near or not swings
         spent += rested
     return spent, residual, drift
 
@@ -142,9 +149,9 @@ def _leaves(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrin
 def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> None:
     """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy."""
     settings = motion.settings
-    count = settings.swing_steps // _LOOKS
+    count = SEARCH_EVERY * max(1, round(settings.swing_steps / _LOOKS / SEARCH_EVERY))
     last = 0.0
-    for _ in range(_LOOKS):
+    for _ in range(round(settings.swing_steps / count)):
         motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping)
         layout = motion.layout
         energy = float((layout.mass * np.square(velocity[:, :3]).sum(axis=1, dtype=np.float64))[layout.free].sum())

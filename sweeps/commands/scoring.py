@@ -88,7 +88,7 @@ def score(
     document = {"table": name, "digest": table.digest, **report.to_json(), "default": methods.DEFAULT}
     moved = list(_distances(table, names, relax, begun := _begun(table, opened)))
     if relax:
-        document |= {"relaxed": [row.to_json() for row in moved], "with_bumps": begun is not None}
+        document |= {"relaxed": [row.to_json() for row in moved], "with_pattern": begun is not None}
     symbol = registry.get(table.info.solver).stages.symbol
     emit(document, as_json, lambda console: _show(console, name, report, moved, symbol, picture))
 

@@ -28,7 +28,7 @@ from .terminal.options import (
 from .terminal.tables import asked_table, open_store, run_command, solver_of
 
 if TYPE_CHECKING:
-    from solver.contract import Solver
+    from solver.contract import Context, Solver
     from store.lookup import ShapeTable
     from store.shape import Shape
 
@@ -180,6 +180,7 @@ def query(asked: _Asked) -> None:
 def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, Any]]]:
     """Return the table, the shapes that were asked for, and what relaxing them has to say of each."""
     from solver import registry
+    from solver.contract import Context
     from store.blending import methods
 
     from .. import outputs
@@ -203,11 +204,12 @@ def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, An
     notes: list[Mapping[str, Any]] = [{} for _ in shapes]
     if asked.relax:
         known = registry.get(table.info.solver)
-        shapes, notes = map(list, zip(*(_relaxed(known, table, shape) for shape in shapes), strict=True))
+        context = Context(library=open_store(asked.store).find)
+        shapes, notes = map(list, zip(*(_relaxed(known, table, shape, context) for shape in shapes), strict=True))
     return table, shapes, notes
 
 
-def _relaxed(solver: Solver, table: ShapeTable, shape: Shape) -> tuple[Shape, Mapping[str, Any]]:
+def _relaxed(solver: Solver, table: ShapeTable, shape: Shape, context: Context) -> tuple[Shape, Mapping[str, Any]]:
     """Return a shape relaxed, and what is said of it.
 
     Raises:
@@ -221,7 +223,7 @@ def _relaxed(solver: Solver, table: ShapeTable, shape: Shape) -> tuple[Shape, Ma
     from ..relaxing import relaxed
 
     try:
-        return relaxed(solver, table, shape)
+        return relaxed(solver, table, shape, context=context)
     except Unstable as error:
         usual, given = solver.parse({}), solver.parse(table.at_parameters(shape.parameters))
         said = {axis: given.axis(axis) for axis in given.axes if given.axis(axis) != usual.axis(axis)}

@@ -63,9 +63,9 @@ def between(table: ShapeTable, count: int, seed: int = 0) -> list[dict[str, floa
 
 
 def at_hand(table: ShapeTable, store: Store) -> bool:
-    """Return whether a store has all that a table's runs begin with: the run whose pattern they share, if they do."""
+    """Return whether a store, or the package, has what a table's runs begin with: the run whose pattern they share."""
     origin = table.info.template.get("pattern")
-    return origin is None or store.has(str(origin["key"]))
+    return origin is None or store.find(str(origin["key"])) is not None
 
 
 def distance(
@@ -73,7 +73,7 @@ def distance(
 ) -> Distance | None:
     """Relax what a method looks up for `STEPS` steps on the mesh of its runs; None where the solver cannot.
 
-    With a `store` that has what they begin with (see `at_hand`) on that of their very fruits, bumps and all.
+    With a `store` that has what they begin with (see `at_hand`), else without the pattern that they share.
 
     Raises:
         InvalidInput: it relaxes nothing.
@@ -83,10 +83,11 @@ def distance(
     assert shape.position is not None
     assert shape.displacement is not None
     need = Need(fields=("displacement", "position"), quality=table.info.quality, resolution=LATTICE)
-    params = solver.parse(table.at_parameters(values))
-    surface, context = np.asarray(shape.position, float), Context(library=None if store is None else store.find)
+    told, library = table.at_parameters(values), None if store is None else store.find
+    params = solver.parse({name: value for name, value in told.items() if library is not None or name != "pattern"})
+    surface = np.asarray(shape.position, float)
     try:
-        found = solver.relaxed(params, surface, stage, need, context, STEPS, store is not None).isel(stage=0)
+        found = solver.relaxed(params, surface, stage, need, Context(library=library), STEPS).isel(stage=0)
     except SolverError as error:
         if error.code == "invalid-input":
             raise

@@ -19,7 +19,7 @@ import xarray as xr
 
 from solver import registry
 from solver.contract import Cancelled, Context, InvalidInput, Need, Solver, SolverError, finish
-from store import shards
+from store import shards, starter
 from store.errors import CorruptShard, StoreError
 from store.ledger.jobs import Job, JobSpec
 from store.store import Store
@@ -113,7 +113,10 @@ def work(task: Task) -> Outcome:
         if digest is not None:
             return hold.report(Outcome(job.key, "done", digest, reused=True))
         with _Heart(task, hold) as heart:
-            result = _solve(task, heart, store)
+            # a pattern that comes with the package might come out otherwise here
+            result = starter.result(job.key)
+            if result is None:
+                result = _solve(task, heart, store)
             if task.apart:
                 digest, data = shards.image(result, job.key)
                 return Outcome(job.key, "done", digest, time.perf_counter() - start, data=bytes(data))

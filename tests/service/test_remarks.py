@@ -19,7 +19,7 @@ from store.ledger.queue import Queue
 from store.store import Store
 
 from ._asking import checked
-from .test_sessions import Served, live, one_service
+from ._live import Served, live, one_service
 
 __all__ = ["live", "one_service"]
 

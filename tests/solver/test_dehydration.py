@@ -239,10 +239,10 @@ def test_a_smooth_stage_before_the_march_leaves_no_trace_in_it():
     Elements ask for more than their fresh masses from s = 0.13 on.
     """
     params = SOLVER.parse({"mirrors": "xyz"})
-    settings = dataclasses.replace(choose(params, "preview"), settle_steps=0, start=0.19)
+    settings = dataclasses.replace(choose(params, "preview"), settle_steps=0, start=0.17)
 
     def at(*stages: float) -> np.ndarray:
         path = Path(params, settings, Context())
         return [path.stage(stage, stages[-1]).surface for stage in stages][-1]
 
-    np.testing.assert_array_equal(at(0.18, 0.25), at(0.25))
+    np.testing.assert_array_equal(at(0.16, 0.25), at(0.25))

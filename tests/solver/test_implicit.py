@@ -11,10 +11,12 @@ from scipy.sparse import bsr_array
 from solver.contract import Cancelled, Context, InvalidInput, NotConverged
 from solver.dehydration import SOLVER
 from solver.dehydration.implicit import (
+    Band,
     BaseState,
     Equilibrium,
     Patch,
     base_state,
+    build_band_mesh,
     build_model,
     build_quadratic_mesh,
     carried,
@@ -23,8 +25,10 @@ from solver.dehydration.implicit import (
 )
 from solver.dehydration.implicit.buckling import parities
 from solver.dehydration.implicit.hexahedron import PRESSURE
+from solver.dehydration.implicit.location import interpolate, locate
 from solver.dehydration.implicit.newton import masked
 from solver.dehydration.params import DehydrationParams
+from solver.fem import HEX27
 
 from ._implicit_twin import block, twin_energy, twin_force
 
@@ -179,6 +183,27 @@ def test_a_patch_follows_the_whole_it_is_cut_from():
     disturbed[inside] += 0.3 * model.free * np.sin(40 * mesh.positions[inside])
     with pytest.raises(NotConverged, match="near a guess"):
         equilibrium(model, 0.05, guess=dataclasses.replace(start, deformed=disturbed), alone=True)
+
+
+def test_a_band_follows_the_whole_it_is_cut_from():
+    """Its sides and its foot, above the stone, stay where the whole's state puts them."""
+    core = graded_layers(2, 1.0)
+    whole = base_state(FRUIT, 0.05, n=8, layers=core, kappa_ratio=100.0)
+    mesh = build_band_mesh(FRUIT, Band(0.6, 1.2, 0.3, np.pi / 2, 4, 8), core[1:], "quarter", 1, None)
+    assert len(mesh.stacks) == 32
+    assert mesh.breaks[0] == core[1]
+    model = build_model(FRUIT, mesh, 100.0)
+    found = equilibrium(model, 0.05, guess=carried(whole, model), alone=True).deformed
+    np.testing.assert_allclose(found, whole(mesh.positions), atol=1e-4)
+    assert np.linalg.norm(found - mesh.positions, axis=1)[:: mesh.levels].min() > 1e-3
+    # points of its elements are found in them, and none beside or below it
+    local = np.array([[0.3, -0.4, 0.5]])
+    points = np.matmul(HEX27.shape(local), mesh.positions[mesh.connectivity])[:, 0]
+    element, at = locate(FRUIT, mesh, points)
+    np.testing.assert_array_equal(element, np.arange(len(points)))
+    np.testing.assert_allclose(at, np.repeat(local, len(points), axis=0), atol=1e-6)
+    around = FRUIT.surface(np.array([0.5, 1.3, 0.9, 0.9]), np.array([1.0, 1.0, 0.2, 1.0])) * [[1], [1], [1], [0.6]]
+    np.testing.assert_array_equal(interpolate(FRUIT, mesh, np.ones_like(mesh.positions), around), 0.0)
 
 
 def test_a_thin_skin_is_carried_to_a_patch_as_thick_as_it_was():

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from solver.dehydration.kernel.diagnostics import NumpyArithmetic
+from solver.dehydration.kernel.elements import isochoric_factor
+
 from ._kernel_twin import (
     KINDS,
     NODE,
@@ -104,3 +107,18 @@ def test_a_skin_of_two_layers_bends_with_its_full_stiffness():
     )
     least = strain_energy(-np.linalg.solve(hessian, slope) @ step)
     assert least / length == pytest.approx(mu * h**3 / 3 * curvature**2 / 2, rel=2e-3)
+
+
+class Rough(NumpyArithmetic):
+    """Cube roots as far off as a back end's may be."""
+
+    def inverse_cube_root(self, a):
+        return super().inverse_cube_root(a) * (1 + 4e-5)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.7, 1.0, 1.4])
+def test_a_rough_cube_root_is_put_right(ratio):
+    """To first order in its error of 4e-5: what is left is less than single precision rounds by."""
+    rough = isochoric_factor(Rough(), np.array(ratio))
+    assert rough.value == pytest.approx(ratio ** (-2 / 3), rel=6e-8)
+    assert rough.slope == pytest.approx(ratio ** (-5 / 3), rel=6e-8)

@@ -16,6 +16,7 @@ from solver.dehydration import SOLVER, DehydrationParams
 from solver.dehydration.bifurcation import AxisymmetricMode, Onset, base_state, full, onset
 from solver.dehydration.bifurcation.base import Meridian
 from solver.dehydration.bifurcation.meridional_elements import deformation, forces, moduli, tangents, volume_rates
+from solver.dehydration.bifurcation.mirrored import mirrored_mode
 from solver.dehydration.bifurcation.pencil import Pencil, Perturbations
 from solver.dehydration.bifurcation.radial_elements import radial_mesh, smooth
 from solver.dehydration.bifurcation.result import dominant_degree
@@ -134,6 +135,38 @@ def test_a_patch_of_plum_1() -> None:
     model, found = full.crossings(params)
     assert model.mesh.foot is not None
     assert found[0].shrinkage == pytest.approx(0.0842, rel=3e-3)
+
+
+@pytest.mark.slow
+def test_bands_agree_with_the_meridional_road_where_waves_run_round_the_axis() -> None:
+    """To what two meshes of 2.9 and 4.2 elements leave; that road's own seven onsets lie within 1.7e-3."""
+    params = SOLVER.parse({}, "wolfberry")
+    assert isinstance(params, DehydrationParams)
+    truth = onset(params, kappa_ratio=1e5, quality="preview").s_cr
+    model, found = full.crossings(params, quality="preview")
+    assert model.mesh.band is not None
+    assert truth is not None
+    assert found[0].shrinkage == pytest.approx(truth, rel=3e-3)
+
+
+@pytest.mark.slow
+def test_bands_are_for_waves_round_the_axis_of_large_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also for the modes that runs start from; fruits whose crests follow parallels have patches."""
+    taken = list[str]()
+
+    def seen(self: Any, *_: object) -> Any:
+        taken.append(type(self).__name__)
+        raise Cancelled("seen")
+
+    monkeypatch.setattr(full.Rings, "run", seen)
+    monkeypatch.setattr(full._Search, "run", seen)
+    wolfberry, plum = SOLVER.parse({"r8": 0.38, "mirrors": "xz"}, "wolfberry"), SOLVER.parse({}, "plum1")
+    assert isinstance(wolfberry, DehydrationParams)
+    assert isinstance(plum, DehydrationParams)
+    for params, find in ((wolfberry, onset), (wolfberry, mirrored_mode), (plum, onset)):
+        with pytest.raises(Cancelled):
+            find(params)
+    assert taken == ["Rings", "Rings", "_Search"]
 
 
 def test_both_roads_agree_on_the_linear_method_which_misses_the_exact_onset() -> None:

@@ -60,3 +60,22 @@ def test_elements_of_the_skin_are_as_wide_as_it_is_thick_at_fine(quality, width)
     assert heights[:, -2:] == pytest.approx(0.02, rel=1e-6)
     assert heights[:, :-3] == pytest.approx(1.3 * heights[:, 1:-2], rel=1e-6)
     assert 0.02 < heights[0, -3] < 0.04
+
+
+@pytest.mark.parametrize(
+    ("te", "gamma", "quality", "hastes"),
+    [
+        (0.04, 50.0, "preview", True),
+        (0.01, 5.0, "preview", True),
+        (0.05, 30.0, "preview", False),
+        (0.005, 10.0, "preview", False),
+        (0.04, 100.0, "preview", False),
+        (0.04, 3.0, "preview", False),
+        (0.04, 10.0, "default", False),
+    ],
+)
+def test_a_preview_hastes_where_that_was_tried(te, gamma, quality, hastes):
+    """By half of the bulk modulus and so a longer step; thicker and stiffer skins would blow up sooner."""
+    settings = choose(SOLVER.parse({"te": te, "gamma": gamma}), quality, 0.3)
+    assert settings.march_kappa_ratio == (15.0 if hastes else 30.0)
+    assert (0.15 in settings.rungs) is not hastes

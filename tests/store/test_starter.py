@@ -104,10 +104,25 @@ def test_every_family_says_how_it_was_made() -> None:
         assert info.dtype == "int16"
 
 
+@pytest.mark.parametrize("name", ["default", *FAMILIES])
+def test_it_holds_the_run_whose_wrinkles_samples_start_from(name: str) -> None:
+    store = Store.open(starter.ROOT)
+    info = tables.info(store, name)
+    pattern = info.template.get("pattern")
+    if pattern is None:
+        pytest.skip("its samples start from bumps alone")
+    plan = Plan.parse(tomllib.loads(info.plan or ""), name)
+    assert plan.first is not None
+    assert [job.key for job in plan.first.jobs()] == [pattern["key"]]
+    found = store.find(pattern["key"])
+    assert found is not None
+    assert pattern["stage"] in found["stage"].values
+
+
 def test_its_files_are_whole_and_small() -> None:
     store = Store.open(starter.ROOT)
     paths = [tables.path_of(store, tables.info(store, name)) for name in store.table_names()]
-    assert all(seal.is_whole(path) for path in paths)
+    assert all(seal.is_whole(path) for path in [*paths, *starter.ROOT.glob("shards/??/*.h5")])
     # what the package may take: spectra of 52 panels and of six fruits, each a grid of te by gamma
     assert sum(path.stat().st_size for path in paths) < 80e6
 

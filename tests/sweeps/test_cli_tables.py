@@ -100,7 +100,7 @@ def test_query(table: Path, tmp_path: Path) -> None:
 
 
 def test_what_falls_apart_when_relaxed_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise Unstable("elements turned inside out.", advice="Run it from the start.")
 
     monkeypatch.setattr("sweeps.relaxing.relaxed", broken)

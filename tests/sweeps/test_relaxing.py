@@ -27,9 +27,7 @@ def test_what_is_relaxed_starts_and_ends_as_in_a_job(resolution: int | None) -> 
     begun: list[Floats] = []
     results: list[xr.Dataset] = []
 
-    def relax(
-        _: Params, position: Floats, stage: float, need: Need, __: Context, steps: int | None, kept: bool
-    ) -> xr.Dataset:
+    def relax(_: Params, position: Floats, stage: float, need: Need, __: Context, steps: int | None) -> xr.Dataset:
         begun.append(position)
         n = need.resolution or 0
         theta, phi = lattice(n)

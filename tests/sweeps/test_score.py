@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from service.cli import app
 from solver import registry
-from solver.contract import Need, Unstable, finish
+from solver.contract import Need, Params, Unstable, finish
 from solver.dehydration import SOLVER
 from solver.fruit import azimuths, colatitudes
 from store import starter
@@ -127,12 +127,14 @@ def test_what_cannot_be_scored(tmp_path: Path) -> None:
     assert wrong.exit_code == 2
 
 
-def test_what_is_looked_up_keeps_what_its_runs_begin_with_where_that_is_at_hand(tmp_path: Path) -> None:
-    """Its pattern is a run of its own, which the package does not hold; bumps follow from the seed."""
+def test_what_is_looked_up_keeps_what_its_runs_begin_with_where_that_is_at_hand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its pattern is a run of its own; bumps follow from the seed."""
     asked: list[bool] = []
 
-    def relax(*given: object) -> xr.Dataset:
-        asked.append(bool(given[-1]))
+    def relax(params: Params, *_: object) -> xr.Dataset:
+        asked.append(params.model_dump()["pattern"] is not None)
         raise Unstable("seen enough.")
 
     solver, empty = dataclasses.replace(SOLVER, relax=relax), Store.open(tmp_path, create=True)
@@ -140,6 +142,8 @@ def test_what_is_looked_up_keeps_what_its_runs_begin_with_where_that_is_at_hand(
         ShapeTable.open(starter.ROOT, name, surfaces=registry.surface) for name in ("stone-radius", "sphere-01")
     )
     assert balance.at_hand(cold, empty)
+    assert balance.at_hand(begun, empty)
+    monkeypatch.setattr(starter, "ROOT", tmp_path)
     assert not balance.at_hand(begun, empty)
     empty.put(begun.info.template["pattern"]["key"], xr.Dataset({"displacement": ("stage", [0.0])}))
     assert balance.at_hand(begun, empty)

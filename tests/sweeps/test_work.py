@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from conftest import Solves
 
 from solver import registry
 from solver.contract import Need
+from store import starter
 from store.ledger.jobs import JobSpec
 from store.store import Store
 from sweeps.running.work import Task, work
@@ -34,3 +36,24 @@ def test_a_worker_of_another_version_refuses(shrinking: Solves, store: Store, ot
     assert done.state == "done"
     assert list(store.keys()) == [specs[1].key]
     assert len(shrinking) == 1
+
+
+def test_what_comes_with_the_package_is_taken_over(
+    shrinking: Solves, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pattern just past its onset might come out otherwise on this processor."""
+    solver, package = registry.get("shrinking"), Store.open(tmp_path / "package", create=True)
+    params, need = solver.parse({"te": 0.03}, "sphere"), solver.settle(Need(stages=(0.1,), quality="preview"))
+    spec = JobSpec.of(solver, params, need)
+    package.put(spec.key, solver.solve(params, need))
+    solved = len(shrinking)
+    monkeypatch.setattr(starter, "ROOT", package.root)
+    assert store.find(spec.key) is not None
+    assert not store.has(spec.key)
+    store.ledger.want([spec], "one")
+    job = store.ledger.claim("somebody", 60.0, [spec.key])
+    assert job is not None
+    done = work(Task(store.root, job, 60.0))
+    assert done.state == "done"
+    assert store.get(spec.key).attrs["digest"] == done.digest == package.get(spec.key).attrs["digest"]
+    assert len(shrinking) == solved

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import sph_legendre_p_all
+from scipy.special import sph_harm_y, sph_legendre_p_all
 
-from ...arrays import Floats
-from ..implicit import Model
+from ...arrays import Bools, Floats
+from ..implicit import Band, Model
 from ..implicit.buckling import Crossing
 from ..implicit.location import fold, interpolate
 from ..params import DehydrationParams
 
-__all__ = ["dominant", "mode_heights"]
+__all__ = ["dominant", "mode_heights", "round_it"]
+
+
+#: Angle [radian] by which a point over a band may lie beside the directions of its columns, which lean.
+ASIDE = 0.05
 
 
 def mode_heights(params: DehydrationParams, model: Model, crossing: Crossing) -> Callable[[Floats], Floats]:
@@ -23,6 +28,14 @@ def mode_heights(params: DehydrationParams, model: Model, crossing: Crossing) ->
     nodal[model.pattern.free >= 0] = crossing.mode
 
     def raw(towards: Floats) -> Floats:
+        if mesh.band is None:
+            return at(towards)
+        # most of the fruit is far from a band
+        found, near = np.zeros(len(towards)), np.flatnonzero(_about(mesh.band, fold(mesh, towards)[0]))
+        found[near] = at(towards[near])
+        return found
+
+    def at(towards: Floats) -> Floats:
         colatitude, azimuth = np.arccos(np.clip(towards[:, 1], -1, 1)), np.arctan2(towards[:, 2], towards[:, 0])
         points = params.surface(colatitude, azimuth)
         folded, signs = fold(mesh, points)
@@ -48,6 +61,28 @@ def mode_heights(params: DehydrationParams, model: Model, crossing: Crossing) ->
     values = raw(sample.reshape(-1, 3))
     scale = values[np.argmax(np.abs(values))]
     return lambda towards: raw(np.asarray(towards, dtype=float)) / scale
+
+
+def _about(band: Band, towards: Floats) -> Bools:
+    """Return which directions (k, 3) lie in a band or beside it."""
+    colatitude, azimuth = np.arccos(np.clip(towards[:, 1], -1, 1)), np.arctan2(towards[:, 2], towards[:, 0])
+    between = (colatitude > band.high - ASIDE) & (colatitude < band.low + ASIDE)
+    found: Bools = between & (azimuth > band.first - ASIDE) & (azimuth < band.last + ASIDE)
+    return found
+
+
+def round_it(heights: Callable[[Floats], Floats], band: Band, highest: int) -> tuple[int, int]:
+    """Return what `dominant` returns, the degree being that of the wavenumber, for a mode in a band."""
+    nodes, weights = np.polynomial.legendre.leggauss(highest + 8)
+    colatitude, count = np.arccos(nodes), 4 * math.ceil(band.cells * np.pi / 2 / (band.last - band.first))
+    azimuth = np.arange(count) * 2 * np.pi / count
+    theta, phi = np.meshgrid(colatitude, azimuth, indexing="ij")
+    points = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
+    waves = np.fft.rfft(heights(points.reshape(-1, 3)).reshape(theta.shape), axis=1)
+    m = int((weights @ np.abs(waves) ** 2).argmax())
+    degrees = np.arange(m, max(highest, m) + 1)
+    harmonics = sph_harm_y(degrees[:, None], m, colatitude[None, :], 0.0).real
+    return int(degrees[np.abs(harmonics @ (weights * waves[:, m])).argmax()]), m
 
 
 def dominant(heights: Callable[[Floats], Floats], highest: int) -> tuple[int, int]:

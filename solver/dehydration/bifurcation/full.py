@@ -20,10 +20,11 @@ from ..fresh.closed_form import flat_film_wavelength, onset_estimate
 from ..implicit import BaseState, Model, Patch
 from ..implicit.buckling import Crossing, Path, crossing, parities
 from ..params import DehydrationParams
-from .field import dominant, mode_heights
+from .field import dominant, mode_heights, round_it
 from .looks import Look, elsewhere, even
 from .places import expected_onsets
 from .result import FieldMode, Method, Onset, Tie
+from .rings import Rings
 from .states import States
 
 __all__ = ["crossings", "onset_full"]
@@ -108,7 +109,9 @@ def onset_full(
         context.check_cancelled()
         context.report(0.9 + 0.1 * number / len(found), "waves of the modes")
         heights = mode_heights(params, model, each)
-        modes.append((each.shrinkage, *dominant(heights, _highest(params, n)), heights))
+        band = model.mesh.band
+        waves = dominant(heights, _highest(params, n)) if band is None else round_it(heights, band, _highest(params))
+        modes.append((each.shrinkage, *waves, heights))
     s_cr, degree, wavenumber, heights = modes[0]
     return Onset(
         s_cr, degree, wavenumber, "full", method, kappa_ratio, FieldMode(heights),
@@ -117,10 +120,11 @@ def onset_full(
     )  # fmt: skip
 
 
-def _highest(params: DehydrationParams, n: int) -> int:
-    """Return the highest degree that a mode on a mesh of `n` elements an edge may have."""
+def _highest(params: DehydrationParams, n: int | None = None) -> int:
+    """Return the highest degree that a mode may have, on a mesh of `n` elements an edge or any."""
     wave = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
-    return min(4 * n, math.ceil(2.5 * 2 * np.pi * max(params.radii) / wave) + 8)
+    highest = math.ceil(2.5 * 2 * np.pi * max(params.radii) / wave) + 8
+    return highest if n is None else min(4 * n, highest)
 
 
 def crossings(
@@ -129,9 +133,14 @@ def crossings(
 ) -> tuple[Model, list[Crossing]]:  # fmt: skip
     """Return the mesh's model and each parity's first singular tangent up to `SEARCHED`, sorted; none where smooth.
 
-    The part of `onset_full` that costs no search for the modes' degrees. Raises what it raises.
+    The part of `onset_full` that costs no search for the modes' degrees. Waves that run round the axis of a large mesh
+    are looked for in bands of latitudes (see `rings`), and only there. Raises what it raises.
     """
     search = _Search(params, method, kappa_ratio or PENALTY, context or Context())
+    if method == "exact" and not search.few(PER_WAVELENGTH[quality][0]):
+        rings = Rings(params, search.states, search.places, search.context)
+        if places := rings.bands(RIVALS):
+            return rings.run(places, quality)
     coarse, fine = (each * (LINEAR_FINER if method == "linear" else 1) for each in PER_WAVELENGTH[quality])
     return search.run(coarse, fine)
 
@@ -198,9 +207,8 @@ class _Search:
 
     def _place(self, per_wavelength: float) -> Look:
         """Return the even parity's first mode on the whole part, or on the patch that holds it."""
-        whole = self._elements(None, per_wavelength)
-        if 6 * whole**2 // 2 ** len(self.states.whole.mesh.planes) <= FEW:
-            model = self.states.model(whole, None)
+        if self.few(per_wavelength):
+            model = self.states.model(self._elements(None, per_wavelength), None)
             return self._repeated(model, {even(model): None}, 0.1)
         seen = [self._grown(patch, per_wavelength, 0) for patch in self._patches()]
         look = min(seen, key=lambda each: each.first.shrinkage)
@@ -215,9 +223,14 @@ class _Search:
             look = self._grown(Patch(centre, radius), per_wavelength, number + 1)
         return look
 
+    def few(self, per_wavelength: float) -> bool:
+        """Return whether the whole part has so few columns that nothing smaller is looked at."""
+        quads = 6 * self._elements(None, per_wavelength) ** 2
+        return bool(quads // 2 ** len(self.states.whole.mesh.planes) <= FEW)
+
     def _patches(self) -> list[Patch]:
         """Return the places that may come first, the first of all first."""
-        middles, expected, _, thinned = self.places
+        middles, expected, _, thinned, _ = self.places
         order, places = np.argsort(expected), list[Patch]()
         for at in order[expected[order] <= RIVALS * expected[order[0]]]:
             radius = REACH * self.wavelength * float(thinned[at])
@@ -234,7 +247,7 @@ class _Search:
 
     def _elements(self, patch: Patch | None, per_wavelength: float) -> int:
         """Return the even number of elements per edge that has `per_wavelength` to a wrinkle where it counts."""
-        middles, onsets, widths, thinned = self.places
+        middles, onsets, widths, thinned, _ = self.places
         if patch is None:
             there = onsets <= RIVALS * onsets.min()
         else:

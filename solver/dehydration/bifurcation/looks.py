@@ -12,7 +12,7 @@ from ..implicit.buckling import Crossing, Path, parities
 from ..implicit.location import interpolate
 from ..params import DehydrationParams
 
-__all__ = ["Look", "elsewhere", "even"]
+__all__ = ["Look", "elsewhere", "even", "nodal"]
 
 
 #: A mode this low on a plane is the same whatever its parity about it.
@@ -36,7 +36,7 @@ class Look:
 
     def heights(self) -> Floats:
         """Return the first mode's size at all nodes, (nn,)."""
-        found: Floats = np.linalg.norm(_nodal(self.model, self.first.mode), axis=1)
+        found: Floats = np.linalg.norm(nodal(self.model, self.first.mode), axis=1)
         return found
 
     def extent(self) -> tuple[Floats, float]:
@@ -56,7 +56,7 @@ class Look:
         return [parity for parity in every if all(one > 0 or there for one, there in zip(parity, met, strict=True))]
 
 
-def _nodal(model: Model, mode: Floats) -> Floats:
+def nodal(model: Model, mode: Floats) -> Floats:
     """Return a mode at all nodes, (nn, 3): 0 on the stone."""
     nodal = np.zeros_like(model.mesh.positions)
     nodal[model.pattern.free >= 0] = mode
@@ -70,4 +70,4 @@ def even(model: Model) -> tuple[int, ...]:
 
 def elsewhere(params: DehydrationParams, model: Model, mode: Floats, to: Model) -> Floats:
     """Return a mode (nf, 3) on another mesh's nodes off the stone."""
-    return interpolate(params, model.mesh, _nodal(model, mode), to.mesh.positions[to.pattern.free >= 0])
+    return interpolate(params, model.mesh, nodal(model, mode), to.mesh.positions[to.pattern.free >= 0])

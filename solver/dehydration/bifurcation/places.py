@@ -39,6 +39,8 @@ class Places(NamedTuple):
     """(ns, 2): the farther that an edge of a face reaches [r1] across the crests and along them"""
     thinned: Floats
     """(ns,): thickness across the skin over that along the ray"""
+    crests: Floats
+    """(ns, 3): unit tangents along the crests"""
 
 
 def expected_onsets(base: BaseState) -> Places:
@@ -72,4 +74,5 @@ def expected_onsets(base: BaseState) -> Places:
     found: Floats = base.state.shrinkage * np.minimum(needed / np.maximum(borne, needed / _NEVER), _NEVER)
     # edges of a face in the frame, turned to the crests
     edges = 2 * np.linalg.cholesky(first @ first.swapaxes(1, 2)) @ frames
-    return Places(grid[:, 1, 1], found, np.abs(edges).max(axis=1), thinned)
+    along = np.einsum("ei,eij,ejk->ek", frames[:, :, 1], inverse, first)
+    return Places(grid[:, 1, 1], found, np.abs(edges).max(axis=1), thinned, along)

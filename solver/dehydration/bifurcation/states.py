@@ -9,10 +9,12 @@ from ...contract import Context
 from ..fresh.closed_form import flat_film_wavelength
 from ..fresh.mesh import flesh_span, layer_fractions
 from ..implicit import (
+    Band,
     BaseState,
     Equilibrium,
     Model,
     Patch,
+    build_band_mesh,
     build_model,
     build_quadratic_mesh,
     carried,
@@ -67,13 +69,24 @@ class States:
 
     def model(self, n: int, patch: Patch | None) -> Model:
         """Return the model on `n` elements an edge of the cubed sphere."""
+        core, foot = self._layers()
+        mesh = build_quadratic_mesh(self.params, n, core, natural_symmetry(self.params), SKIN_LAYERS, patch, foot)
+        return build_model(self.params, mesh, self.kappa_ratio)
+
+    def in_band(self, band: Band, deep: int | None = None) -> Model:
+        """Return the model of a band. deep: how many layers of the flesh there are below the skin, None: all."""
+        core, foot = self._layers()
+        core = core if deep is None else core[-deep - 1 :]
+        mesh = build_band_mesh(self.params, band, core, natural_symmetry(self.params), SKIN_LAYERS, foot)
+        return build_model(self.params, mesh, self.kappa_ratio)
+
+    def _layers(self) -> tuple[Floats, float | None]:
+        """Return the breaks of the flesh's layers, and from which on columns stand upright."""
         params = self.params
         wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
         # layers are shares of the flesh below each place: where it is thick they must not be too thick for waves
         core = layer_fractions(flesh_span(params)[1], FIRST_LAYER * min(wavelength, 0.4), LAYER_GROWTH)
-        foot = float(core[-UPRIGHT - 1]) if len(core) > UPRIGHT + 1 else None
-        mesh = build_quadratic_mesh(params, n, core, natural_symmetry(params), SKIN_LAYERS, patch, foot)
-        return build_model(params, mesh, self.kappa_ratio)
+        return core, float(core[-UPRIGHT - 1]) if len(core) > UPRIGHT + 1 else None
 
     def path(
         self, model: Model, shrinkage: float, coarser: tuple[BaseState, Velocity] | None
@@ -84,15 +97,28 @@ class States:
             NotConverged: there is none, or none that is stable.
 
         """
+        settled, lead = self._near(model, shrinkage, coarser)
+        path = along(model, settled, fresh_metric(model), lead, self.watch)
+        return path, BaseState(self.params, model, settled)
+
+    def moving(
+        self, model: Model, shrinkage: float, coarser: tuple[BaseState, Velocity] | None
+    ) -> tuple[BaseState, Velocity]:
+        """Return a mesh's smooth state and where it goes. Raises what `path` raises."""
+        settled, lead = self._near(model, shrinkage, coarser)
+        return BaseState(self.params, model, settled), velocity(model, settled, lead, self.watch)
+
+    def _near(
+        self, model: Model, shrinkage: float, coarser: tuple[BaseState, Velocity] | None
+    ) -> tuple[Equilibrium, Floats]:
+        """Return a mesh's smooth state and the way of the whole's coarse one at its nodes."""
         base, rate = self.smooth(shrinkage)
         start = carried(base, model)
         if coarser is not None and abs(shrinkage / coarser[0].state.shrinkage - 1) < NEARBY:
             state, moving = coarser
             start = carried(BaseState(self.params, state.model, moved_on(state.state, moving, shrinkage)), model, start)
         settled = self._settled(model, start)
-        lead = interpolate(self.params, base.mesh, rate, model.mesh.positions)
-        path = along(model, settled, fresh_metric(model), lead, self.watch)
-        return path, BaseState(self.params, model, settled)
+        return settled, interpolate(self.params, base.mesh, rate, model.mesh.positions)
 
     def fresh_path(self, model: Model) -> tuple[Path, BaseState]:
         """Return the fresh tangent and the change that the stress of a small state makes, for the linear method."""

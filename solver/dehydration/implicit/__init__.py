@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 from .base_state import BaseState, base_state, carried
-from .mesh import Patch, QuadraticMesh, Symmetry, build_quadratic_mesh, graded_layers, natural_symmetry
+from .mesh import (
+    Band,
+    Patch,
+    QuadraticMesh,
+    Symmetry,
+    build_band_mesh,
+    build_quadratic_mesh,
+    graded_layers,
+    natural_symmetry,
+)
 from .newton import Equilibrium, Loading, Model, build_model, equilibrium
 
 __all__ = [
+    "Band",
     "BaseState",
     "Equilibrium",
     "Loading",
@@ -15,6 +25,7 @@ __all__ = [
     "QuadraticMesh",
     "Symmetry",
     "base_state",
+    "build_band_mesh",
     "build_model",
     "build_quadratic_mesh",
     "carried",

@@ -101,7 +101,7 @@ def carried(coarse: BaseState, model: Model, elsewhere: Equilibrium | None = Non
     folded, signs = fold(coarse.mesh, fresh)
     moved = fresh + signs * interpolate(coarse.params, coarse.mesh, coarse.displaced - coarse.nodes, folded)
     held = np.zeros_like(moved, dtype=bool)
-    held[:: model.mesh.levels] = True
+    held[:: model.mesh.levels] = model.mesh.breaks[0] == 0
     for axis in model.mesh.planes:
         held[:, axis] |= fresh[:, axis] == 0
     moved = np.where(held, fresh, moved)

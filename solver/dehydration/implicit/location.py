@@ -8,7 +8,7 @@ from ...arrays import Floats, Ints
 from ...fem import HEX27
 from ..fresh.mesh import _FACES as FACES
 from ..params import DehydrationParams
-from .mesh import QuadraticMesh
+from .mesh import Band, QuadraticMesh
 from .upright import parametric, slanted
 
 __all__ = ["fold", "interpolate", "locate", "nominal"]
@@ -16,6 +16,8 @@ __all__ = ["fold", "interpolate", "locate", "nominal"]
 
 _NUDGE = 1e-9
 """Points on a symmetry plane are looked up this far inside, so that round-off does not put them beyond it."""
+_ROUND = 1e-3
+"""Share of a cell, or of the flesh, by which a point may lie beyond an edge and still be on it."""
 
 
 def fold(mesh: QuadraticMesh, points: Floats) -> tuple[Floats, Floats]:
@@ -30,16 +32,7 @@ def _first_guess(params: DehydrationParams, mesh: QuadraticMesh, points: Floats)
     towards = parametric(params, points)
     for axis in mesh.planes:
         towards[:, axis] = np.maximum(towards[:, axis], _NUDGE)
-    heights = towards @ FACES[:, 0].T
-    face = np.argmax(heights, axis=1)
-    axes = FACES[face]
-    angles = np.stack(
-        [np.arctan2(np.einsum("pi,pi->p", towards, axes[:, k]), heights.max(axis=1)) for k in (1, 2)], axis=-1
-    )
-    n = len(mesh.quad_of[0])
-    cells = (angles + np.pi / 4) * (2 * n / np.pi)
-    cell = np.clip(np.floor(cells).astype(np.int64), 0, n - 1)
-    stack = mesh.quad_of[face, cell[:, 0], cell[:, 1]]
+    stack, across = _on_cube(mesh, towards) if mesh.band is None else _in_band(mesh, mesh.band, towards)
     distance = np.linalg.norm(points, axis=1)
     rays = points / np.maximum(distance, 1e-300)[:, None]
     stone = params.stone_distance(rays)
@@ -50,8 +43,36 @@ def _first_guess(params: DehydrationParams, mesh: QuadraticMesh, points: Floats)
     )
     layer = np.clip(np.searchsorted(mesh.breaks, depth, side="right") - 1, 0, mesh.layers - 1)
     low, high = mesh.breaks[layer], mesh.breaks[layer + 1]
-    local = np.concatenate([2 * (cells - cell) - 1, (2 * (depth - low) / (high - low) - 1)[:, None]], axis=1)
-    return stack * mesh.layers + layer, local
+    local = np.concatenate([across, (2 * (depth - low) / (high - low) - 1)[:, None]], axis=1)
+    above = (mesh.breaks[0] == 0) | (depth > mesh.breaks[0] - _ROUND)
+    return np.where(above, stack * mesh.layers + layer, -1), local
+
+
+def _on_cube(mesh: QuadraticMesh, towards: Floats) -> tuple[Ints, Floats]:
+    """Return stack (k,) and local coordinates (k, 2) across of directions (k, 3) on the parametric sphere."""
+    heights = towards @ FACES[:, 0].T
+    face = np.argmax(heights, axis=1)
+    axes = FACES[face]
+    angles = np.stack(
+        [np.arctan2(np.einsum("pi,pi->p", towards, axes[:, k]), heights.max(axis=1)) for k in (1, 2)], axis=-1
+    )
+    n = len(mesh.quad_of[0])
+    cells = (angles + np.pi / 4) * (2 * n / np.pi)
+    cell = np.clip(np.floor(cells).astype(np.int64), 0, n - 1)
+    return mesh.quad_of[face, cell[:, 0], cell[:, 1]], 2 * (cells - cell) - 1
+
+
+def _in_band(mesh: QuadraticMesh, band: Band, towards: Floats) -> tuple[Ints, Floats]:
+    """Return what `_on_cube` returns; the stack is negative beyond the band."""
+    angles = np.stack(
+        [np.arctan2(towards[:, 2], towards[:, 0]), np.arccos(np.clip(towards[:, 1], -1, 1))], axis=-1
+    )  # fmt: skip
+    begin, end = np.array([band.first, band.high]), np.array([band.last, band.low])
+    count = np.array([band.cells, band.rows])
+    cells = (angles - begin) / (end - begin) * count
+    cell = np.clip(np.floor(cells).astype(np.int64), 0, count - 1)
+    inside = ((cells > -_ROUND) & (cells < count + _ROUND)).all(axis=1)
+    return np.where(inside, mesh.quad_of[0, cell[:, 0], cell[:, 1]], -1), 2 * (cells - cell) - 1
 
 
 def nominal(params: DehydrationParams, mesh: QuadraticMesh, points: Floats) -> tuple[Ints, Floats]:
@@ -89,6 +110,8 @@ def interpolate(params: DehydrationParams, mesh: QuadraticMesh, nodal: Floats, p
     """
     element, local = nominal(params, mesh, points)
     found, inside = np.zeros_like(points), np.flatnonzero(element >= 0)
+    if not len(inside):
+        return found
     shape = HEX27.shape(local[inside])[:, None]
     found[inside] = np.matmul(shape, nodal[mesh.connectivity[element[inside]]])[:, 0]
     return found

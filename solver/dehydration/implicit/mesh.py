@@ -12,11 +12,21 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidInput
-from ..fresh.mesh import CubedSphere, along_rays, corner_ratios, cubed_sphere, meeting, right_side_out
+from ...fruit import directions
+from ..fresh.mesh import along_rays, corner_ratios, cubed_sphere, meeting, right_side_out
 from ..params import DehydrationParams
 from .upright import upright
 
-__all__ = ["Patch", "QuadraticMesh", "Symmetry", "build_quadratic_mesh", "graded_layers", "natural_symmetry"]
+__all__ = [
+    "Band",
+    "Patch",
+    "QuadraticMesh",
+    "Symmetry",
+    "build_band_mesh",
+    "build_quadratic_mesh",
+    "graded_layers",
+    "natural_symmetry",
+]
 
 Symmetry = Literal["octant", "quarter", "whole"]
 
@@ -33,6 +43,21 @@ class Patch(NamedTuple):
     radius: float
 
 
+class Band(NamedTuple):
+    """Part of a fruit between two colatitudes and two azimuths [radian, parametric], these within a quarter turn.
+
+    rows, cells: elements from `high` to `low` and from `first` to `last`. A cubed sphere's quads are as long as they
+    are wide, and lie across meridians near the poles; where waves run round the axis, crests are several times as long.
+    """
+
+    high: float
+    low: float
+    first: float
+    last: float
+    rows: int
+    cells: int
+
+
 @dataclass(frozen=True, eq=False)
 class QuadraticMesh:
     """hex27 elements between stone and outer surface.
@@ -40,13 +65,13 @@ class QuadraticMesh:
     positions: (nn, 3) fresh; node = column * levels + level, level 0 on the stone, odd levels mid-layer.
     connectivity: (ne, 27) in the order of `hexahedron`; element = stack * layers + layer. is_exocarp: (ne,).
     stacks: (ns, 9) columns under each quad of the surface. planes: normal axes of the symmetry planes that bound the
-    mesh. quad_of: (6, n, n) stack of each quad of the cubed sphere, -1 where the part leaves it out.
-    breaks: (layers + 1,) radial breakpoints: fraction of the flesh up to 1, then 1 + fraction of the exocarp.
-    cut: (columns,) those on the edge of a patch, which no symmetry holds. foot: share of the flesh's depth above which
-    columns stand upright (see `upright`), None where they follow rays.
+    mesh. quad_of: (6, n, n) stack of each quad of the cubed sphere, -1 where the part leaves it out; of a band's
+    (1, cells, rows). breaks: (layers + 1,) radial breakpoints: fraction of the flesh up to 1, then 1 + fraction of the
+    exocarp; the first is not 0 where the mesh ends above the stone. cut: (columns,) those on the edge of a patch, which
+    no symmetry holds. foot: share of the flesh's depth above which columns stand upright (see `upright`), None where
+    they follow rays. band: None for parts of a cubed sphere.
     """
 
-    sphere: CubedSphere
     positions: Floats
     connectivity: Ints
     is_exocarp: Bools
@@ -57,6 +82,7 @@ class QuadraticMesh:
     breaks: Floats
     cut: Bools
     foot: float | None = None
+    band: Band | None = None
 
     @property
     def columns(self) -> int:
@@ -123,7 +149,55 @@ def build_quadratic_mesh(
     number = np.full(len(rays), -1)
     number[columns] = np.arange(len(columns))
     stacks = number[quads[kept]]
-    positions = along_rays(params, rays[columns], outer[columns], _with_middles(core), 2 * exocarp_layers)
+    ground = _Ground(rays[columns], outer[columns], stacks, quad_of, edge[columns], planes)
+    return _raised(params, ground, core, exocarp_layers, foot)
+
+
+def build_band_mesh(
+    params: DehydrationParams, band: Band, core: Floats, symmetry: Symmetry, exocarp_layers: int, foot: float | None
+) -> QuadraticMesh:
+    """Return the mesh of a band. core, exocarp_layers, foot: as of `build_quadratic_mesh`.
+
+    The lowest of `core` may lie above the stone: the mesh is cut there. Sides off the symmetry planes are, too.
+    Raises InvalidGeometry where elements turn inside out.
+    """
+    colatitude = np.linspace(band.high, band.low, 2 * band.rows + 1)
+    azimuth = np.linspace(band.first, band.last, 2 * band.cells + 1)
+    towards = directions(colatitude[None, :], azimuth[:, None])
+    wide, long = towards.shape[:2]
+    grid = np.arange(wide * long).reshape(wide, long)
+    # azimuth, colatitude and outwards are right-handed
+    stacks = np.stack([grid[i : wide - 2 + i : 2, j : long - 2 + j : 2] for i in range(3) for j in range(3)], axis=-1)
+    planes = PLANES[symmetry]
+    edge = np.zeros(grid.shape, dtype=bool)
+    edge[:, 0] = True
+    edge[:, -1] = 1 not in planes or band.low < np.pi / 2
+    edge[0] |= band.first > 0
+    edge[-1] |= band.last < np.pi / 2
+    rays, outer = meeting(params, towards.reshape(-1, 3))
+    quad_of = np.arange(band.cells * band.rows).reshape(1, band.cells, band.rows)
+    ground = _Ground(rays, outer, stacks.reshape(-1, 9), quad_of, edge.ravel(), planes, band)
+    return _raised(params, ground, core, exocarp_layers, foot)
+
+
+class _Ground(NamedTuple):
+    """Where columns stand: along `rays` (columns, 3), which meet the interface at `outer`; else as of the mesh."""
+
+    rays: Floats
+    outer: Floats
+    stacks: Ints
+    quad_of: Ints
+    cut: Bools
+    planes: tuple[int, ...]
+    band: Band | None = None
+
+
+def _raised(
+    params: DehydrationParams, ground: _Ground, core: Floats, exocarp_layers: int, foot: float | None
+) -> QuadraticMesh:
+    """Return the mesh of columns."""
+    rays, outer, stacks, quad_of, cut, planes, band = ground
+    positions = along_rays(params, rays, outer, _with_middles(core), 2 * exocarp_layers)
     levels = positions.shape[1]
     layers = (levels - 1) // 2
     corners = stacks[:, None, [0, 2, 6, 8], None] * levels + 2 * np.arange(layers)[:, None, None] + np.array([0, 2])
@@ -135,12 +209,11 @@ def build_quadratic_mesh(
         else:
             foot = None
     for axis in planes:
-        positions[np.abs(rays[columns, axis]) < 1e-9, :, axis] = 0.0
+        positions[np.abs(rays[:, axis]) < 1e-9, :, axis] = 0.0
     level = 2 * np.arange(layers)[:, None] + np.arange(3)
     connectivity = (stacks[:, None, :, None] * levels + level[None, :, None, :]).reshape(-1, 27)
     is_exocarp = np.tile(np.arange(layers) >= len(core) - 1, len(stacks))
     breaks = np.concatenate([core, 1 + np.arange(1, exocarp_layers + 1) / exocarp_layers])
     return QuadraticMesh(
-        sphere, positions.reshape(-1, 3), connectivity, is_exocarp, stacks, planes, quad_of, levels, breaks,
-        edge[columns], foot,
+        positions.reshape(-1, 3), connectivity, is_exocarp, stacks, planes, quad_of, levels, breaks, cut, foot, band,
     )  # fmt: skip

@@ -22,6 +22,10 @@ Conventions. Local node ``a`` of a hex8 sits at xi = +1 if ``a & 4``, eta = +1 i
 so that D_k = 8 dx/dxi_k is linear in them and F is never formed: with B = dxi/dX and w the fresh volume of a point,
 
     w I1 = sum_kl metric_kl D_k . D_l,   metric = w B B^T / 64,        J = det(D) * det(B) / 512.
+
+The points of core and exocarp hold their metric as m1, m2, m3 on the diagonal between two unit triangles:
+
+    w I1 = sum_k m_k |D'_k|^2,   D'_1 = D_1 + a D_2 + b D_3,   D'_2 = D_2 + c D_3,   D'_3 = D_3,   det(D') = det(D).
 """
 
 from __future__ import annotations
@@ -57,9 +61,10 @@ BARRIER_BELOW, BARRIER_STIFFNESS, TANGENT_BELOW = 0.6, 8.0, 0.25
 
 MU, KAPPA, INVERSE_VOLUME, GEOMETRY = 0, 1, 2, 3
 """Stored planes of every element type: shear modulus, bulk modulus, 1 / fresh volume; then its fresh geometry."""
-CORE_PLANES = EXOCARP_PLANES = GEOMETRY + 3 * 7
-"""Core and exocarp store modes 1 to 7 of the fresh positions and derive the metric of each point from them: arithmetic
-is cheaper than fetching seven floats a point, above all where threads or jobs share a cache."""
+POINT = 7
+"""Planes of a point of the core and the exocarp: a, b, c, m1, m2, m3 of its metric, see `upright`, and det(B) / 512.
+Deriving them from the fresh positions in every step would be a third of an element's arithmetic."""
+CORE_PLANES, EXOCARP_PLANES = GEOMETRY + 8 * POINT, GEOMETRY + 10 * POINT
 LINEAR_PLANES = GEOMETRY + 6
 MEAN_PLANES = LINEAR_PLANES + 12
 ONE_POINT_PLANES = MEAN_PLANES + 9
@@ -81,7 +86,7 @@ class Arithmetic(Protocol):
         """The larger of two; b if a is not a number."""
 
     def inverse_cube_root(self, a: Number) -> Number:
-        """a^(-1/3) for a > 0."""
+        """a^(-1/3) for a > 0, to 4e-5 at least."""
 
 
 Planes: TypeAlias = Callable[[int], Number]
@@ -89,12 +94,9 @@ Planes: TypeAlias = Callable[[int], Number]
 
 
 def refine_inverse_cube_root(value: Number, guess: Number) -> Number:
-    """value^(-1/3) to float32 accuracy from the bit-trick guess (3.4 % off): each pass cubes the error."""
-    root = guess
-    for _ in range(2):
-        defect = 1.0 - value * (root * root * root)
-        root = root + root * defect * (1 / 3 + defect * (2 / 9))
-    return root
+    """value^(-1/3) to 4e-5 from the bit-trick guess (3.4 % off), whose error this cubes."""
+    defect = 1.0 - value * (guess * guess * guess)
+    return guess + guess * defect * (1 / 3 + defect * (2 / 9))
 
 
 INVERSE_CUBE_ROOT_MAGIC = float(0x54A2FA8C)
@@ -104,6 +106,11 @@ INVERSE_CUBE_ROOT_MAGIC = float(0x54A2FA8C)
 def cross(a: Vector, b: Vector) -> Vector:
     """Cross product."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def plus_cross(total: Vector, a: Vector, b: Vector) -> Vector:
+    """Total plus the cross product, in multiply-adds."""
+    return [(total[i] + a[j] * b[k]) - a[k] * b[j] for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
 
 
 def dot(a: Vector, b: Vector) -> Number:
@@ -148,34 +155,51 @@ def nodal_from_modal(modal: dict[int, Vector]) -> list[Vector]:
     return [vector for vector in nodal if vector is not None]
 
 
-def gauss_derivatives(modes: Sequence[Vector]) -> list[list[Vector]]:
-    """D = 8 dx/dxi at the 2x2x2 points: [point][direction] -> vector. Each direction has only four distinct values."""
+def to_points(modes: Sequence[Vector]) -> list[Vector]:
+    """Modes by what their coordinates are at the 2x2x2 points: there D_k are sums and differences of these."""
+    scaled = [list(mode) for mode in modes]
+    for m in HOURGLASS:
+        scale = GAUSS**2 if m == (XI | ETA | ZETA) else GAUSS
+        scaled[m] = [scale * component for component in scaled[m]]
+    return scaled
+
+
+def gauss_derivatives(scaled: Sequence[Vector]) -> list[list[Vector]]:
+    """D = 8 dx/dxi at the 2x2x2 points, from `to_points`: [point][direction] -> vector.
+
+    Each direction has only four distinct values.
+    """
     by_signs: list[dict[tuple[int, int], Vector]] = []
     for own, u, v in DIRECTIONS:
         values: dict[tuple[int, int], Vector] = {}
         for su in SIGNS:
-            even = [p + (su * GAUSS) * q for p, q in zip(modes[own], modes[own | u], strict=True)]
-            odd = [p + (su * GAUSS) * q for p, q in zip(modes[own | v], modes[7], strict=True)]
+            even, odd = _signed(su, scaled[own], scaled[own | u]), _signed(su, scaled[own | v], scaled[7])
             for sv in SIGNS:
-                values[su, sv] = [p + (sv * GAUSS) * q for p, q in zip(even, odd, strict=True)]
+                values[su, sv] = _signed(sv, even, odd)
         by_signs.append(values)
     return [[by_signs[0][b, c], by_signs[1][a, c], by_signs[2][a, b]] for a, b, c in GAUSS_SIGNS]
 
 
-def centre_line_derivatives(modes: Sequence[Vector]) -> list[list[Vector]]:
-    """D at the two points on the in-plane centre line, zeta = -LINE and +LINE: [point][direction] -> vector."""
+def _signed(sign: int, first: Vector, second: Vector) -> Vector:
+    """First + sign * second."""
+    pairs = zip(first, second, strict=True)
+    return [p + q for p, q in pairs] if sign > 0 else [p - q for p, q in pairs]
+
+
+def centre_line_derivatives(scaled: Sequence[Vector]) -> list[list[Vector]]:
+    """D at the two points on the in-plane centre line, zeta = -LINE and +LINE, from `to_points`: [point][direction]."""
     return [
         [
-            [p + (s * LINE) * q for p, q in zip(modes[XI], modes[XI | ZETA], strict=True)],
-            [p + (s * LINE) * q for p, q in zip(modes[ETA], modes[ETA | ZETA], strict=True)],
-            list(modes[ZETA]),
+            [p + (s * LINE / GAUSS) * q for p, q in zip(scaled[XI], scaled[XI | ZETA], strict=True)],
+            [p + (s * LINE / GAUSS) * q for p, q in zip(scaled[ETA], scaled[ETA | ZETA], strict=True)],
+            list(scaled[ZETA]),
         ]
         for s in SIGNS
     ]
 
 
 def modal_from_points(stress: Sequence[Sequence[Vector]]) -> dict[int, Vector]:
-    """Adjoint of `gauss_derivatives` followed by `centre_line_derivatives` (the latter if ten points are given)."""
+    """Adjoint of `to_points`, then `gauss_derivatives` and `centre_line_derivatives` (if ten points are given)."""
     modal: dict[int, Vector] = {}
 
     def add(mode: int, vector: Vector) -> None:
@@ -186,18 +210,20 @@ def modal_from_points(stress: Sequence[Sequence[Vector]]) -> dict[int, Vector]:
         for signs, point in zip(GAUSS_SIGNS, stress[:8], strict=True):
             key = (signs[1] if k == 0 else signs[0], signs[1] if k == 2 else signs[2])
             sums[key] = [p + q for p, q in zip(sums[key], point[k], strict=True)] if key in sums else point[k]
-        plus = {su: [p + q for p, q in zip(sums[su, 1], sums[su, -1], strict=True)] for su in SIGNS}
-        minus = {su: [p - q for p, q in zip(sums[su, 1], sums[su, -1], strict=True)] for su in SIGNS}
-        add(own, [p + q for p, q in zip(plus[1], plus[-1], strict=True)])
-        add(own | u, [GAUSS * (p - q) for p, q in zip(plus[1], plus[-1], strict=True)])
-        add(own | v, [GAUSS * (p + q) for p, q in zip(minus[1], minus[-1], strict=True)])
-        add(7, [GAUSS**2 * (p - q) for p, q in zip(minus[1], minus[-1], strict=True)])
-    for s, point in zip(SIGNS, stress[8:], strict=False):
+        plus = {su: _signed(1, sums[su, 1], sums[su, -1]) for su in SIGNS}
+        minus = {su: _signed(-1, sums[su, 1], sums[su, -1]) for su in SIGNS}
+        add(own, _signed(1, plus[1], plus[-1]))
+        add(own | u, _signed(-1, plus[1], plus[-1]))
+        add(own | v, _signed(1, minus[1], minus[-1]))
+        add(7, _signed(-1, minus[1], minus[-1]))
+    if len(stress) > len(GAUSS_SIGNS):
+        low, high = stress[8:]
         for k, own in enumerate((XI, ETA)):
-            add(own, point[k])
-            add(own | ZETA, [(s * LINE) * p for p in point[k]])
-        add(ZETA, point[2])
-    return modal
+            add(own, _signed(1, high[k], low[k]))
+            add(own | ZETA, [(LINE / GAUSS) * p for p in _signed(-1, high[k], low[k])])
+        add(ZETA, _signed(1, high[2], low[2]))
+    scaled = to_points([modal.get(m, []) for m in range(8)])
+    return {m: scaled[m] for m in modal}
 
 
 def hexahedron_volume(modes: Sequence[Vector]) -> tuple[Number, dict[int, Vector]]:
@@ -227,3 +253,34 @@ def apply_metric(metric: Sequence[Number], derivatives: Sequence[Vector]) -> tup
     rows = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
     lowered = [combine([metric[j] for j in row], derivatives) for row in rows]
     return lowered, dot(derivatives[0], lowered[0]) + dot(derivatives[1], lowered[1]) + dot(derivatives[2], lowered[2])
+
+
+def upright(triangle: Sequence[Number], derivatives: Sequence[Vector]) -> list[Vector]:
+    """D' of the module's head; triangle: a, b, c."""
+    a, b, c = triangle
+    first, second, third = derivatives
+    return [
+        [x + a * y + b * z for x, y, z in zip(first, second, third, strict=True)],
+        [y + c * z for y, z in zip(second, third, strict=True)],
+        third,
+    ]
+
+
+def upright_adjoint(triangle: Sequence[Number], stress: Sequence[Vector]) -> list[Vector]:
+    """Derivatives of an energy by D' -> by D."""
+    a, b, c = triangle
+    first, second, third = stress
+    return [
+        first,
+        [y + a * x for x, y in zip(first, second, strict=True)],
+        [z + b * x + c * y for x, y, z in zip(first, second, third, strict=True)],
+    ]
+
+
+def triangles_of(metric: Sequence[Number]) -> list[Number]:
+    """a, b, c, m1, m2, m3 of a metric stored 11, 12, 13, 22, 23, 33."""
+    xx, xy, xz, yy, yz, zz = metric
+    a, b = xy / xx, xz / xx
+    second = yy - a * xy
+    c = (yz - a * xz) / second
+    return [a, b, c, xx, second, zz - b * xz - c * c * second]

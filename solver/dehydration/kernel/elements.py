@@ -29,6 +29,7 @@ from solver.dehydration.kernel.algebra import (
     LINEAR_PLANES,
     MEAN_PLANES,
     MU,
+    POINT,
     TANGENT_BELOW,
     XI,
     ZETA,
@@ -46,6 +47,11 @@ from solver.dehydration.kernel.algebra import (
     modal_from_points,
     modes_of,
     nodal_from_modal,
+    plus_cross,
+    to_points,
+    triangles_of,
+    upright,
+    upright_adjoint,
 )
 
 
@@ -56,29 +62,35 @@ class Shrinkage(NamedTuple):
     inverse: Number
     mu: Number
     """mu * Jd"""
+    shear: Number
+    """mu * theta: what (J/Jd)^(-2/3) I1(F) / 2 is multiplied with, as Jd J^(-2/3) = theta (J/Jd)^(-2/3)"""
 
 
 def shrinkage_of(plane: Planes, theta: Number) -> Shrinkage:
     """Jd and its companions for Fd = theta I."""
     volume = theta * theta * theta
-    return Shrinkage(volume, 1.0 / volume, plane(MU) * volume)
+    return Shrinkage(volume, 1.0 / volume, plane(MU) * volume, plane(MU) * theta)
 
 
 class Isochoric(NamedTuple):
-    """J^(-2/3) with its linear continuation below TANGENT_BELOW, and its slope."""
+    """(J/Jd)^(-2/3) with its linear continuation below TANGENT_BELOW, and its slope."""
 
     value: Number
-    third_of_slope: Number
-    """-(1/2) d value / dJ, that is J^(-5/3) / 3"""
+    slope: Number
+    """-(3/2) d value / d(J/Jd), that is (J/Jd)^(-5/3)"""
 
 
-def isochoric_factor(ar: Arithmetic, jacobian: Number, shrinkage: Shrinkage) -> Isochoric:
-    """J^(-2/3) of a point or element, safe for any J."""
-    bounded = ar.maximum(jacobian, TANGENT_BELOW * shrinkage.volume)
+def isochoric_factor(ar: Arithmetic, ratio: Number) -> Isochoric:
+    """(J/Jd)^(-2/3) of a point or element, safe for any ratio."""
+    bounded = ar.maximum(ratio, TANGENT_BELOW)
     root = ar.inverse_cube_root(bounded)
     square = root * root
-    slope = square * (square * root) * (1 / 3)
-    return Isochoric(square + 2.0 * slope * (bounded - jacobian), slope)
+    cube = square * root
+    # root is a little off: to first order in the defect, its square and its cube (1 / bounded) are put right
+    defect = 1.0 - bounded * cube
+    square = square + (square * defect) * (2 / 3)
+    slope = square * (cube + cube * defect)
+    return Isochoric(square + (slope * (2 / 3)) * (bounded - ratio), slope)
 
 
 def barrier_overlap(ar: Arithmetic, ratio: Number) -> Number:
@@ -88,17 +100,29 @@ def barrier_overlap(ar: Arithmetic, ratio: Number) -> Number:
 
 def derivatives_of(modes: Sequence[Vector], exocarp: bool) -> list[list[Vector]]:
     """D = 8 dx/dxi at the points of an element type: [point][direction] -> vector."""
-    return gauss_derivatives(modes) + (centre_line_derivatives(modes) if exocarp else [])
+    scaled = to_points(modes)
+    return gauss_derivatives(scaled) + (centre_line_derivatives(scaled) if exocarp else [])
 
 
-def fresh_derivatives(plane: Planes, exocarp: bool) -> list[list[Vector]]:
-    """D of the fresh element."""
-    modes = [[plane(GEOMETRY + 3 * (m - 1) + i) for i in range(3)] if m else [] for m in range(8)]
-    return derivatives_of(modes, exocarp)
+class PointGeometry(NamedTuple):
+    """Fresh geometry of a point, see `algebra`."""
+
+    triangle: list[Number]
+    """a, b, c"""
+    stretches: list[Number]
+    """m1, m2, m3"""
+    inverse_det: Number
+    """det(B) / 512"""
 
 
-def point_metric(fresh: Sequence[Vector], weight: float) -> tuple[list[Number], Number]:
-    """(metric 11, 12, 13, 22, 23, 33 of `algebra`, det(B)/512) of a point with fresh derivatives D.
+def point_geometry(plane: Planes, point: int) -> PointGeometry:
+    """What is stored of a point."""
+    stored = [plane(GEOMETRY + POINT * point + k) for k in range(POINT)]
+    return PointGeometry(stored[:3], stored[3:6], stored[6])
+
+
+def fresh_point(fresh: Sequence[Vector], weight: float) -> list[Number]:
+    """What to store of a point with fresh derivatives D.
 
     weight: quadrature weight / 512. With C the cofactors of D, B = 8 C / det(D), so that
     w B B^T / 64 = weight C C^T / det(D).
@@ -106,57 +130,62 @@ def point_metric(fresh: Sequence[Vector], weight: float) -> tuple[list[Number], 
     cofactors = [cross(fresh[1], fresh[2]), cross(fresh[2], fresh[0]), cross(fresh[0], fresh[1])]
     inverse_det = 1.0 / dot(fresh[0], cofactors[0])
     factor = inverse_det * weight
-    scaled = [[factor * component for component in row] for row in cofactors]
-    return [dot(scaled[k], cofactors[m]) for k in range(3) for m in range(k, 3)], inverse_det
+    metric = [factor * dot(cofactors[k], cofactors[m]) for k in range(3) for m in range(k, 3)]
+    return [*triangles_of(metric), inverse_det]
 
 
 def mean_volume(modes: Sequence[Vector], derivatives: Sequence[Sequence[Vector]], exocarp: bool) -> Number:
     """Deformed element volume by the element's own rule (2x2x2 integrates a trilinear hex exactly)."""
-    if not exocarp:
-        return hexahedron_volume(modes)[0] * (1 / 64)
-    total: Number = 0.0
-    for weight, d in zip(EXOCARP_WEIGHTS, derivatives, strict=True):
+    total = hexahedron_volume(modes)[0] * (EXOCARP_WEIGHTS[0] / 64 if exocarp else 1 / 64)
+    for weight, d in zip(EXOCARP_WEIGHTS[8:], derivatives[8:], strict=exocarp):
         total = dot(d[0], cross(d[1], d[2])) * (weight / 512) + total
     return total
 
 
 def point_stress(
     ar: Arithmetic,
-    d: Sequence[Vector],
-    fresh: Sequence[Vector],
-    plane: Planes,
+    derivatives: Sequence[Vector],
+    geometry: PointGeometry,
     weight: float,
     pressure: Number,
+    mu: Number,
     shrink: Shrinkage,
 ) -> list[Vector]:
     """Derivative of the element's energy by the three D_k of one point.
 
-    fresh: D_k of the fresh element. weight: quadrature weight / 512. pressure: kappa (Jbar/Jd - 1), the derivative of
-    the volumetric energy by the element's volume.
+    weight: quadrature weight / 512. pressure: kappa (Jbar/Jd - 1), the derivative of the volumetric energy by the
+    element's volume.
     """
-    metric, inverse_det = point_metric(fresh, weight)
-    cofactors = [cross(d[1], d[2]), cross(d[2], d[0]), cross(d[0], d[1])]
-    jacobian = dot(d[0], cofactors[0]) * inverse_det
-    lowered, stretch = apply_metric(metric, d)
-    isochoric = isochoric_factor(ar, jacobian, shrink)
-    overlap = barrier_overlap(ar, jacobian * shrink.inverse)
-    shear = shrink.mu * isochoric.value
-    spherical = (pressure + (BARRIER_STIFFNESS * overlap) * plane(MU)) * weight
-    spherical = spherical - (shrink.mu * stretch) * (isochoric.third_of_slope * inverse_det)
-    return [combine((shear, spherical), pair) for pair in zip(lowered, cofactors, strict=True)]
+    d = upright(geometry.triangle, derivatives)
+    first = cross(d[1], d[2])
+    scale = geometry.inverse_det * shrink.inverse
+    ratio = dot(d[0], first) * scale
+    isochoric = isochoric_factor(ar, ratio)
+    stretch = dot(geometry.stretches, [dot(each, each) for each in d])
+    spherical = pressure * weight + barrier_overlap(ar, ratio) * (mu * (BARRIER_STIFFNESS * weight))
+    spherical = spherical - (shrink.shear * (1 / 3) * stretch) * (isochoric.slope * scale)
+    shear = shrink.shear * isochoric.value
+    sheared = [[shear * m * p for p in each] for m, each in zip(geometry.stretches, d, strict=True)]
+    # the other two cofactors are not needed but times the spherical stress
+    pressed = [spherical * p for p in d[0]]
+    by_upright = [
+        [p + spherical * q for p, q in zip(sheared[0], first, strict=True)],
+        plus_cross(sheared[1], d[2], pressed),
+        plus_cross(sheared[2], pressed, d[1]),
+    ]
+    return upright_adjoint(geometry.triangle, by_upright)
 
 
 def _forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number, exocarp: bool) -> list[Vector]:
     modes = modes_of(positions)
     shrink = shrinkage_of(plane, theta)
     derivatives = derivatives_of(modes, exocarp)
-    fresh = fresh_derivatives(plane, exocarp)
     weights = EXOCARP_WEIGHTS if exocarp else CORE_WEIGHTS
     ratio = mean_volume(modes, derivatives, exocarp) * plane(INVERSE_VOLUME) * shrink.inverse
     pressure = plane(KAPPA) * (ratio - 1.0)
     stress = [
-        point_stress(ar, d, d0, plane, weight / 512, pressure, shrink)
-        for d, d0, weight in zip(derivatives, fresh, weights, strict=True)
+        point_stress(ar, d, point_geometry(plane, k), weight / 512, pressure, plane(MU), shrink)
+        for k, (d, weight) in enumerate(zip(derivatives, weights, strict=True))
     ]
     return nodal_from_modal(modal_from_points(stress))
 
@@ -178,20 +207,20 @@ def energy(
     modes = modes_of(positions)
     shrink = shrinkage_of(plane, theta)
     derivatives = derivatives_of(modes, exocarp)
-    fresh = fresh_derivatives(plane, exocarp)
     weights = EXOCARP_WEIGHTS if exocarp else CORE_WEIGHTS
     volume = 1.0 / plane(INVERSE_VOLUME)
     dilatation = mean_volume(modes, derivatives, exocarp) * plane(INVERSE_VOLUME) * shrink.inverse - 1.0
     total = volume * (0.5 * plane(KAPPA) * shrink.volume * (dilatation * dilatation) - 1.5 * shrink.mu)
     least: Number = None
-    for d, d0, weight in zip(derivatives, fresh, weights, strict=True):
-        metric, inverse_det = point_metric(d0, weight / 512)
-        jacobian = dot(d[0], cross(d[1], d[2])) * inverse_det
-        ratio = jacobian * shrink.inverse
+    for k, (derivative, weight) in enumerate(zip(derivatives, weights, strict=True)):
+        geometry = point_geometry(plane, k)
+        d = upright(geometry.triangle, derivative)
+        ratio = dot(d[0], cross(d[1], d[2])) * geometry.inverse_det * shrink.inverse
         overlap = barrier_overlap(ar, ratio)
-        stretch = apply_metric(metric, d)[1]
-        total = total + 0.5 * shrink.mu * isochoric_factor(ar, jacobian, shrink).value * stretch
-        total = total + 0.5 * BARRIER_STIFFNESS * shrink.mu * (overlap * overlap) * (weight / 512) / inverse_det
+        stretch = dot(geometry.stretches, [dot(each, each) for each in d])
+        total = total + 0.5 * shrink.shear * isochoric_factor(ar, ratio).value * stretch
+        fresh = (weight / 512) / geometry.inverse_det
+        total = total + 0.5 * BARRIER_STIFFNESS * shrink.mu * (overlap * overlap) * fresh
         least = ratio if least is None else ar.minimum(least, ratio)
     return total, least
 
@@ -242,10 +271,11 @@ def one_point_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes,
     jacobian = volume * (1 / 64) * plane(INVERSE_VOLUME)
     ratio = jacobian * shrink.inverse
     mean = mean_shear(modes, plane)
-    isochoric = isochoric_factor(ar, jacobian, shrink)
-    shear = shrink.mu * isochoric.value
+    isochoric = isochoric_factor(ar, ratio)
+    shear = shrink.shear * isochoric.value
     spherical = plane(KAPPA) * (ratio - 1.0) + (BARRIER_STIFFNESS * barrier_overlap(ar, ratio)) * plane(MU)
-    spherical = spherical - (shrink.mu * mean.stretch) * (isochoric.third_of_slope * plane(INVERSE_VOLUME))
+    by_volume = isochoric.slope * (plane(INVERSE_VOLUME) * shrink.inverse)
+    spherical = spherical - (shrink.shear * (1 / 3) * mean.stretch) * by_volume
     spherical = spherical * (1 / 64)
     modal = {m: [shear * p for p in vector] for m, vector in zip(HOURGLASS, mean.by_hourglass, strict=True)}
     for k, own in enumerate((XI, ETA, ZETA)):
@@ -267,5 +297,5 @@ def one_point_energy(ar: Arithmetic, positions: Sequence[Vector], plane: Planes,
     volumetric = 0.5 * plane(KAPPA) * ((ratio - 1.0) * (ratio - 1.0))
     barrier = 0.5 * BARRIER_STIFFNESS * plane(MU) * (overlap * overlap)
     fresh = 1.0 / plane(INVERSE_VOLUME)
-    shear = 0.5 * shrink.mu * (isochoric_factor(ar, jacobian, shrink).value * stretch - 3.0 * fresh)
+    shear = 0.5 * (shrink.shear * isochoric_factor(ar, ratio).value * stretch - 3.0 * shrink.mu * fresh)
     return shear + fresh * shrink.volume * (volumetric + barrier)

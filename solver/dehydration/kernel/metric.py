@@ -20,6 +20,7 @@ from solver.dehydration.kernel.algebra import (
     hexahedron_volume,
     modes_of,
 )
+from solver.dehydration.kernel.elements import derivatives_of, fresh_point
 from solver.fem import HEX8
 
 from ...arrays import Floats
@@ -76,8 +77,11 @@ def _modes(corners: Floats) -> Any:
 
 def element_planes(corners: Floats, mu: Floats, kappa: Floats, exocarp: bool) -> Floats:
     """Planes of the full core or the exocarp element, (planes, ne) float64."""
-    volume = np.linalg.det(corners.transpose(0, 2, 1)[:, None] @ SLOPES[exocarp]) @ quadrature(exocarp)[1]
-    return np.stack([mu, kappa, 1.0 / volume, *(component for mode in _modes(corners)[1:] for component in mode)])
+    weights = quadrature(exocarp)[1] / 512
+    derivatives = derivatives_of(_modes(corners), exocarp)
+    points = [fresh_point(d, weight) for d, weight in zip(derivatives, weights, strict=True)]
+    volume = sum(weight / point[-1] for point, weight in zip(points, weights, strict=True))
+    return np.stack([mu, kappa, 1.0 / volume, *(number for point in points for number in point)])
 
 
 class OnePoint(NamedTuple):

@@ -4,22 +4,24 @@ With X' = G X, F' = dx/dX' and V' = G V the energy of an element is exactly that
 
     integral over V of det(Fd) W(F Fd^-1)  =  integral over V' of theta^3 W(F' / theta).
 
-So the kernel, which knows one theta for the whole core, is handed the fresh geometry of X'. The stored planes hold the
-modes of the fresh element, which are linear in X: three multiplications a mode, and nothing else changes.
+So the kernel, which knows one theta for the whole core, is handed the fresh geometry of X', and nothing else changes.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
-from solver.dehydration.kernel.algebra import GEOMETRY, INVERSE_VOLUME, KAPPA, MU
+from solver.dehydration.kernel.algebra import KAPPA, MU
 from solver.dehydration.kernel.fixed_point import positions
-from solver.dehydration.kernel.layout import Layout, aligned_copy, aligned_zeros
-from solver.dehydration.kernel.metric import one_point_planes
+from solver.dehydration.kernel.layout import Layout, aligned_zeros
+from solver.dehydration.kernel.metric import element_planes, one_point_planes
+from solver.dehydration.kernel.strips import LANES
 
-from ...arrays import Floats, Singles
+from ...arrays import Bools, Floats, Singles
 
 __all__ = ["reload"]
 
@@ -37,23 +39,26 @@ def reload(layout: Layout, fresh: Layout, target: Floats) -> Layout:
     lanes = target[fresh.core_elements]
     if not np.all(lanes > 0):
         raise ValueError("targets must be positive: the flesh would shrink to nothing")
-    scale = np.ascontiguousarray(lanes.transpose(0, 2, 1), np.float32)
-    planes = aligned_copy(fresh.core_planes, np.float32)
-    blocks, _, width = planes.shape
-    planes[:, GEOMETRY:].reshape(blocks, -1, 3, width)[...] *= scale[:, None]
-    planes[:, INVERSE_VOLUME] /= scale.prod(axis=1)
-    return dataclasses.replace(layout, core_planes=planes, one_point_planes=_one_point(fresh, lanes))
+    corners = positions(fresh.fresh)[fresh.connectivity[fresh.core_elements]] * lanes[:, :, None]
+    real = fresh.core_elements >= 0
+    core, single = fresh.core_planes, fresh.one_point_planes
+    return dataclasses.replace(
+        layout,
+        core_planes=_anew(core, real, corners, partial(element_planes, exocarp=False)),
+        one_point_planes=_anew(single, real, corners, one_point_planes),
+    )
 
 
-def _one_point(fresh: Layout, lanes: Floats) -> Singles:
-    """Planes of the one-point element; its metric is not linear in X and is taken anew."""
-    old = fresh.one_point_planes
-    if not len(old):
-        return old
-    elements = fresh.core_elements.ravel()
-    corners = positions(fresh.fresh)[fresh.connectivity[elements]] * lanes.reshape(-1, 1, 3)
-    mu, kappa = (old[:, plane].ravel().astype(np.float64) for plane in (MU, KAPPA))
+def _anew(old: Singles, real: Bools, corners: Floats, planes_of: Callable[..., Floats], chunk: int = 128) -> Singles:
+    """Planes like the `old` ones (blocks, planes, 16) of elements whose fresh corners are (blocks, 16, 8, 3).
+
+    Lanes that only fill a vector, those that are not `real` (blocks, 16), keep the old ones.
+    """
     planes: Singles = aligned_zeros(old.shape, np.float32)
-    made = one_point_planes(corners, mu, kappa).reshape(-1, *fresh.core_elements.shape)
-    planes[...] = made.transpose(1, 0, 2)
+    for first in range(0, len(old), chunk):
+        part = slice(first, first + chunk)
+        mu, kappa = (old[part, plane].ravel().astype(np.float64) for plane in (MU, KAPPA))
+        made = planes_of(corners[part].reshape(-1, 8, 3), mu, kappa)
+        made = made.reshape(old.shape[1], -1, LANES).transpose(1, 0, 2)
+        planes[part] = np.where(real[part, None], made, old[part])
     return planes

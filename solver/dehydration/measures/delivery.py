@@ -1,28 +1,35 @@
 """The surface that is handed over: nodes of the finite elements read on a lattice, so that it does not cross itself.
 
 Splines through the nodes are smooth, and where walls fold onto each other they swing through: at te = 0.04, gamma = 10,
-s = 0.3 (preview) the finite elements' own triangles cross nowhere and a spline on 128 colatitudes crosses 6,500 times.
-So a stage whose spline crosses is read off those triangles, as solved. What then still crosses, where a lattice cuts
-corners that are finer than it is, is evened out in place, step by step, until nothing does: 36 pairs there, on 0.9 % of
-the surface, rms 0.0016 r1.
+s = 0.3 (preview) the finite elements' own triangles cross nowhere and a spline on 128 colatitudes crosses 2,500 times.
+Around those places, and nowhere else, creases are rounded (`folds`): then nothing crosses there, on any lattice, and
+all stays as smooth. What crosses even so, where a lattice cuts corners that are finer than it is, is evened out in
+place, step by step, until nothing does.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 
-from ...arrays import Bools, Floats
-from ...fruit import Fruit, lattice
+from ...arrays import Bools, Floats, Ints
+from ...fruit import lattice
 from ...geometry.crossings import Crossings
 from ...lattice import closed_lattice
-from ..fresh.mesh import CubedSphere, FruitMesh, Sampler
+from ..fresh.mesh import FruitMesh, Sampler
+from ..fresh.sector import cut
+from ..params import DehydrationParams
+from .facets import on_triangles
+from .folds import Folds
 from .penetration import of_lattice
 
-__all__ = ["Delivered", "Delivery", "even_out", "on_triangles"]
+__all__ = ["COARSE", "Delivered", "Delivery", "even_out"]
 
+#: Lattice on which finer ones learn where to round, so that shapes differ less from one resolution to the next.
+COARSE = 64
 #: Rounds of evening out; what crosses after them is delivered, and said.
 _ROUNDS = 60
 
@@ -37,49 +44,61 @@ class Delivered(NamedTuple):
     found: Crossings
     """where it crosses itself"""
     moved: float
-    """farthest that evening out moved a point off the solved triangles"""
+    """farthest that a point lies from both readings of what was solved: by splines, and off its triangles"""
 
 
 class Delivery:
     """Reads surface nodes on the lattice of one resolution."""
 
-    def __init__(self, fruit: Fruit, mesh: FruitMesh, resolution: int, dtype: str) -> None:
-        self._mesh, self._dtype = mesh, dtype
+    def __init__(self, fruit: DehydrationParams, mesh: FruitMesh, resolution: int, dtype: str) -> None:
+        self._fruit, self._mesh, self._resolution, self._dtype = fruit, mesh, resolution, dtype
         self._sampler = Sampler(mesh.sphere, resolution)
         self._fresh = fruit.surface(*lattice(resolution))
         self._fresh_nodes = mesh.positions[mesh.surface_nodes]
 
     def __call__(self, nodes: Floats) -> Delivered:
         """Return what is handed over of nodes (nc, 3)."""
-        position, moved = self._fresh + self._sampler(nodes - self._fresh_nodes), 0.0
-        found = of_lattice(self._rounded(position))
+        position, moved = self._spline(nodes), 0.0
+        found = self._look(position)
         if found.count:
-            linear = (on_triangles(self._mesh.sphere, self._sampler) @ nodes).reshape(position.shape)
-            position, found = even_out(linear, self._rounded)
-            moved = float(np.linalg.norm(position - linear, axis=-1).max())
+            readings = position, (on_triangles(self._mesh.sphere, self._sampler) @ nodes).reshape(position.shape)
+            position, found, _ = self._apart(nodes, position, found)
+            if found.count:
+                position, found = even_out(position, self._given)
+            off = [np.linalg.norm(position - reading, axis=-1) for reading in readings]
+            moved = float(np.minimum(*off).max())
         return Delivered((position - self._fresh).astype(self._dtype), position.astype(self._dtype), found, moved)
 
-    def _rounded(self, position: Floats) -> Floats:
+    def _spline(self, nodes: Floats) -> Floats:
+        found: Floats = self._fresh + self._sampler(nodes - self._fresh_nodes)
+        return found
+
+    def _apart(self, nodes: Floats, spline: Floats, found: Crossings) -> tuple[Floats, Crossings, Ints]:
+        """Return the surface (n, 2n, 3) with creases rounded where the spline crosses, what still does, and levels."""
+        level = self._coarse._levels(nodes) if self._resolution > COARSE else np.zeros(len(nodes), np.int64)
+        return self._folds.apart(spline, nodes - self._fresh_nodes, found, level)
+
+    def _levels(self, nodes: Floats) -> Ints:
+        """Return how strongly each node (nc,) is rounded: see `Folds`."""
+        spline = self._spline(nodes)
+        found = self._look(spline)
+        return self._apart(nodes, spline, found)[2] if found.count else np.zeros(len(nodes), np.int64)
+
+    @cached_property
+    def _folds(self) -> Folds:
+        image = cut(self._mesh, self._fruit.mirrors).image
+        return Folds(self._mesh.sphere, self._sampler, self._fresh, self._look, image)
+
+    @cached_property
+    def _coarse(self) -> Delivery:
+        return Delivery(self._fruit, self._mesh, COARSE, self._dtype)
+
+    def _look(self, position: Floats) -> Crossings:
+        return of_lattice(self._given(position))
+
+    def _given(self, position: Floats) -> Floats:
+        """Return positions as they are handed over, rounded to their type."""
         return position.astype(self._dtype).astype(np.float64)
-
-
-def on_triangles(sphere: CubedSphere, sampler: Sampler) -> csr_array:
-    """Return the weights (lattice points, nd) that read a nodal field off the triangles that quads are cut into."""
-    n = sphere.n
-    places = (np.stack([sampler.alpha, sampler.beta], axis=1) + np.pi / 4) * (2 * n / np.pi)
-    cell = np.clip(places.astype(np.int64), 0, n - 1)
-    u, v = np.clip(places - cell, 0, 1).T
-    corners = sphere.quads.reshape(6, n, n, 4)[sampler.face, cell[:, 0], cell[:, 1]]
-    # quads begin at the corner (0, 0), or one further, at (1, 0): see `cubed_sphere`
-    turned = corners[:, 0] != sphere.faces[sampler.face, cell[:, 0], cell[:, 1]]
-    u, v = np.where(turned, v, u), np.where(turned, 1 - u, v)
-    # seen from their first corner: (0, 0), (1, 0), (1, 1), (0, 1), cut from (0, 0) to (1, 1)
-    upper = v > u
-    rows = np.repeat(np.arange(len(u)), 3)
-    columns = np.stack([corners[:, 0], np.where(upper, corners[:, 3], corners[:, 1]), corners[:, 2]], axis=1)
-    weights = np.stack([1 - np.maximum(u, v), abs(u - v), np.minimum(u, v)], axis=1)
-    shape = len(u), len(sphere.directions)
-    return coo_array((weights.ravel(), (rows, columns.ravel())), shape).tocsr()
 
 
 def even_out(position: Floats, rounded: Any = lambda position: position) -> tuple[Floats, Crossings]:
