@@ -135,6 +135,6 @@ def test_the_worst_element_is_the_same_whether_energies_are_asked_for_or_not() -
         for fields in (("least_jacobian",), ("least_jacobian", "strain_energy"))
     )
     assert float(plain["least_jacobian"]) == float(more["least_jacobian"])
-    assert 0.5 < float(plain["least_jacobian"]) < 1.0
+    assert 0.4 < float(plain["least_jacobian"]) < 1.0
     assert float(more["strain_energy"]) > 0
     assert "strain_energy" not in plain
