@@ -2,9 +2,8 @@
 
 Of families in the package, at random points between their samples, and at some of these: from which residual, and how
 far, 600 steps of the solver move what each method looks up, and how its statistics compare with what becomes of it
-(record dehydration-score). Fruits keep the bumps and the pattern that runs begin with: runs whose pattern others share
-are made in --store where they are missing, and left out where they come out otherwise. The record is kept after each
-family, and what it has is not done again.
+(record dehydration-score). Fruits keep the bumps and the pattern that runs begin with, which come with the package. The
+record is kept after each family, and what it has is not done again.
 
 With --tier, of whole fruits of the default family instead: the tier between table and run, with seconds by the clock
 and of the processor, on as many threads as there are, after a first one (record dehydration-relaxed).
@@ -15,9 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,23 +23,16 @@ from numba import get_num_threads
 from benchmarks import figures
 from benchmarks.figures import Row, Sheet, markdown
 from solver import registry
-from solver.contract import Context
 from solver.dehydration import SOLVER
-from solver.dehydration.fresh.pattern import pattern_heights
-from solver.dehydration.measures.harmonics import remove_low
-from solver.dehydration.params import DehydrationParams
 from solver.geometry.crossings import crossings
-from solver.lattice import closed_lattice, directions, lattice
+from solver.lattice import closed_lattice
 from store.blending import methods
 from store.lookup import ShapeTable
 from store.starter import ROOT
 from store.store import Store
-from sweeps.planning.plan import Plan
 from sweeps.refining import balance
 from sweeps.refining.balance import Distance
 from sweeps.relaxing import relaxed
-from sweeps.running import executors
-from sweeps.running.runner import run_jobs
 
 __all__ = ["table"]
 
@@ -64,16 +54,12 @@ _FRUITS = (
     *((0.03, 10.0, 0.3), (0.04, 50.0, 0.3)),
 )
 _LATTICE = 64
-#: Correlation from which on a pattern is the one that a table began with (others are .6 alike at most), and the least
-#: degree of wrinkles.
-_SAME, _LOWEST = 0.9, 5
 #: Last stage of the narrower goals.
 _EARLY = 0.2
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--store", type=Path, default=Path("maps/patterns"), help="where the patterns are, or are made")
     parser.add_argument("--families", nargs="+", help="without: all of more than one sample")
     parser.add_argument("--stages", nargs="+", type=float, default=[0.1, 0.2, 0.3])
     parser.add_argument("--points", type=int, default=3, help="of each family")
@@ -82,12 +68,13 @@ def main() -> None:
     if asked.tier:
         _tier()
     else:
-        _score(Store.open(asked.store, create=True), asked.families, asked.stages, asked.points)
+        _score(asked.families, asked.stages, asked.points)
 
 
-def _score(store: Store, names: Sequence[str] | None, stages: Sequence[float], count: int) -> None:
+def _score(names: Sequence[str] | None, stages: Sequence[float], count: int) -> None:
     """Fill in what the record lacks, family by family."""
-    tables = {name: ShapeTable.open(ROOT, name, surfaces=registry.surface) for name in Store.open(ROOT).table_names()}
+    package = Store.open(ROOT)
+    tables = {name: ShapeTable.open(ROOT, name, surfaces=registry.surface) for name in package.table_names()}
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
     about = {
         name: {"version": SOLVER.version, "family": name, "digest": one.digest, "stages": [*stages], "points": count}
@@ -103,12 +90,8 @@ def _score(store: Store, names: Sequence[str] | None, stages: Sequence[float], c
     for name in names or about:
         if name in runs:
             continue
-        table_ = tables[name]
-        _make_pattern(store, table_)
         begin = time.process_time()
-        alike = _alike(table_, store)
-        begun = store if alike >= _SAME else None
-        runs[name] = {**about[name], "alike": alike, "each": list(_measured(table_, begun, stages, count))}
+        runs[name] = {**about[name], "each": list(_measured(tables[name], package, stages, count))}
         figures.keep(NAME, [runs[k] for k in about if k in runs], "dehydration", steps=balance.STEPS)
         print(f"{name}: {time.process_time() - begin:.0f} s of the processor", file=sys.stderr, flush=True)
 
@@ -117,41 +100,7 @@ def _is_of(row: Row, about: Mapping[str, Any]) -> bool:
     return bool(about) and all(row.get(name) == value for name, value in about.items())
 
 
-def _make_pattern(store: Store, table_: ShapeTable) -> None:
-    """Run what all runs of a table start from, if anything, where the store has it not yet."""
-    if balance.at_hand(table_, store):
-        return
-    plan = Plan.parse(tomllib.loads(table_.info.plan), table_.info.name)
-    assert plan.first is not None
-    with executors.serial() as workers:
-        run_jobs(plan.first.jobs(), store, workers, plan.first.name)
-    if not balance.at_hand(table_, store):
-        raise SystemExit(
-            f"what {table_.info.name} starts from is another run now: `wizen table plan {table_.info.name}`"
-        )
-
-
-def _alike(table_: ShapeTable, store: Store) -> float:
-    """Return how the pattern in the store correlates with a sample's wrinkles at the first stage: it lies below them.
-
-    What comes out otherwise, as a cold run about its onset may, is not what the runs began with.
-    """
-    params = DehydrationParams.model_validate(table_.at_parameters(table_.sample(0)))
-    if params.pattern is None:
-        return 1.0
-    angles = lattice(_LATTICE)
-    heights = pattern_heights(params, directions(*angles).reshape(-1, 3), Context(library=store.find))
-    shape = table_.at(table_.sample(0), table_.stages[0], resolution=_LATTICE, fields=("displacement",))
-    fresh = table_.fresh(table_.sample(0)).points(*angles)
-    assert shape.displacement is not None
-    rays = fresh / np.linalg.norm(fresh, axis=-1, keepdims=True)
-    wrinkles = remove_low(np.einsum("ijk,ijk->ij", np.asarray(shape.displacement, float), rays), _LOWEST)
-    area = np.sin(angles[0])
-    a, b = wrinkles, heights.reshape(wrinkles.shape)
-    return float((area * a * b).sum() / np.sqrt((area * a * a).sum() * (area * b * b).sum()))
-
-
-def _measured(table_: ShapeTable, store: Store | None, stages: Sequence[float], count: int) -> Iterator[Row]:
+def _measured(table_: ShapeTable, store: Store, stages: Sequence[float], count: int) -> Iterator[Row]:
     """Yield the distance of each method at each point and stage, and that of some samples."""
     points = balance.between(table_, count)
     samples = np.random.default_rng(0).permutation(table_.size)[:count].tolist()
@@ -178,8 +127,7 @@ def table(record: Row) -> str:
             residual = f"{own.residual_placed:.2f} to {own.residual:.0e}"
             missed = ", ".join(_short(name) for name in _WANTED if not _is_met(own, name)) or "-"
             worse = "; ".join(filter(None, (_worse(own, found[other], other) for other in _OTHERS))) or "-"
-            said = run["family"] + " *" * (run["alike"] < _SAME)
-            lines.append([said, f"{stage:g}", residual, *cells, missed, worse])
+            lines.append([run["family"], f"{stage:g}", residual, *cells, missed, worse])
     return markdown(head, lines)
 
 
