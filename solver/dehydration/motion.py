@@ -200,15 +200,19 @@ class Motion:
 
     def _followed(self, state: Fixed, rest: Floats, count: int, shrinkage: float, damping: float) -> Floats:
         """Return the rest volumes that go with the pressures after `count` steps at this damping."""
-        settings = self.settings
-        if settings.kappa_ratio == settings.march_kappa_ratio:
-            return rest
-        loaded = self._ready(shrinkage, rest)
-        goal = rests(dilatations(loaded, state, 1 - shrinkage), settings.march_kappa_ratio, settings.kappa_ratio)
+        goal = self.rests(state, rest, shrinkage)
         # volumes ring for 2 / damping steps; following faster than that feeds what rings
         share = 1 - np.exp(-_FOLLOW * damping * count)
         following: Floats = rest * (goal / rest) ** share
         return following
+
+    def rests(self, state: Fixed, rest: Floats, shrinkage: float) -> Floats:
+        """Return the rest volumes (ne,) that go with the pressures that a state has under `rest`."""
+        settings = self.settings
+        if settings.kappa_ratio == settings.march_kappa_ratio:
+            return rest
+        strain = dilatations(self._ready(shrinkage, rest), state, 1 - shrinkage)
+        return rests(strain, settings.march_kappa_ratio, settings.kappa_ratio)
 
     def run(
         self,

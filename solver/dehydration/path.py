@@ -98,6 +98,8 @@ class Path:
         self._march(shrinkage, last)
         self._rest = self._arrived(self._state, self._velocity, shrinkage)
         self._settled = self._settle(self._state, self._velocity, self._rest, shrinkage)
+        assert self._settled.rest is not None
+        self._rest = self._settled.rest
         self._velocity[:] = 0
         self._foot, self._place = shrinkage, 0
 

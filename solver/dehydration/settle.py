@@ -23,6 +23,9 @@ _LOOKS = 15
 #: Steps in which a surface at rest may drift so far.
 _REST_STEPS = 200
 
+#: Residual over the one that counts as settled within which rest volumes are taken anew.
+_NEAR = 3.0
+
 #: Drift over the one that counts as settled beyond which a state swings on, over the same of the residual.
 _FAR_DRIFT = 2.0
 
@@ -38,7 +41,8 @@ class State:
 
     residual: out-of-balance force over internal force. drift: rms motion of the surface in 200 steps, by the last that
     were looked at, in exocarp thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy
-    in mu r1^3, and released: by how much settling lowered it, where that was asked for.
+    in mu r1^3, and released: by how much settling lowered it, where that was asked for. rest: rest volumes (ne,) of the
+    elements, which go with their pressures.
     """
 
     surface: Floats
@@ -49,6 +53,7 @@ class State:
     least_ratio: float
     energy: float
     released: float | None = None
+    rest: Floats | None = None
 
 
 def settle(
@@ -68,6 +73,9 @@ def settle(
     still whenever the kinetic energy begins to fall, for there the potential was about least. Then it is calmed,
     and swings again if it was not there yet. State and velocity change in place.
 
+    `rest` volumes are those of the pressures that it came with, and buckles take much of the pressure off a fruit with
+    a stiff skin: after each turn they are taken anew, until that changes them by less than forces are out of balance.
+
     smooth: whether a state at rest may have no buckles yet. Such a one is left to swing, and where it goes elsewhere
     settles there: a smooth fruit past its onset balances and is not stable, but buckles grow from its bumps, at first
     by less than a drift that counts.
@@ -81,13 +89,14 @@ def settle(
     surface = motion.surface(state)
     if shrinkage == 0:
         whole = motion.sector.whole(surface)
-        return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, 0.0)  # free of stress: nothing to settle
+        # free of stress: nothing to settle
+        return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, 0.0, rest)
     copies = motion.sector.copies
-    before = motion.marched_energy(state, rest, shrinkage) if with_release else None
-    spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
+    arrived = state.copy() if with_release else None
+    rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
     looked_at = smooth is not None and spent < settings.settle_steps and smooth(state)
     if looked_at and _leaves(motion, state, velocity, rest, shrinkage):
-        _, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
+        rest, _, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
     strained, least = motion.strained(state, rest, shrinkage)
     if least <= 0:
         raise Unstable(
@@ -95,19 +104,28 @@ def settle(
             advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
             residual=residual,
         )
-    released = copies * (before - motion.marched_energy(state, rest, shrinkage)) if before is not None else None
+    released = None
+    if arrived is not None:
+        # under the same rest volumes: energies under others do not compare
+        before, after = (motion.marched_energy(each, rest, shrinkage) for each in (arrived, state))
+        released = copies * (before - after)
     whole = motion.sector.whole(motion.surface(state))
-    return State(whole, shrinkage, residual, drift, motion.steps, least, copies * strained, released)
+    return State(whole, shrinkage, residual, drift, motion.steps, least, copies * strained, released, rest)
 
 
 def _come_to_rest(
     motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float
-) -> tuple[int, float, float]:
-    """Swing and calm by turns; return the steps spent, the residual and the drift."""
+) -> tuple[Floats, int, float, float]:
+    """Swing and calm by turns; return the rest volumes, the steps spent, the residual and the drift."""
     settings = motion.settings
-    spent, residual, drift = 0, np.inf, np.inf
-    while (residual > settings.residual or drift > settings.drift) and spent < settings.settle_steps:
-        swings = shrinkage > settings.start or spent > 0
+    spent, residual, drift, lag, balanced = 0, np.inf, np.inf, np.inf, False
+    while (not balanced or lag > settings.residual) and spent < settings.settle_steps:
+        # far from balance pressures are those of what swings
+        if residual <= _NEAR * settings.residual:
+            rest = goal
+        # what was in balance is calmed under the new rest volumes, and swings if it does not come back
+        swings = (shrinkage > settings.start or spent > 0) and not balanced
+        residual = drift = np.inf
         if swings:
             _swing(motion, state, velocity, rest, shrinkage)
             spent += settings.swing_steps
@@ -123,7 +141,10 @@ def _come_to_rest(
             far = max(residual / settings.residual, drift / (_FAR_DRIFT * settings.drift))
             is_near = far <= settings.near or not swings
         spent += rested
-    return spent, residual, drift
+        balanced = residual <= settings.residual and drift <= settings.drift
+        goal = motion.rests(state, rest, shrinkage)
+        lag = float(np.sqrt(np.mean(np.square(goal / rest - 1))))
+    return rest, spent, residual, drift
 
 
 def _way(motion: Motion, state: Fixed, surface: Floats) -> float:
