@@ -23,8 +23,8 @@ _LOOKS = 15
 #: Steps in which a surface at rest may drift so far.
 _REST_STEPS = 200
 
-#: Residual over the one that counts as settled within which rest volumes are taken anew.
-_NEAR = 3.0
+#: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
+_CALM_TURNS = 5
 
 #: Drift over the one that counts as settled beyond which a state swings on, over the same of the residual.
 _FAR_DRIFT = 2.0
@@ -118,18 +118,14 @@ def _come_to_rest(
 ) -> tuple[Floats, int, float, float]:
     """Swing and calm by turns; return the rest volumes, the steps spent, the residual and the drift."""
     settings = motion.settings
-    spent, residual, drift, lag, balanced = 0, np.inf, np.inf, np.inf, False
-    while (not balanced or lag > settings.residual) and spent < settings.settle_steps:
-        # far from balance pressures are those of what swings
-        if residual <= _NEAR * settings.residual:
-            rest = goal
-        # what was in balance is calmed under the new rest volumes, and swings if it does not come back
-        swings = (shrinkage > settings.start or spent > 0) and not balanced
-        residual = drift = np.inf
-        if swings:
+    spent, residual, drift, lag = 0, np.inf, np.inf, np.inf
+    calm = 0 if shrinkage > settings.start else 1
+    while spent < settings.settle_steps:
+        if calm == 0:
             _swing(motion, state, velocity, rest, shrinkage)
             spent += settings.swing_steps
         rested, is_near = 0, True
+        residual = drift = np.inf
         while (residual > settings.residual or drift > settings.drift) and is_near and rested < settings.calm_steps:
             surface = motion.surface(state)
             # rest volumes stay: under some that go on following, forces have no potential and hardly balance
@@ -139,11 +135,17 @@ def _come_to_rest(
             residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
             drift = _way(motion, state, surface) / count * _REST_STEPS
             far = max(residual / settings.residual, drift / (_FAR_DRIFT * settings.drift))
-            is_near = far <= settings.near or not swings
+            is_near = far <= settings.near or calm > 0
         spent += rested
-        balanced = residual <= settings.residual and drift <= settings.drift
-        goal = motion.rests(state, rest, shrinkage)
-        lag = float(np.sqrt(np.mean(np.square(goal / rest - 1))))
+        if residual <= settings.residual and drift <= settings.drift:
+            goal = motion.rests(state, rest, shrinkage)
+            lag = float(np.sqrt(np.mean(np.square(goal / rest - 1))))
+            if lag <= settings.residual:
+                break
+            # under new rest volumes it stays where it is, or nearly: to swing would throw it far
+            rest, calm = goal, _CALM_TURNS
+        else:
+            calm = max(calm - 1, 0)
     return rest, spent, residual, drift
 
 
