@@ -23,8 +23,11 @@ _LOOKS = 15
 #: Steps in which a surface at rest may drift so far.
 _REST_STEPS = 200
 
+#: Residual over the one that counts as settled within which a state that swings gets new rest volumes.
+_NEAR = 3.0
+
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
-_CALM_TURNS = 5
+_CALM_TURNS = 3
 
 #: Drift over the one that counts as settled beyond which a state swings on, over the same of the residual.
 _FAR_DRIFT = 2.0
@@ -145,6 +148,8 @@ def _come_to_rest(
             # under new rest volumes it stays where it is, or nearly: to swing would throw it far
             rest, calm = goal, _CALM_TURNS
         else:
+            if calm == 0 and residual <= _NEAR * settings.residual:
+                rest = motion.rests(state, rest, shrinkage)
             calm = max(calm - 1, 0)
     return rest, spent, residual, drift
 
