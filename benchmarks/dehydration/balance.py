@@ -34,7 +34,7 @@ from sweeps.refining import balance
 from sweeps.refining.balance import Distance
 from sweeps.relaxing import relaxed
 
-__all__ = ["table"]
+__all__ = ["sphere_volume", "table"]
 
 NAME = "dehydration-score"
 _OTHERS = ("nearest", "idw")
@@ -175,7 +175,7 @@ def _tier() -> None:
         pairs = crossings(ends[1], closed_lattice(_LATTICE)).count
         radii = [np.linalg.norm(one[:-2], axis=1) for one in ends]
         alike = float(np.corrcoef(radii)[0, 1])
-        volumes = [_volume(one) / _exact(table, te, s) for one in ends]
+        volumes = [_volume(one) / sphere_volume(table, te, s) for one in ends]
         sheet.add(
             (
                 *(f"{te:g}", f"{gamma:g}", f"{s:g}", f"{said['residual']:.1e}", f"{said['iterations']:.0f}"),
@@ -194,7 +194,7 @@ def _volume(points: np.ndarray) -> float:
     return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6
 
 
-def _exact(table: ShapeTable, te: float, s: float) -> float:
+def sphere_volume(table: ShapeTable, te: float, s: float) -> float:
     """Return the volume of an incompressible sphere at s: only its flesh shrinks, neither skin nor stone."""
     stone = float(table.fixed["rs1"]) ** 3
     return 4 / 3 * np.pi * ((1 - s) ** 3 * (1 - stone) + stone + (1 + te) ** 3 - 1)

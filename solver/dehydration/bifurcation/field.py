@@ -13,6 +13,7 @@ from ..implicit import Band, Model
 from ..implicit.buckling import Crossing
 from ..implicit.location import fold, interpolate
 from ..params import DehydrationParams
+from .looks import nodal
 
 __all__ = ["dominant", "mode_heights", "round_it"]
 
@@ -24,8 +25,7 @@ ASIDE = 0.05
 def mode_heights(params: DehydrationParams, model: Model, crossing: Crossing) -> Callable[[Floats], Floats]:
     """Return a mode's height along the outward normal over parametric directions, largest magnitude 1."""
     mesh = model.mesh
-    nodal = np.zeros_like(mesh.positions)
-    nodal[model.pattern.free >= 0] = crossing.mode
+    at_nodes = nodal(model, crossing.mode)
 
     def raw(towards: Floats) -> Floats:
         if mesh.band is None:
@@ -39,7 +39,7 @@ def mode_heights(params: DehydrationParams, model: Model, crossing: Crossing) ->
         colatitude, azimuth = np.arccos(np.clip(towards[:, 1], -1, 1)), np.arctan2(towards[:, 2], towards[:, 0])
         points = params.surface(colatitude, azimuth)
         folded, signs = fold(mesh, points)
-        moved = signs * interpolate(params, mesh, nodal, folded)
+        moved = signs * interpolate(params, mesh, at_nodes, folded)
         for axis, parity in zip(mesh.planes, crossing.parity, strict=True):
             if parity < 0:
                 moved *= signs[:, axis : axis + 1]

@@ -58,9 +58,9 @@ class Look:
 
 def nodal(model: Model, mode: Floats) -> Floats:
     """Return a mode at all nodes, (nn, 3): 0 on the stone."""
-    nodal = np.zeros_like(model.mesh.positions)
-    nodal[model.pattern.free >= 0] = mode
-    return nodal
+    found: Floats = np.zeros_like(model.mesh.positions)
+    found[model.pattern.free >= 0] = mode
+    return found
 
 
 def even(model: Model) -> tuple[int, ...]:
