@@ -28,7 +28,7 @@ _SLICE = 0.01
 
 #: Updates of the rest volumes before a state settles, steps between two, and their damping: what rings is gone by the
 #: next. A march's volumes lag by 0.03 of shrinkage; those of a smooth start know no pressure.
-_PRESSINGS, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 150, 0.12
+_PRESSINGS, _PRESSINGS_OF_SMOOTH, _PRESSING_STEPS, _PRESSING_DAMPING = 2, 3, 150, 0.12
 
 #: Height of bumps (rms) below which a sphere is smooth [te], and the latest onset of other fruits over the start.
 _SMOOTH, _LATE_ONSET = 0.1, 3.0
@@ -76,7 +76,7 @@ class Path:
         if shrinkage <= settings.start:
             masses = self.motion.masses
             state, velocity = self.motion.smooth(shrinkage)
-            rest = self._pressed(state, velocity, self._rest, shrinkage, settings.pressings)
+            rest = self._pressed(state, velocity, self._rest, shrinkage, _PRESSINGS_OF_SMOOTH)
             found = self._settle(state, velocity, rest, shrinkage)
             self.motion.masses = masses
             return found
@@ -98,7 +98,6 @@ class Path:
         self._march(shrinkage, last)
         self._rest = self._arrived(self._state, self._velocity, shrinkage)
         self._settled = self._settle(self._state, self._velocity, self._rest, shrinkage)
-        assert self._settled.rest is not None
         self._rest = self._settled.rest
         self._velocity[:] = 0
         self._foot, self._place = shrinkage, 0

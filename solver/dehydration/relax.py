@@ -93,7 +93,8 @@ def relax(
     if least <= 0:
         raise Unstable("elements turned inside out.", advice="Run it from the start.", residual=residual)
     whole = sector.whole(motion.surface(state))
-    found = State(whole, stage, residual, drift / params.exocarp_thickness, motion.steps, least, sector.copies * energy)
+    way = drift / params.exocarp_thickness
+    found = State(whole, stage, residual, way, motion.steps, least, sector.copies * energy, rest)
     record = Record(params, need, motion.mesh, begin)
     record.add(found, residual <= RESIDUAL)
     attrs = {"path": "relaxed", "elements": motion.elements, "residual_limit": RESIDUAL, "unit_of_length": "r1"}

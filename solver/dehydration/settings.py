@@ -30,8 +30,7 @@ class Settings:
     calm_damping: while a stage settles (see `settle.settle`). residual, drift: at which a stage counts as settled (see
     `settle.State`). swing_steps, calm_steps: longest turn of each way of settling. settle_steps: after which a stage
     does not settle. clearance: gap that self-contact keeps, in exocarp thicknesses. rungs: shrinkages of the settled
-    states on the way. calm_look: calm steps between two looks at residual and drift. near: residual over the one that
-    counts as settled beyond which a state swings on after a look. pressings: updates of a smooth start's rest volumes.
+    states on the way.
     """
 
     n: int
@@ -49,9 +48,6 @@ class Settings:
     settle_steps: int
     start: float
     rungs: tuple[float, ...]
-    calm_look: int
-    near: float
-    pressings: int
     clearance: float = 0.1
     full_levels: int = 1000
     copies: int = 1
@@ -72,25 +68,13 @@ class _Quality:
     full_levels: int
 
 
-@dataclass(frozen=True)
-class _March:
-    kappa_ratio: float
-    rungs: tuple[float, ...]
-    calm_look: int
-    near: float
-    pressings: int
-
-
-#: How to march. Half of the bulk modulus allows 1.4 times the step, and a smooth start takes more updates of its rest
-#: volumes then. Where buckles come up the first rung decides their number (without the one at 0.05 stiff skins had a
-#: fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart. A state that is far from rest
-#: after a look slides along a soft way: a hundred calm steps take a few percent off its residual, swinging takes more.
-_STEADY = _March(30.0, tuple(round(0.05 * k, 2) for k in range(1, 13)), 200, np.inf, 3)
-_HASTY = _March(15.0, (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6), 100, 3.0, 5)
-#: Skins and moduli for which a preview hastes: thicker and stiffer ones blow up sooner by it (te = 0.15, gamma = 30 at
-#: s = 0.27 in place of 0.29), soft ones settle worse, and the wolfberry, te = 0.005, does not settle at s = 0.3. At
-#: default it saves no steps and makes skins rougher.
-_HASTY_SKINS, _HASTY_MODULI = (0.0075, 0.04), (5.0, 50.0)
+#: Shrinkages at which a path settles on its way. Where buckles come up the first decides their number (without the one
+#: at 0.05 stiff skins had a fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart, which
+#: saves a quarter of the steps of a preview. At default it saves none and makes skins rougher.
+_RUNGS = tuple(round(0.05 * k, 2) for k in range(1, 13))
+_WIDE = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+#: Skins and moduli for which a preview's rungs stand apart: others were not tried, or blow up sooner by it.
+_WIDE_SKINS, _WIDE_MODULI = (0.0075, 0.04), (5.0, 50.0)
 
 #: Under deep folds core layers with one point each turn inside out: the three below the skin at gamma = 10 (s = 0.25),
 #: the fourth at gamma = 50 (s = 0.3). Below five, J stays above 0.6; one point there changes the roughness by less than
@@ -106,17 +90,19 @@ _FEWEST_PER_WAVELENGTH = 4.0
 #: Elements of the largest run: 3 GB, and an hour or more to s = 0.3 on two cores.
 _MOST_ELEMENTS = 2_500_000
 
-#: Steps from s = 0 to 0.3 at n = 24, kappa / mu = 30: two and a half or four times as many change the roughness of
+#: Steps from s = 0 to 0.3 at n = 24: two and a half or four times as many change the roughness of
 #: settled stages by less than 2 %, as another seed does; five eighths of them raise it by 3 % at s = 0.3. More elements
-#: and a stiffer volume shorten the critical step, so their product with the step must be kept.
-_STEPS, _STEPS_N, _STEPS_KAPPA, _STEPS_SPAN = 6400.0, 24, 30.0, 0.3
+#: shorten the critical step, so their product with the step must be kept.
+_STEPS, _STEPS_N, _STEPS_SPAN = 6400.0, 24, 0.3
 #: Damping per step at the same reference: low enough not to delay the onset; and while a stage settles. The slowest
 #: modes keep their shape on every mesh, so per step they slow down as the step shrinks, and damping with them.
 _DAMPING, _SWING_DAMPING = 0.004, 0.0005
 #: Longest turns of swinging (at the same reference) and calming, and most steps that a stage may settle for.
 _SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 20_000
-#: Bulk over shear modulus that all qualities stand for: off by 1e-4 from incompressible in radius.
-_KAPPA = 1000.0
+#: Bulk over shear modulus that all qualities stand for, off by 1e-4 from incompressible in radius; and that steps are
+#: taken with. By 15 they were 1.4 times as long, but what balances at 1000 may be unstable at 15 while rest volumes
+#: stay (te = 0.02, gamma = 10 at preview, s = 0.15, and at 22 as well): it never settled.
+_KAPPA, _MARCH_KAPPA = 1000.0, 30.0
 #: Thickness of the core layer at the interface, in wavelengths, and how fast layers grow inwards.
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
@@ -138,7 +124,6 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
 
     """
     q = _QUALITIES[quality]
-    march = _HASTY if quality == "preview" and _is_easy(params) else _STEADY
     wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
     n = math.ceil(np.pi / 2 * q.per_wavelength / wavelength)
     # the bound is on the cost: an eighth may be eight times as fine in area
@@ -154,12 +139,12 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
     # where flesh is more than twice as thick as on average, layers are counted on it
     flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), flesh_span(params)[1] / 2)
     core = layer_fractions(max(flesh, 0.05), _FIRST_LAYER * min(wavelength, 0.4), _GROWTH)
-    scale = (n / _STEPS_N) * math.sqrt(march.kappa_ratio / _STEPS_KAPPA)
+    scale = n / _STEPS_N
     settings = Settings(
         n=n,
         core=core,
         kappa_ratio=_KAPPA,
-        march_kappa_ratio=march.kappa_ratio,
+        march_kappa_ratio=_MARCH_KAPPA,
         pace=_STEPS_SPAN / (_STEPS * scale) / loading.peak,
         damping=_DAMPING / scale,
         swing_damping=_SWING_DAMPING / scale,
@@ -170,10 +155,7 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
         calm_steps=_CALM_STEPS,
         settle_steps=round(_SETTLE_STEPS * scale),
         start=start,
-        rungs=march.rungs,
-        calm_look=march.calm_look,
-        near=march.near,
-        pressings=march.pressings,
+        rungs=_WIDE if quality == "preview" and _is_easy(params) else _RUNGS,
         full_levels=q.full_levels,
         copies=2 ** len(params.mirrors),
     )
@@ -187,7 +169,7 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
 
 
 def _is_easy(params: DehydrationParams) -> bool:
-    (thin, thick), (soft, stiff) = _HASTY_SKINS, _HASTY_MODULI
+    (thin, thick), (soft, stiff) = _WIDE_SKINS, _WIDE_MODULI
     return thin <= params.exocarp_thickness <= thick and soft <= params.modulus_ratio <= stiff
 
 

@@ -29,8 +29,8 @@ _NEAR = 3.0
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
 _CALM_TURNS = 3
 
-#: Drift over the one that counts as settled beyond which a state swings on, over the same of the residual.
-_FAR_DRIFT = 2.0
+#: Calm steps between two looks at residual and drift.
+_CALM_LOOK = 200
 
 #: Swings that a state is left to itself to show whether it is stable, and the rms way of the surface [te] after which
 #: it was not: of what is seen to be smooth, and of what may have buckles, whose soft ways are longer. 1 % past the
@@ -55,8 +55,8 @@ class State:
     steps: int
     least_ratio: float
     energy: float
+    rest: Floats
     released: float | None = None
-    rest: Floats | None = None
 
 
 def settle(
@@ -93,7 +93,7 @@ def settle(
     if shrinkage == 0:
         whole = motion.sector.whole(surface)
         # free of stress: nothing to settle
-        return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, 0.0, rest)
+        return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, rest, 0.0)
     copies = motion.sector.copies
     arrived = state.copy() if with_release else None
     rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
@@ -113,7 +113,7 @@ def settle(
         before, after = (motion.marched_energy(each, rest, shrinkage) for each in (arrived, state))
         released = copies * (before - after)
     whole = motion.sector.whole(motion.surface(state))
-    return State(whole, shrinkage, residual, drift, motion.steps, least, copies * strained, released, rest)
+    return State(whole, shrinkage, residual, drift, motion.steps, least, copies * strained, rest, released)
 
 
 def _come_to_rest(
@@ -121,37 +121,33 @@ def _come_to_rest(
 ) -> tuple[Floats, int, float, float]:
     """Swing and calm by turns; return the rest volumes, the steps spent, the residual and the drift."""
     settings = motion.settings
-    spent, residual, drift, lag = 0, np.inf, np.inf, np.inf
+    spent, drift = 0, np.inf
     calm = 0 if shrinkage > settings.start else 1
     while spent < settings.settle_steps:
         if calm == 0:
             _swing(motion, state, velocity, rest, shrinkage)
             spent += settings.swing_steps
-        rested, is_near = 0, True
-        residual = drift = np.inf
-        while (residual > settings.residual or drift > settings.drift) and is_near and rested < settings.calm_steps:
+        rested, residual, drift = 0, np.inf, np.inf
+        while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
             surface = motion.surface(state)
             # rest volumes stay: under some that go on following, forces have no potential and hardly balance
-            count = min(settings.calm_look, max(20, motion.slice))
+            count = min(_CALM_LOOK, max(20, motion.slice))
             motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping)
             rested += count
             residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
             drift = _way(motion, state, surface) / count * _REST_STEPS
-            far = max(residual / settings.residual, drift / (_FAR_DRIFT * settings.drift))
-            is_near = far <= settings.near or calm > 0
         spent += rested
+        goal = motion.rests(state, rest, shrinkage)
         if residual <= settings.residual and drift <= settings.drift:
-            goal = motion.rests(state, rest, shrinkage)
-            lag = float(np.sqrt(np.mean(np.square(goal / rest - 1))))
-            if lag <= settings.residual:
-                break
+            if np.sqrt(np.mean(np.square(goal / rest - 1))) <= settings.residual:
+                return rest, spent, residual, drift
             # under new rest volumes it stays where it is, or nearly: to swing would throw it far
             rest, calm = goal, _CALM_TURNS
         else:
             if calm == 0 and residual <= _NEAR * settings.residual:
-                rest = motion.rests(state, rest, shrinkage)
+                rest = goal
             calm = max(calm - 1, 0)
-    return rest, spent, residual, drift
+    return rest, spent, motion.residual(state, rest, shrinkage, settings.calm_damping), drift
 
 
 def _way(motion: Motion, state: Fixed, surface: Floats) -> float:

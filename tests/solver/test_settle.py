@@ -1,4 +1,4 @@
-"""How a stage comes to rest: what is far from it swings on, what is near is calmed; and where the rungs stand."""
+"""How a stage comes to rest: it swings, and is calmed, and rest volumes follow; and where the rungs stand."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ SETTINGS = choose(PARAMS, "preview")
 
 
 class Told:
-    """Stands in for `Motion`: after each calm turn the residual is the next that it is told; the surface stays."""
+    """Stands in for `Motion`: at each look the residual is the next that it is told; the surface stays.
+
+    volumes: rest volumes that go with the pressures at the end of each turn, as long as they are told; then the last.
+    """
 
     params, settings = PARAMS, SETTINGS
     slice = 1000
     masses = None
 
-    def __init__(self, residuals):
-        self.left, self.turns, self.steps = list(residuals), [], 0
+    def __init__(self, residuals, volumes=(1.0,)):
+        self.left, self.volumes, self.turns, self.steps = list(residuals), list(volumes), [], 0
         self.layout = self
         self.mass, self.free = np.ones(1), np.ones(1, bool)
         self.sector = self
@@ -37,25 +40,30 @@ class Told:
 
     def run(self, state, velocity, rest, count, a, b, damping):
         self.steps += count
-        self.turns.append((damping, count))
+        self.turns.append((damping, count, float(rest[0])))
 
     def residual(self, state, rest, shrinkage, damping):
         return self.left.pop(0) * SETTINGS.residual
+
+    def rests(self, state, rest, shrinkage):
+        return np.full(1, self.volumes.pop(0) if len(self.volumes) > 1 else self.volumes[0])
 
     def strained(self, state, rest, shrinkage):
         return 0.0, 1.0
 
     def looks(self):
-        """S for each swing and c for each calm turn, in order."""
-        word = "".join("c" if damping == SETTINGS.calm_damping else "s" for damping, _ in self.turns)
-        swing = "s" * sum(damping != SETTINGS.calm_damping for damping, _ in self.turns[: word.index("c")])
+        """S for each swing and c for each look while it is calmed, in order."""
+        word = "".join("c" if damping == SETTINGS.calm_damping else "s" for damping, *_ in self.turns)
+        swing = "s" * sum(damping != SETTINGS.calm_damping for damping, *_ in self.turns[: word.index("c")])
         return word.replace(swing, "S") if swing else word
 
 
-def settled(residuals, shrinkage=0.2):
-    motion = Told(residuals)
+def settled(residuals, shrinkage=0.2, volumes=(1.0,)):
+    motion = Told(residuals, volumes)
     found = settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), shrinkage)
+    assert not motion.left
     assert found.residual <= SETTINGS.residual
+    assert found.rest == pytest.approx(motion.volumes[-1], rel=SETTINGS.residual)
     return motion
 
 
@@ -63,22 +71,61 @@ def settled(residuals, shrinkage=0.2):
     ("residuals", "turns"),
     [
         ([0.9], "Sc"),
-        ([1.2, 1.1, 0.9], "Sccc"),
-        ([9.0, 0.9], "ScSc"),
-        ([1.2, 1.1, 1.1, 1.1, 0.9], "SccccSc"),
+        ([1.2, 0.9], "Scc"),
+        ([9.0, 5.0, 0.9], "SccSc"),
     ],
 )
-def test_what_is_far_from_rest_swings_on_and_what_is_near_is_calmed(residuals, turns):
+def test_it_swings_and_is_calmed_by_turns(residuals, turns):
     assert settled(residuals).looks() == turns
 
 
-def test_what_is_smooth_is_calmed_however_far_from_rest():
-    """Before the march begins there are no buckles that could slide."""
-    assert settled([9.0, 5.0, 0.9], SETTINGS.start / 2).looks() == "ccc"
+def test_what_is_smooth_is_calmed_alone_at_first():
+    """Before the march begins there are no buckles that could merge."""
+    assert settled([9.0, 0.9], SETTINGS.start / 2).looks() == "cc"
+
+
+def test_what_balances_is_calmed_under_new_rest_volumes():
+    """And swings again if three turns do not bring it to rest."""
+    motion = settled([0.9, 1.5, 0.9], volumes=(0.98, 0.98))
+    assert motion.looks() == "Sccc"
+    assert [rest for *_, rest in motion.turns[-3:]] == [1.0, 0.98, 0.98]
+    assert settled([0.9, *[1.5] * 6, 0.9], volumes=(0.98,)).looks() == "S" + 7 * "c" + "Sc"
+
+
+def test_volumes_that_follow_by_less_than_forces_are_out_of_balance_are_right():
+    assert settled([0.9], volumes=(1 + 0.9 * SETTINGS.residual,)).looks() == "Sc"
+    assert settled([0.9, 0.9], volumes=(1 + 1.1 * SETTINGS.residual,)).looks() == "Scc"
+
+
+@pytest.mark.parametrize(("residual", "rest"), [(2.5, 0.98), (3.5, 1.0)])
+def test_rest_volumes_are_taken_anew_near_balance_alone(residual, rest):
+    motion = Told([residual, residual, 0.9, 0.9], (0.98,))
+    settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
+    assert motion.looks().startswith("SccSc")
+    swung = [rest for damping, _, rest in motion.turns if damping != SETTINGS.calm_damping]
+    assert swung[0] == 1.0
+    assert swung[-1] == rest
+
+
+class Restless(Told):
+    """Volumes never stop, and forces balance under those alone that the last turn was made under."""
+
+    def rests(self, state, rest, shrinkage):
+        return 0.99 * rest
+
+    def residual(self, state, rest, shrinkage, damping):
+        return (0.5 if rest[0] == self.turns[-1][2] else 7.0) * SETTINGS.residual
+
+
+def test_what_runs_out_of_steps_says_how_far_it_is_out_of_balance_under_its_last_volumes():
+    motion = Restless([])
+    found = settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
+    assert found.residual == pytest.approx(7 * SETTINGS.residual)
+    assert motion.steps >= SETTINGS.settle_steps
 
 
 def test_whole_searches_for_contact_lie_between_two_looks():
-    swing = [count for damping, count in settled([0.9]).turns if damping != SETTINGS.calm_damping]
+    swing = [count for damping, count, _ in settled([0.9]).turns if damping != SETTINGS.calm_damping]
     assert {count % SEARCH_EVERY for count in swing} == {0}
     assert sum(swing) == pytest.approx(SETTINGS.swing_steps, rel=0.1)
 
