@@ -82,7 +82,7 @@ def onset(params: DehydrationParams, **options: Any) -> Onset:
 
 SOLVER = Solver(
     name="dehydration",
-    version="11",
+    version="12",
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
     fields=("position", "displacement", "mesh_position", *_DESCRIPTORS, "strain_energy", "released_energy"),
