@@ -5,16 +5,21 @@ far, 600 steps of the solver move what each method looks up, and how its statist
 (record dehydration-score). Fruits keep the bumps and the pattern that runs begin with, which come with the package. The
 record is kept after each family, and what it has is not done again.
 
-With --tier, of whole fruits of the default family instead: the tier between table and run, with seconds by the clock
-and of the processor, on as many threads as there are, after a first one (record dehydration-relaxed).
+With --tier, of fruits of the default family and of that of te = 0.01 in the package instead: the tier between table and
+run, with seconds by the clock and of the processor, on as many threads as there are, after a first one (record
+dehydration-relaxed). The default family's four corners are also run at preview, which takes a minute and a half: in
+--store, or nowhere.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 import time
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,13 +31,17 @@ from solver import registry
 from solver.dehydration import SOLVER
 from solver.geometry.crossings import crossings
 from solver.lattice import closed_lattice
+from store import tables
 from store.blending import methods
 from store.lookup import ShapeTable
 from store.starter import ROOT
 from store.store import Store
+from sweeps.planning.plan import Plan
 from sweeps.refining import balance
 from sweeps.refining.balance import Distance
 from sweeps.relaxing import relaxed
+from sweeps.running import executors
+from sweeps.running.runner import run_plan
 
 __all__ = ["sphere_volume", "table"]
 
@@ -45,14 +54,18 @@ _METHODS = (methods.DEFAULT, *_OTHERS)
 _WANTED = {"moved": (0.15, 0.25), "rgh": (0.02, 0.04), "dB": (1.2, 2.4), "W1": (1.0, 2.0)}
 _CALLED = {"moved": "moved", "rgh": "roughness", "dB": "bands [dB]", "W1": "slopes W1 [degree]"}
 _RELAXED = (
-    *("te", "gamma", "s", "residual", "steps", "moved", "correlation", "crossing pairs"),
+    *("family", "quality", "te", "gamma", "s", "residual", "steps", "moved", "correlation", "crossing pairs"),
     *("volume over exact, looked up", "relaxed", "seconds", "processor seconds"),
 )
-#: te, gamma and s of fruits that are relaxed to the end.
+#: te, gamma and s of fruits that are relaxed to the end: of the default family, of one at preview, and of eighths.
 _FRUITS = (
     *((0.0375, 22.0, 0.2), (0.0375, 22.0, 0.3), (0.0325, 13.0, 0.2), (0.0325, 13.0, 0.3)),
     *((0.03, 10.0, 0.3), (0.04, 50.0, 0.3)),
 )
+_CORNERS = {"te": [0.04, 0.03], "gamma": [10, 20]}
+_AT_PREVIEW = ((0.0345, 14.0, 0.2), (0.0345, 14.0, 0.3), (0.0375, 17.0, 0.2), (0.0375, 17.0, 0.3), (0.03, 10.0, 0.3))
+_THIN = "sphere-01"
+_EIGHTHS = ((0.01, 17.0, 0.2), (0.01, 17.0, 0.3), (0.01, 10.0, 0.3))
 _LATTICE = 64
 #: Last stage of the narrower goals.
 _EARLY = 0.2
@@ -64,9 +77,13 @@ def main() -> None:
     parser.add_argument("--stages", nargs="+", type=float, default=[0.1, 0.2, 0.3])
     parser.add_argument("--points", type=int, default=3, help="of each family")
     parser.add_argument("--tier", action="store_true", help="the tier between table and run alone")
+    parser.add_argument(
+        "--store", type=Path, help="with --tier: keep the runs at preview there, or take those it holds"
+    )
     asked = parser.parse_args()
     if asked.tier:
-        _tier()
+        with tempfile.TemporaryDirectory() as folder:
+            _tier(asked.store or Path(folder))
     else:
         _score(asked.families, asked.stages, asked.points)
 
@@ -74,11 +91,11 @@ def main() -> None:
 def _score(names: Sequence[str] | None, stages: Sequence[float], count: int) -> None:
     """Fill in what the record lacks, family by family."""
     package = Store.open(ROOT)
-    tables = {name: ShapeTable.open(ROOT, name, surfaces=registry.surface) for name in package.table_names()}
+    opened = {name: ShapeTable.open(ROOT, name, surfaces=registry.surface) for name in package.table_names()}
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
     about = {
         name: {"version": SOLVER.version, "family": name, "digest": one.digest, "stages": [*stages], "points": count}
-        for name, one in tables.items()
+        for name, one in opened.items()
         if one.size > 1
     }
     if unknown := set(names or ()) - set(about):
@@ -91,7 +108,7 @@ def _score(names: Sequence[str] | None, stages: Sequence[float], count: int) -> 
         if name in runs:
             continue
         begin = time.process_time()
-        runs[name] = {**about[name], "each": list(_measured(tables[name], package, stages, count))}
+        runs[name] = {**about[name], "each": list(_measured(opened[name], package, stages, count))}
         figures.keep(NAME, [runs[k] for k in about if k in runs], "dehydration", steps=balance.STEPS)
         print(f"{name}: {time.process_time() - begin:.0f} s of the processor", file=sys.stderr, flush=True)
 
@@ -162,30 +179,50 @@ def _worse(own: Distance, other: Distance, called: str) -> str:
     return f"{called}: {', '.join(map(_short, names))}" if names else ""
 
 
-def _tier() -> None:
-    table, solver = ShapeTable.open(ROOT, surfaces=registry.surface), registry.get("dehydration")
+def _tier(root: Path) -> None:
     sheet = Sheet("dehydration-relaxed", _RELAXED, "dehydration")
-    relaxed(solver, table, table.at({"te": 0.04, "gamma": 10.0}, 0.1, resolution=_LATTICE))  # compiles
-    for te, gamma, s in _FRUITS:
-        shape = table.at({"te": te, "gamma": gamma}, s, resolution=_LATTICE)
-        clock, begin = time.perf_counter(), time.process_time()
-        found, said = relaxed(solver, table, shape)
-        seconds, cpu = time.perf_counter() - clock, time.process_time() - begin
-        ends = [np.concatenate([one.position.reshape(-1, 3), one.poles]).astype(float) for one in (shape, found)]  # type: ignore[union-attr,list-item]
-        pairs = crossings(ends[1], closed_lattice(_LATTICE)).count
-        radii = [np.linalg.norm(one[:-2], axis=1) for one in ends]
-        alike = float(np.corrcoef(radii)[0, 1])
-        volumes = [_volume(one) / sphere_volume(table, te, s) for one in ends]
-        sheet.add(
-            (
-                *(f"{te:g}", f"{gamma:g}", f"{s:g}", f"{said['residual']:.1e}", f"{said['iterations']:.0f}"),
-                *(f"{said['moved']:.2f}", f"{alike:.2f}", pairs, *(f"{v:.3f}" for v in volumes)),
-                *(f"{seconds:.2f}", f"{cpu:.2f}"),
-            ),
-            te=te, gamma=gamma, s=s, **said, corr=alike, pairs=pairs, volumes=volumes, cpu=cpu, clock=seconds,
-            threads=get_num_threads(), converged=found.converged,
-        )  # fmt: skip
-    sheet.keep(digest=table.digest)
+    package = ShapeTable.open(ROOT, surfaces=registry.surface)
+    thin = ShapeTable.open(ROOT, _THIN, surfaces=registry.surface)
+    relaxed(SOLVER, package, package.at({"te": 0.04, "gamma": 10.0}, 0.1, resolution=_LATTICE))  # compiles
+    for table, fruits in ((package, _FRUITS), (_corners(root), _AT_PREVIEW), (thin, _EIGHTHS)):
+        for fruit in fruits:
+            _relax(sheet, table, *fruit)
+    sheet.keep(digest=package.digest)
+
+
+def _corners(root: Path) -> ShapeTable:
+    """Return a family of whole fruits at preview about the default one's softer half."""
+    written: dict[str, Any] = tomllib.loads((figures.ROOT / "examples" / "starter.toml").read_text(encoding="utf-8"))
+    written["axes"], written["need"]["quality"] = _CORNERS, "preview"
+    del written["pattern"]["controls"]
+    plan, store = Plan.parse(written, "preview"), Store.open(root, create=True)
+    with executors.serial() as executor:
+        run_plan(plan, store, executor)
+    tables.build(store, SOLVER, "preview", keys=[job.key for job in plan.jobs()])
+    return ShapeTable.open(root, "preview", surfaces=registry.surface)
+
+
+def _relax(sheet: Sheet, table: ShapeTable, te: float, gamma: float, s: float) -> None:
+    """Relax one fruit and add what became of it to the sheet."""
+    asked = {"te": te, "gamma": gamma}
+    shape = table.at({axis: asked[axis] for axis in table.axes}, s, resolution=_LATTICE)
+    clock, begin = time.perf_counter(), time.process_time()
+    found, said = relaxed(SOLVER, table, shape)
+    seconds, cpu = time.perf_counter() - clock, time.process_time() - begin
+    ends = [np.concatenate([one.position.reshape(-1, 3), one.poles]).astype(float) for one in (shape, found)]  # type: ignore[union-attr]
+    pairs = crossings(ends[1], closed_lattice(_LATTICE)).count
+    radii = [np.linalg.norm(one[:-2], axis=1) for one in ends]
+    alike = float(np.corrcoef(radii)[0, 1])
+    volumes = [_volume(one) / sphere_volume(table, te, s) for one in ends]
+    sheet.add(
+        (
+            *(table.info.name, table.info.quality, f"{te:g}", f"{gamma:g}", f"{s:g}", f"{said['residual']:.1e}"),
+            *(f"{said['iterations']:.0f}", f"{said['moved']:.2f}", f"{alike:.2f}", pairs),
+            *(*(f"{v:.3f}" for v in volumes), f"{seconds:.2f}", f"{cpu:.2f}"),
+        ),
+        family=table.info.name, quality=table.info.quality, te=te, gamma=gamma, s=s, **said, corr=alike, pairs=pairs,
+        volumes=volumes, cpu=cpu, clock=seconds, threads=get_num_threads(), converged=found.converged,
+    )  # fmt: skip
 
 
 def _volume(points: np.ndarray) -> float:
