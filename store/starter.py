@@ -14,7 +14,7 @@ from .errors import ReadOnlyStore
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ROOT", "check_own", "is_starter", "own_or_starter", "result"]
+__all__ = ["ROOT", "check_own", "has", "is_starter", "own_or_starter", "result"]
 
 #: The store in the package. Read only.
 ROOT = Path(__file__).parent / "starter"
@@ -28,6 +28,13 @@ def own_or_starter(root: Path | None) -> Path:
 def is_starter(root: Path) -> bool:
     """Return whether `root` is the store in the package."""
     return root.resolve() == ROOT.resolve()
+
+
+def has(key: str) -> bool:
+    """Return whether the result of `key` comes with the package."""
+    from .store import Store
+
+    return Store(ROOT).has(key)
 
 
 def result(key: str) -> xr.Dataset | None:

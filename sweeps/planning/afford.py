@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from solver.contract import budget
+from store import starter
 from store.store import Store
 
 from ..errors import InvalidOption
@@ -26,6 +27,7 @@ def afford(plan: Plan, store: Path, seconds: float, scheduler: str | None) -> No
     opened = Store.open(store) if store.exists() else None
     for part in plan.parts():
         jobs = zip(part.samples, part.jobs(), strict=True)
-        left = [params for params, job in jobs if opened is None or not opened.has(job.key)]
+        # what comes with the package is taken over
+        left = [at for at, job in jobs if not ((opened is not None and opened.has(job.key)) or starter.has(job.key))]
         budget.within(part.solver, left, part.need, seconds)
         seconds -= sum(part.solver.cost(params, part.need).seconds for params in left)
