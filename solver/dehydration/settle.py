@@ -130,7 +130,7 @@ def _come_to_rest(
     calm = 0 if shrinkage > settings.start else 1
     while spent < settings.settle_steps:
         if calm == 0:
-            _swing(motion, state, velocity, rest, shrinkage)
+            _swung(motion, state, velocity, rest, shrinkage)
             spent += settings.swing_steps
         rested, residual, drift = 0, np.inf, np.inf
         while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
@@ -172,6 +172,16 @@ def _leaves(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrin
         return False
     state[:], velocity[:] = tried, 0
     return True
+
+
+def _swung(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> None:
+    """Let the state fall, or stay where it was if it falls so fast that it leaves the finite."""
+    begin, masses = state.copy(), motion.masses
+    try:
+        _swing(motion, state, velocity, rest, shrinkage)
+    except Unstable:
+        state[:], motion.masses = begin, masses
+        velocity[:] = 0
 
 
 def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> None:

@@ -101,6 +101,16 @@ def test_fruits_of_stiff_skins_keep_the_volume_of_what_they_are_made_of(te, gamm
     assert run["converged"].values.all()
 
 
+def test_what_falls_too_fast_to_swing_is_calmed():
+    """Left to swing, a thick and very stiff skin that snaps through leaves the finite."""
+    params = SOLVER.parse({"te": 0.1, "gamma": 100, "mirrors": "xyz"})
+    run = SOLVER.solve(params, SOLVER.settle(Need(stages=(0.1,), quality="preview", fields=("roughness", "volume"))))
+    assert run["converged"].values.all()
+    assert run["roughness"].values[0] > 0.1
+    exact = 4 / 3 * np.pi * (0.4**3 + 0.9**3 * (1 - 0.4**3) + 1.1**3 - 1)
+    assert run["volume"].values[0] == pytest.approx(exact, rel=5e-3)
+
+
 @pytest.mark.timeout(600)
 def test_buckles_appear_past_the_exact_onset_with_its_degree():
     case = next(
