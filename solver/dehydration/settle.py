@@ -31,6 +31,10 @@ _NEAR = 3.0
 #: default, s = 0.15: 41,000 steps so far in place of 20,000).
 _SHARE = 0.5
 
+#: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
+#: as rest volumes hardly hold it, comes to rest when calmed while they follow.
+_SWINGING = 0.75
+
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
 _CALM_TURNS = 3
 
@@ -129,7 +133,8 @@ def _come_to_rest(
     spent, residual, drift, behind = 0, np.inf, np.inf, np.inf
     calm = 0 if shrinkage > settings.start else 1
     while spent < settings.settle_steps:
-        if calm == 0:
+        late = spent >= _SWINGING * settings.settle_steps
+        if calm == 0 and not late:
             _swung(motion, state, velocity, rest, shrinkage)
             spent += settings.swing_steps
         rested, residual, drift = 0, np.inf, np.inf
@@ -147,7 +152,8 @@ def _come_to_rest(
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break
-        if spent < settings.settle_steps and (balanced or (calm == 0 and residual <= _NEAR * settings.residual)):
+        near = (calm == 0 or late) and residual <= _NEAR * settings.residual
+        if spent < settings.settle_steps and (balanced or near):
             rest = rest * lag**_SHARE
         # under new rest volumes what balances stays where it is, or nearly: to swing would throw it far
         calm = _CALM_TURNS if balanced else max(calm - 1, 0)

@@ -113,6 +113,18 @@ def test_rest_volumes_are_taken_anew_near_balance_alone(residual, rest):
     assert swung[-1] == pytest.approx(rest)
 
 
+def test_what_each_swing_throws_out_of_balance_is_calmed_in_the_end():
+    """Volumes follow then after each turn: half of the way each time."""
+    motion = Told([1.2] * 999, (1.5,))
+    settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
+    steps = np.cumsum([count for _, count, _ in motion.turns])
+    late = steps > 0.75 * SETTINGS.settle_steps + SETTINGS.swing_steps + SETTINGS.calm_steps
+    last = [(damping, rest) for (damping, _, rest), is_late in zip(motion.turns, late, strict=True) if is_late]
+    assert {damping for damping, _ in last} == {SETTINGS.calm_damping}
+    assert {damping for damping, *_ in motion.turns} == {SETTINGS.calm_damping, SETTINGS.swing_damping}
+    assert len({rest for _, rest in last}) == pytest.approx(len(last) / 2, abs=1)
+
+
 def test_what_runs_out_of_steps_says_how_far_its_volumes_lag():
     """Forces balance after each turn, but volumes never do."""
 
