@@ -25,9 +25,13 @@ def afford(plan: Plan, store: Path, seconds: float, scheduler: str | None) -> No
     if scheduler is not None:
         raise InvalidOption("--max-seconds knows this machine alone.", "Leave it out, or --scheduler.")
     opened = Store.open(store) if store.exists() else None
+
+    def known(key: str) -> bool:
+        # what comes with the package is taken over
+        return (opened is not None and opened.has(key)) or starter.has(key)
+
     for part in plan.parts():
         jobs = zip(part.samples, part.jobs(), strict=True)
-        # what comes with the package is taken over
-        left = [at for at, job in jobs if not ((opened is not None and opened.has(job.key)) or starter.has(job.key))]
+        left = [params for params, job in jobs if not known(job.key)]
         budget.within(part.solver, left, part.need, seconds)
         seconds -= sum(part.solver.cost(params, part.need).seconds for params in left)
