@@ -1,0 +1,161 @@
+"""How stages settle, and what was considered instead: python -m benchmarks.dehydration.stress.settling [--quick].
+
+Eighths of four stages: steps of the whole run, roughness, how far volumes are from a sphere's, and what a stage is left
+with, as things are and with one thing changed: rungs every 0.05 for previews, the march at another kappa/mu, rest
+volumes that go all of the way to those of the pressures. Then thick and stiff skins at preview, to where they blow up.
+Kept as dehydration-settling; runs that are in the record already, of this version, are not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.figures import RESULTS, Sheet, load
+from solver.contract import Context, Need
+from solver.contract.errors import SolverError
+from solver.dehydration import SOLVER, settings, settle
+
+Row = dict[str, Any]
+
+_HEAD = (
+    *("quality", "te", "gamma", "seed", "changed", "steps", "of as it is", "roughness [te]"),
+    *("volume off [1e-3]", "residual [1e-3]", "drift [te]", "CPU s", "ends"),
+)
+_STAGES = (0.05, 0.1, 0.2, 0.3)
+_THICK_STAGES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35)
+_STONE = 0.4
+#: What is changed: module, name and value.
+_AS_IT_IS = "nothing"
+_CHANGES: dict[str, tuple[Any, str, Any]] = {
+    "rungs every 0.05": (settings, "_WIDE", settings._RUNGS),
+    "march at 15": (settings, "_MARCH_KAPPA", 15.0),
+    "march at 60": (settings, "_MARCH_KAPPA", 60.0),
+    "volumes all of the way": (settle, "_SHARE", 1.0),
+}
+_EASY = (("preview", 0.04, 10.0), ("preview", 0.04, 50.0), ("preview", 0.02, 10.0), ("preview", 0.01, 10.0))
+_CAREFUL = (("default", 0.04, 10.0), ("default", 0.02, 10.0))
+_THICK = ((0.1, 50.0), (0.1, 100.0), (0.15, 30.0), (0.15, 100.0), (0.2, 10.0), (0.2, 30.0))
+_SEEDS = (0, 1)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="the first fruit alone")
+    parser.add_argument("--minutes", type=float, default=1e9, help="begin no run after that, and keep what there is")
+    asked = parser.parse_args()
+    known = {} if asked.quick else _known()
+    sheet = Sheet("dehydration-settling", _HEAD, "dehydration")
+    until = time.monotonic() + 60 * asked.minutes
+    base: dict[Any, int] = {}
+    for case in _cases(asked.quick):
+        quality, te, gamma, seed, changed = case
+        row = known.get(case)
+        if row is None:
+            if time.monotonic() > until:
+                continue
+            thick = (te, gamma) in _THICK
+            row = _run(quality, te, gamma, seed, changed, _THICK_STAGES if thick else _STAGES)
+        if changed == _AS_IT_IS:
+            base[case[:4]] = row["steps"]
+        _add(sheet, row, base.get(case[:4]))
+    if not asked.quick:
+        sheet.keep()
+
+
+def _cases(quick: bool) -> Iterator[tuple[str, float, float, int, str]]:
+    """Yield quality, te, gamma, seed and what is changed."""
+    for quality, te, gamma in _EASY[:1] if quick else _EASY + _CAREFUL:
+        for seed in _SEEDS[:1] if quick else _SEEDS:
+            for changed in (_AS_IT_IS, *_CHANGES):
+                if quality == "preview" or changed != "rungs every 0.05":
+                    yield quality, te, gamma, seed, changed
+    if not quick:
+        yield from (("preview", te, gamma, seed, _AS_IT_IS) for te, gamma in _THICK for seed in _SEEDS)
+
+
+def _run(quality: str, te: float, gamma: float, seed: int, changed: str, stages: tuple[float, ...]) -> Row:
+    """Solve an eighth, with one thing changed, and return what is said of it."""
+    params = SOLVER.parse({"te": te, "gamma": gamma, "mirrors": "xyz", "seed": seed})
+    need = Need(stages=stages, quality=quality, fields=("roughness", "volume"))
+    row: Row = {"quality": quality, "te": te, "gamma": gamma, "seed": seed, "changed": changed}
+    begin = time.process_time()
+    with _changed(changed):
+        try:
+            found: xr.Dataset | None = SOLVER.solve(params, need, Context())
+            row["ends"] = "settled"
+        except SolverError as error:
+            found, row["ends"] = error.partial, type(error).__name__
+    row["cpu"] = time.process_time() - begin
+    row |= {"steps": 0, "stages": [], "roughness": [], "volume_off": [], "residual": [], "drift": []}
+    if found is None:
+        return row
+    done = found.stage.values
+    row |= {
+        "stages": done.tolist(),
+        "steps": int(found.iterations.values[-1]),
+        "roughness": (found.roughness.values / te).tolist(),
+        "volume_off": (found.volume.values / _volume(done, te) - 1).tolist(),
+        "residual": found.residual.values.tolist(),
+        "drift": found.drift.values.tolist(),
+    }
+    if not bool(found.converged.values.all()):
+        row["ends"] = f"{int((~found.converged.values).sum())} not settled"
+    return row
+
+
+@contextmanager
+def _changed(what: str) -> Iterator[None]:
+    if what == _AS_IT_IS:
+        yield
+        return
+    module, name, value = _CHANGES[what]
+    before = getattr(module, name)
+    setattr(module, name, value)
+    try:
+        yield
+    finally:
+        setattr(module, name, before)
+
+
+def _volume(s: np.ndarray, te: float) -> np.ndarray:
+    """Return the volume of a sphere whose flesh has shrunk by s in length, and whose stone and skin keep theirs."""
+    flesh = (1 - s) ** 3 * (1 - _STONE**3)
+    return 4 / 3 * np.pi * (flesh + _STONE**3 + (1 + te) ** 3 - 1)
+
+
+def _known() -> dict[tuple[str, float, float, int, str], Row]:
+    """Return the runs of the record, if it is of this version."""
+    if not (RESULTS / "dehydration-settling.json").exists():
+        return {}
+    record = load("dehydration-settling")
+    if record["version"] != SOLVER.version:
+        return {}
+    return {tuple(row[name] for name in ("quality", "te", "gamma", "seed", "changed")): row for row in record["runs"]}
+
+
+def _add(sheet: Sheet, row: Row, base: int | None) -> None:
+    def all_of(name: str, form: str, factor: float = 1.0) -> str:
+        return " ".join(format(factor * value, form) for value in row[name])
+
+    last = f"{row['stages'][-1]:g}" if row["stages"] else "none"
+    ends = row["ends"] if row["ends"] == "settled" else f"{row['ends']}, to s = {last}"
+    sheet.add(
+        (
+            *(row["quality"], f"{row['te']:g}", f"{row['gamma']:g}", row["seed"], row["changed"], f"{row['steps']:,}"),
+            f"{row['steps'] / base:.2f}" if base else "",
+            *(all_of("roughness", ".2f"), all_of("volume_off", ".1f", 1e3), all_of("residual", ".1f", 1e3)),
+            *(all_of("drift", ".3f"), f"{row['cpu']:.0f}", ends),
+        ),
+        **row,
+    )
+
+
+if __name__ == "__main__":
+    main()
