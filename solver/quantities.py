@@ -69,9 +69,12 @@ register(
     colatitude=Quantity("radian", "colatitude of the spline parameter, from the pole y > 0", "theta"),
     azimuth=Quantity("radian", "azimuth about the y axis, from x towards z", "phi"),
     component=Quantity("1", "Cartesian component", "i"),
-    converged=Quantity("1", "the stage reached its residual", "-"),
+    converged=Quantity("1", "the stage met its limits of residual and motion", "-"),
     residual=Quantity(
-        "1", "out-of-balance force over internal force, or the largest error of a step, relative L2", "|r|/|f|"
+        "1",
+        "out-of-balance force over internal force or, if larger, rms share that rest volumes lag; or the largest error "
+        "of a step, relative L2",
+        "|r|/|f|",
     ),
     moved=Quantity("1", "how far relaxing moved a surface: rms of the radial motion over its roughness", "d/r"),
     residual_placed=Quantity("1", "residual of a surface as it was put on the mesh, before it was relaxed", "|r|/|f|"),

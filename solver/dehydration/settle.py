@@ -23,7 +23,8 @@ _LOOKS = 15
 #: Steps in which a surface at rest may drift so far.
 _REST_STEPS = 200
 
-#: Residual over the one that counts as settled within which a state that swings gets new rest volumes.
+#: Residual over the one that counts as settled within which a state gets new rest volumes after a swing, or when it
+#: swings no more.
 _NEAR = 3.0
 
 #: Share of the way that rest volumes go to those of the pressures. What balances at the wanted bulk modulus may be
@@ -51,10 +52,11 @@ _TRIAL_SWINGS, _LEFT, _LEFT_BUCKLED = 4, 0.05, 0.25
 class State:
     """A settled stage: nodes of the outer surface (nc, 3), how settled it is, and the steps spent so far.
 
-    residual: out-of-balance force over internal force or, if larger, by how much rest volumes lag (rms). drift: rms
-    motion of the surface in 200 steps, by the last that were looked at, in exocarp thicknesses. least_ratio: least J/Jd
-    of all integration points. energy: strain energy in mu r1^3, and released: by how much settling lowered it, where
-    that was asked for. rest: rest volumes (ne,) of the elements, which go with their pressures.
+    residual: out-of-balance force over internal force or, if larger, by how much rest volumes lag (rms), which relaxed
+    shapes leave out. drift: rms motion of the surface in 200 steps, by the last that were looked at, in exocarp
+    thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy in mu r1^3, and released: by
+    how much settling lowered it, where that was asked for. rest: rest volumes (ne,) of the elements, which go with
+    their pressures.
     """
 
     surface: Floats
@@ -83,10 +85,12 @@ def settle(
     It swings to where the energy leads: after the onset buckles go on merging for thousands of steps, along ways
     so soft that damping would only delay them. Kinetic damping knows no rate (Day 1965, Cundall 1976): all stands
     still whenever the kinetic energy begins to fall, for there the potential was about least. Then it is calmed,
-    and swings again if it was not there yet. State and velocity change in place.
+    and swings again if it was not there yet, until most of its steps are spent. State and velocity change in place.
 
     `rest` volumes are those of the pressures that it came with, and buckles take much of the pressure off a fruit with
-    a stiff skin: near balance they follow after each turn, until they are off (rms) by no more than forces may be.
+    a stiff skin. Where a state balances they go half of the way to those of its pressures, and it is calmed alone for
+    a few turns; after a swing, and at last, they do so near balance, too. So on, until they are off (rms) by no more
+    than forces may be.
 
     smooth: whether a state at rest may have no buckles yet. Such a one is left to swing, and where it goes elsewhere
     settles there: a smooth fruit past its onset balances and is not stable, but buckles grow from its bumps, at first
@@ -167,12 +171,19 @@ def _way(motion: Motion, state: Fixed, surface: Floats) -> float:
 
 
 def _leaves(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> bool:
-    """Return whether a state at rest goes elsewhere when left to swing; it is there then, else where it was."""
+    """Return whether a state at rest goes elsewhere when left to swing; it is there then, else where it was.
+
+    So it is if it leaves the finite, as no peak of the kinetic energy stops it here: it swings from where it was then.
+    """
     settings = motion.settings
     surface, masses, steps = motion.surface(state), motion.masses, motion.steps
     tried, speed = state.copy(), np.zeros_like(velocity)
     count = _TRIAL_SWINGS * settings.swing_steps
-    motion.run(tried, speed, rest, count, shrinkage, shrinkage, settings.swing_damping)
+    try:
+        motion.run(tried, speed, rest, count, shrinkage, shrinkage, settings.swing_damping)
+    except Unstable:
+        motion.masses, velocity[:] = masses, 0
+        return True
     if _way(motion, tried, surface) < (_LEFT if motion.params.stays_spherical else _LEFT_BUCKLED):
         motion.masses, motion.steps = masses, steps  # as if it had not been looked at
         return False

@@ -15,7 +15,7 @@ __all__ = ["afford"]
 
 
 def afford(plan: Plan, store: Path, seconds: float, scheduler: str | None) -> None:
-    """Refuse the runs of a plan that are not stored yet, if they are expected to take longer than `seconds` here.
+    """Refuse the runs of a plan that are neither stored nor in the package, if they take longer than `seconds` here.
 
     Raises:
         InvalidOption: other machines compute, whose speed nobody knows.

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from solver import registry
+from solver.contract import Context, Unstable
 from solver.dehydration.kernel.march import SEARCH_EVERY
+from solver.dehydration.path import Path
 from solver.dehydration.settings import choose
 from solver.dehydration.settle import settle
 
@@ -140,6 +144,90 @@ def test_what_runs_out_of_steps_says_how_far_its_volumes_lag():
     assert motion.steps >= SETTINGS.settle_steps
     assert found.residual == pytest.approx(0.01)
     assert found.rest == motion.turns[-1][2]
+
+
+def test_released_energy_is_that_between_two_states_under_the_same_rest_volumes():
+    class Weighed(Told):
+        copies = 8
+
+        def marched_energy(self, state, rest, shrinkage):
+            return float(rest[0]) + (1.0 if state[0, 0] else 3.0)
+
+        def run(self, state, *args):
+            super().run(state, *args)
+            state[:] = 1
+
+    motion = Weighed([0.9] * 3, (1.003,))
+    motion.copies = 8
+    found = settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2, with_release=True)
+    assert found.rest > 1
+    assert found.released == pytest.approx(8 * (3.0 - 1.0))
+
+
+def smooth_at_first(motion, way):
+    """Settle what is seen to be smooth, and goes `way` [te] when it is left to swing."""
+    motion.surface = lambda state: state[:, :3]
+    swing, count = motion.run, 4 * SETTINGS.swing_steps
+
+    def run(state, velocity, rest, steps, *args):
+        swing(state, velocity, rest, steps, *args)
+        if steps == count:
+            state[:, 0] += way * PARAMS.exocarp_thickness
+
+    motion.run = run
+    return settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2, smooth=lambda state: True)
+
+
+def test_rest_volumes_are_those_of_where_a_smooth_state_went():
+    """They go with the buckles that came up, not with the smooth state that was left."""
+    went = smooth_at_first(Told([0.9] * 9, (1.0, 1.01)), 1.0)
+    assert went.rest == pytest.approx(1.01, rel=SETTINGS.residual)
+    stayed = smooth_at_first(Told([0.9], (1.0, 1.01)), 0.01)
+    assert stayed.rest == 1.0
+    assert stayed.surface[0, 0] == 0
+
+
+def test_a_smooth_state_that_leaves_the_finite_when_left_to_swing_swings_from_where_it_was():
+    class Wild(Told):
+        def run(self, state, velocity, rest, count, *args):
+            super().run(state, velocity, rest, count, *args)
+            if count == 4 * SETTINGS.swing_steps:
+                state[:], velocity[:], self.masses = np.nan, np.nan, "heavy"
+                raise Unstable("left the finite", advice="")
+
+    motion = Wild([0.9] * 2)
+    motion.masses = "light"
+    found = smooth_at_first(motion, 0.0)
+    assert np.isfinite(found.surface).all()
+    assert motion.masses == "light"
+    assert motion.looks() == "ScSsc"  # swung, calmed, left to swing, swung, calmed
+
+
+def test_a_swing_that_leaves_the_finite_is_put_back():
+    """State, masses and rest are those of before; it is calmed from there."""
+    seen = []
+
+    class Wild(Told):
+        def run(self, state, velocity, rest, count, a, b, damping):
+            super().run(state, velocity, rest, count, a, b, damping)
+            if damping == SETTINGS.swing_damping:
+                state[:], velocity[:], self.masses = np.nan, np.nan, "heavy"
+                raise Unstable("left the finite", advice="")
+            seen.append((state.max(), velocity.max(), self.masses))
+
+    motion = Wild([0.9])
+    motion.masses = "light"
+    settle(motion, np.zeros((1, 4)), np.ones((1, 4)), np.ones(1), 0.2)
+    assert seen == [(0.0, 0.0, "light")]
+
+
+def test_the_march_goes_on_under_the_rest_volumes_of_the_rung():
+    """Buckles took pressure off there: the volumes that it came with are those of before."""
+    params = SOLVER.parse({"te": 0.2, "gamma": 3.0, "mirrors": "xyz"})
+    path = Path(params, dataclasses.replace(choose(params, "preview"), rungs=(0.01,), start=0.005), Context())
+    settled = path.stage(0.01, 0.02)
+    np.testing.assert_array_equal(path._rest, settled.rest)
+    assert np.abs(settled.rest - 1).max() > 0
 
 
 def test_whole_searches_for_contact_lie_between_two_looks():

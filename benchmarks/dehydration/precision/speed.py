@@ -54,7 +54,7 @@ BUDGET, EVERY = (("preview", 0.04, "xyz"), ("default", 0.04, "xyz"), ("preview",
 BUDGET_HEAD = ("run", "part", "times", "CPU s", "share", "ns per element and step", "on all threads")
 OTHERS = {
     "masses follow": ("reweigh.py", "reweigh", "mostly"),
-    "rest volumes follow": ("motion.py", "_followed", "mostly"),
+    "rest volumes follow": ("motion.py", "rests", "mostly"),
     "stages measured and written": ("run.py", "add", "no"),
     "mesh and layout": ("motion.py", "__init__", "no"),
 }
