@@ -221,13 +221,18 @@ def test_a_swing_that_leaves_the_finite_is_put_back():
     assert seen == [(0.0, 0.0, "light")]
 
 
-def test_the_march_goes_on_under_the_rest_volumes_of_the_rung():
-    """Buckles took pressure off there: the volumes that it came with are those of before."""
+def test_the_march_goes_on_under_the_rest_volumes_of_the_rung(monkeypatch):
+    """Buckles take pressure off there: the volumes that it came with are those of before."""
+    come = Path._settle
+
+    def settled(path, state, velocity, rest, shrinkage):
+        return dataclasses.replace(come(path, state, velocity, rest, shrinkage), rest=0.999 * rest)
+
+    monkeypatch.setattr(Path, "_settle", settled)
     params = SOLVER.parse({"te": 0.2, "gamma": 3.0, "mirrors": "xyz"})
     path = Path(params, dataclasses.replace(choose(params, "preview"), rungs=(0.01,), start=0.005), Context())
     settled = path.stage(0.01, 0.02)
     np.testing.assert_array_equal(path._rest, settled.rest)
-    assert np.abs(settled.rest - 1).max() > 0
 
 
 def test_whole_searches_for_contact_lie_between_two_looks():
