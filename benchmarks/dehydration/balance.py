@@ -217,7 +217,7 @@ def _relax(sheet: Sheet, table: ShapeTable, context: Context, te: float, gamma: 
     pairs = crossings(ends[1], closed_lattice(_LATTICE)).count
     radii = [np.linalg.norm(one[:-2], axis=1) for one in ends]
     alike = float(np.corrcoef(radii)[0, 1])
-    volumes = [_volume(one) / sphere_volume(table, te, s) for one in ends]
+    volumes = [_volume(one) / sphere_volume(float(table.fixed["rs1"]), te, s) for one in ends]
     sheet.add(
         (
             *(table.info.name, table.info.quality, f"{te:g}", f"{gamma:g}", f"{s:g}", f"{said['residual']:.1e}"),
@@ -235,10 +235,9 @@ def _volume(points: np.ndarray) -> float:
     return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6
 
 
-def sphere_volume(table: ShapeTable, te: float, s: float) -> float:
+def sphere_volume(stone: float, te: float, s: float) -> float:
     """Return the volume of an incompressible sphere at s: only its flesh shrinks, neither skin nor stone."""
-    stone = float(table.fixed["rs1"]) ** 3
-    return 4 / 3 * np.pi * ((1 - s) ** 3 * (1 - stone) + stone + (1 + te) ** 3 - 1)
+    return 4 / 3 * np.pi * ((1 - s) ** 3 * (1 - stone**3) + stone**3 + (1 + te) ** 3 - 1)
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ def _settled(runs: Sequence[xr.Dataset], table: ShapeTable) -> None:
         pairs = int(run["crossings"].sum() + run["lattice_crossings"].sum())
         moved, least = float(run["lattice_evened"].max()), min(columns["least_jacobian"])
         residuals = " ".join(f"{1e3 * value:.2f}" for value in columns["residual"])
-        exact = [sphere_volume(table, te, s) for s in table.stages]
+        exact = [sphere_volume(float(table.fixed["rs1"]), te, s) for s in table.stages]
         off = (run["volume"].values / exact - 1).tolist()
         met = f"{sum(columns['converged'])} of {len(columns['converged'])}"
         sheet.add(

@@ -16,13 +16,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from benchmarks.figures import RESULTS, Sheet, load
 from solver.contract import Context, Need
 from solver.contract.errors import SolverError
 from solver.dehydration import SOLVER, settings, settle
+
+from ..balance import sphere_volume
 
 Row = dict[str, Any]
 
@@ -63,25 +64,21 @@ _SEEDS = (0, 1)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="the first fruit alone")
-    parser.add_argument("--minutes", type=float, default=1e9, help="begin no run after that, and keep what there is")
     asked = parser.parse_args()
     known = {} if asked.quick else _known()
     sheet = Sheet("dehydration-settling", _HEAD, "dehydration")
-    until = time.monotonic() + 60 * asked.minutes
     base: dict[Any, int] = {}
     for case in _cases(asked.quick):
         quality, te, gamma, seed, changed = case
         row = known.get(case)
         if row is None:
-            if time.monotonic() > until:
-                continue
             thick = (te, gamma) in _THICK
             row = _run(quality, te, gamma, seed, changed, _THICK_STAGES if thick else _STAGES)
         if changed == _AS_IT_IS:
             base[case[:4]] = row["steps"]
         _add(sheet, row, base.get(case[:4]))
-    if not asked.quick:
-        sheet.keep()
+        if not asked.quick and case not in known:
+            sheet.keep()  # a benchmark that is stopped goes on from there
 
 
 def _cases(quick: bool) -> Iterator[tuple[str, float, float, int, str]]:
@@ -111,11 +108,12 @@ def _run(quality: str, te: float, gamma: float, seed: int, changed: str, stages:
     if found is None:
         return row
     done = found.stage.values
+    exact = [sphere_volume(_STONE, te, float(s)) for s in done]
     row |= {
         "stages": done.tolist(),
         "steps": int(found.iterations.values[-1]),
         "roughness": (found.roughness.values / te).tolist(),
-        "volume_off": (found.volume.values / _volume(done, te) - 1).tolist(),
+        "volume_off": (found.volume.values / exact - 1).tolist(),
         "residual": found.residual.values.tolist(),
         "drift": found.drift.values.tolist(),
     }
@@ -138,12 +136,6 @@ def _changed(what: str, quality: str) -> Iterator[None]:
     finally:
         for place, value in before.items():
             setattr(*place, value)
-
-
-def _volume(s: np.ndarray, te: float) -> np.ndarray:
-    """Return the volume of a sphere whose flesh has shrunk by s in length, and whose stone and skin keep theirs."""
-    flesh = (1 - s) ** 3 * (1 - _STONE**3)
-    return 4 / 3 * np.pi * (flesh + _STONE**3 + (1 + te) ** 3 - 1)
 
 
 def _known() -> dict[tuple[str, float, float, int, str], Row]:
