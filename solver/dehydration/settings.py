@@ -70,10 +70,10 @@ class _Quality:
 
 #: Shrinkages at which a path settles on its way. Where buckles come up the first decides their number (without the one
 #: at 0.05 stiff skins had a fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart, which
-#: saves previews up to a quarter of their steps.
+#: saves up to a quarter of the steps. `fine` keeps them all.
 _RUNGS = tuple(round(0.05 * k, 2) for k in range(1, 13))
 _WIDE = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-#: Skins and moduli for which a preview's rungs stand apart: others were not tried so.
+#: Skins and moduli for which rungs stand apart: others were not tried so.
 _WIDE_SKINS, _WIDE_MODULI = (0.0075, 0.04), (5.0, 50.0)
 
 #: Under deep folds core layers with one point each turn inside out: the three below the skin at gamma = 10 (s = 0.25),
@@ -98,7 +98,7 @@ _STEPS, _STEPS_N, _STEPS_SPAN = 6400.0, 24, 0.3
 #: modes keep their shape on every mesh, so per step they slow down as the step shrinks, and damping with them.
 _DAMPING, _SWING_DAMPING = 0.004, 0.0005
 #: Longest turns of swinging (at the same reference) and calming, and most steps that a stage may settle for.
-_SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 20_000
+_SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 40_000
 #: Bulk over shear modulus that all qualities stand for, off by 1e-4 from incompressible in radius; and that steps are
 #: taken with. By 15 they were 1.4 times as long, but what balances at 1000 may be unstable at 15 while rest volumes
 #: stay (te = 0.02, gamma = 10 at preview, s = 0.15, and at 22 as well): it never settled.
@@ -155,7 +155,7 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
         calm_steps=_CALM_STEPS,
         settle_steps=round(_SETTLE_STEPS * scale),
         start=start,
-        rungs=_WIDE if quality == "preview" and _is_easy(params) else _RUNGS,
+        rungs=_WIDE if quality != "fine" and _is_easy(params) else _RUNGS,
         full_levels=q.full_levels,
         copies=2 ** len(params.mirrors),
     )
@@ -180,9 +180,9 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     if need.start is not None:
         return _whole_cost(settings, _RELAXING_STEPS)
     rungs = [rung for rung in settings.rungs if settings.start < rung < last + 1e-9]
-    # most settle for a sixth of the steps they may take
+    # most settle for a twelfth of the steps they may take
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
-    steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 6 * states
+    steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 12 * states
     return _whole_cost(settings, steps)
 
 

@@ -28,13 +28,20 @@ _REST_STEPS = 200
 _NEAR = 3.0
 
 #: Share of the way that rest volumes go to those of the pressures. What balances at the wanted bulk modulus may be
-#: hardly stable at the one that is marched with: all of the way such states swung to and fro (te = 0.02, gamma = 10 at
-#: default, s = 0.15: 41,000 steps so far in place of 20,000).
+#: hardly stable at the one that is marched with: all of the way such states swing to and fro.
 _SHARE = 0.5
 
+#: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
+_SHARE_SWINGING, _SHARE_STILL = 0.1, 0.2
+
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
-#: as rest volumes hardly hold it, comes to rest when calmed while they follow.
+#: as rest volumes hardly hold it, comes to rest when eased while they follow.
 _SWINGING = 0.75
+
+#: Damping of a turn of easing over a swing's, its parts, after each of which rest volumes follow, and what of the
+#: residual is left where it is worth another. A swing goes past the end of ways so soft that a calmed state creeps
+#: along them: thin skins at default swung to and fro until their steps were spent.
+_EASING, _EASING_PARTS, _EASED = 20.0, 2, 0.7
 
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
 _CALM_TURNS = 3
@@ -85,12 +92,14 @@ def settle(
     It swings to where the energy leads: after the onset buckles go on merging for thousands of steps, along ways
     so soft that damping would only delay them. Kinetic damping knows no rate (Day 1965, Cundall 1976): all stands
     still whenever the kinetic energy begins to fall, for there the potential was about least. Then it is calmed,
-    and swings again if it was not there yet, until most of its steps are spent. State and velocity change in place.
+    and swings again if it was not there yet, until most of its steps are spent. What is near balance by then does not
+    swing but is eased, under a damping between the two, for as long as that helps: it is a soft way from its end, and
+    a swing would go past it. State and velocity change in place.
 
     `rest` volumes are those of the pressures that it came with, and buckles take much of the pressure off a fruit with
     a stiff skin. Where a state balances they go half of the way to those of its pressures, and it is calmed alone for
-    a few turns; after a swing, and at last, they do so near balance, too. So on, until they are off (rms) by no more
-    than forces may be.
+    a few turns; while it is eased, and near balance after a swing and at last, they do so, too; in a swing they follow
+    a little. So on, until they are off (rms) by no more than forces may be.
 
     smooth: whether a state at rest may have no buckles yet. Such a one is left to swing, and where it goes elsewhere
     settles there: a smooth fruit past its onset balances and is not stable, but buckles grow from its bumps, at first
@@ -135,11 +144,14 @@ def _come_to_rest(
     """Swing and calm by turns; return the rest volumes, the steps spent, the residual and the drift."""
     settings = motion.settings
     spent, residual, drift, behind = 0, np.inf, np.inf, np.inf
-    calm = 0 if shrinkage > settings.start else 1
+    calm, eases = 0 if shrinkage > settings.start else 1, False
     while spent < settings.settle_steps:
-        late = spent >= _SWINGING * settings.settle_steps
-        if calm == 0 and not late:
-            _swung(motion, state, velocity, rest, shrinkage)
+        late, before = spent >= _SWINGING * settings.settle_steps, residual
+        if late or eases:
+            rest = _eased(motion, state, velocity, rest, shrinkage)
+        elif calm == 0:
+            rest = _swung(motion, state, velocity, rest, shrinkage)
+        if late or calm == 0:
             spent += settings.swing_steps
         rested, residual, drift = 0, np.inf, np.inf
         while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
@@ -159,6 +171,8 @@ def _come_to_rest(
         near = (calm == 0 or late) and residual <= _NEAR * settings.residual
         if spent < settings.settle_steps and (balanced or near):
             rest = rest * lag**_SHARE
+        # what is eased gets nearer each time, or it is not the end of a way but the middle of one
+        eases = near and not balanced and (not eases or residual < _EASED * before)
         # under new rest volumes what balances stays where it is, or nearly: to swing would throw it far
         calm = _CALM_TURNS if balanced else max(calm - 1, 0)
     return rest, spent, max(residual, behind), drift
@@ -191,18 +205,36 @@ def _leaves(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrin
     return True
 
 
-def _swung(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> None:
-    """Let the state fall, or stay where it was if it falls so fast that it leaves the finite."""
+def _eased(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> Floats:
+    """Let the state slide for as long as a swing, and return the rest volumes, which follow."""
+    settings = motion.settings
+    for _ in range(_EASING_PARTS):
+        count = settings.swing_steps // _EASING_PARTS
+        motion.run(state, velocity, rest, count, shrinkage, shrinkage, _EASING * settings.swing_damping)
+        rest = _followed(motion, state, rest, shrinkage, _SHARE)
+    return rest
+
+
+def _followed(motion: Motion, state: Fixed, rest: Floats, shrinkage: float, share: float) -> Floats:
+    """Return rest volumes a share of the way to those of the state's pressures."""
+    lag = motion.rests(state, rest, shrinkage) / rest
+    followed: Floats = rest * lag**share
+    return followed
+
+
+def _swung(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> Floats:
+    """Let the state fall, or stay where it was if it falls so fast that it leaves the finite; return rest volumes."""
     begin, masses = state.copy(), motion.masses
     try:
-        _swing(motion, state, velocity, rest, shrinkage)
+        return _swing(motion, state, velocity, rest, shrinkage)
     except Unstable:
         state[:], motion.masses = begin, masses
         velocity[:] = 0
+        return rest
 
 
-def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> None:
-    """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy."""
+def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> Floats:
+    """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy; return rest volumes."""
     settings = motion.settings
     count = SEARCH_EVERY * max(1, round(settings.swing_steps / _LOOKS / SEARCH_EVERY))
     last = 0.0
@@ -210,6 +242,9 @@ def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrink
         motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping)
         layout = motion.layout
         energy = float((layout.mass * np.square(velocity[:, :3]).sum(axis=1, dtype=np.float64))[layout.free].sum())
-        if energy < last:
+        falls = energy < last
+        if falls:
             velocity[:] = energy = 0.0
         last = energy
+        rest = _followed(motion, state, rest, shrinkage, _SHARE_STILL if falls else _SHARE_SWINGING)
+    return rest
