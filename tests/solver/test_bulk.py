@@ -90,13 +90,18 @@ def test_the_fixed_point_has_the_wanted_modulus() -> None:
 
 @pytest.mark.parametrize(("shrinkage", "start"), [(-0.1, 0.06), (0.05, 0.06), (0.05, 0.0)])
 def test_a_whole_fruit_is_as_stiff_in_volume_as_it_says(shrinkage: float, start: float) -> None:
-    """Started from or marched to, against the incompressible closed form; kappa/mu = 30 alone is off by 2e-3."""
+    """Started from or marched to, against the incompressible closed form; kappa/mu = 30 alone is off by 2e-3.
+
+    Volumes may lag by as much as forces are out of balance, a preview's by as much as that: so it balances better here.
+    """
     params = DehydrationParams.parse({"imperfection": 0.0})
     errors = []
     for kappa_ratio in (KAPPA, WANTED):
-        settings = dataclasses.replace(choose(params, "preview"), n=10, kappa_ratio=kappa_ratio, start=start)
+        settings = dataclasses.replace(
+            choose(params, "preview"), n=10, kappa_ratio=kappa_ratio, start=start, residual=5e-4
+        )
         state = Path(params, settings, Context()).stage(shrinkage, shrinkage)
-        assert state.residual < 2e-3
+        assert state.residual <= 5e-4
         outer = (0.4**3 + (1 - shrinkage) ** 3 * (1 - 0.4**3) + 1.04**3 - 1) ** (1 / 3)
         errors.append(abs(np.linalg.norm(state.surface, axis=1).mean() / outer - 1))
     assert errors[1] < 2e-4 * max(1, abs(shrinkage) / 0.05)

@@ -71,10 +71,12 @@ def test_elements_of_the_skin_are_as_wide_as_it_is_thick_at_fine(quality, width)
         (0.005, 10.0, "preview", False),
         (0.04, 100.0, "preview", False),
         (0.04, 3.0, "preview", False),
-        (0.04, 10.0, "default", False),
+        (0.04, 10.0, "default", True),
+        (0.05, 30.0, "default", False),
+        (0.04, 10.0, "fine", False),
     ],
 )
-def test_rungs_of_a_preview_stand_apart_where_that_was_tried(te, gamma, quality, wide):
+def test_rungs_stand_apart_where_that_was_tried(te, gamma, quality, wide):
     settings = choose(SOLVER.parse({"te": te, "gamma": gamma}), quality, 0.3)
     assert (0.15 in settings.rungs) is not wide
     assert {0.05, 0.1, 0.2, 0.3} <= set(settings.rungs)

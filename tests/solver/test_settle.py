@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from solver.dehydration.settle import settle
 SOLVER = registry.get("dehydration")
 PARAMS = SOLVER.parse({"mirrors": "xyz"})
 SETTINGS = choose(PARAMS, "preview")
+EASING = 20 * SETTINGS.swing_damping
 
 
 class Told:
@@ -56,10 +58,11 @@ class Told:
         return 0.0, 1.0
 
     def looks(self):
-        """S for each swing and c for each look while it is calmed, in order."""
-        word = "".join("c" if damping == SETTINGS.calm_damping else "s" for damping, *_ in self.turns)
-        swing = "s" * sum(damping != SETTINGS.calm_damping for damping, *_ in self.turns[: word.index("c")])
-        return word.replace(swing, "S") if swing else word
+        """S for each swing, E for each turn of easing and c for each look while it is calmed, in order."""
+        letters = {SETTINGS.calm_damping: "c", SETTINGS.swing_damping: "s", EASING: "e"}
+        word = "".join(letters[damping] for damping, *_ in self.turns)
+        # two that swing or ease never follow each other
+        return re.sub("e+", "E", re.sub("s+", "S", word))
 
 
 def settled(residuals, shrinkage=0.2, volumes=(1.0,)):
@@ -83,6 +86,50 @@ def test_it_swings_and_is_calmed_by_turns(residuals, turns):
     assert settled(residuals).looks() == turns
 
 
+@pytest.mark.parametrize(
+    ("residuals", "turns"),
+    [
+        # near: eased; not near: it swings
+        ([2.9, 2.9, 0.9], "SccEc"),
+        ([3.1, 3.1, 0.9], "SccSc"),
+        # nearer each time: eased on, else it swings
+        ([2.9, 2.9, 2.0, 2.0, 1.3, 1.3, 0.9], "SccEccEccEc"),
+        ([2.9, 2.9, 2.1, 2.1, 0.9], "SccEccSc"),
+        # near again after that swing: eased, however near it was before
+        ([2.9, 2.9, 2.8, 2.8, 2.9, 2.9, 0.9], "SccEccSccEc"),
+        # off balance after easing: it swings
+        ([2.9, 2.9, 9.0, 9.0, 0.9], "SccEccSc"),
+    ],
+)
+def test_what_is_near_balance_is_eased_as_long_as_that_helps(residuals, turns):
+    assert settled(residuals).looks() == turns
+
+
+def test_a_turn_of_easing_is_as_long_as_a_swing_and_volumes_follow_it_twice():
+    still = [1.0] * len(settled([0.9]).turns)  # a swing, and the turn after it
+    motion = Told([2.9, 2.9, *[0.9] * 9], (*still, 1.01))
+    settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
+    assert motion.looks().startswith("SccEc")
+    eased = [(count, rest) for damping, count, rest in motion.turns if damping == EASING]
+    after = [rest for damping, _, rest in motion.turns if damping == SETTINGS.calm_damping][2]
+    assert sum(count for count, _ in eased) == pytest.approx(SETTINGS.swing_steps, abs=1)
+    assert [*(rest for _, rest in eased), after] == pytest.approx([1.0, 1.01**0.5, 1.01**0.75])
+
+
+def test_volumes_follow_a_swing_a_little_and_more_where_all_stands_still():
+    class Swinging(Told):
+        """The kinetic energy begins to fall at the fourth look."""
+
+        def run(self, state, velocity, rest, count, a, b, damping):
+            super().run(state, velocity, rest, count, a, b, damping)
+            velocity[:, :3] = min(len(self.turns), 6 - len(self.turns))
+
+    motion = Swinging([0.9] * 9, (1.1,))
+    settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
+    left = np.log(1.1 / np.array([rest for *_, rest in motion.turns[:5]]))
+    assert left[1:] / left[:-1] == pytest.approx([0.9, 0.9, 0.9, 0.8])
+
+
 def test_what_is_smooth_is_calmed_alone_at_first():
     """Before the march begins there are no buckles that could merge."""
     assert settled([9.0, 0.9], SETTINGS.start / 2).looks() == "cc"
@@ -90,43 +137,45 @@ def test_what_is_smooth_is_calmed_alone_at_first():
 
 def test_what_balances_is_calmed_under_new_rest_volumes():
     """And swings again if three turns do not bring it to rest."""
-    motion = settled([0.9, 1.5, 0.9], volumes=(1.002,))
+    still = len(settled([0.9]).turns) - 1  # volumes begin to lag once it has swung
+    motion = settled([0.9, 1.5, 0.9], volumes=(*[1.0] * still, 1.004))
     assert motion.looks() == "Sccc"
-    assert [rest for *_, rest in motion.turns[-3:]] == pytest.approx([1.0, 1.001, 1.001], abs=1e-6)
-    assert settled([0.9, *[1.5] * 6, 0.9], volumes=(1.003,)).looks() == "S" + 7 * "c" + "Sc"
+    assert [rest for *_, rest in motion.turns[-3:]] == pytest.approx([1.0, 1.002, 1.002], abs=1e-5)
+    assert settled([0.9, *[3.5] * 6, 0.9], volumes=(*[1.0] * still, 1.003)).looks() == "S" + 7 * "c" + "Sc"
 
 
 def test_rest_volumes_follow_half_of_the_way_at_a_time():
-    motion = settled([0.9] * 4, volumes=(1.01,))
+    still = len(settled([0.9]).turns) - 1
+    motion = settled([0.9] * 4, volumes=(*[1.0] * still, 1.01))
     assert motion.looks() == "Scccc"
     assert [rest for *_, rest in motion.turns[-4:]] == pytest.approx([1.01 ** (1 - 0.5**k) for k in range(4)])
 
 
 def test_volumes_that_follow_by_less_than_forces_are_out_of_balance_are_right():
-    assert settled([0.9], volumes=(1 + 0.9 * SETTINGS.residual,)).looks() == "Sc"
-    assert settled([0.9, 0.9], volumes=(1 + 1.1 * SETTINGS.residual,)).looks() == "Scc"
+    still = [1.0] * (len(settled([0.9]).turns) - 1)
+    assert settled([0.9], volumes=(*still, 1 + 0.9 * SETTINGS.residual)).looks() == "Sc"
+    assert settled([0.9, 0.9], volumes=(*still, 1 + 1.1 * SETTINGS.residual)).looks() == "Scc"
 
 
 @pytest.mark.parametrize(("residual", "rest"), [(2.5, 0.98**0.5), (3.5, 1.0)])
 def test_rest_volumes_are_taken_anew_near_balance_alone(residual, rest):
-    motion = Told([residual, residual, *[0.9] * 9], (0.98,))
+    still = [1.0] * (len(settled([0.9]).turns) - 1)
+    motion = Told([residual, residual, *[0.9] * 9], (*still, 0.98))
     settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
-    assert motion.looks().startswith("SccSc")
-    swung = [rest for damping, _, rest in motion.turns if damping != SETTINGS.calm_damping]
-    assert swung[0] == 1.0
-    assert swung[-1] == pytest.approx(rest)
+    first = motion.looks()[:4]
+    assert first == ("SccE" if residual < 3 else "SccS")
+    assert motion.turns[len(still) + 2][2] == pytest.approx(rest)
 
 
-def test_what_each_swing_throws_out_of_balance_is_calmed_in_the_end():
-    """Volumes follow then after each turn: half of the way each time."""
-    motion = Told([1.2] * 999, (1.5,))
+def test_what_each_swing_throws_out_of_balance_is_eased_in_the_end():
+    """Volumes follow then three times a turn: half of the way each time."""
+    motion = Told([1.2, 1.2, 9.0, 9.0] * 999, (1.5,))
     settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
     steps = np.cumsum([count for _, count, _ in motion.turns])
     late = steps > 0.75 * SETTINGS.settle_steps + SETTINGS.swing_steps + SETTINGS.calm_steps
-    last = [(damping, rest) for (damping, _, rest), is_late in zip(motion.turns, late, strict=True) if is_late]
-    assert {damping for damping, _ in last} == {SETTINGS.calm_damping}
-    assert {damping for damping, *_ in motion.turns} == {SETTINGS.calm_damping, SETTINGS.swing_damping}
-    assert len({rest for _, rest in last}) == pytest.approx(len(last) / 2, abs=1)
+    last = [damping for (damping, *_), is_late in zip(motion.turns, late, strict=True) if is_late]
+    assert set(last) == {SETTINGS.calm_damping, EASING}
+    assert {damping for damping, *_ in motion.turns} == {SETTINGS.calm_damping, SETTINGS.swing_damping, EASING}
 
 
 def test_what_runs_out_of_steps_says_how_far_its_volumes_lag():
@@ -180,9 +229,10 @@ def smooth_at_first(motion, way):
 
 def test_rest_volumes_are_those_of_where_a_smooth_state_went():
     """They go with the buckles that came up, not with the smooth state that was left."""
-    went = smooth_at_first(Told([0.9] * 9, (1.0, 1.01)), 1.0)
+    still = [1.0] * len(settled([0.9]).turns)
+    went = smooth_at_first(Told([0.9] * 9, (*still, 1.01)), 1.0)
     assert went.rest == pytest.approx(1.01, rel=SETTINGS.residual)
-    stayed = smooth_at_first(Told([0.9], (1.0, 1.01)), 0.01)
+    stayed = smooth_at_first(Told([0.9], (*still, 1.01)), 0.01)
     assert stayed.rest == 1.0
     assert stayed.surface[0, 0] == 0
 
@@ -200,7 +250,7 @@ def test_a_smooth_state_that_leaves_the_finite_when_left_to_swing_swings_from_wh
     found = smooth_at_first(motion, 0.0)
     assert np.isfinite(found.surface).all()
     assert motion.masses == "light"
-    assert motion.looks() == "ScSsc"  # swung, calmed, left to swing, swung, calmed
+    assert motion.looks() == "ScSc"  # swung, calmed, left to swing and swung, calmed
 
 
 def test_a_swing_that_leaves_the_finite_is_put_back():
