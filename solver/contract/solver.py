@@ -62,7 +62,9 @@ class Cost(NamedTuple):
 class Solver:
     """One system of equations as a value: name, version, parameters, fields, run and cost.
 
-    `version` changes whenever the numbers change, so that stored results of the old numbers are not reused.
+    `version` changes whenever the numbers change, so that stored results of the old numbers are not reused. `tables_of`
+    are versions before it that solved the same equations, on the same meshes and to the same residuals, by another way:
+    their tables hold equilibria as this one finds them, and are answered from.
     `run` is called with a settled need only.
 
     The rest is what the floors above want to know of it: `surface`, where the fresh shape is parametric, so that
@@ -104,6 +106,11 @@ class Solver:
     sizes: Mapping[str, float] = field(default_factory=dict)
     extent: Callable[[Any], Extent] | None = None
     remarks: Callable[[Any, Need], str] | None = None
+    tables_of: tuple[str, ...] = ()
+
+    def answers_from(self, version: str) -> bool:
+        """Return whether a table of that version holds what this one would solve, but for the way to it."""
+        return version == self.version or version in self.tables_of
 
     def parse(self, values: Mapping[str, Any], preset: str | None = None) -> Params:
         """Return validated parameters from a preset overlaid with `values`.

@@ -59,6 +59,8 @@ _STRIDE, _WATCHED = 100, 2_000_000
 #: Way of a node, in edges of the skin, after which the masses are taken anew. Thick skins that fall from a late onset
 #: (te = 0.1, gamma = 30) need 1.6 times their masses after an edge and a half and blow up after three.
 _WAY = 0.5
+#: Likewise of what has left the finite once.
+_CLOSE = 0.1
 
 #: How fast rest volumes follow the pressure, as a share of what damping takes from a ringing volume.
 _FOLLOW = 0.125
@@ -121,7 +123,7 @@ class Motion:
         )
         self.steps = 0
         self._weighed = self.layout.fresh.copy()
-        self._way = _WAY * float(self._skin.contact.size)
+        self._edge, self._closely = float(self._skin.contact.size), False
         # whole searches for contact
         self._stride = SEARCH_EVERY * max(1, min(_STRIDE, _WATCHED // self.elements) // SEARCH_EVERY)
 
@@ -154,17 +156,18 @@ class Motion:
 
     def _follow(self, state: Fixed, velocity: Singles) -> int:
         """Take the masses anew if nodes have come far since the last time; return how many steps may be made now."""
-        if QUANTUM * float(np.abs(state - self._weighed).max()) > self._way:
+        way = (_CLOSE if self._closely else _WAY) * self._edge
+        if QUANTUM * float(np.abs(state - self._weighed).max()) > way:
             self.layout = reweigh(
                 self.layout, state, self.sector.mesh.is_exocarp, *self._moduli, self._fresh_bound, safety=_SAFETY
             )
             self._weighed = state.copy()
             weigh(self._skin, self.layout)
         speed = float(np.abs(velocity).max())
-        if speed * self._stride <= self._way:
+        if speed * self._stride <= way:
             return self._stride
         # what has blown up has no speed
-        return SEARCH_EVERY * max(1, int(self._way / speed) // SEARCH_EVERY) if np.isfinite(speed) else SEARCH_EVERY
+        return SEARCH_EVERY * max(1, int(way / speed) // SEARCH_EVERY) if np.isfinite(speed) else SEARCH_EVERY
 
     def advance(
         self,
@@ -226,8 +229,34 @@ class Motion:
     ) -> None:
         """March from shrinkage a to b under rest volumes `rest`; state and velocity change in place.
 
-        Masses follow the deformation on the way.
+        Masses follow the deformation on the way. What leaves the finite is taken again, and masses follow closely from
+        then on: a thick and very stiff skin that snaps through outruns them.
+
+        Raises:
+            Unstable: it left the finite nevertheless; state and velocity are those of then.
+            Cancelled: the observer asked to stop.
+
         """
+        begin = state.copy(), velocity.copy(), self.masses
+        try:
+            self._run(state, velocity, rest, count, a, b, damping)
+        except Unstable:
+            if self._closely:
+                raise
+            self._closely = True
+            state[:], velocity[:], self.masses = begin
+            self._run(state, velocity, rest, count, a, b, damping)
+
+    def _run(
+        self,
+        state: Fixed,
+        velocity: Singles,
+        rest: Floats,
+        count: int,
+        a: float,
+        b: float,
+        damping: float,
+    ) -> None:
         forget(self._skin, self.layout)
         for begin, end, steps in self.drive.pieces(a, b, count):
             middle = (begin + end) / 2

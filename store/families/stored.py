@@ -77,13 +77,13 @@ def _samples(path: Path, axes: tuple[str, ...]) -> Array | None:
 
 
 def check_version(info: TableInfo, solver: Solver) -> None:
-    """Refuse to answer from a table of another version of its solver.
+    """Refuse to answer from a table whose version solved something else than its solver does now.
 
     Raises:
         StaleTable: it is one; what to rebuild.
 
     """
-    if info.version != solver.version:
+    if not solver.answers_from(info.version):
         raise StaleTable(
             f"table {info.name!r} is of version {info.version} of {solver.name}, and this is {solver.version}.",
             f"Make it anew: `wizen table plan {info.name} > plan.toml`, `wizen sweep plan.toml`, "

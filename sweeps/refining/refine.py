@@ -98,7 +98,7 @@ def check(plan: Plan, table: TableInfo) -> None:
     if (plan.solver.name, plan.solver.version) != (table.solver, table.version):
         raise MixedSamples(
             f"the table is of {table.solver} {table.version}, the plan of {plan.solver.name} {plan.solver.version}.",
-            advice,
+            f"{advice} One of another version is swept and built anew first: samples of two versions do not mix.",
         )
     if not any(job.key in table.keys for job in plan.jobs()):
         raise MixedSamples(f"table {table.name} holds no run of the plan {plan.name}.", advice)

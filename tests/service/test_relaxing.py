@@ -134,6 +134,8 @@ def test_a_table_of_another_version_is_refused_with_what_to_rebuild(tmp_path: Pa
         points = {"solver": "dehydration", "points": [{"te": 0.035, "s": 0.2}]}
         checked(client.post("/v1/shapes:batch", json=points), 409, "stale-table")
         assert client.get("/v1/tables").status_code == 200
+        (covered,) = client.get("/v1/maps").json()["maps"]
+        assert (covered["version"], covered["is_current"]) == ("9", False)
     typed = wizen("query", "--store", store.root, "--set", "te=0.035", "--stages", "0.2")
     assert typed.exit_code != 0
     assert "version 9" in typed.output
