@@ -51,8 +51,10 @@ def _one(kind: str, about: str, body: str) -> str:
 
 
 def table(record: figures.Row, *part: str) -> str:
-    """Return a record's table as Markdown: its own, or what the module `tables` beside its benchmark makes of it."""
-    if "table" in record:
+    """Return a record's table as Markdown: its own, or what the module `tables` beside its benchmark makes of it, as of
+    each part of a record.
+    """
+    if "table" in record and not part:
         return figures.markdown(record["table"]["head"], record["table"]["rows"])
     room = str(record["name"]).split("-")[0]
     made: str = importlib.import_module(f"benchmarks.{room}.tables").table(record, *part)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from benchmarks.figures import Row, markdown
@@ -17,6 +17,8 @@ from .precision.spheres import SHIPPED, ratios
 
 __all__ = ["table"]
 
+#: Skins from which a fruit counts as thick.
+_THICK = 0.1
 #: Seconds of the paper's own run.
 _PAPER = 7200.0
 _CODES = {
@@ -45,6 +47,8 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-scaling": _scaling,
         "dehydration-speed": _speed,
         "dehydration-skips": _skips,
+        "dehydration-settling changed": _changed,
+        "dehydration-settling thick": _thick,
         "dehydration-meshes": order.table,
         "dehydration-controls": controls.table,
         "dehydration-jumps": jumps.table,
@@ -297,3 +301,48 @@ def _added(row: dict[str, Any]) -> str:
         return "none"
     relative = row["error_is"].startswith("relative")
     return f"{100 * row['error']:+.0f} %, {row['error_is']}" if relative else f"{row['error']:.1e}, {row['error_is']}"
+
+
+def _changed(record: Row) -> str:
+    """Steps over those of things as they are, a seed each, by change and case, and the roughness over theirs."""
+    cases: dict[str, dict[str, list[Row]]] = {}
+    for run in record["runs"]:
+        if run["te"] < _THICK:
+            case = f"{run['quality']}, te {run['te']:g}, gamma {run['gamma']:g}"
+            cases.setdefault(case, {}).setdefault(run["changed"], []).append(run)
+    as_it_is, *changes = next(iter(cases.values()))
+    lines = [["as it is: steps", *(_seeds(f"{r['steps']:,}" for r in case[as_it_is]) for case in cases.values()), ""]]
+    for change in changes:
+        pairs = [list(zip(case[change], case[as_it_is], strict=True)) for case in cases.values()]
+        steps = [_seeds(f"{a['steps'] / b['steps']:.2f}{_missed(a)}" for a, b in case) for case in pairs]
+        # at the first stage buckles have only begun to grow
+        rough = [
+            x / y
+            for case in pairs
+            for a, b in case
+            for x, y in zip(a["roughness"][1:], b["roughness"][1:], strict=True)
+        ]
+        lines.append([change, *steps, f"{min(rough):.2f} to {max(rough):.2f}"])
+    stages = ", ".join(f"{s:g}" for s in record["runs"][0]["stages"][1:])
+    return markdown(("changed", *cases, f"roughness at s = {stages}"), lines)
+
+
+def _seeds(said: Iterable[str]) -> str:
+    return ", ".join(said)
+
+
+def _missed(run: Row) -> str:
+    return "" if run["ends"] == "settled" else f" ({run['ends']})"
+
+
+def _thick(record: Row) -> str:
+    """The last stage that each thick skin comes to, and what ends it there."""
+    cases: dict[tuple[float, float], list[Row]] = {}
+    for run in record["runs"]:
+        if run["te"] >= _THICK:
+            cases.setdefault((run["te"], run["gamma"]), []).append(run)
+    lines = []
+    for (te, gamma), runs in cases.items():
+        ends = [f"{run['stages'][-1]:g}{'' if run['ends'] == 'settled' else ' (' + run['ends'] + ')'}" for run in runs]
+        lines.append([f"{te:g}", f"{gamma:g}", _seeds(ends)])
+    return markdown(("te", "gamma", "last stage, a seed each"), lines)

@@ -27,8 +27,7 @@ _REST_STEPS = 200
 #: swings no more.
 _NEAR = 3.0
 
-#: Share of the way that rest volumes go to those of the pressures. What balances at the wanted bulk modulus may be
-#: hardly stable at the one that is marched with: all of the way such states swing to and fro.
+#: Share of the way that rest volumes go to those of the pressures: all of the way takes as many steps.
 _SHARE = 0.5
 
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.

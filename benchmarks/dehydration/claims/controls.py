@@ -1,8 +1,9 @@
-"""Cold controls of the package's families: python -m benchmarks.dehydration.claims.controls [--seconds 300].
+"""Controls of the package's families: python -m benchmarks.dehydration.claims.controls [--seconds 300].
 
-Of each family that was started from a pattern, the sample that is expected to take least is solved again without it,
-from its bumps alone: what the pattern changes in what is counted and measured, stage by stage. Kept after each run;
-what the record has of the solver's version is not run again, and what is expected to take longer is left out.
+Of each family that was started from a pattern, the sample that is expected to take least is solved again twice: from
+the pattern, by the solver as it is, which may not be the version that made the table; and without it, from its bumps
+alone. What that changes in what is counted and measured, stage by stage, and how alike the wrinkles are. Kept after
+each run; what the record has of the solver's version is not run again, and what is expected to take longer is left out.
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ from solver import registry
 from solver.contract import Context, Need
 from solver.dehydration import SOLVER
 from store import starter
+from store.generations import trust
 from store.lookup import ShapeTable
 from store.store import Store
+from store.surfaces import measures
+from store.surfaces.measures import Surface
 
 __all__ = ["table"]
 
@@ -43,13 +47,16 @@ def main() -> None:
         if any((row["family"], row["digest"]) == (name, digest) for row in runs):
             continue
         runs = [row for row in runs if row["family"] != name]
-        runs.append({"version": SOLVER.version, "family": name, "digest": digest, **_controlled(table_, i)})
+        runs.append({"version": SOLVER.version, "family": name, "digest": digest, **_controlled(store, table_, i)})
         figures.keep(NAME, runs, "dehydration", threads=1)
-        print(name, runs[-1]["cpu"], file=sys.stderr, flush=True)
+        print(name, runs[-1]["cold"]["cpu"], file=sys.stderr, flush=True)
 
 
 def _need(table_: ShapeTable) -> Need:
-    return SOLVER.settle(Need(stages=table_.stages, quality=table_.info.quality, fields=_COMPARED))
+    fields = ("displacement", *_COMPARED)
+    return SOLVER.settle(
+        Need(stages=table_.stages, quality=table_.info.quality, fields=fields, resolution=measures.LATTICE)
+    )
 
 
 def _cheapest(store: Store, name: str) -> tuple[float, str, int]:
@@ -65,47 +72,55 @@ def _cold(table_: ShapeTable, i: int) -> Any:
     return SOLVER.parse({**table_.at_parameters(table_.sample(i)), "pattern": None})
 
 
-def _controlled(table_: ShapeTable, i: int) -> Row:
-    """Return the numbers of a sample as it is in its table, and of the same fruit without a pattern."""
-    begin = time.process_time()
-    cold = SOLVER.solve(_cold(table_, i), _need(table_), Context())
-    spent = time.process_time() - begin
+def _controlled(store: Store, table_: ShapeTable, i: int) -> Row:
+    """Return the numbers of a sample as it is in its table, solved anew, and of the same fruit without a pattern."""
     sample = table_.sample(i)
-    stored = [table_.at(sample, s, fields=()).descriptors for s in table_.stages]
-    return {
+    params = SOLVER.parse(table_.at_parameters(sample))
+    fresh = trust.fresh(registry.surface(SOLVER.name).of(params.model_dump()), measures.LATTICE)
+    stored = [table_.at(sample, s, resolution=measures.LATTICE, fields=("displacement",)) for s in table_.stages]
+    truth = [Surface(fresh, one.displacement) for one in stored]
+    row: Row = {
         "sample": sample,
         "stages": list(table_.stages),
         "quality": table_.info.quality,
         "seed": 0,
-        "stored": {name: [one[name] for one in stored] for name in _COMPARED},
-        "cold": {name: cold[name].values.tolist() for name in _COMPARED},
-        "converged": cold["converged"].values.tolist(),
-        "cpu": spent,
+        "table_version": table_.info.version,
+        "stored": {name: [one.descriptors[name] for one in stored] for name in _COMPARED},
     }
+    for name, asked in (("anew", params), ("cold", _cold(table_, i))):
+        begin = time.process_time()
+        run = SOLVER.solve(asked, _need(table_), Context(library=store.find))
+        spent = time.process_time() - begin
+        found = [Surface(fresh, u) for u in run["displacement"].transpose("stage", ...).values]
+        row[name] = {each: run[each].values.tolist() for each in _COMPARED} | {
+            "correlation": [measures.compare(a, b).corr for a, b in zip(found, truth, strict=True)],
+            "steps": int(run["iterations"].values[-1]),
+            "converged": run["converged"].values.tolist(),
+            "cpu": spent,
+        }
+    return row
 
 
 def table(record: Row) -> str:
-    """Return by how much the cold run is off the one from the pattern, by family and stage."""
+    """Return by how much what was solved anew and cold is off the table, by family and stage."""
     lines = []
     for row in record["runs"]:
-        off = {
-            name: " ".join(_off(c, p) for c, p in zip(row["cold"][name], row["stored"][name], strict=True))
-            for name in _COMPARED
-        }
         said = ", ".join(f"{axis} {value:g}" for axis, value in row["sample"].items())
-        lines.append([row["family"], said, row["quality"], *off.values(), f"{row['cpu']:.0f}"])
+        for name in ("anew", "cold"):
+            run = row[name]
+            off = [
+                " ".join(_off(c, p) for c, p in zip(run[each], row["stored"][each], strict=True)) for each in _COMPARED
+            ]
+            alike = " ".join(f"{value:.2f}" for value in run["correlation"])
+            lines.append([row["family"], said, row["quality"], name, alike, *off, f"{run['cpu']:.0f}"])
     stages = ", ".join(f"{s:g}" for s in record["runs"][0]["stages"])
-    head = (
-        "family",
-        "sample",
-        "quality",
-        f"roughness at s = {stages}",
-        "dominant degree",
-        "buckles",
-        "volume",
-        "CPU s",
+    return markdown(
+        (
+            *("family", "sample", "quality", "solved", f"correlation at s = {stages}", "roughness"),
+            *("dominant degree", "buckles", "volume", "CPU s"),
+        ),
+        lines,
     )
-    return markdown(head, lines)
 
 
 def _off(cold: float, stored: float) -> str:

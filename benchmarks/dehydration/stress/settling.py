@@ -1,10 +1,10 @@
 """How stages settle, and what was considered instead: python -m benchmarks.dehydration.stress.settling [--quick].
 
 Eighths of four stages: steps of the whole run, roughness, how far volumes are from a sphere's, and what a stage is left
-with, as things are and with one thing changed: rungs that do not stand apart (at default: that do), the march at
-another kappa/mu, with steps as long as it allows, rest volumes that go all of the way to those of the pressures. Then
-thick and stiff skins at preview, to where they blow up. Kept as dehydration-settling; runs that are in the record
-already, of this version, are not run again.
+with, as things are and with one thing changed: rungs that do not stand apart, swings where it would be eased, rest
+volumes that stay in a swing, or that go all of the way to those of the pressures, the march at another kappa/mu, with
+steps as long as it allows. Then thick and stiff skins at preview, to where they blow up. Kept as dehydration-settling;
+runs that are in the record already, of this version, are not run again.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -44,16 +44,14 @@ def _march_at(kappa: float) -> _Change:
     return {(settings, "_MARCH_KAPPA"): kappa, (settings, "_STEPS_N"): settings._STEPS_N * longer}
 
 
-#: What is changed: names of a module, and their values; rungs of previews stand apart, those of default do not.
-_RUNGS: dict[str, _Change] = {
-    "preview": {(settings, "_WIDE"): settings._RUNGS},
-    "default": {(settings, "_RUNGS"): settings._WIDE},
-}
-_CHANGES: dict[str, Callable[[str], _Change]] = {
-    "rungs": _RUNGS.__getitem__,
-    "march at 15": lambda _: _march_at(15.0),
-    "march at 60": lambda _: _march_at(60.0),
-    "volumes all of the way": lambda _: {(settle, "_SHARE"): 1.0},
+#: What is changed: names of a module, and their values.
+_CHANGES: dict[str, _Change] = {
+    "rungs close together": {(settings, "_WIDE"): settings._RUNGS},
+    "it swings, not eased": {(settle, "_eased"): settle._swung},
+    "volumes stay in swings": {(settle, "_SHARE_SWINGING"): 0.0, (settle, "_SHARE_STILL"): 0.0},
+    "volumes all of the way": {(settle, "_SHARE"): 1.0},
+    "march at 15": _march_at(15.0),
+    "march at 60": _march_at(60.0),
 }
 _EASY = (("preview", 0.04, 10.0), ("preview", 0.04, 50.0), ("preview", 0.02, 10.0), ("preview", 0.02, 50.0))
 _CAREFUL = (("default", 0.04, 10.0), ("default", 0.02, 10.0))
@@ -97,7 +95,7 @@ def _run(quality: str, te: float, gamma: float, seed: int, changed: str, stages:
     need = Need(stages=stages, quality=quality, fields=("roughness", "volume"))
     row: Row = {"quality": quality, "te": te, "gamma": gamma, "seed": seed, "changed": changed}
     begin = time.process_time()
-    with _changed(changed, quality):
+    with _changed(changed):
         try:
             found: xr.Dataset | None = SOLVER.solve(params, need, Context())
             row["ends"] = "settled"
@@ -123,11 +121,8 @@ def _run(quality: str, te: float, gamma: float, seed: int, changed: str, stages:
 
 
 @contextmanager
-def _changed(what: str, quality: str) -> Iterator[None]:
-    if what == _AS_IT_IS:
-        yield
-        return
-    change = _CHANGES[what](quality)
+def _changed(what: str) -> Iterator[None]:
+    change = {} if what == _AS_IT_IS else _CHANGES[what]
     before = {place: getattr(*place) for place in change}
     for place, value in change.items():
         setattr(*place, value)
