@@ -29,6 +29,9 @@ Scope = Literal["read", "run", "admin"]
 #: Each includes those before it.
 SCOPES: tuple[Scope, ...] = get_args(Scope)
 
+#: Longest life of a token [s]: 300 years.
+_LONGEST = 300 * 365.25 * 86400
+
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.@-]{0,63}")
 _FORM = re.compile(r"wizen_([0-9a-f]{12})_[A-Za-z0-9_-]{43}")
 
@@ -79,8 +82,9 @@ class Tokens:
             raise InvalidToken(f"{name!r} is not a token's name.", "Use letters, digits and '_.@-', at most 64.")
         if not scopes or not set(scopes) <= set(SCOPES):
             raise InvalidToken(f"no token can have the scopes {list(scopes)}.", f"Choose from {', '.join(SCOPES)}.")
-        if seconds is not None and not 0 < seconds < 1e10:
-            raise InvalidToken("a token must expire in the future.", "Leave the time out for one that never does.")
+        if seconds is not None and not 0 < seconds <= _LONGEST:
+            what = "a token must expire in the future" if seconds <= 0 else "a token expires within 300 years"
+            raise InvalidToken(f"{what}.", "Leave the time out for one that never does.")
         number = secrets.token_hex(6)
         secret = f"wizen_{number}_{secrets.token_urlsafe(32)}"
         now = time.time()

@@ -26,7 +26,7 @@ from solver import __version__
 
 from .. import holding, seal
 from ..errors import CorruptBackup, CorruptLedger, MissingStore, ReadOnlyStore, full_disk
-from ..ledger.database import readable
+from ..ledger.database import ask_the_system, readable
 from ..store import Store
 
 __all__ = ["Copied", "backup", "restore"]
@@ -230,6 +230,7 @@ def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
 
     Raises:
         CorruptLedger: it cannot be read.
+        StorageFull, StorageFailed: the store's own disk is full or broken; to be read it takes some kB there.
 
     """
     path = store.ledger.path
@@ -241,6 +242,8 @@ def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
             copy.commit()
             data = copy.serialize()
     except sqlite3.DatabaseError as error:
+        if getattr(error, "sqlite_errorname", "").startswith(("SQLITE_FULL", "SQLITE_IOERR")):
+            ask_the_system(path)
         advice = "`wizen doctor` says what is wrong with it. Who may not write there cannot read it while it is in use."
         raise CorruptLedger(f"{path} cannot be read ({error}).", advice) from error
     seal.publish(root / at, data)

@@ -13,7 +13,7 @@ from .. import seal
 from ..errors import CorruptLedger, ReadOnlyStore, StorageFailed, StorageFull
 from .filesystem import refuse_network
 
-__all__ = ["Database", "readable"]
+__all__ = ["Database", "ask_the_system", "readable"]
 
 #: Seconds to wait for another process's transaction; each lasts milliseconds.
 _PATIENCE = 60.0
@@ -27,6 +27,18 @@ _inherited: list[sqlite3.Connection] = []
 def readable(path: Path) -> str:
     """Return the address by which SQLite opens a file to read it only, whatever its name holds: `#`, `?`, `%`."""
     return f"{path.absolute().as_uri()}?mode=ro"
+
+
+def ask_the_system(path: Path) -> None:
+    """Write beside a database what it needs at least: SQLite keeps to itself what the system told it.
+
+    Raises:
+        StorageFull, StorageFailed, ReadOnlyStore: as the system says now.
+
+    """
+    with seal.scratch(path) as trial:
+        trial.write_bytes(bytes(_LEAST))
+        seal.sync(trial)
 
 
 class Database:
@@ -144,7 +156,7 @@ class Database:
             if name == "SQLITE_FULL":
                 raise StorageFull(f"there is no space left to write {self._path}.", "Free space and go on.") from error
             if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_IOERR")):
-                self._ask_the_system()
+                ask_the_system(self._path)
             if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")):
                 raise ReadOnlyStore(f"{self._path} cannot be written.", "Name a store of your own.") from error
             if name.startswith("SQLITE_IOERR"):
@@ -153,17 +165,6 @@ class Database:
             if name in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
                 raise self._unreadable(f"is not a sound database ({error})") from error
             raise
-
-    def _ask_the_system(self) -> None:
-        """Write beside the ledger what it needs at least: SQLite keeps to itself what the system told it.
-
-        Raises:
-            StorageFull, StorageFailed, ReadOnlyStore: as the system says now.
-
-        """
-        with seal.scratch(self._path) as trial:
-            trial.write_bytes(bytes(_LEAST))
-            seal.sync(trial)
 
     def _unreadable(self, why: str) -> CorruptLedger:
         return CorruptLedger(

@@ -138,6 +138,10 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert listed["tokens"][0]["name"] == "studio"
     assert made["secret"] not in json.dumps(listed)
     assert wizen("token", "create", "--name", "b", "--expires", "soon")[0] == 2
+    code, refused = wizen("token", "create", "--name", "b", "--expires", "400000d")
+    assert (code, "within 300 years" in json.dumps(refused)) == (2, True)
+    code, refused = wizen("token", "create", "--name", "b", "--expires", "0d")
+    assert (code, "in the future" in json.dumps(refused)) == (2, True)
     assert wizen("token", "create", "--name", "studio")[0] == 2
     assert wizen("token", "revoke", "studio")[0] == 0
     assert wizen("token", "revoke", "studio")[0] == 1

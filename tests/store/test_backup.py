@@ -211,6 +211,31 @@ def test_of_a_restore_that_finds_no_room_nothing_stays(
     restore(tmp_path / "copy", tmp_path / "again")
 
 
+BACKUP = """
+import resource, signal, sys
+from pathlib import Path
+from store.copies.backup import backup
+from store.errors import StoreError
+from store.store import Store
+store = Store.open(Path(sys.argv[1]))
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+try:
+    backup(store, Path(sys.argv[2]))
+except StoreError as error:
+    print(error.code, error.message)
+"""
+
+
+def test_a_store_on_a_full_disk_says_so_and_not_that_its_ledger_is_broken(own: Store, tmp_path: Path) -> None:
+    """SQLite makes files beside a ledger to read it, and calls it an I/O error if it cannot."""
+    backup(own, tmp_path / "copy")
+    restore(tmp_path / "copy", tmp_path / "closed")  # nobody has it open
+    said = python(BACKUP, tmp_path / "closed", tmp_path / "another").communicate(timeout=120)[0]
+    assert said.startswith("storage-full")
+    assert str(tmp_path / "closed" / "ledger.sqlite") in said
+
+
 def test_a_store_is_restored_where_one_stands_and_behind_a_link(
     own: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
