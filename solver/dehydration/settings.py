@@ -180,9 +180,9 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     if need.start is not None:
         return _whole_cost(settings, _RELAXING_STEPS)
     rungs = [rung for rung in settings.rungs if settings.start < rung < last + 1e-9]
-    # most settle for a twelfth of the steps they may take
+    # by and large they settle for an eighteenth of the steps they may take
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
-    steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 12 * states
+    steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 18 * states
     return _whole_cost(settings, steps)
 
 
