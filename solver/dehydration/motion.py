@@ -44,7 +44,8 @@ from .settings import Settings
 __all__ = ["Motion"]
 
 Fixed = NDArray[np.int32]
-Masses: TypeAlias = tuple[Layout, Fixed]
+#: The layout that holds them, the state that they were taken in, and whether they follow closely.
+Masses: TypeAlias = tuple[Layout, Fixed, bool]
 
 #: Factor on the scaled masses.
 _SAFETY = 2.0
@@ -147,12 +148,12 @@ class Motion:
 
     @property
     def masses(self) -> Masses:
-        """The masses, and the state that they were taken in; what follows depends on them as on state and velocity."""
-        return self.layout, self._weighed
+        """The masses and how they follow: what comes next depends on them as on state and velocity."""
+        return self.layout, self._weighed, self._closely
 
     @masses.setter
     def masses(self, masses: Masses) -> None:
-        self.layout, self._weighed = masses
+        self.layout, self._weighed, self._closely = masses
 
     def _follow(self, state: Fixed, velocity: Singles) -> int:
         """Take the masses anew if nodes have come far since the last time; return how many steps may be made now."""
@@ -243,8 +244,8 @@ class Motion:
         except Unstable:
             if self._closely:
                 raise
-            self._closely = True
             state[:], velocity[:], self.masses = begin
+            self._closely = True
             self._run(state, velocity, rest, count, a, b, damping)
 
     def _run(

@@ -11,6 +11,7 @@ from numpy.testing import assert_array_equal
 from solver.contract import Context, Unstable
 from solver.dehydration import DehydrationParams
 from solver.dehydration.motion import Motion
+from solver.dehydration.path import Path
 from solver.dehydration.settings import choose
 
 PARAMS = DehydrationParams.parse({"te": 0.2, "gamma": 3.0, "mirrors": "xyz"})
@@ -33,7 +34,7 @@ def test_what_leaves_the_finite_is_taken_again_with_masses_that_follow_closely(m
     def once(state, count, shrinkage):
         if not blown:
             blown.append(shrinkage)
-            state[:], velocity[:], motion.masses = 2**30, np.nan, (motion.layout, state)
+            state[:], velocity[:], motion.masses = 2**30, np.nan, (motion.layout, state, False)
             raise Unstable("left the finite", advice="")
         arrive(state, count, shrinkage)
 
@@ -47,6 +48,22 @@ def test_what_leaves_the_finite_is_taken_again_with_masses_that_follow_closely(m
     assert_array_equal(velocity, speed)
     assert motion.steps == STEPS
     assert motion._closely
+
+
+def test_a_stage_on_a_copy_leaves_the_march_as_it_was(monkeypatch):
+    """Masses that follow closely from there on would be another march's."""
+    path = Path(PARAMS, dataclasses.replace(choose(PARAMS, "preview"), n=6, start=0.0, rungs=(0.05,)), Context())
+    settle = path._settle
+
+    def blown(*args):
+        found = settle(*args)
+        path.motion._closely = True
+        return found
+
+    path.stage(0.01, 0.05)
+    monkeypatch.setattr(path, "_settle", blown)
+    path.stage(0.02, 0.05)
+    assert not path.motion._closely
 
 
 def test_what_leaves_the_finite_nevertheless_is_refused(monkeypatch):
