@@ -2,12 +2,12 @@
 
 Wrinkled skins bend over lengths of te, so what a mesh adds goes with the square of an element's edge h over te:
 
-    error = RATE (h / te)^2 + SCATTER (min(gamma, 30) / 10)^POWER
+    error = RATE (h / te)^2 + SCATTER (min(gamma, 35) / 10)^POWER
 
 The second is what single seeds differ by from their mean. Stiff skins have few and large facets, of which a seed
-decides where they stand: at gamma = 30 seeds differ by up to 18 % of their mean, at 10 by up to 6 %, at 50 not by more
-than at 30. Past the onset it is a statement on descriptors alone: the pattern itself is chaotic. The runs are kept in
-`benchmarks/results/dehydration-meshes.json` (version 10, whose skin bends with its full stiffness).
+decides where they stand: at gamma = 10 seeds differ by up to 6 % of their mean, at 30 by 11 %, at 50 by 17 %, where the
+worst of all runs is off by 38 %. Past the onset it is a statement on descriptors alone: the pattern itself is chaotic.
+The runs are kept in `benchmarks/results/dehydration-meshes.json`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .settings import choose, expected_cost
 
 __all__ = ["SCATTER", "expected_error", "of_mesh"]
 
-RATE, SCATTER, POWER, _SATURATED = 0.045, 0.067, 1.17, 30.0
+RATE, SCATTER, POWER, _SATURATED = 0.045, 0.067, 1.17, 35.0
 
 #: Where it was measured: te (0.02 at gamma = 10 alone, by version 5), gamma, the last stage, and the stone.
 _THICKNESS, _RATIO, _LAST, _STONE = (0.02, 0.04), (10.0, 50.0), 0.3, 0.4
