@@ -1,7 +1,7 @@
 """Shapes of one solver for runs of another that want only those: from the tables that come with wizen, in milliseconds.
 
-Solvers know no store: they ask through `Context.shape`. It is always these tables, which belong to the version, so that
-the same parameters give the same bytes wherever they are solved.
+Solvers know no store: they ask through `Context.shape`. It is always these tables, so that the same
+parameters give the same bytes wherever they are solved.
 """
 
 from __future__ import annotations

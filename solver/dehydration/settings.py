@@ -70,7 +70,7 @@ class _Quality:
 
 #: Shrinkages at which a path settles on its way. Where buckles come up the first decides their number (without the one
 #: at 0.05 stiff skins had a fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart, which
-#: saves up to a quarter of the steps. `fine` keeps them all.
+#: saves up to a third of the steps. `fine` keeps them all.
 _RUNGS = tuple(round(0.05 * k, 2) for k in range(1, 13))
 _WIDE = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 #: Skins and moduli for which rungs stand apart: others were not tried so.
@@ -100,8 +100,8 @@ _DAMPING, _SWING_DAMPING = 0.004, 0.0005
 #: Longest turns of swinging (at the same reference) and calming, and most steps that a stage may settle for.
 _SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 40_000
 #: Bulk over shear modulus that all qualities stand for, off by 1e-4 from incompressible in radius; and that steps are
-#: taken with. By 15 they were 1.4 times as long, but what balances at 1000 may be unstable at 15 while rest volumes
-#: stay (te = 0.02, gamma = 10 at preview, s = 0.15, and at 22 as well): it never settled.
+#: taken with. By 15 they are 1.4 times as long, but what balances at 1000 may be unstable at 15 while rest volumes
+#: stay: te = 0.02, gamma = 10 at default took four times the steps and did not settle (record dehydration-settling).
 _KAPPA, _MARCH_KAPPA = 1000.0, 30.0
 #: Thickness of the core layer at the interface, in wavelengths, and how fast layers grow inwards.
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
