@@ -290,9 +290,11 @@ class Motion:
             )
 
     def _ready(self, shrinkage: float, rest: Floats) -> Layout:
-        """Return the layout with the targets at `shrinkage` and the rest volumes; the last one made is kept."""
-        if self._made is None or self._made[0] is not rest or not self.drive.loading.uniform:
-            self._made = rest, rested(self.drive.loaded(self.layout, shrinkage), rest)
+        """Return the layout with the targets at `shrinkage` and the rest volumes, until the next is asked for."""
+        uniform = self.drive.loading.uniform
+        if self._made is None or self._made[0] is not rest or not uniform:
+            before = self._made[1] if self._made is not None and uniform else None
+            self._made = rest, rested(self.drive.loaded(self.layout, shrinkage), rest, before)
         planes = self._made[1]
         return dataclasses.replace(planes, mass=self.layout.mass, inverse_mass=self.layout.inverse_mass)
 

@@ -38,7 +38,7 @@ from ...arrays import Ints32, Singles
 from .data import ACTIVE, BINS, HELD, HITS, INLINE, LIVE, OPTIONS, PAIRS, READS, Contact, Single
 from .distance import edge_edge, gone, node_triangle
 
-__all__ = ["measure", "prepare", "push_apart", "resolve"]
+__all__ = ["depart", "measure", "near", "prepare", "push_apart", "resolve"]
 
 STIFFNESS = np.float32(1.0)
 """Of the 4 that a unit step carries, the masses leave 2 to contact."""
@@ -55,16 +55,17 @@ SURE = np.float32(0.98)
 """Share of what a pair may come nearer by without counting that is believed: the rest is for rounding."""
 
 
-@njit(**OPTIONS)
-def prepare(contact: Contact, x: Singles, v: Singles) -> int:
-    """Positions at the beginning of the step, before x moved by v, and the number of pairs near enough to `measure`."""
-    before, rows, counts = contact.before, contact.surface_nodes, contact.counts
-    reads, searched = contact.reads, contact.searched
-    counts[LIVE] = counts[ACTIVE] = counts[HITS] = counts[HELD] = 0
-    if counts[PAIRS] == 0:
-        return 0
+@njit(**INLINE)
+def depart(
+    before: Singles, searched: Singles, rows: Ints32, reads: Ints32, x: Singles, v: Singles, extremes: Singles,
+    share: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Positions of a share of the nodes at the beginning of the step, before x moved by v, and the extremes among them.
+
+    The arrays are those of `Contact` by the same names; the share is the entries `first` to `last` of `reads`.
+    """
     farthest = fastest = np.float32(0)
-    for place in range(counts[READS]):
+    for place in range(first, last):
         i = reads[place]
         square = speed = np.float32(0)
         for k in range(3):
@@ -72,10 +73,21 @@ def prepare(contact: Contact, x: Singles, v: Singles) -> int:
             square += (before[i, k] - searched[i, k]) ** 2
             speed += v[rows[i], k] ** 2
         farthest, fastest = max(farthest, square), max(fastest, speed)
+    extremes[share, 0], extremes[share, 1] = farthest, fastest
+
+
+@njit(**OPTIONS)
+def near(contact: Contact, shares: int) -> int:
+    """Number of pairs near enough to `measure`, once that many shares of the nodes have departed."""
+    counts, extremes = contact.counts, contact.extremes
+    counts[LIVE] = counts[ACTIVE] = counts[HITS] = counts[HELD] = 0
+    farthest = fastest = np.float32(0)
+    for share in range(shares):
+        farthest, fastest = max(farthest, extremes[share, 0]), max(fastest, extremes[share, 1])
     contact.moved[0], contact.moved[1] = np.sqrt(farthest), fastest
     # two nodes of a pair may both have come this far
-    near = contact.clearance + SLACK * contact.margin + np.float32(2) * contact.moved[0]
-    last = np.int64(near * np.float32(BINS) / (contact.clearance + contact.margin)) + 1
+    reach = contact.clearance + SLACK * contact.margin + np.float32(2) * contact.moved[0]
+    last = np.int64(reach * np.float32(BINS) / (contact.clearance + contact.margin)) + 1
     counts[LIVE] = contact.bins[last if last < BINS else BINS]
     return int(counts[LIVE])
 
@@ -244,6 +256,20 @@ def resolve(contact: Contact, x: Singles, v: Singles, minv: Singles) -> float:
     if counts[HELD] != 0:
         _hold(contact, x, v)
     return energy
+
+
+@njit(**OPTIONS)
+def prepare(contact: Contact, x: Singles, v: Singles) -> int:
+    """Positions at the beginning of the step, before x moved by v, and the number of pairs near enough to `measure`."""
+    counts = contact.counts
+    counts[LIVE] = counts[ACTIVE] = counts[HITS] = counts[HELD] = 0
+    if counts[PAIRS] == 0:
+        return 0
+    depart(
+        contact.before, contact.searched, contact.surface_nodes, contact.reads, x, v, contact.extremes, 0, 0,
+        counts[READS],
+    )  # fmt: skip
+    return int(near(contact, 1))
 
 
 @njit(**OPTIONS)

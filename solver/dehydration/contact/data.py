@@ -26,6 +26,8 @@ ENTRIES = 16
 BATCH, MEETINGS, PARTS = 1024, 16, 16
 """Pairs of triangles whose nodes are entered before their edges; room for pairs that a search meets, per triangle (a
 skin meets 8 of each); and parts of the cells that are gone through side by side."""
+SHARES = 16
+"""Shares of the nodes that a step looks at side by side."""
 AT_ONCE = 16
 """Entries of a cell that the search holds against another one at once."""
 BINS = 16
@@ -79,6 +81,7 @@ class Contact(NamedTuple):
     hits: Ints32  # (capacity,) live pairs that count
     hit_values: Singles  # (capacity, 2) stiffness and impulse
     moved: Singles  # (2,) farthest that a node has moved since the last search, and the square of the fastest speed
+    extremes: Singles  # (SHARES, 2) the squares of both, of each share of the nodes
     reads: Ints32  # (ns,) nodes that a step looks at: own ones and those in pairs
     counts: Ints  # (8,) PAIRS, NEEDED, ACTIVE, SEARCHES, HITS, LIVE, READS, HELD
 
@@ -137,6 +140,7 @@ def make_contact(
         load=np.zeros(ns, single),
         room=np.zeros(ns, single),
         moved=np.zeros(2, single),
+        extremes=np.zeros((SHARES, 2), single),
         reads=np.zeros(ns, integer),
         counts=np.zeros(8, np.int64),
         **_trusted(triangles, own_nodes, own_edges, origin),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import get_num_threads
 from numpy.typing import ArrayLike, DTypeLike
 
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
@@ -14,7 +15,7 @@ from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.fixed_point import positions as positions_of
 from solver.dehydration.kernel.masses import largest_stiffness
 from solver.dehydration.kernel.metric import element_planes, one_point_planes, refuse_inverted
-from solver.dehydration.kernel.strips import LANES, Strips, assembly_rows, build_strips
+from solver.dehydration.kernel.strips import LANES, Strips, assembly_rows, build_strips, group_order
 
 from ...arrays import Array, Bools, Floats, Ints, Ints32, Singles
 
@@ -65,6 +66,8 @@ class Layout:
     """(nodes + 1,): first entry of each node in ``rows``"""
     rows: Ints32
     """place of each contribution in the flat force rows, in the fixed order of summation"""
+    groups: Ints32
+    """(groups,): order in which groups of nodes are moved (see `strips.group_order`)"""
     inverse_mass: Singles
     """(nodes,): 1 / scaled mass, 0 where fixed"""
     core_elements: Ints
@@ -212,6 +215,7 @@ def build_layout(
         exocarp_planes=exocarp_planes,
         row_start=aligned_copy(row_start, np.int32),
         rows=aligned_copy(ROW * rows, np.int32),
+        groups=aligned_copy(group_order(row_start, rows, strips, get_num_threads()), np.int32),
         inverse_mass=aligned_copy(_inverse(mass, held), np.float32),
         core_elements=np.where(strips.core_real, strips.core, -1),
         exocarp_elements=np.where(strips.exocarp_real, strips.exocarp, -1),

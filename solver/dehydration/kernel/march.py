@@ -17,14 +17,13 @@ import numpy as np
 from numba import get_num_threads, njit, prange, set_num_threads, typeof, types
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from solver.dehydration.contact.contact import SLACK, measure
-from solver.dehydration.contact.data import PAIRS, make_contact
+from solver.dehydration.contact.contact import SLACK, measure, near
+from solver.dehydration.contact.data import PAIRS, SHARES, make_contact
 from solver.dehydration.contact.search import is_stale
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.generate.digest import source_digest
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
-from solver.dehydration.kernel.skin import Skin, approach, keep_apart, search, widen
-from solver.dehydration.kernel.strips import GROUP
+from solver.dehydration.kernel.skin import Skin, approach, give, keep_apart, search, widen
 
 from ...arrays import Array, Floats, Ints, Singles
 
@@ -76,6 +75,7 @@ _SIGNATURE = types.int64(
     types.int64,  # outermost core levels that are integrated fully
     _INDICES,  # row start
     _INDICES,  # rows
+    _INDICES,  # groups of nodes in the order in which they are moved
     _FLAT,  # inverse mass
     types.float64,  # theta at the start
     types.float64,  # theta at the end
@@ -102,17 +102,18 @@ def _build(stamp: int) -> Callable[..., int]:
     )
     def advance(
         steps: int, state: State, velocity: Singles, strips: Ints, face_offsets: State, core: Singles,
-        one_point: Singles, exocarp: Singles, full: int, row_start: State, rows: State, inverse_mass: Singles,
-        theta0: float, theta1: float, damping: float, forces: Singles, record: bool, squares: Singles,
-        planes: State, touching: bool, skin: Skin,
+        one_point: Singles, exocarp: Singles, full: int, row_start: State, rows: State, groups: State,
+        inverse_mass: Singles, theta0: float, theta1: float, damping: float, forces: Singles, record: bool,
+        squares: Singles, planes: State, touching: bool, skin: Skin,
     ) -> int:  # fmt: skip
         source = stamp  # noqa: F841  a captured cell is part of numba's cache key
         keep = np.float32((1 - damping / 2) / (1 + damping / 2))
         push = np.float32(1 / (1 + damping / 2))
-        # a parallel loop takes no tuples
         contact = skin.contact
         before, searched, candidates, apart = contact.before, contact.searched, contact.pairs, contact.apart
-        limits, values, weights = contact.limits, contact.values, contact.weights
+        limits, values, weights, counts = contact.limits, contact.values, contact.weights, contact.counts
+        reads, surface_nodes, extremes = contact.reads, contact.surface_nodes, contact.extremes
+        skin_rows, sign, own, position, speed = skin.rows, skin.sign, skin.own, skin.position, skin.velocity
         slack, clearance = SLACK * contact.margin, contact.clearance
         for step in range(steps):
             if touching and (step % SEARCH_EVERY == 0 or is_stale(contact)) and not search(skin, state, velocity):
@@ -124,21 +125,26 @@ def _build(stamp: int) -> Callable[..., int]:
                     theta, forces, record, squares,
                 )  # fmt: skip
             if not record:
-                for group in prange((inverse_mass.shape[0] + GROUP - 1) // GROUP):
-                    update_nodes(forces, row_start, rows, inverse_mass, state, velocity, keep, push, np.int64(group))
+                for turn in prange(groups.size):
+                    group = np.int64(groups[turn])
+                    update_nodes(forces, row_start, rows, inverse_mass, state, velocity, keep, push, group)
                 # a part's nodes on a mirror plane feel half of what balances across it
                 stay(planes, state, velocity)
-                if touching:
-                    pairs = approach(skin, state, velocity)
-                    if pairs:
-                        for pair in prange(pairs):
-                            measure(
-                                before, searched, candidates, apart, values, weights, limits, slack, clearance,
-                                np.int64(pair),
-                            )  # fmt: skip
-                    if contact.counts[PAIRS]:
-                        keep_apart(skin, state, velocity)
-                        stay(planes, state, velocity)
+                if touching and counts[PAIRS]:
+                    for share in prange(SHARES):
+                        approach(
+                            skin_rows, sign, position, speed, reads, counts, before, searched, surface_nodes, extremes,
+                            state, velocity, np.int64(share),
+                        )  # fmt: skip
+                    for pair in prange(near(contact, SHARES)):
+                        measure(
+                            before, searched, candidates, apart, values, weights, limits, slack, clearance,
+                            np.int64(pair),
+                        )  # fmt: skip
+                    if keep_apart(skin, state, velocity):
+                        for share in prange(SHARES):
+                            give(skin_rows, own, speed, reads, counts, state, velocity, np.int64(share))
+                    stay(planes, state, velocity)
         return steps
 
     compiled_loop: Callable[..., int] = advance
@@ -197,7 +203,8 @@ def _arrays(layout: Layout, one_point: bool) -> tuple[Any, ...]:
         raise ValueError("this layout was built without the one-point core; build it with one_point=True")
     return (
         layout.strips, layout.face_offsets, layout.core_planes, layout.one_point_planes, layout.exocarp_planes,
-        layout.full_levels if one_point else ALL, layout.row_start, layout.rows, layout.inverse_mass,
+        layout.full_levels if one_point else ALL, layout.row_start, layout.rows,
+        layout.groups, layout.inverse_mass,
     )  # fmt: skip
 
 

@@ -8,13 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from solver.dehydration.contact.contact import prepare, resolve
-from solver.dehydration.contact.data import HELD, HITS, PAIRS, READS, Contact, grow, make_contact
+from solver.dehydration.contact.contact import depart, resolve
+from solver.dehydration.contact.data import HELD, HITS, READS, SHARES, Contact, grow, make_contact
 from solver.dehydration.contact.search import find_pairs
 from solver.dehydration.kernel.fixed_point import QUANTUM, positions
 from solver.dehydration.kernel.layout import Layout
 
-from ...arrays import Bools, Ints32, Singles
+from ...arrays import Bools, Ints, Ints32, Singles
 
 OPTIONS: Any = {"error_model": "numpy"}
 """No cache of their own: numba would keep what they inline from other files. The loop that calls them is cached."""
@@ -116,16 +116,19 @@ def search(skin: Skin, state: Ints32, velocity: Singles) -> bool:
     return bool(find_pairs(skin.contact, skin.position) <= skin.contact.pairs.shape[0])
 
 
-@njit(**OPTIONS)
-def approach(skin: Skin, state: Ints32, velocity: Singles) -> int:
-    """Read the nodes that may touch after the step just made; returns how many pairs there are to `measure`."""
-    contact = skin.contact
-    if contact.counts[PAIRS] == 0:
-        return 0
-    rows, sign, position, speed, reads = skin.rows, skin.sign, skin.position, skin.velocity, contact.reads
-    for place in range(contact.counts[READS]):
+@njit(**OPTIONS, forceinline=True)
+def approach(
+    rows: Ints32, sign: Singles, position: Singles, speed: Singles, reads: Ints32, counts: Ints, before: Singles,
+    searched: Singles, surface_nodes: Ints32, extremes: Singles, state: Ints32, velocity: Singles, share: int,
+) -> None:  # fmt: skip
+    """Read a share of the nodes that may touch, after the step just made.
+
+    The arrays are those of `Skin` and `Contact` by the same names: a parallel loop takes no tuples.
+    """
+    first, last = share * counts[READS] // SHARES, (share + 1) * counts[READS] // SHARES
+    for place in range(first, last):
         _read_node(rows, sign, position, speed, state, velocity, reads[place])
-    return int(prepare(contact, skin.position, skin.velocity))
+    depart(before, searched, surface_nodes, reads, position, speed, extremes, share, first, last)
 
 
 @njit(**OPTIONS, forceinline=True)
@@ -141,18 +144,29 @@ def _write_node(rows: Ints32, own: Bools, speed: Singles, state: Ints32, velocit
             state[first + k] += np.int32(np.rint(push * QUANTA))
 
 
+@njit(**OPTIONS, forceinline=True)
+def give(
+    rows: Ints32, own: Bools, speed: Singles, reads: Ints32, counts: Ints, state: Ints32, velocity: Singles, share: int
+) -> None:
+    """Give the fruit what contact has changed of a share of the nodes; arguments as in `approach`."""
+    for place in range(share * counts[READS] // SHARES, (share + 1) * counts[READS] // SHARES):
+        _write_node(rows, own, speed, state, velocity, reads[place])
+
+
 @njit(**OPTIONS)
-def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> None:
-    """Push touching skin apart in the step just made."""
+def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> bool:
+    """Push touching skin apart in the step just made; returns whether each share is still to `give` it to the fruit.
+
+    Few pushes are given here. Many share their nodes, and each node is looked at once at less cost.
+    """
     contact = skin.contact
     resolve(contact, skin.position, skin.velocity, skin.inverse_mass)
-    rows, own, speed, reads, counts = skin.rows, skin.own, skin.velocity, contact.reads, contact.counts
+    rows, own, speed, counts = skin.rows, skin.own, skin.velocity, contact.counts
     pairs, hits, forces = contact.pairs, contact.hits, contact.hit_values
-    if counts[HELD] != 0:
-        for place in range(counts[READS]):
-            _write_node(rows, own, speed, state, velocity, reads[place])
-        return
+    if counts[HELD] != 0 or 4 * counts[HITS] > counts[READS]:
+        return True
     for h in range(counts[HITS]):
         if forces[h, 1] != 0:
             for k in range(4):
                 _write_node(rows, own, speed, state, velocity, pairs[hits[h], k])
+    return False
