@@ -41,28 +41,33 @@ def _cells(boxes: Singles, t: int, i: int, grown: Single, cell: Single) -> tuple
 
 
 @njit(**OPTIONS)
-def sort_into_cells(boxes: Singles, grown: Single, cell: Single, keys: Ints, order: Ints32, starts: Ints32) -> Single:
+def sort_into_cells(
+    boxes: Singles, grown: Single, cell: Single, keys: Ints, order: Ints32, starts: Ints32, entered: Ints32
+) -> Single:
     """Enter each triangle's box, grown, into every cell it overlaps; equal input gives equal order.
 
     A counting sort by hashed cell fills `order` (entries,) with triangles and `keys` with their cells; `starts` holds
     the first entry of each bucket. Cells widen until the entries fit, so that a few stretched triangles cost memory
-    nowhere. Returns the width of the cells.
+    nowhere. `entered` (nt,) is scratch. Returns the width of the cells.
     """
     buckets = starts.size - 1
     while True:
-        entries = 0
+        entries = count = 0
         for t in range(boxes.shape[0]):
             block = 1
             for i in range(3):
                 first, last = _cells(boxes, t, i, grown, cell)
                 block *= last - first + 1
             entries += block
+            entered[count] = t
+            count += block > 0
         if entries <= order.size:
             break
         cell *= np.float32(1.5)
     starts[:] = 0
     for filling in range(2):
-        for t in range(boxes.shape[0]):
+        for place in range(count):
+            t = entered[place]
             i0, i1 = _cells(boxes, t, 0, grown, cell)
             j0, j1 = _cells(boxes, t, 1, grown, cell)
             k0, k1 = _cells(boxes, t, 2, grown, cell)

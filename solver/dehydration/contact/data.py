@@ -47,6 +47,7 @@ class Contact(NamedTuple):
     own_edges: Ints32  # (nt, 3, 2) ends of the edges that it answers for, each edge once; -1: another one does
     source: Ints32  # (ns,) node that this one is a mirror image of; itself where it is none
     around: Ints32  # (na, 7) pairs of triangles around a node, and two features of theirs: four nodes, kind
+    bending: Ints32  # (nb,) triangles that are in `around`; the others, images far from the part, do nothing to another
     least: Singles  # (nt,) distance of those to the nearest around it, of the features named above, at `looked`
     looked: Singles  # (ns, 3) positions when `least` was measured
     bent: Singles  # (nt, 2) how far corners have come against each other since, its own and those of any around it
@@ -62,6 +63,7 @@ class Contact(NamedTuple):
     boxes: Singles  # (nt, 6) least and largest coordinates at the last search
     keys: Ints  # (ENTRIES nt,) cell of each entry
     order: Ints32  # (ENTRIES nt,) triangle of each entry, sorted by bucket
+    entered: Ints32  # (nt,) scratch: triangles that have entries
     starts: Ints32  # (buckets + 1,) first of each bucket in `order`; buckets is a power of two
     sides: Singles  # (6, ENTRIES nt + AT_ONCE) both corners of the box of each entry, see `cells.spread`
     marks: Ints32  # (3, ENTRIES nt + AT_ONCE) its cell, and in which directions that is the triangle's first
@@ -127,15 +129,9 @@ def make_contact(
         size=single(h),
         searched=np.full((ns, 3), 1e15, single),
         before=np.zeros((ns, 3), single),
-        boxes=np.zeros((nt, 6), single),
-        sides=np.zeros((6, ENTRIES * nt + AT_ONCE), single),
-        marks=np.zeros((3, ENTRIES * nt + AT_ONCE), integer),
         met=np.zeros((meetings, 2), integer),
         met_by_part=np.zeros(PARTS, np.int64),
         near=np.zeros(meetings, integer),
-        keys=np.zeros(ENTRIES * nt, np.int64),
-        order=np.zeros(ENTRIES * nt, integer),
-        starts=np.zeros((1 << int(2 * nt - 1).bit_length()) + 1, integer),
         bins=np.zeros(BINS + 1, np.int64),
         load=np.zeros(ns, single),
         room=np.zeros(ns, single),
@@ -143,20 +139,37 @@ def make_contact(
         extremes=np.zeros((SHARES, 2), single),
         reads=np.zeros(ns, integer),
         counts=np.zeros(8, np.int64),
+        **_cells(nt),
         **_trusted(triangles, own_nodes, own_edges, origin),
         **_room(pairs),
     )
 
 
+def _cells(nt: int) -> dict[str, Any]:
+    """The arrays that sort triangles into cells."""
+    integer = np.int32
+    return {
+        "boxes": np.zeros((nt, 6), np.float32),
+        "sides": np.zeros((6, ENTRIES * nt + AT_ONCE), np.float32),
+        "marks": np.zeros((3, ENTRIES * nt + AT_ONCE), integer),
+        "keys": np.zeros(ENTRIES * nt, np.int64),
+        "order": np.zeros(ENTRIES * nt, integer),
+        "entered": np.zeros(nt, integer),
+        "starts": np.zeros((1 << int(2 * nt - 1).bit_length()) + 1, integer),
+    }
+
+
 def _trusted(triangles: Ints32, own_nodes: Ints32, own_edges: Ints32, source: Ints32) -> dict[str, Any]:
     """The arrays that say which neighbours need no look."""
     nt = len(triangles)
+    around = neighbours(triangles, own_nodes, own_edges, source)
     return {
-        "around": neighbours(triangles, own_nodes, own_edges, source),
+        "around": around,
+        "bending": np.unique(around[:, :2]).astype(np.int32),
         "least": np.zeros(nt, np.float32),
         "looked": np.full((len(source), 3), 1e15, np.float32),
         "bent": np.zeros((nt, 2), np.float32),
-        "sure": np.zeros(nt, np.bool_),
+        "sure": np.ones(nt, np.bool_),
         "doubts": np.zeros(2, np.int64),
     }
 

@@ -58,44 +58,46 @@ def farthest_moved(contact: Contact, x: Singles) -> Single:
     return found
 
 
-@njit(**OPTIONS)
-def gentlest(contact: Contact) -> Single:
+@njit(parallel=True, **OPTIONS)
+def gentlest(x: Singles, corners: Ints32, ellipsoid: Singles) -> Single:
     """Smallest cosine between a triangle's normal and the normal of the rest ellipsoid through its centre.
 
     Points that touch share that ellipsoid normal, so where every cosine is above GENTLE no two of them can face each
-    other: an unfolded skin is recognised without a search.
+    other: an unfolded skin is recognised without a search. x, corners, ellipsoid: `searched`, `triangles` and
+    `ellipsoid` of the contact.
     """
-    x, corners = contact.searched, contact.triangles
-    least = np.float32(1)
-    centre, scale = contact.ellipsoid[0], contact.ellipsoid[1]
-    third = np.float32(1 / 3)
-    for q in range(corners.shape[0]):
-        a, b, c = corners[q, 0], corners[q, 1], corners[q, 2]
-        nx = (x[b, 1] - x[a, 1]) * (x[c, 2] - x[a, 2]) - (x[b, 2] - x[a, 2]) * (x[c, 1] - x[a, 1])
-        ny = (x[b, 2] - x[a, 2]) * (x[c, 0] - x[a, 0]) - (x[b, 0] - x[a, 0]) * (x[c, 2] - x[a, 2])
-        nz = (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
-        inverse = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-30))
-        dx = third * (x[a, 0] + x[b, 0] + x[c, 0]) - centre[0]
-        dy = third * (x[a, 1] + x[b, 1] + x[c, 1]) - centre[1]
-        dz = third * (x[a, 2] + x[b, 2] + x[c, 2]) - centre[2]
-        ex, ey, ez = dx * scale[0], dy * scale[1], dz * scale[2]
-        square, level = ex * ex + ey * ey + ez * ez, dx * ex + dy * ey + dz * ez
-        dot = (ex * nx + ey * ny + ez * nz) * inverse
-        # near the centre the ellipsoid's normal turns within an element: no statement possible there
-        least = min(least, dot / np.sqrt(square + np.float32(1e-30))) if level > 0.04 else np.float32(-1)
-    return least
+    centre, scale = ellipsoid[0], ellipsoid[1]
+    parts, third = np.empty(PARTS, np.float32), np.float32(1 / 3)
+    for part in prange(PARTS):
+        least = np.float32(1)
+        for q in range(part * corners.shape[0] // PARTS, (part + 1) * corners.shape[0] // PARTS):
+            a, b, c = corners[q, 0], corners[q, 1], corners[q, 2]
+            nx = (x[b, 1] - x[a, 1]) * (x[c, 2] - x[a, 2]) - (x[b, 2] - x[a, 2]) * (x[c, 1] - x[a, 1])
+            ny = (x[b, 2] - x[a, 2]) * (x[c, 0] - x[a, 0]) - (x[b, 0] - x[a, 0]) * (x[c, 2] - x[a, 2])
+            nz = (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
+            inverse = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-30))
+            dx = third * (x[a, 0] + x[b, 0] + x[c, 0]) - centre[0]
+            dy = third * (x[a, 1] + x[b, 1] + x[c, 1]) - centre[1]
+            dz = third * (x[a, 2] + x[b, 2] + x[c, 2]) - centre[2]
+            ex, ey, ez = dx * scale[0], dy * scale[1], dz * scale[2]
+            square, level = ex * ex + ey * ey + ez * ez, dx * ex + dy * ey + dz * ez
+            dot = (ex * nx + ey * ny + ez * nz) * inverse
+            # near the centre the ellipsoid's normal turns within an element: no statement possible there
+            least = min(least, dot / np.sqrt(square + np.float32(1e-30))) if level > 0.04 else np.float32(-1)
+        parts[part] = least
+    found: Single = parts.min()
+    return found
 
 
-@njit(**OPTIONS)
-def _enclose(contact: Contact, reach: Single) -> None:
+@njit(parallel=True, **OPTIONS)
+def _enclose(x: Singles, triangles: Ints32, source: Ints32, reach: Single, boxes: Singles) -> None:
     """Boxes of the triangles; one out of reach of all nodes that are nobody's image gets none."""
-    x, boxes, source, triangles = contact.searched, contact.boxes, contact.source, contact.triangles
     low, high = np.full(3, np.float32(np.inf)), np.full(3, np.float32(-np.inf))
     for i in range(x.shape[0]):
         if source[i] == i:
             for k in range(3):
                 low[k], high[k] = min(low[k], x[i, k] - reach), max(high[k], x[i, k] + reach)
-    for t in range(boxes.shape[0]):
+    for t in prange(boxes.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         near = True
         for k in range(3):
@@ -108,22 +110,28 @@ def _enclose(contact: Contact, reach: Single) -> None:
 
 
 @njit(**INLINE)
-def _enter(
-    rest: Singles, clearance: Single, found: Ints32, away: Singles, place: int, a: int, b: int, c: int, d: int,
-    kind: int, distance: Single, out: Singles,
-) -> int:  # fmt: skip
-    """Enter a pair at `place` if there is room, node a and triangle b c d or edges a b and c d; returns the next place.
-
-    What was near in the fresh fruit keeps less than the clearance.
-    """
+def _enter(found: Ints32, place: int, a: int, b: int, c: int, d: int, kind: int) -> int:
+    """Enter a pair at `place` if there is room: node a and triangle b c d, or edges a b and c d. Returns the next."""
     if place < found.shape[0]:
-        if kind == 0:
-            node_triangle(rest, a, b, c, d, out)
-        else:
-            edge_edge(rest, a, b, c, d, out)
         found[place, 0], found[place, 1], found[place, 2], found[place, 3], found[place, 4] = a, b, c, d, kind
-        away[place, 0], away[place, 1] = distance, min(clearance, OPENING * out[7])
     return place + 1
+
+
+@njit(parallel=True, **OPTIONS)
+def _hold_apart(x: Singles, rest: Singles, clearance: Single, found: Ints32, away: Singles, count: int) -> None:
+    """Distance and clearance of the first `count` pairs; what was near in the fresh fruit keeps less of it."""
+    for part in prange((count + BATCH - 1) // BATCH):
+        out = np.empty(8, np.float32)
+        for i in range(part * BATCH, min((part + 1) * BATCH, count)):
+            a, b, c, d = found[i, 0], found[i, 1], found[i, 2], found[i, 3]
+            if found[i, 4] == 0:
+                away[i, 0] = node_triangle(x, a, b, c, d, out)
+                node_triangle(rest, a, b, c, d, out)
+            else:
+                edge_edge(x, a, b, c, d, out)
+                away[i, 0] = out[7]
+                edge_edge(rest, a, b, c, d, out)
+            away[i, 1] = min(clearance, OPENING * out[7])
 
 
 @njit(**INLINE)
@@ -234,11 +242,11 @@ def _look(
 
 
 @njit(**OPTIONS)
-def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
+def _take_in(contact: Contact, count: int, reach: Single) -> None:
     """Enter all pairs of features in reach that the first `count` pairs of triangles met answer for."""
     triangles, x, met, near = contact.triangles, contact.searched, contact.met, contact.near
     own_nodes, own_edges = contact.own_nodes, contact.own_edges
-    rest, clearance, found, away = contact.rest, contact.clearance, contact.found, contact.away
+    found = contact.found
     _look(met, near, count, triangles, own_nodes, own_edges, contact.boxes, x, contact.source, contact.sure, reach)
     place = contact.counts[NEEDED]
     for first in range(0, count, BATCH):
@@ -251,9 +259,7 @@ def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
             b, c, d = triangles[theirs, 0], triangles[theirs, 1], triangles[theirs, 2]
             for i in range(3):
                 if bits >> i & 1:
-                    a = own_nodes[mine, i]
-                    distance = node_triangle(x, a, b, c, d, out)
-                    place = _enter(rest, clearance, found, away, place, a, b, c, d, 0, distance, out)
+                    place = _enter(found, place, own_nodes[mine, i], b, c, d, 0)
         for m in range(first, last):
             bits = near[m] >> 6
             if bits == 0:
@@ -263,8 +269,7 @@ def _take_in(contact: Contact, count: int, reach: Single, out: Singles) -> None:
                 for j in range(3):
                     if bits >> (3 * i + j) & 1:
                         a, b, c, d = own_edges[t, i, 0], own_edges[t, i, 1], own_edges[u, j, 0], own_edges[u, j, 1]
-                        edge_edge(x, a, b, c, d, out)
-                        place = _enter(rest, clearance, found, away, place, a, b, c, d, 1, out[7], out)
+                        place = _enter(found, place, a, b, c, d, 1)
     contact.counts[NEEDED] = place
 
 
@@ -296,7 +301,7 @@ def _visit(contact: Contact, reach: Single, cell: Single) -> None:
     """Go through all pairs of triangles in reach and take in their features, in the order of the cells."""
     order, starts, met, counts = contact.order, contact.starts, contact.met, contact.met_by_part
     sides, marks, room = contact.sides, contact.marks, contact.met.shape[0]
-    out, half, entries = np.zeros(8, np.float32), np.float32(0.5) * reach, starts[starts.size - 1]
+    half, entries = np.float32(0.5) * reach, starts[starts.size - 1]
     spread(contact.boxes, reach, half, cell, contact.keys, order, entries, sides, marks)
     _meet(order, starts, sides, marks, met, counts)
     count = 0
@@ -317,9 +322,9 @@ def _visit(contact: Contact, reach: Single, cell: Single) -> None:
                         bits &= bits - 1
                         count += 1
                         if count == room:
-                            _take_in(contact, count, reach, out)
+                            _take_in(contact, count, reach)
                             count = 0
-    _take_in(contact, count, reach, out)
+    _take_in(contact, count, reach)
 
 
 @njit(**OPTIONS)
@@ -380,16 +385,17 @@ def find_pairs(contact: Contact, x: Singles) -> int:
             finite &= abs(contact.searched[i, k]) < np.float32(1e6)
     counts[PAIRS] = counts[NEEDED] = counts[HITS] = counts[LIVE] = counts[READS] = 0
     contact.moved[0] = 0
-    if not finite or gentlest(contact) > GENTLE:
+    if not finite or gentlest(contact.searched, contact.triangles, contact.ellipsoid) > GENTLE:
         return int(counts[NEEDED])
     counts[SEARCHES] += 1
     reach = contact.clearance + contact.margin
     half = np.float32(0.5) * reach
-    _enclose(contact, reach)
+    _enclose(contact.searched, contact.triangles, contact.source, reach, contact.boxes)
     trust(contact, reach)
     cell = contact.size + reach
-    cell = sort_into_cells(contact.boxes, half, cell, contact.keys, contact.order, contact.starts)
+    cell = sort_into_cells(contact.boxes, half, cell, contact.keys, contact.order, contact.starts, contact.entered)
     _visit(contact, reach, cell)
     counts[PAIRS] = min(counts[NEEDED], contact.pairs.shape[0])
+    _hold_apart(contact.searched, contact.rest, contact.clearance, contact.found, contact.away, counts[PAIRS])
     _sort_by_distance(contact, reach)
     return int(counts[NEEDED])

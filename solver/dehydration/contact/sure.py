@@ -27,8 +27,9 @@ MORE = 16
 def _judge(contact: Contact, reach: Single) -> int:
     """Fill `sure` at positions `searched`, and return how many triangles are not."""
     x, looked, triangles, around = contact.searched, contact.looked, contact.triangles, contact.around
-    bent, least, sure = contact.bent, contact.least, contact.sure
-    for t in range(triangles.shape[0]):
+    bent, least, sure, bending = contact.bent, contact.least, contact.sure, contact.bending
+    for i in range(bending.size):
+        t = bending[i]
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         most = max(gone(x, looked, a, b), gone(x, looked, b, c), gone(x, looked, c, a))
         bent[t, 0] = np.sqrt(most)
@@ -37,7 +38,8 @@ def _judge(contact: Contact, reach: Single) -> int:
         t, u = around[i, 0], around[i, 1]
         bent[t, 1], bent[u, 1] = max(bent[t, 1], bent[u, 0]), max(bent[u, 1], bent[t, 0])
     doubts = 0
-    for t in range(triangles.shape[0]):
+    for i in range(bending.size):
+        t = bending[i]
         sure[t] = (least[t] - bent[t, 0] - bent[t, 1]) * ROUNDING > reach
         doubts += not sure[t]
     return doubts

@@ -41,7 +41,7 @@ def test_grid_and_tree_meet_the_same_pairs():
     boxes, reach = np.concatenate([low, high], axis=1).astype(np.float32), np.float32(0.125)
     entries, found = 64 * len(boxes), np.zeros((200 * len(boxes), 2), np.int64)
     keys, order, starts = np.zeros(entries, np.int64), np.zeros(entries, np.int32), np.zeros(4097, np.int32)
-    cell = sort_into_cells(boxes, reach / 2, np.float32(0.25), keys, order, starts)
+    cell = sort_into_cells(boxes, reach / 2, np.float32(0.25), keys, order, starts, np.empty(len(boxes), np.int32))
     grid = found[: _met(boxes, reach, cell, keys, order, starts, found)]
     tree = np.sort(touching(low - 0.0625, high + 0.0625), axis=1)
     assert len(grid) > 5 * len(boxes)
