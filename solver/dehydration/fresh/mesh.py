@@ -52,6 +52,7 @@ _FACES = np.array(
 
 #: Radius of the ball cut out of a fruit without a stone, in units of r1, and its largest share of the thinnest ray.
 CENTRE_BALL, CENTRE_SHARE = 0.1, 0.4
+_AT_A_TIME = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,12 +159,15 @@ def corner_ratios(positions: Floats, connectivity: Ints) -> Floats:
 
     positions (nn, 3), connectivity (ne, 8) with bits xi = 4, eta = 2, zeta = 1.
     """
-    corners = positions[connectivity]
-    jacobians = np.empty(corners.shape[:2])
-    for c in range(8):
-        # the neighbour along each axis differs in one bit; the sign turns the edge to point along the axis
-        edges = [(corners[:, c ^ bit] - corners[:, c]) * (-1 if c & bit else 1) for bit in (4, 2, 1)]
-        jacobians[:, c] = np.einsum("ei,ei->e", np.cross(edges[0], edges[1]), edges[2])
+    jacobians = np.empty((len(connectivity), 8))
+    # so many at a time that all of it stays in the cache
+    for first in range(0, len(connectivity), _AT_A_TIME):
+        part = slice(first, first + _AT_A_TIME)
+        corners = positions[connectivity[part]]
+        for c in range(8):
+            # the neighbour along each axis differs in one bit; the sign turns the edge to point along the axis
+            edges = [(corners[:, c ^ bit] - corners[:, c]) * (-1 if c & bit else 1) for bit in (4, 2, 1)]
+            jacobians[part, c] = np.einsum("ei,ei->e", np.cross(edges[0], edges[1]), edges[2])
     ratios: Floats = jacobians.min(axis=1) / np.abs(jacobians).max(axis=1)
     return ratios
 
