@@ -50,7 +50,12 @@ def folded() -> Use:
     return _run((0.2,), te=0.04, gamma=10.0)
 
 
-USES = (eighth, thick, whole, folded)
+def thin() -> Use:
+    """An eighth at te .02 to s = .3, which folds much."""
+    return _run((0.1, 0.15, 0.2, 0.3), te=0.02, gamma=10.0, mirrors="xyz")
+
+
+USES = (eighth, thick, whole, folded, thin)
 
 
 if __name__ == "__main__":

@@ -144,8 +144,8 @@ def _budget() -> None:
         searching = min(budget.searches * float(np.mean(budget.search)), contact) if budget.search else 0.0
         parts = {
             "forces and nodes": (budget.steps, budget.seconds - contact, "yes"),
-            "contact: searches": (budget.searches, searching, "two thirds"),
-            "contact: steps": (budget.steps, contact - searching, "its distances"),
+            "contact: searches": (budget.searches, searching, "most"),
+            "contact: steps": (budget.steps, contact - searching, "but for pushes"),
         }
         for name, (file, function, threads) in OTHERS.items():
             rows = [r for (path, _, called), r in calls.items() if path.endswith(file) and called == function]
