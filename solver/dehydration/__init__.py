@@ -47,8 +47,8 @@ def _spin_a_while() -> None:
     """Let OpenMP's threads spin for some 0.1 ms while they wait, as long as one thread's own work in a step takes.
 
     Read once, when the first parallel loop starts. On idle cores threads that sleep after a third of that, and are
-    woken in each step, make an eighth at te 0.02 take 1.3 times as long. Spinning on, as is OpenMP's way, makes two runs
-    on the same two cores take 3.7 times as long as if they slept so early; this, 1.2 times.
+    woken in each step, make an eighth at te 0.02 take 1.3 times as long. Spinning on, as is OpenMP's way, makes two
+    runs on the same two cores take 3.7 times as long as if they slept so early; this, 1.2 times.
     """
     os.environ.setdefault("GOMP_SPINCOUNT", "3000")
 

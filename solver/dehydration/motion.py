@@ -22,6 +22,7 @@ from .kernel import (
     element_report,
     forget,
     internal_force,
+    least_ratios,
     make_skin,
     march,
     new_state,
@@ -303,22 +304,21 @@ class Motion:
         layout = self._ready(shrinkage, rest)
         return float(element_report(layout, state, 1 - shrinkage, one_point=True).energy.sum())
 
-    def strained(self, state: Fixed, rest: Floats, shrinkage: float) -> tuple[float, float]:
-        """Return the strain energy of the part [mu r1^3], of flesh, whose bulk modulus is not the march's, and the
-        least J/Jd of all integration points, which no rest volume changes.
+    def strained(
+        self, state: Fixed, rest: Floats, shrinkage: float, with_energy: bool = True
+    ) -> tuple[float | None, float]:
+        """Return the strain energy of the whole fruit [mu r1^3], where it is asked for, of flesh whose bulk modulus is
+        not the march's, and the least J/Jd of all integration points, which no rest volume changes.
         """
         theta, settings = 1 - shrinkage, self.settings
         loaded = self.drive.loaded(self.layout, shrinkage)
+        if not with_energy:
+            return None, float(least_ratios(loaded, state, theta).min())
         sheared = element_report(without_bulk(loaded), state, theta, one_point=True)
         dilatation = dilatations(self._ready(shrinkage, rest), state, theta)
         share = settings.march_kappa_ratio / settings.kappa_ratio
         energy = float((sheared.energy + pressure_energy(loaded, dilatation, theta, share)).sum())
-        return energy, float(sheared.least_ratio.min())
-
-    def least_ratio(self, state: Fixed, shrinkage: float) -> float:
-        """Return the least J/Jd of all integration points, as `strained` does."""
-        loaded = self.drive.loaded(self.layout, shrinkage)
-        return float(element_report(loaded, state, 1 - shrinkage).least_ratio.min())
+        return self.sector.copies * energy, float(sheared.least_ratio.min())
 
     def residual(self, state: Fixed, rest: Floats, shrinkage: float, damping: float) -> float:
         """Return the out-of-balance force, contact included: what one step from rest does to the momentum.

@@ -41,9 +41,15 @@ class Path:
     """One fruit's way from fresh to dry."""
 
     def __init__(
-        self, params: DehydrationParams, settings: Settings, context: Context, *, with_release: bool = False
+        self,
+        params: DehydrationParams,
+        settings: Settings,
+        context: Context,
+        *,
+        with_release: bool = False,
+        with_energy: bool = True,
     ) -> None:
-        self._with_release = with_release
+        self._asked = with_release, with_energy
         self._settings, self._context = settings, context
         self.motion = Motion(params, settings, context)
         self._rest = self.motion.rest
@@ -136,7 +142,7 @@ class Path:
         def smooth(state: Fixed) -> bool:
             return self._may_be_smooth(state, shrinkage)
 
-        return settle(self.motion, state, velocity, rest, shrinkage, self._with_release, smooth)
+        return settle(self.motion, state, velocity, rest, shrinkage, *self._asked, smooth)
 
     def _may_be_smooth(self, state: Fixed, shrinkage: float) -> bool:
         """Whether a state may have no buckles yet: of a sphere one sees it, of another fruit the shrinkage tells."""

@@ -86,15 +86,12 @@ def relax(
     placed = sector.whole(motion.surface(state))
     began = motion.residual(state, rest, stage, _FREE_DAMPING)
     rest, residual, drift = _balance(motion, state, velocity, rest, stage, steps or _MOST, context)
-    if "strain_energy" in need.fields:
-        energy, least = motion.strained(state, rest, stage)
-    else:
-        energy, least = 0.0, motion.least_ratio(state, stage)  # a quarter less of what comes after the steps
+    energy, least = motion.strained(state, rest, stage, "strain_energy" in need.fields)
     if least <= 0:
         raise Unstable("elements turned inside out.", advice="Run it from the start.", residual=residual)
     whole = sector.whole(motion.surface(state))
     way = drift / params.exocarp_thickness
-    found = State(whole, stage, residual, way, motion.steps, least, sector.copies * energy, rest)
+    found = State(whole, stage, residual, way, motion.steps, least, energy, rest)
     record = Record(params, need, motion.mesh, begin)
     record.add(found, residual <= RESIDUAL)
     attrs = {"path": "relaxed", "elements": motion.elements, "residual_limit": RESIDUAL, "unit_of_length": "r1"}

@@ -129,7 +129,8 @@ def run(params: DehydrationParams, need: Need, context: Context) -> xr.Dataset:
     loading.check(need.stages[-1])
     settings = choose(params, need.quality, need.stages[-1])
     context.report(0.0, f"meshing {settings.elements} elements")
-    path = Path(params, settings, context, with_release="released_energy" in need.fields)
+    released, strained = ("released_energy" in need.fields, "strain_energy" in need.fields)
+    path = Path(params, settings, context, with_release=released, with_energy=strained)
     record = Record(params, need, path.mesh)
     last = need.stages[-1]
     attrs = {

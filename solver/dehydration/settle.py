@@ -61,7 +61,7 @@ class State:
     residual: out-of-balance force over internal force or, if larger, by how much rest volumes lag (rms), which relaxed
     shapes leave out. drift: rms motion of the surface in 200 steps, by the last that were looked at, in exocarp
     thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy in mu r1^3, and released: by
-    how much settling lowered it, where that was asked for. rest: rest volumes (ne,) of the elements, which go with
+    how much settling lowered it, where they were asked for. rest: rest volumes (ne,) of the elements, which go with
     their pressures.
     """
 
@@ -71,7 +71,7 @@ class State:
     drift: float
     steps: int
     least_ratio: float
-    energy: float
+    energy: float | None
     rest: Floats
     released: float | None = None
 
@@ -83,6 +83,7 @@ def settle(
     rest: Floats,
     shrinkage: float,
     with_release: bool = False,
+    with_energy: bool = True,
     smooth: Callable[[Fixed], bool] | None = None,
 ) -> State:
     """Hold the shrinkage until forces balance *and* the surface has come to rest.
@@ -115,13 +116,12 @@ def settle(
         whole = motion.sector.whole(surface)
         # free of stress: nothing to settle
         return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, rest, 0.0)
-    copies = motion.sector.copies
     arrived = state.copy() if with_release else None
     rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
     looked_at = smooth is not None and spent < settings.settle_steps and smooth(state)
     if looked_at and _leaves(motion, state, velocity, rest, shrinkage):
         rest, _, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
-    strained, least = motion.strained(state, rest, shrinkage)
+    energy, least = motion.strained(state, rest, shrinkage, with_energy)
     if least <= 0:
         raise Unstable(
             f"elements turned inside out at shrinkage s = {shrinkage:.3f} (least J {least:.2f}).",
@@ -132,9 +132,9 @@ def settle(
     if arrived is not None:
         # under the same rest volumes: energies under others do not compare
         before, after = (motion.marched_energy(each, rest, shrinkage) for each in (arrived, state))
-        released = copies * (before - after)
+        released = motion.sector.copies * (before - after)
     whole = motion.sector.whole(motion.surface(state))
-    return State(whole, shrinkage, residual, drift, motion.steps, least, copies * strained, rest, released)
+    return State(whole, shrinkage, residual, drift, motion.steps, least, energy, rest, released)
 
 
 def _come_to_rest(

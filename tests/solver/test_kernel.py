@@ -13,6 +13,7 @@ from solver.dehydration.kernel import (
     build_layout,
     element_report,
     internal_force,
+    least_ratios,
     march,
     new_state,
     positions,
@@ -173,3 +174,10 @@ def test_misuse_is_refused():
         march(layout, state, velocity.astype(float), 1, theta=(1, 1), damping=0)
     with pytest.raises(ValueError, match="negative"):
         march(layout, state, velocity, -1, theta=(1, 1), damping=0)
+
+
+def test_least_ratios_alone_are_those_of_the_report():
+    rng = np.random.default_rng(11)
+    layout = build_layout(**block_mesh(rng, (5, 6)))
+    state, _ = deformed(layout, rng, 0.002, 1.0)
+    assert least_ratios(layout, state, 0.8).tobytes() == element_report(layout, state, 0.8).least_ratio.tobytes()

@@ -54,7 +54,7 @@ class Told:
     def rests(self, state, rest, shrinkage):
         return np.full(1, self.volumes.pop(0) if len(self.volumes) > 1 else self.volumes[0])
 
-    def strained(self, state, rest, shrinkage):
+    def strained(self, state, rest, shrinkage, with_energy):
         return 0.0, 1.0
 
     def looks(self):

@@ -6,7 +6,13 @@ holds its two compiled back ends (chosen by WIZEN_KERNEL = auto, vector or scala
 """
 
 from solver.dehydration.kernel.bulk import dilatations, pressure_energy, rested, rests, without_bulk
-from solver.dehydration.kernel.diagnostics import ElementReport, element_report, kinetic_energy, strain_energy
+from solver.dehydration.kernel.diagnostics import (
+    ElementReport,
+    element_report,
+    kinetic_energy,
+    least_ratios,
+    strain_energy,
+)
 from solver.dehydration.kernel.fixed_point import out_of_reach, place, positions
 from solver.dehydration.kernel.layout import Layout, build_layout
 from solver.dehydration.kernel.march import (
@@ -33,6 +39,7 @@ __all__ = [
     "forget",
     "internal_force",
     "kinetic_energy",
+    "least_ratios",
     "make_skin",
     "march",
     "new_state",

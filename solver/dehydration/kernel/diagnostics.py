@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.dehydration.kernel.algebra import Number
-from solver.dehydration.kernel.elements import energy, one_point_energy
+from solver.dehydration.kernel.elements import energy, least_ratio, one_point_energy
 from solver.dehydration.kernel.fixed_point import positions
 from solver.dehydration.kernel.layout import Layout
 
@@ -88,6 +88,22 @@ def element_report(layout: Layout, state: Ints32, theta: float, *, one_point: bo
         results.append((energies, ratios))
     (core_energy, core_ratio), (skin_energy, skin_ratio) = results
     return ElementReport(layout.lanes(core_energy, skin_energy), layout.lanes(core_ratio, skin_ratio))
+
+
+def least_ratios(layout: Layout, state: Ints32, theta: float) -> Floats:
+    """The `least_ratio` of `element_report` alone, (elements,), in a third of its time."""
+    arithmetic = NumpyArithmetic()
+    found: list[Floats] = []
+    for exocarp, elements, planes in (
+        (False, layout.core_elements, layout.core_planes),
+        (True, layout.exocarp_elements, layout.exocarp_planes),
+    ):
+        ratios, factor = np.empty(elements.shape), np.float64(1.0 if exocarp else theta)
+        for part, nodes, stored in _chunks(layout, state, elements, planes):
+            least = least_ratio(arithmetic, nodes, stored.__getitem__, factor, exocarp)
+            ratios[part] = least.reshape(elements[part].shape)
+        found.append(ratios)
+    return layout.lanes(*found)
 
 
 def strain_energy(layout: Layout, state: Ints32, theta: float, *, one_point: bool = False) -> float:

@@ -200,6 +200,25 @@ def exocarp_forces(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, t
     return _forces(ar, positions, plane, theta, exocarp=True)
 
 
+def _ratio_of(
+    plane: Planes, point: int, derivatives: Sequence[Vector], shrink: Shrinkage
+) -> tuple[Number, list[Vector]]:
+    """J/Jd of a point, and its derivatives `upright`."""
+    geometry = point_geometry(plane, point)
+    d = upright(geometry.triangle, derivatives)
+    return dot(d[0], cross(d[1], d[2])) * geometry.inverse_det * shrink.inverse, d
+
+
+def least_ratio(ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number, exocarp: bool) -> Number:
+    """Least J/Jd over the points of a core or exocarp element."""
+    shrink = shrinkage_of(plane, theta)
+    least: Number = None
+    for k, derivative in enumerate(derivatives_of(modes_of(positions), exocarp)):
+        ratio, _ = _ratio_of(plane, k, derivative, shrink)
+        least = ratio if least is None else ar.minimum(least, ratio)
+    return least
+
+
 def energy(
     ar: Arithmetic, positions: Sequence[Vector], plane: Planes, theta: Number, exocarp: bool
 ) -> tuple[Number, Number]:
@@ -214,8 +233,7 @@ def energy(
     least: Number = None
     for k, (derivative, weight) in enumerate(zip(derivatives, weights, strict=True)):
         geometry = point_geometry(plane, k)
-        d = upright(geometry.triangle, derivative)
-        ratio = dot(d[0], cross(d[1], d[2])) * geometry.inverse_det * shrink.inverse
+        ratio, d = _ratio_of(plane, k, derivative, shrink)
         overlap = barrier_overlap(ar, ratio)
         stretch = dot(geometry.stretches, [dot(each, each) for each in d])
         total = total + 0.5 * shrink.shear * isochoric_factor(ar, ratio).value * stretch
