@@ -47,7 +47,7 @@ class Contact(NamedTuple):
     own_edges: Ints32  # (nt, 3, 2) ends of the edges that it answers for, each edge once; -1: another one does
     source: Ints32  # (ns,) node that this one is a mirror image of; itself where it is none
     around: Ints32  # (na, 7) pairs of triangles around a node, and two features of theirs: four nodes, kind
-    bending: Ints32  # (nb,) triangles that are in `around`; the others, images far from the part, do nothing to another
+    bending: Ints32  # (nb,) triangles that are in `around`; the others can do nothing to one that shares a node
     least: Singles  # (nt,) distance of those to the nearest around it, of the features named above, at `looked`
     looked: Singles  # (ns, 3) positions when `least` was measured
     bent: Singles  # (nt, 2) how far corners have come against each other since, its own and those of any around it
