@@ -61,6 +61,16 @@ def test_an_element_at_its_rest_volume_is_free_of_stress(one_point: bool) -> Non
     assert internal_force(layout, state, 1.0, one_point=one_point).norm > 1e-2 * scale
 
 
+def test_planes_that_are_written_over_are_those_of_copies() -> None:
+    _, layout = sphere()
+    kept = layout.core_planes.tobytes(), layout.one_point_planes.tobytes(), layout.exocarp_planes.tobytes()
+    g = np.random.default_rng(3).uniform(0.9, 1.1, (2, layout.elements))
+    copied, over = rested(layout, g[1]), rested(layout, g[1], rested(layout, g[0]))
+    for name in ("core_planes", "one_point_planes", "exocarp_planes"):
+        assert getattr(over, name).tobytes() == getattr(copied, name).tobytes()
+    assert kept == (layout.core_planes.tobytes(), layout.one_point_planes.tobytes(), layout.exocarp_planes.tobytes())
+
+
 def test_shear_does_not_see_the_rest_volume() -> None:
     """Both core elements: a volume-preserving stretch of the rested block is that of the plain one, scaled."""
     _, layout = sphere()

@@ -65,7 +65,7 @@ def test_same_bytes_on_one_and_two_threads_that_touch() -> None:
 
 def test_threads_move_what_they_push(monkeypatch) -> None:
     """Every group of nodes is moved once, and rows of force are read by the thread that has written them."""
-    own = {}
+    own, plain = {}, {}
     for threads in (1, 2, 4):
         monkeypatch.setattr("solver.dehydration.kernel.layout.get_num_threads", lambda threads=threads: threads)
         layout, _, _ = grooved()
@@ -76,9 +76,11 @@ def test_threads_move_what_they_push(monkeypatch) -> None:
         node = np.repeat(np.arange(layout.nodes), np.diff(layout.row_start))
         parts = turn[node // GROUP] * threads // len(turn), strip * threads // len(layout.strips)
         own[threads] = np.mean(parts[0] == parts[1])
+        plain[threads] = np.mean(node // GROUP * threads // len(turn) == parts[1])
     assert own[1] == 1
     assert own[2] > 0.85
     assert own[4] > 0.75
+    assert plain[2] < 0.6  # by number alone
 
 
 def test_order_of_groups_does_not_matter() -> None:

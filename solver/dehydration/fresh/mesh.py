@@ -52,6 +52,8 @@ _FACES = np.array(
 
 #: Radius of the ball cut out of a fruit without a stone, in units of r1, and its largest share of the thinnest ray.
 CENTRE_BALL, CENTRE_SHARE = 0.1, 0.4
+
+#: Elements whose corners are looked at at once: what that takes stays in the cache.
 _AT_A_TIME = 2048
 
 
@@ -160,7 +162,6 @@ def corner_ratios(positions: Floats, connectivity: Ints) -> Floats:
     positions (nn, 3), connectivity (ne, 8) with bits xi = 4, eta = 2, zeta = 1.
     """
     jacobians = np.empty((len(connectivity), 8))
-    # so many at a time that all of it stays in the cache
     for first in range(0, len(connectivity), _AT_A_TIME):
         part = slice(first, first + _AT_A_TIME)
         corners = positions[connectivity[part]]

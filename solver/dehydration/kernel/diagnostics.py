@@ -91,7 +91,7 @@ def element_report(layout: Layout, state: Ints32, theta: float, *, one_point: bo
 
 
 def least_ratios(layout: Layout, state: Ints32, theta: float) -> Floats:
-    """The `least_ratio` of `element_report` alone, (elements,), in a third of its time."""
+    """The `least_ratio` of `element_report` alone, (elements,), in three fifths of its time."""
     arithmetic = NumpyArithmetic()
     found: list[Floats] = []
     for exocarp, elements, planes in (
