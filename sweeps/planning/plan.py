@@ -13,12 +13,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
 from solver import registry
 from solver.contract import InvalidGeometry, InvalidInput, Need, Params, Solver
+from store import starter
 from store.ledger.jobs import JobSpec
 
 from ..errors import PlanError
@@ -155,16 +156,27 @@ def _from_pattern(
         origin = solver.parse({**written.set, **pattern.sample}, written.preset)
         early = solver.settle(need.model_copy(update={"stages": (pattern.stage,), "fields": ()}))
         cold = tuple(solver.parse({**written.set, **values}, written.preset) for values in pattern.controls)
-        start = {"key": job(solver, origin, early).key, "stage": pattern.stage, "amplitude": pattern.amplitude}
+        begun = _begun_by(solver, origin, early)
+        start = {"key": job(begun, origin, early).key, "stage": pattern.stage, "amplitude": pattern.amplitude}
         warm = {
             shown: solver.parse({**params.model_dump(mode="json"), "pattern": start})
             for shown, params in samples.items()
         }
     except InvalidInput as error:
         raise PlanError(f"[pattern]: {error.message}", error.advice) from None
-    first = Plan(f"{name}-pattern", solver, (origin,), early, axes)
+    first = Plan(f"{name}-pattern", begun, (origin,), early, axes)
     controls = Plan(f"{name}-controls", solver, cold, need, axes) if cold else None
     return first, controls, warm
+
+
+def _begun_by(solver: Solver, origin: Params, early: Need) -> Solver:
+    """Return the solver as of the version whose run of the pattern comes with the package, else as it is.
+
+    What only begins others need not be this version's, and what begins as before keeps its wrinkles.
+    """
+    versions = (solver.version, *solver.tables_of)
+    known = (replace(solver, version=version) for version in versions)
+    return next((older for older in known if starter.has(job(older, origin, early).key)), solver)
 
 
 def _check_names(written: PlanFile, solver: Solver) -> None:

@@ -124,9 +124,8 @@ def test_it_holds_the_run_whose_wrinkles_samples_start_from(name: str) -> None:
         assert plan.first is None  # from bumps alone
         return
     assert plan.first is not None
-    # by the version that made the table: another comes to other wrinkles
-    made = replace(plan.first, solver=replace(plan.solver, version=info.version))
-    assert [job.key for job in made.jobs()] == [pattern["key"]]
+    # of whichever version it is: another run of it comes to other wrinkles
+    assert [job.key for job in plan.first.jobs()] == [pattern["key"]]
     found = store.find(pattern["key"])
     assert found is not None
     assert pattern["stage"] in found["stage"].values

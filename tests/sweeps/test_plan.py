@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import xarray as xr
 
 from solver import registry
+from store import starter
+from store.store import Store
 from sweeps.errors import PlanError
 from sweeps.planning import points
 from sweeps.planning.plan import Plan
@@ -61,6 +65,32 @@ def test_a_pattern_runs_first_and_is_part_of_the_samples_keys() -> None:
     assert not {job.key for job in samples} & {job.key for job in cold.jobs()}
     assert {job.key for job in controls} < {job.key for job in cold.jobs()}
     assert cold.parts() == (cold,)
+
+
+def test_a_pattern_in_the_package_is_begun_from_if_its_version_is_answered_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A new version keeps the wrinkles of the tables that it still answers from."""
+    monkeypatch.setattr(starter, "ROOT", tmp_path / "package")
+    package, solver = Store.open(starter.ROOT, create=True), registry.get("dehydration")
+
+    def begun(version: str, tables_of: tuple[str, ...]) -> str:
+        monkeypatch.setattr(registry, "get", lambda name: replace(solver, version=version, tables_of=tables_of))
+        first, samples, _ = plan(axes={"te": [0.02]}, pattern=PATTERN).parts()
+        (job,), (sample,) = first.jobs(), samples.jobs()
+        assert sample.params["pattern"]["key"] == job.key
+        assert sample.version == version
+        if job.version == version:
+            return "its own"
+        assert package.has(job.key)
+        return f"that of {job.version}"
+
+    (pattern,) = plan(axes={"te": [0.02]}, pattern=PATTERN).parts()[0].jobs()
+    assert begun("98", (solver.version,)) == "its own"  # there is none
+    package.put(pattern.key, xr.Dataset())
+    assert begun("98", (solver.version,)) == f"that of {solver.version}"
+    assert begun("98", ()) == "its own"  # of other equations
+    assert begun(solver.version, ()) == "its own"
 
 
 @pytest.mark.parametrize(
