@@ -170,17 +170,17 @@ def _around(
 def _along(x: Doubles, faces: Words, a: int, b: int, axis: int) -> float:
     """By how much two triangles overlap along one of the axes that can tell them apart; less than 0: a gap.
 
-    From one's middle to the other's, which tells most pairs apart, the normals of both, then the products of an edge of
-    each. Infinite where the axis has no length.
+    The normals of both, one of which tells most pairs apart, from one's middle to the other's, then the products of an
+    edge of each. Infinite where the axis has no length.
     """
-    if axis == 0:
+    if axis == 2:
         nx = ny = nz = 0.0
         for k in range(3):
             v, w = faces[a, k], faces[b, k]
             nx, ny, nz = nx + x[w, 0] - x[v, 0], ny + x[w, 1] - x[v, 1], nz + x[w, 2] - x[v, 2]
         return _apart_by(x, faces, a, b, nx, ny, nz, nx * nx + ny * ny + nz * nz)
-    if axis < 3:
-        t = a if axis == 1 else b
+    if axis < 2:
+        t = a if axis == 0 else b
         p, q, r = faces[t, 0], faces[t, 1], faces[t, 2]
         s, u = p, r
     else:
@@ -229,7 +229,10 @@ def _weigh(
         overlap = _along(x, faces, a, b, axes[n])
         if overlap <= -gap:
             continue
+        last = axes[n]
         for axis in range(_AXES):
+            if axis == last:
+                continue
             here = _along(x, faces, a, b, axis)
             if here < overlap:
                 overlap, axes[n] = here, axis

@@ -27,10 +27,10 @@ _AROUND = 0.1
 _WIDE = 1.3
 #: Cells along a side, over the root of the number of triangles, and at most.
 _FINE, _MOST = 0.75, 384
-#: Cells that are left out together, both ways.
-_BLOCK = 4
-#: Boxes that are held against one together; keys of one bin up to which they are sorted by bins.
-_TOGETHER, _CROWD = 32, 64
+#: Boxes that are held against one together.
+_TOGETHER = 32
+#: Bits of a key that are sorted by at once.
+_DIGIT = 11
 
 
 @njit(cache=True, error_model="numpy")
@@ -114,17 +114,26 @@ def _mark(x: Doubles, faces: Words, some: Words, marked: NDArray[np.bool_]) -> b
 
 
 @njit(cache=True, error_model="numpy")
-def _blocks(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which blocks of cells (6, m, m), with those after them both ways, hold one that is marked."""
-    many = (marked.shape[1] - 1) // _BLOCK + 1
-    found = np.zeros((6, many, many), np.bool_)
+def _sums(marked: NDArray[np.bool_]) -> Words:
+    """Return how many cells (6, n, n) are marked before each corner (6, n + 1, n + 1) of theirs, both ways."""
+    cells = marked.shape[1]
+    found = np.zeros((6, cells + 1, cells + 1), np.int32)
     for side in range(6):
-        for i in range(marked.shape[1]):
-            for j in range(marked.shape[1]):
-                if marked[side, i, j]:
-                    row, column = i // _BLOCK, j // _BLOCK
-                    found[side, max(row - 1, 0) : row + 1, max(column - 1, 0) : column + 1] = True
+        for i in range(cells):
+            here, above, below = marked[side, i], found[side, i, 1:], found[side, i + 1, 1:]
+            count = np.int32(0)
+            for j in range(cells):
+                count += np.int32(here[j])
+                below[j] = above[j] + count
     return found
+
+
+@njit(cache=True, error_model="numpy")
+def _within(sums: Words, side: int, low: int, high: int, left: int, right: int) -> int:
+    """Return how many cells are marked from row `low` to before `high`, from column `left` to before `right`."""
+    of = sums[side]
+    many: int = of[high, right] - of[low, right] - of[high, left] + of[low, left]
+    return many
 
 
 @njit(cache=True, error_model="numpy")
@@ -161,27 +170,22 @@ def candidates(x: Doubles, faces: Words, moved: NDArray[np.bool_]) -> Words:
         rows[v] = int((x[v, (side + 1) % 3] / depth + _WIDE) * scale)
         columns[v] = int((x[v, (side + 2) % 3] / depth + _WIDE) * scale)
         sides[v] = 2 * side + (x[v, side] < 0)
-    blocks = _blocks(marked)
+    sums = _sums(marked)
     some, count = np.empty(len(faces), np.int32), 0
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         side = sides[a]
         if sides[b] == side and sides[c] == side:
             low, left = min(rows[a], rows[b], rows[c]), min(columns[a], columns[b], columns[c])
-            high, right = max(rows[a], rows[b], rows[c]), max(columns[a], columns[b], columns[c])
-            is_small = high - low <= _BLOCK and right - left <= _BLOCK
-            if is_small and not blocks[side, low // _BLOCK, left // _BLOCK]:
-                continue
-            box[0, 0], box[0, 1], box[1, 0], box[1, 1] = low, high, left, right
-            is_one = False
+            high, right = max(rows[a], rows[b], rows[c]) + 1, max(columns[a], columns[b], columns[c]) + 1
+            many = _within(sums, side, low, high, left, right)
+        elif _project(x, faces, t, side, cells, box):
+            many = _within(sums, side, box[0, 0], box[0, 1] + 1, box[1, 0], box[1, 1] + 1)
         else:
-            is_one = not _project(x, faces, t, side, cells, box)
-        for i in range(box[0, 0], box[0, 1] + 1):
-            for j in range(box[1, 0], box[1, 1] + 1):
-                is_one = is_one or marked[side, i, j]
-        if is_one:
-            some[count] = t
-            count += 1
+            many = 1
+        # no branch: no processor guesses which ones fold
+        some[count] = t
+        count += many > 0
     return some[:count]
 
 
@@ -261,27 +265,26 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
 
 
 @njit(cache=True, error_model="numpy")
-def _order(keys: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Return what sorts `keys`: by bins where they are spread, a seventh of the time of argsort for 4,000."""
-    count, low = len(keys), keys.min()
-    scale = count / max(keys.max() - low, 1e-30)
-    ends, bins = np.zeros(count + 2, np.int64), np.empty(count, np.int64)
+def _order(keys: NDArray[np.float32]) -> Words:
+    """Return what sorts `keys`, digit by digit from the last: a tenth of the time of argsort for 50,000."""
+    count, base = len(keys), 1 << _DIGIT
+    bits, sign = keys.view(np.uint32), np.uint32(1 << 31)
+    words = np.empty(count, np.uint32)
     for n in range(count):
-        bins[n] = min(int((keys[n] - low) * scale), count)
-        ends[bins[n] + 1] += 1
-    if ends.max() > _CROWD:
-        return np.argsort(keys)
-    ends = np.cumsum(ends)
-    order = np.empty(count, np.int64)
-    for n in range(count):
-        order[ends[bins[n]]] = n
-        ends[bins[n]] += 1
-    for n in range(1, count):
-        one, back = order[n], n
-        while back > 0 and keys[order[back - 1]] > keys[one]:
-            order[back] = order[back - 1]
-            back -= 1
-        order[back] = one
+        # so that they are in the order of the numbers: all bits of a negative one the other way, of others the first
+        words[n] = ~bits[n] if bits[n] & sign else bits[n] | sign
+    order, sorted_words = np.arange(count).astype(np.int32), words
+    for shift in range(0, 32, _DIGIT):
+        ends = np.zeros(base + 1, np.int64)
+        for n in range(count):
+            ends[((words[n] >> np.uint32(shift)) & np.uint32(base - 1)) + 1] += 1
+        ends = np.cumsum(ends)
+        moved, sorted_words = np.empty(count, np.int32), np.empty(count, np.uint32)
+        for n in range(count):
+            digit = (words[n] >> np.uint32(shift)) & np.uint32(base - 1)
+            moved[ends[digit]], sorted_words[ends[digit]] = order[n], words[n]
+            ends[digit] += 1
+        order, words = moved, sorted_words
     return order
 
 
@@ -291,23 +294,29 @@ def _meet(
 ) -> None:
     """Fill which of the boxes from `o` on meet box `m`, without a common corner, and for the first time in this strip.
 
-    No branch: the compiler makes it a few instructions for all of them.
+    No branch, and views that are read from their first place on: so the compiler makes it a few instructions for all of
+    them. With places that it has to suspect of being negative it took three times as long.
     """
     x1, y0, y1, z0, z1 = bounds[3, m], bounds[1, m], bounds[4, m], bounds[2, m], bounds[5, m]
     p, q, r = corners[0, m], corners[1, m], corners[2, m]
     # a pair belongs to the strip in which both are met first
     first = np.int32(strip if first_strip[m] < strip else -1)
+    end = o + _TOGETHER
+    low_x, low_y, high_y, low_z, high_z = (
+        bounds[0, o:end],
+        bounds[1, o:end],
+        bounds[4, o:end],
+        bounds[2, o:end],
+        bounds[5, o:end],
+    )
+    firsts, seconds, thirds, strips = corners[0, o:end], corners[1, o:end], corners[2, o:end], first_strip[o:end]
     for k in range(_TOGETHER):
-        n = o + k
-        a, b, c = corners[0, n], corners[1, n], corners[2, n]
+        a, b, c = firsts[k], seconds[k], thirds[k]
         is_other = (
             (a != p) & (a != q) & (a != r) & (b != p) & (b != q) & (b != r) & (c != p) & (c != q) & (c != r)
         )  # fmt: skip
-        is_here = (bounds[0, n] <= x1) & (bounds[1, n] <= y1) & (bounds[4, n] >= y0)
-        met[k] = (
-            is_other & is_here & (bounds[2, n] <= z1) & (bounds[5, n] >= z0)
-            & ((first < 0) | (first_strip[n] == first))
-        )  # fmt: skip
+        is_here = (low_x[k] <= x1) & (low_y[k] <= y1) & (high_y[k] >= y0) & (low_z[k] <= z1) & (high_z[k] >= z0)
+        met[k] = is_other & is_here & ((first < 0) | (strips[k] == first))
 
 
 @njit(cache=True, error_model="numpy")
