@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .crossings import cross
 from .inward import candidates, pairs
 
-__all__ = ["GAP", "ROUNDS", "Apart", "Looked", "Topology", "look", "put_apart"]
+__all__ = ["GAP", "ROUNDS", "Apart", "Looked", "Topology", "look", "look_again", "put_apart"]
 
 Doubles = NDArray[np.float64]
 Words = NDArray[np.int32]
@@ -80,7 +80,15 @@ class Looked(NamedTuple):
 
 def look(x: Doubles, topology: Topology) -> Looked:
     """Look at all of a surface of vertices x (nv, 3): most of what putting it apart takes."""
-    return Looked(*_look(x, topology.triangles))
+    size = np.empty(len(topology.triangles))
+    return Looked(_look(x, topology.triangles, np.empty(0, np.bool_), size), size)
+
+
+def look_again(x: Doubles, topology: Topology, before: Looked, moved: NDArray[np.bool_]) -> Looked:
+    """Look at a surface some vertices of which, `moved` (nv,), lie elsewhere than at the last look."""
+    is_moved = np.asarray(moved[topology.triangles].any(axis=1))
+    stay, size = before.pairs[~is_moved[before.pairs].any(axis=1)], before.size.copy()
+    return Looked(np.concatenate([stay, _look(x, topology.triangles, moved, size)]), size)
 
 
 def put_apart(x: Doubles, topology: Topology, rounds: int = ROUNDS, looked: Looked | None = None) -> Apart:
@@ -93,10 +101,9 @@ def put_apart(x: Doubles, topology: Topology, rounds: int = ROUNDS, looked: Look
 
 
 @njit(cache=True, error_model="numpy", nogil=True)  # a service has others to answer meanwhile
-def _look(x: Doubles, faces: Words) -> tuple[Words, Doubles]:
-    size = np.empty(len(faces))
-    some = candidates(x, faces, np.empty(0, np.bool_))
-    return (pairs(x, faces, some, size) if len(some) > 0 else np.empty((0, 2), np.int32)), size
+def _look(x: Doubles, faces: Words, moved: NDArray[np.bool_], size: Doubles) -> Words:
+    some = candidates(x, faces, moved)
+    return pairs(x, faces, some, size, moved) if len(some) > 0 else np.empty((0, 2), np.int32)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -104,7 +111,7 @@ def _put_apart(
     x: Doubles, faces: Words, first: Words, near: Words, rounds: int, found: Words, sizes: Doubles
 ) -> tuple[int, int, int]:
     began, spent = -1, 0
-    size, weight, way = sizes.copy(), np.zeros(len(x)), np.zeros(len(x))
+    size, weight, way, gone = sizes.copy(), np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x))
     moved = np.empty(0, np.bool_)
     while True:
         if len(moved) > 0:
@@ -112,32 +119,31 @@ def _put_apart(
             some = candidates(x, faces, moved)
             if len(some) == 0:
                 return max(began, 0), spent, 0
-            found = pairs(x, faces, some, size)
-        axes = np.zeros(len(found), np.int8)
-        active, pushed = _weigh(x, faces, found, axes, size, weight, spent)
+            found = pairs(x, faces, some, size, moved)
+        axes, until = np.zeros(len(found), np.int8), np.zeros(len(found))
+        active, pushed = _weigh(x, faces, found, axes, until, gone, size, weight, spent)
         began = active if began < 0 else began
         if active == 0:
             return began, spent, 0
         if spent >= rounds:
             if len(moved) > 0:
-                found = pairs(x, faces, candidates(x, faces, moved[:0]), size)
+                found = pairs(x, faces, candidates(x, faces, moved[:0]), size, moved[:0])
             return began, spent, _count(x, faces, found)
         moved = np.zeros(len(x), np.bool_)
-        few, few_axes = _around(faces, found, axes, pushed, first, near)
+        kept = _around(faces, found, pushed, first, near)
+        few, few_axes, few_until = found[kept], axes[kept], until[kept]
         last = min(spent + _STEPS, rounds)
         while active > 0 and spent < last:
-            _step(x, _spread(weight, pushed, way, first, near), way, moved, first, near)
+            _step(x, _spread(weight, pushed, way, first, near), way, gone, moved, first, near)
             spent += 1
             weight[pushed] = 0
-            active, pushed = _weigh(x, faces, few, few_axes, size, weight, spent)
+            active, pushed = _weigh(x, faces, few, few_axes, few_until, gone, size, weight, spent)
         weight[pushed] = 0
 
 
 @njit(cache=True, error_model="numpy")
-def _around(
-    faces: Words, found: Words, axes: NDArray[np.int8], pushed: Words, first: Words, near: Words
-) -> tuple[Words, NDArray[np.int8]]:
-    """Return the pairs that some rounds may bring into contact: those a few points from what is pushed."""
+def _around(faces: Words, found: Words, pushed: Words, first: Words, near: Words) -> NDArray[np.int64]:
+    """Return which pairs some rounds may bring into contact: those a few points from what is pushed."""
     is_near = np.zeros(len(first) - 1, np.bool_)
     front = pushed
     for _ in range(_RINGS):
@@ -163,7 +169,7 @@ def _around(
                 kept[count] = n
                 count += 1
                 break
-    return found[kept[:count]], axes[kept[:count]]
+    return kept[:count]
 
 
 @njit(cache=True, error_model="numpy")
@@ -213,10 +219,20 @@ def _apart_by(x: Doubles, faces: Words, a: int, b: int, nx: float, ny: float, nz
 
 @njit(cache=True, error_model="numpy")
 def _weigh(
-    x: Doubles, faces: Words, pairs: Words, axes: NDArray[np.int8], size: Doubles, weight: Doubles, spent: int
+    x: Doubles,
+    faces: Words,
+    pairs: Words,
+    axes: NDArray[np.int8],
+    until: Doubles,
+    gone: Doubles,
+    size: Doubles,
+    weight: Doubles,
+    spent: int,
 ) -> tuple[int, Words]:
     """Fill the way (nv,), zero before, that each vertex may go after so many rounds; return the number of pairs that
     ask for it, 0 if enough of the gap stays everywhere, and the vertices that have one.
+
+    A pair found apart is not asked again `until` (np,) its corners have `gone` (nv,) as far as it was, together.
     """
     enough = _ENOUGH if spent < _STEPS else _AT_LAST
     far = _WAY * 2.0 ** min(spent // _STEPS, 8)
@@ -224,21 +240,24 @@ def _weigh(
     pushed, count = np.empty(1024, np.int32), 0
     for n in range(len(pairs)):
         a, b = pairs[n, 0], pairs[n, 1]
+        way = 0.0
+        for k in range(3):
+            way += gone[faces[a, k]] + gone[faces[b, k]]
+        if way < until[n]:
+            continue
         gap = GAP * min(size[a], size[b])
         # what told them apart last does so again, mostly
         overlap = _along(x, faces, a, b, axes[n])
-        if overlap <= -gap:
-            continue
         last = axes[n]
         for axis in range(_AXES):
-            if axis == last:
-                continue
-            here = _along(x, faces, a, b, axis)
-            if here < overlap:
-                overlap, axes[n] = here, axis
-                if overlap <= -gap:
-                    break
+            if overlap <= -gap:
+                break
+            if axis != last:
+                here = _along(x, faces, a, b, axis)
+                if here < overlap:
+                    overlap, axes[n] = here, axis
         if overlap <= -gap:
+            until[n] = way - gap - overlap
             continue
         active += 1
         way = far * (overlap + gap)
@@ -276,8 +295,12 @@ def _spread(weight: Doubles, pushed: Words, way: Doubles, first: Words, near: Wo
 
 
 @njit(cache=True, error_model="numpy")
-def _step(x: Doubles, who: Words, way: Doubles, moved: NDArray[np.bool_], first: Words, near: Words) -> None:
-    """Move some vertices halfway to the mean of their neighbours, but no farther than their way, which is then zero."""
+def _step(
+    x: Doubles, who: Words, way: Doubles, gone: Doubles, moved: NDArray[np.bool_], first: Words, near: Words
+) -> None:
+    """Move some vertices halfway to the mean of their neighbours, but no farther than their way, which is then zero;
+    add to what each has `gone`.
+    """
     goal = np.empty((len(who), 3))
     for n in range(len(who)):
         v = who[n]
@@ -289,6 +312,7 @@ def _step(x: Doubles, who: Words, way: Doubles, moved: NDArray[np.bool_], first:
             goal[n, k] = (total / (first[v + 1] - first[v]) - x[v, k]) / 2
             square += goal[n, k] ** 2
         part = min(way[v] / math.sqrt(square), 1.0) if square > 0 else 0.0
+        gone[v] += part * math.sqrt(square)
         for k in range(3):
             goal[n, k] = x[v, k] + part * goal[n, k]
     for n in range(len(who)):

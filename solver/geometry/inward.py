@@ -9,6 +9,7 @@ first, and where there is none that is all. Surfaces that do not enclose the ori
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -34,10 +35,10 @@ _DIGIT = 11
 
 
 @njit(cache=True, error_model="numpy")
-def inward(x: Doubles, faces: Words) -> Words:
-    """Return the triangles of vertices x (nv, 3) that face the origin, or hardly away from it."""
-    found, count = np.empty(len(faces), np.int32), 0
-    for t in range(len(faces)):
+def inward(x: Doubles, faces: Words, some: Words) -> Words:
+    """Return which of some triangles of vertices x (nv, 3) face the origin, or hardly away from it."""
+    found, count = np.empty(len(some), np.int32), 0
+    for t in some:
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         ux, uy, uz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         vx, vy, vz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
@@ -121,44 +122,26 @@ def _sums(marked: NDArray[np.bool_]) -> Words:
     for side in range(6):
         for i in range(cells):
             here, above, below = marked[side, i], found[side, i, 1:], found[side, i + 1, 1:]
-            count = np.int32(0)
-            for j in range(cells):
-                count += np.int32(here[j])
-                below[j] = above[j] + count
+            if here.any():
+                count = np.int32(0)
+                for j in range(cells):
+                    count += np.int32(here[j])
+                    below[j] = above[j] + count
+            else:
+                below[:] = above
     return found
 
 
-@njit(cache=True, error_model="numpy")
-def _within(sums: Words, side: int, low: int, high: int, left: int, right: int) -> int:
-    """Return how many cells are marked from row `low` to before `high`, from column `left` to before `right`."""
-    of = sums[side]
-    many: int = of[high, right] - of[low, right] - of[high, left] + of[low, left]
-    return many
+class _Cells(NamedTuple):
+    """The cell of each vertex on its own side of the cube."""
+
+    side: NDArray[np.int8]
+    row: NDArray[np.int16]
+    column: NDArray[np.int16]
 
 
 @njit(cache=True, error_model="numpy")
-def candidates(x: Doubles, faces: Words, moved: NDArray[np.bool_]) -> Words:
-    """Return the triangles that lie before or behind one that faces inwards, and one with a corner in `moved` (nv,);
-    where it is empty, each counts as moved.
-    """
-    hidden = inward(x, faces)
-    if len(hidden) == 0:
-        return hidden
-    cells = min(int(_FINE * math.sqrt(len(faces))) + 1, _MOST)
-    marked = np.zeros((6, cells, cells), np.bool_)
-    if not _mark(x, faces, hidden, marked):
-        return np.arange(len(faces)).astype(np.int32)
-    if len(moved) > 0:
-        others, count = np.empty(len(faces), np.int32), 0
-        for t in range(len(faces)):
-            if moved[faces[t, 0]] or moved[faces[t, 1]] or moved[faces[t, 2]]:
-                others[count] = t
-                count += 1
-        there = np.zeros((6, cells, cells), np.bool_)
-        if _mark(x, faces, others[:count], there):
-            marked &= there
-    box = np.empty((2, 2), np.int64)
-    # the cell of each vertex on its own side
+def _cells(x: Doubles, cells: int) -> tuple[NDArray[np.int8], NDArray[np.int16], NDArray[np.int16]]:
     sides, rows, columns = np.empty(len(x), np.int8), np.empty(len(x), np.int16), np.empty(len(x), np.int16)
     scale = cells / (2 * _WIDE)
     for v in range(len(x)):
@@ -170,23 +153,68 @@ def candidates(x: Doubles, faces: Words, moved: NDArray[np.bool_]) -> Words:
         rows[v] = int((x[v, (side + 1) % 3] / depth + _WIDE) * scale)
         columns[v] = int((x[v, (side + 2) % 3] / depth + _WIDE) * scale)
         sides[v] = 2 * side + (x[v, side] < 0)
-    sums = _sums(marked)
-    some, count = np.empty(len(faces), np.int32), 0
-    for t in range(len(faces)):
+    return sides, rows, columns
+
+
+@njit(cache=True, error_model="numpy")
+def _covering(x: Doubles, faces: Words, some: Words, at: _Cells, marked: NDArray[np.bool_], wider: int) -> Words:
+    """Return which of some triangles cover a marked cell (6, n, n), or come as near to one as so many cells."""
+    cells, sums, box = marked.shape[1], _sums(marked), np.empty((2, 2), np.int64)
+    found, count = np.empty(len(some), np.int32), 0
+    for t in some:
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-        side = sides[a]
-        if sides[b] == side and sides[c] == side:
-            low, left = min(rows[a], rows[b], rows[c]), min(columns[a], columns[b], columns[c])
-            high, right = max(rows[a], rows[b], rows[c]) + 1, max(columns[a], columns[b], columns[c]) + 1
-            many = _within(sums, side, low, high, left, right)
-        elif _project(x, faces, t, side, cells, box):
-            many = _within(sums, side, box[0, 0], box[0, 1] + 1, box[1, 0], box[1, 1] + 1)
+        side = at.side[a]
+        is_seen = at.side[b] == side and at.side[c] == side
+        if is_seen:
+            i, j = (at.row[a], at.row[b], at.row[c]), (at.column[a], at.column[b], at.column[c])
+            low, high, left, right = min(i), max(i) + 1, min(j), max(j) + 1
         else:
-            many = 1
+            is_seen = _project(x, faces, t, side, cells, box)
+            low, high, left, right = box[0, 0], box[0, 1] + 1, box[1, 0], box[1, 1] + 1
+        if is_seen:
+            low, left = max(low - wider, 0), max(left - wider, 0)
+            high, right = min(high + wider, cells), min(right + wider, cells)
+            of = sums[side]
+            many = of[high, right] - of[low, right] - of[high, left] + of[low, left]
+        else:
+            many = np.int32(1)
         # no branch: no processor guesses which ones fold
-        some[count] = t
+        found[count] = t
         count += many > 0
-    return some[:count]
+    return found[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def candidates(x: Doubles, faces: Words, moved: NDArray[np.bool_]) -> Words:
+    """Return the triangles that lie before or behind one that faces inwards, and one with a corner in `moved` (nv,);
+    where it is empty, each counts as moved.
+    """
+    some = np.arange(len(faces)).astype(np.int32)
+    cells = min(int(_FINE * math.sqrt(len(faces))) + 1, _MOST)
+    marked, there = np.zeros((6, cells, cells), np.bool_), np.ones((6, cells, cells), np.bool_)
+    if len(moved) == 0:
+        hidden = inward(x, faces, some)
+        if len(hidden) == 0:
+            return hidden
+        at = _Cells(*_cells(x, cells))
+    else:
+        others, count = np.empty(len(faces), np.int32), 0
+        for t in some:
+            others[count] = t
+            count += moved[faces[t, 0]] | moved[faces[t, 1]] | moved[faces[t, 2]]
+        at = _Cells(*_cells(x, cells))
+        there[:] = False
+        if _mark(x, faces, others[:count], there):
+            # by so much are what triangles mark and what they cover apart
+            some = _covering(x, faces, some, at, there, 1)
+        else:
+            there[:] = True
+        hidden = inward(x, faces, some)
+        if len(hidden) == 0:
+            return hidden
+    if not _mark(x, faces, hidden, marked):
+        return np.arange(len(faces)).astype(np.int32)
+    return _covering(x, faces, some, at, marked & there, 0)
 
 
 @njit(cache=True, error_model="numpy")
@@ -204,9 +232,9 @@ def _around(x: Doubles, faces: Words, some: Words, size: Doubles) -> NDArray[np.
 
 
 @njit(cache=True, error_model="numpy")
-def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
+def pairs(x: Doubles, faces: Words, some: Words, size: Doubles, moved: NDArray[np.bool_]) -> Words:
     """Return the pairs (np, 2) among some triangles without a common corner that touch or nearly do, as far as their
-    boxes and the line between their middles tell.
+    boxes and the line between their middles tell; if any are `moved` (nv,), those of which one has a corner among them.
 
     The sizes of these triangles are filled into `size` (nt,).
     """
@@ -231,6 +259,7 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
         np.zeros((3, ends[-1] + _TOGETHER), np.int32),
     )
     place, first_strip = np.empty(ends[-1], np.int32), np.zeros(ends[-1] + _TOGETHER, np.int32)
+    counts = np.ones(ends[-1], np.bool_)
     for m in range(count):
         for strip in range(lows[m], highs[m] + 1):
             there = fill[strip]
@@ -239,6 +268,8 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
                 bounds[k, there] = box[order[m], k]
             for k in range(3):
                 corners[k, there] = faces[some[order[m]], k]
+            if len(moved) > 0:
+                counts[there] = moved[corners[0, there]] | moved[corners[1, there]] | moved[corners[2, there]]
             fill[strip] += 1
     found, room = np.empty((1024, 2), np.int32), 0
     met = np.empty(_TOGETHER, np.uint8)
@@ -252,7 +283,9 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles) -> Words:
                     if eights[eight] == 0:
                         continue
                     for k in range(8 * eight, min(8 * eight + 8, ends[strip + 1] - o)):
-                        if met[k] == 0 or _lie_apart(x, size, faces, place[m], place[o + k]):
+                        if met[k] == 0 or not (counts[m] or counts[o + k]):
+                            continue
+                        if _lie_apart(x, size, faces, place[m], place[o + k]):
                             continue
                         if room == len(found):
                             found = np.concatenate((found, found))
@@ -321,7 +354,9 @@ def _meet(
 
 @njit(cache=True, error_model="numpy")
 def _lie_apart(x: Doubles, size: Doubles, faces: Words, a: int, b: int) -> bool:
-    """Whether two triangles are clearly apart along the line between their middles: most that lie side by side are."""
+    """Whether two triangles are clearly apart: along the line between their middles, as most that lie side by side are,
+    or beyond an edge, as needles around a pole are.
+    """
     nx = ny = nz = 0.0
     for k in range(3):
         v, w = faces[a, k], faces[b, k]
@@ -333,4 +368,27 @@ def _lie_apart(x: Doubles, size: Doubles, faces: Words, a: int, b: int) -> bool:
         low = min(low, nx * x[w, 0] + ny * x[w, 1] + nz * x[w, 2])
     more = _AROUND * (size[a] + size[b]) + 1e-6
     gap = low - high
-    return gap > 0 and gap * gap > more * more * (nx * nx + ny * ny + nz * nz)
+    if gap > 0 and gap * gap > more * more * (nx * nx + ny * ny + nz * nz):
+        return True
+    return _is_beyond(x, faces, a, b, more) or _is_beyond(x, faces, b, a, more)
+
+
+@njit(cache=True, error_model="numpy")
+def _is_beyond(x: Doubles, faces: Words, a: int, b: int, more: float) -> bool:
+    """Whether triangle `b` lies farther than `more` beyond an edge of `a`, in the plane of that."""
+    p, q, r = faces[a, 0], faces[a, 1], faces[a, 2]
+    ux, uy, uz = x[q, 0] - x[p, 0], x[q, 1] - x[p, 1], x[q, 2] - x[p, 2]
+    vx, vy, vz = x[r, 0] - x[p, 0], x[r, 1] - x[p, 1], x[r, 2] - x[p, 2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    for i in range(3):
+        p, q = faces[a, i], faces[a, (i + 1) % 3]
+        ux, uy, uz = x[q, 0] - x[p, 0], x[q, 1] - x[p, 1], x[q, 2] - x[p, 2]
+        # away from the third corner, which is counter-clockwise from this edge
+        ox, oy, oz = uy * nz - uz * ny, uz * nx - ux * nz, ux * ny - uy * nx
+        least = math.inf
+        for k in range(3):
+            w = faces[b, k]
+            least = min(least, ox * (x[w, 0] - x[p, 0]) + oy * (x[w, 1] - x[p, 1]) + oz * (x[w, 2] - x[p, 2]))
+        if least > 0 and least * least > more * more * (ox * ox + oy * oy + oz * oz):
+            return True
+    return False

@@ -93,7 +93,7 @@ def even_out(
     before()
     given = np.concatenate([points.reshape(-1, 3), poles], dtype=np.float64)
     # compiled: loaded when the first surface that folds is asked for
-    from solver.geometry.apart import ROUNDS, look, put_apart
+    from solver.geometry.apart import ROUNDS, look, look_again, put_apart
 
     topology, moved = _topology(n), given.copy()
     looked = look(moved, topology)
@@ -109,7 +109,7 @@ def even_out(
         if coarse.points is not None and coarse.poles is not None:
             moved[:-2] += _refine(coarse.points, coarse.poles, n).reshape(-1, 3)
             moved[-2:] += coarse.poles
-            looked = look(moved, topology)
+            looked = look_again(moved, topology, looked, (moved != given).any(axis=1))
         found = put_apart(moved, topology, looked=looked)
     shift = moved - given
     return Evened(shift[:-2].reshape(n, 2 * n, 3), shift[-2:], found.crossings, near)

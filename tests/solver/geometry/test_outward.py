@@ -37,7 +37,7 @@ def test_it_is_whole_where_nothing_faces_inwards(height: float, slide: float) ->
     triangles = closed_lattice(24).astype(np.int32)
     points = wavy(height, slide)
     whole = np.concatenate([points.reshape(-1, 3), ends(points)])
-    found = inward(whole, triangles)
+    found = inward(whole, triangles, np.arange(len(triangles), dtype=np.int32))
     assert seen(points, ends(points)) == (len(found) == 0)
     assert seen(points.astype("f4"), ends(points).astype("f4")) == (len(found) == 0)
 
