@@ -80,12 +80,12 @@ def _project(x: Doubles, faces: Words, t: int, side: int, cells: int, box: NDArr
         low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, w), max(high_v, w)
     if low_u < -_WIDE or high_u > _WIDE or low_v < -_WIDE or high_v > _WIDE:
         return False
-    # and the cells around, for what only comes near
+    # and a little around, for what only comes near
+    more_u, more_v = _WIDE - _AROUND * (high_u - low_u), _WIDE - _AROUND * (high_v - low_v)
+    less_u, less_v = _WIDE + _AROUND * (high_u - low_u), _WIDE + _AROUND * (high_v - low_v)
     scale = cells / (2 * _WIDE)
-    box[0, 0] = max(int((low_u + _WIDE) * scale) - 1, 0)
-    box[0, 1] = min(int((high_u + _WIDE) * scale) + 1, cells - 1)
-    box[1, 0] = max(int((low_v + _WIDE) * scale) - 1, 0)
-    box[1, 1] = min(int((high_v + _WIDE) * scale) + 1, cells - 1)
+    box[0, 0], box[0, 1] = max(int((low_u + more_u) * scale), 0), min(int((high_u + less_u) * scale), cells - 1)
+    box[1, 0], box[1, 1] = max(int((low_v + more_v) * scale), 0), min(int((high_v + less_v) * scale), cells - 1)
     return True
 
 
