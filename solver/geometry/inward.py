@@ -231,15 +231,28 @@ def _around(x: Doubles, faces: Words, some: Words, size: Doubles) -> NDArray[np.
     return box
 
 
-@njit(cache=True, error_model="numpy")
-def pairs(x: Doubles, faces: Words, some: Words, size: Doubles, moved: NDArray[np.bool_]) -> Words:
-    """Return the pairs (np, 2) among some triangles without a common corner that touch or nearly do, as far as their
-    boxes and the line between their middles tell; if any are `moved` (nv,), those of which one has a corner among them.
+class _Strips(NamedTuple):
+    """Boxes in strips across y, each in order along x: what is walked through lies side by side in memory."""
 
-    The sizes of these triangles are filled into `size` (nt,).
-    """
-    count, box = len(some), _around(x, faces, some, size)
-    # in strips across y, each swept along x; what is walked through lies side by side in memory
+    bounds: NDArray[np.float32]
+    """(6, n) by bound, for several boxes are looked at together; behind the last come some that nothing meets"""
+    corners: Words
+    """(3, n) of the triangles in them"""
+    first: Words
+    """(n,) the first strip that each box is in"""
+    place: Words
+    """(n,) their triangles"""
+    counts: NDArray[np.bool_]
+    """(n,) whether one of a triangle's corners has moved, or none was asked for"""
+    ends: NDArray[np.int64]
+    """(strips + 1,) where each strip begins"""
+
+
+@njit(cache=True, error_model="numpy")
+def _in_strips(
+    faces: Words, some: Words, box: NDArray[np.float32], moved: NDArray[np.bool_]
+) -> tuple[NDArray[np.float32], Words, Words, Words, NDArray[np.bool_], NDArray[np.int64]]:
+    count = len(some)
     first_y, last_y = box[:, 1].min(), box[:, 4].max()
     strips = min(max(int(math.sqrt(count)) // 4, 1), 64)
     scale = strips / max(last_y - first_y, 1e-6)
@@ -253,7 +266,6 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles, moved: NDArray[n
             ends[strip + 1] += 1
     ends = np.cumsum(ends)
     fill = ends[:-1].copy()
-    # by bound and by corner, for several are looked at together; behind the last come some that nothing meets
     bounds, corners = (
         np.full((6, ends[-1] + _TOGETHER), np.inf, np.float32),
         np.zeros((3, ends[-1] + _TOGETHER), np.int32),
@@ -271,14 +283,26 @@ def pairs(x: Doubles, faces: Words, some: Words, size: Doubles, moved: NDArray[n
             if len(moved) > 0:
                 counts[there] = moved[corners[0, there]] | moved[corners[1, there]] | moved[corners[2, there]]
             fill[strip] += 1
+    return bounds, corners, first_strip, place, counts, ends
+
+
+@njit(cache=True, error_model="numpy")
+def pairs(x: Doubles, faces: Words, some: Words, size: Doubles, moved: NDArray[np.bool_]) -> Words:
+    """Return the pairs (np, 2) among some triangles without a common corner that touch or nearly do, as far as their
+    boxes and the line between their middles tell; if any are `moved` (nv,), those of which one has a corner among them.
+
+    The sizes of these triangles are filled into `size` (nt,).
+    """
+    strips = _Strips(*_in_strips(faces, some, _around(x, faces, some, size), moved))
+    bounds, ends, place, counts = strips.bounds, strips.ends, strips.place, strips.counts
     found, room = np.empty((1024, 2), np.int32), 0
     met = np.empty(_TOGETHER, np.uint8)
     eights = met.view(np.uint64)
-    for strip in range(strips):
+    for strip in range(len(ends) - 1):
         for m in range(ends[strip], ends[strip + 1]):
             o = m + 1
             while o < ends[strip + 1]:
-                _meet(bounds, corners, first_strip, m, o, strip, met)
+                _meet(bounds, strips.corners, strips.first, m, o, strip, met)
                 for eight in range(_TOGETHER // 8):
                     if eights[eight] == 0:
                         continue

@@ -6,10 +6,10 @@ from scipy.special import sph_harm_y
 
 from solver import registry
 from solver.contract import InvalidGeometry
+from solver.dehydration.fresh.corners import corner_ratios
 from solver.dehydration.fresh.mesh import (
     Sampler,
     build_mesh,
-    corner_ratios,
     cubed_sphere,
     flesh_span,
     inner_distance,
@@ -117,6 +117,23 @@ def test_corner_ratio_of_a_brick_is_one_and_of_a_mirrored_one_is_not_positive():
     crushed = brick.copy()
     crushed[7] = [0.2, 0.2, 0.0]
     assert corner_ratios(crushed, np.arange(8)[None])[0] < 0
+
+
+def test_corner_ratios_are_those_of_the_trilinear_map() -> None:
+    """By determinants of its derivatives at the corners."""
+    rng = np.random.default_rng(0)
+    bits = np.array([[c >> 2 & 1, c >> 1 & 1, c & 1] for c in range(8)])
+    positions = bits + rng.uniform(-0.4, 0.4, (40, 8, 3))
+    signs = 2 * bits - 1
+    for cell, found in zip(
+        positions, corner_ratios(positions.reshape(-1, 3), np.arange(320).reshape(40, 8)), strict=True
+    ):
+        values = []
+        for at in signs:
+            shape = (1 + signs * at) / 2
+            slopes = [signs[:, i] / 2 * np.delete(shape, i, axis=1).prod(axis=1) for i in range(3)]
+            values.append(np.linalg.det(np.array(slopes) @ cell))
+        assert found == pytest.approx(min(values) / max(np.abs(values)), rel=1e-9)
 
 
 def test_without_a_stone_a_small_ball_is_left_out():

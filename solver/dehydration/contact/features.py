@@ -7,6 +7,7 @@ Representative triangles: Curtis, Tamstorf & Manocha 2008, doi 10.1145/1342250.1
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from ...arrays import Bools, Ints32
 
@@ -41,45 +42,85 @@ def neighbours(triangles: Ints32, own_nodes: Ints32, own_edges: Ints32, source: 
     Two triangles, then the features: a node and the corners of the other triangle (kind 0), or the ends of two edges
     (kind 1). source (ns,): nodes that others are images of; images alone do nothing.
     """
-    pairs = _sharing(triangles)
     image = source != np.arange(len(source))
-    found = []
-    for t, u in (pairs.T, pairs.T[::-1]):
+    pairs = _sharing(np.ascontiguousarray(triangles), len(source))
+    given = pairs, triangles, own_nodes, own_edges, image
+    found = np.empty((_between(*given, np.empty((0, 7), np.int32)), 7), np.int32)
+    _between(*given, found)
+    return found
+
+
+@njit(cache=True)
+def _sharing(triangles: Ints32, nodes: int) -> Ints32:
+    """Return the pairs (np, 2) of triangles (nt, 3) on so many nodes that share one, the lesser first, in order."""
+    first = np.zeros(nodes + 1, np.int64)
+    for v in triangles.ravel():
+        first[v + 1] += 1
+    first = np.cumsum(first)
+    around, fill = np.empty(first[-1], np.int32), first[:-1].copy()
+    for t in range(len(triangles)):
+        for v in triangles[t]:
+            around[fill[v]] = t
+            fill[v] += 1
+    pairs, count = np.empty((8 * len(triangles) + 64, 2), np.int32), 0
+    for t in range(len(triangles)):
+        start = count
         for i in range(3):
-            a, other = own_nodes[t, i], triangles[u]
-            apart = (a >= 0) & _all(other != a[:, None]) & ~(image[a] & _all(image[other]))
-            found.append(np.column_stack([t, u, a, other, np.zeros_like(a)])[apart])
-    t, u = pairs.T
+            for u in around[first[triangles[t, i]] : first[triangles[t, i] + 1]]:
+                if u <= t or _has(triangles[u], triangles[t, :i]):
+                    continue  # met already
+                if count == len(pairs):
+                    pairs = np.concatenate((pairs, np.empty_like(pairs)))
+                place = count
+                while place > start and pairs[place - 1, 1] > u:
+                    pairs[place] = pairs[place - 1]
+                    place -= 1
+                pairs[place, 0], pairs[place, 1] = t, u
+                count += 1
+    return pairs[:count].copy()
+
+
+@njit(cache=True)
+def _between(
+    pairs: Ints32, triangles: Ints32, own_nodes: Ints32, own_edges: Ints32, image: Bools, found: Ints32
+) -> int:
+    """Fill what pairs of triangles may do to each other (see `neighbours`); return how much, and only that if `found`
+    is empty.
+    """
+    count, is_asked = 0, len(found) > 0
+    for turned in range(2):
+        for i in range(3):
+            for n in range(len(pairs)):
+                t, u = pairs[n, turned], pairs[n, 1 - turned]
+                a, other = own_nodes[t, i], triangles[u]
+                if a < 0 or _has(other, own_nodes[t, i : i + 1]):
+                    continue
+                if image[a] and image[other[0]] and image[other[1]] and image[other[2]]:
+                    continue
+                if is_asked:
+                    found[count, 0], found[count, 1], found[count, 2], found[count, 6] = t, u, a, 0
+                    found[count, 3:6] = other
+                count += 1
     for i in range(3):
         for j in range(3):
-            mine, theirs = own_edges[t, i], own_edges[u, j]
-            apart = (mine[:, 0] >= 0) & (theirs[:, 0] >= 0)
-            apart &= _all(mine != theirs) & _all(mine != theirs[:, ::-1])
-            apart &= ~(_all(image[mine]) & _all(image[theirs]))
-            found.append(np.column_stack([t, u, mine, theirs, np.ones_like(t)])[apart])
-    return np.ascontiguousarray(np.concatenate(found), np.int32)
+            for n in range(len(pairs)):
+                t, u = pairs[n, 0], pairs[n, 1]
+                (a, b), (c, d) = own_edges[t, i], own_edges[u, j]
+                if a < 0 or c < 0 or a in (c, d) or b in (c, d):
+                    continue
+                if image[a] and image[b] and image[c] and image[d]:
+                    continue
+                if is_asked:
+                    found[count, 0], found[count, 1], found[count, 6] = t, u, 1
+                    found[count, 2], found[count, 3], found[count, 4], found[count, 5] = a, b, c, d
+                count += 1
+    return count
 
 
-def _sharing(triangles: Ints32) -> Ints32:
-    """Return the pairs (np, 2) of triangles (nt, 3) that share a node, the lesser first, each once."""
-    corners = triangles.ravel()
-    order = np.argsort(corners, kind="stable")
-    starts = np.flatnonzero(np.r_[True, np.diff(corners[order]) > 0])
-    counts = np.diff(np.r_[starts, len(corners)])
-    found = []
-    for many in np.unique(counts):
-        around = order[starts[counts == many][:, None] + np.arange(many)] // 3
-        first, second = np.triu_indices(many, 1)
-        found.append(np.stack([around[:, first], around[:, second]], axis=-1).reshape(-1, 2))
-    pairs, count = np.concatenate(found), len(triangles)
-    # as one number each: rows are sorted some ten times as slowly
-    keys = np.unique(pairs.min(axis=1) * count + pairs.max(axis=1))
-    return np.stack(np.divmod(keys, count), axis=-1).astype(np.int32)
-
-
-def _all(each: Bools) -> Bools:
-    """Return where all of the few in each row (n, k) are true; numpy's own way takes several times as long."""
-    found = each[:, 0].copy()
-    for k in range(1, each.shape[1]):
-        found &= each[:, k]
-    return found
+@njit(cache=True)
+def _has(some: Ints32, any_of: Ints32) -> bool:
+    for a in some:
+        for b in any_of:
+            if a == b:
+                return True
+    return False

@@ -8,17 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from ...arrays import Bools, Floats, Ints
-from ...contract import InvalidGeometry
 from ...fruit import Fruit, directions, lattice
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = [
     "CubedSphere",
@@ -26,13 +21,11 @@ __all__ = [
     "Sampler",
     "along_rays",
     "build_mesh",
-    "corner_ratios",
     "cubed_sphere",
     "flesh_span",
     "inner_distance",
     "layer_fractions",
     "meeting",
-    "right_side_out",
 ]
 
 
@@ -52,9 +45,6 @@ _FACES = np.array(
 
 #: Radius of the ball cut out of a fruit without a stone, in units of r1, and its largest share of the thinnest ray.
 CENTRE_BALL, CENTRE_SHARE = 0.1, 0.4
-
-#: Elements whose corners are looked at at once: what that takes stays in the cache.
-_AT_A_TIME = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,23 +146,6 @@ def flesh_span(fruit: Fruit) -> tuple[float, float]:
     return float(flesh.min()), float(flesh.max())
 
 
-def corner_ratios(positions: Floats, connectivity: Ints) -> Floats:
-    """Return least over largest corner Jacobian of each element, (ne,): 1 for a brick, not positive if inverted.
-
-    positions (nn, 3), connectivity (ne, 8) with bits xi = 4, eta = 2, zeta = 1.
-    """
-    jacobians = np.empty((len(connectivity), 8))
-    for first in range(0, len(connectivity), _AT_A_TIME):
-        part = slice(first, first + _AT_A_TIME)
-        corners = positions[connectivity[part]]
-        for c in range(8):
-            # the neighbour along each axis differs in one bit; the sign turns the edge to point along the axis
-            edges = [(corners[:, c ^ bit] - corners[:, c]) * (-1 if c & bit else 1) for bit in (4, 2, 1)]
-            jacobians[part, c] = np.einsum("ei,ei->e", np.cross(edges[0], edges[1]), edges[2])
-    ratios: Floats = jacobians.min(axis=1) / np.abs(jacobians).max(axis=1)
-    return ratios
-
-
 def build_mesh(fruit: Fruit, n: int, core: Floats, exocarp_layers: int = 2) -> FruitMesh:
     """Return the mesh of `fruit` with `n` elements per cube edge and core layers at the fractions `core` (0..1).
 
@@ -184,6 +157,9 @@ def build_mesh(fruit: Fruit, n: int, core: Floats, exocarp_layers: int = 2) -> F
         InvalidGeometry: an element is inverted or flat at a corner.
 
     """
+    # the compiler: what only estimates the cost of a run does without
+    from .corners import right_side_out
+
     sphere = cubed_sphere(n)
     rays, outer = meeting(fruit, sphere.directions)
     columns = along_rays(fruit, rays, outer, core, exocarp_layers)
@@ -218,22 +194,6 @@ def along_rays(fruit: Fruit, rays: Floats, outer: Floats, core: Floats, exocarp_
     )
     found: Floats = rays[:, None, :] * distance[..., None]
     return found
-
-
-def right_side_out(positions: Floats, connectivity: Ints) -> float:
-    """Return the least of `corner_ratios`.
-
-    Raises:
-        InvalidGeometry: it is not positive.
-
-    """
-    worst = float(corner_ratios(positions, connectivity).min())
-    if not worst > 0:
-        raise InvalidGeometry(
-            f"the mesh turns inside out (corner Jacobians of one element differ by the factor {worst:.3g}).",
-            advice="Bring r2..r8 closer to each other, make the stone rounder, or ask for a finer quality.",
-        )
-    return worst
 
 
 class Sampler:

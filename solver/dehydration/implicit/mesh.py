@@ -13,7 +13,8 @@ import numpy as np
 from ...arrays import Bools, Floats, Ints
 from ...contract import InvalidInput
 from ...fruit import directions
-from ..fresh.mesh import along_rays, corner_ratios, cubed_sphere, meeting, right_side_out
+from ..fresh.corners import corner_ratios, right_side_out
+from ..fresh.mesh import along_rays, cubed_sphere, meeting
 from ..params import DehydrationParams
 from .upright import upright
 
