@@ -15,7 +15,7 @@ from store.starter import ROOT
 from store.surfaces.window import Window
 
 #: Questions to the table in the package whose blends cross themselves.
-ASKED = ({"te": 0.0375, "gamma": 20.0}, {"te": 0.0325, "gamma": 25.0})
+ASKED = ({"te": 0.0374, "gamma": 44.5}, {"te": 0.0332, "gamma": 38.5})
 
 
 @pytest.fixture(scope="module")
