@@ -25,7 +25,7 @@ from store.manifest import TableInfo
 from store.store import Store
 
 _HEAD = (
-    *("family", "samples", "quality", "part solved", "stages met", "worst residual"),
+    *("family", "version", "samples", "quality", "part solved", "stages met", "worst residual"),
     *("crossing pairs", "least J", "evened [r1]", "MB", "loss [r1]"),
 )
 
@@ -66,8 +66,8 @@ def _add(sheet: Sheet, name: str, info: TableInfo, package: Store, found: list[M
     settled = f"{met} of {asked}", f"{residual:.1e}"
     shape = pairs, f"{least:.2f}", f"{evened:.3f}"
     sheet.add(
-        (name, len(found), quality, part, *settled, *shape, f"{size:.1f}", f"{loss:.0e}"),
-        family=name, digest=info.digest, quality=quality, part=part, runs=found, bytes=path.stat().st_size, loss=loss,
+        (name, info.version, len(found), quality, part, *settled, *shape, f"{size:.1f}", f"{loss:.0e}"),
+        family=name, digest=info.digest, version=info.version, quality=quality, part=part, runs=found, bytes=path.stat().st_size, loss=loss,
         evened=evened,
     )  # fmt: skip
 
