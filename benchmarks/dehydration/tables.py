@@ -162,10 +162,10 @@ def _full(record: Row) -> str:
         lines.append(
             [
                 row["fruit"], row["quality"], f"{row['s_cr']:.5f}", off, str(row["degree"]), str(size["stacks"]),
-                str(size["unknowns"]), f"{row['cpu']:.0f}",
+                str(size["unknowns"]), f"{row['seconds']:.0f}", f"{row['cpu']:.0f}",
             ]
         )  # fmt: skip
-    head = ("fruit", "quality", "s_cr", "off by", "degree", "columns", "unknowns", "processor seconds")
+    head = ("fruit", "quality", "s_cr", "off by", "degree", "columns", "unknowns", "seconds", "processor seconds")
     return markdown(head, lines)
 
 
