@@ -67,8 +67,8 @@ def _add(sheet: Sheet, name: str, info: TableInfo, package: Store, found: list[M
     shape = pairs, f"{least:.2f}", f"{evened:.3f}"
     sheet.add(
         (name, info.version, len(found), quality, part, *settled, *shape, f"{size:.1f}", f"{loss:.0e}"),
-        family=name, digest=info.digest, version=info.version, quality=quality, part=part, runs=found, bytes=path.stat().st_size, loss=loss,
-        evened=evened,
+        family=name, digest=info.digest, version=info.version, quality=quality, part=part, runs=found,
+        bytes=path.stat().st_size, loss=loss, evened=evened,
     )  # fmt: skip
 
 
