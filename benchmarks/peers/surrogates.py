@@ -26,7 +26,7 @@ from store.blending import methods
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import measures
-from store.surfaces.measures import LATTICE, Measures, Surface
+from store.surfaces.measures import Measures, Surface, lattice_for
 from sweeps.refining import score as scores
 
 #: Share of the displacements' variance that the modes keep.
@@ -170,7 +170,7 @@ def _row(sheet: Sheet, name: str, stage: float, m: Measures, seconds: float | No
 
 
 def _stored(table: ShapeTable, sample: dict[str, float], stage: float) -> Array:
-    found = table.at(sample, stage, resolution=LATTICE, fields=("displacement",)).displacement
+    found = table.at(sample, stage, resolution=lattice_for(table.resolution), fields=("displacement",)).displacement
     assert found is not None
     return found.astype(float)
 

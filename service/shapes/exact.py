@@ -17,6 +17,7 @@ from store.errors import TooUncertain
 from store.families.stored import document, refusal
 from store.starter import is_starter
 from sweeps.commands.terminal.tables import run_command
+from sweeps.relaxing import lattice_of
 
 from ..errors import OutsideRanges, Uncertain
 from ..jobs.submit import asker_of, submit
@@ -114,7 +115,7 @@ def relax(request: Request, asked: Asked) -> Response:
         stages=(query.stage,),
         quality=table.info.quality,
         resolution=asked.resolution,
-        start=Start(table=asked.found.name, digest=table.digest, method=query.method),
+        start=Start(table=asked.found.name, digest=table.digest, method=query.method, lattice=lattice_of(table)),
     )
     return _sent(request, asked, table.at_parameters(query.point), need, None)
 

@@ -47,6 +47,17 @@ class Start(BaseModel):
     table: str = Field(min_length=1, max_length=100, description="Name of the table")
     digest: str = Field(min_length=1, max_length=100, description="Its generation, as GET /v1/tables says it")
     method: str = Field(min_length=1, max_length=100, description="How to look up in it")
+    lattice: int | None = Field(
+        None, ge=4, le=2048, description="Colatitudes of the lattice that is laid on the mesh; None is the table's own"
+    )
+
+    @model_serializer(mode="wrap")
+    def _written(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out a lattice that is not there: keys of what was stored before there was one stay as they are."""
+        written: dict[str, Any] = plain(self)
+        if self.lattice is None:
+            written.pop("lattice", None)
+        return written
 
 
 class Need(BaseModel):

@@ -20,7 +20,7 @@ from ..blending.methods.weights import Samples
 from ..blending.neighbours import Weighted
 from ..errors import OutsideTable, TooUncertain
 from ..surfaces import harmonics
-from ..surfaces.measures import LATTICE, Measures, Surface, compare
+from ..surfaces.measures import Measures, Surface, compare, lattice_for
 from ..surfaces.packed import Stored
 from ..surfaces.window import WHOLE
 
@@ -43,9 +43,9 @@ def leave_one_out(blender: Blender, stored: Stored, samples: Samples, shapes: li
 
     The log-linear fit behind LL is that of the whole table.
     """
-    rows = []
+    rows, n = [], _lattice(stored)
     for i, shape in enumerate(shapes):
-        others, start, point = samples.without(i, method.weighting), fresh(shape), samples.values[i]
+        others, start, point = samples.without(i, method.weighting), fresh(shape, n), samples.values[i]
         rows.append(
             [
                 compare(
@@ -58,17 +58,22 @@ def leave_one_out(blender: Blender, stored: Stored, samples: Samples, shapes: li
     return np.array(rows)
 
 
-def fresh(shape: Fresh, n: int = LATTICE) -> Array:
+def fresh(shape: Fresh, n: int) -> Array:
     """Return a fresh surface (n, 2n, 3)."""
     return shape.points(*lattice(n))
 
 
+def _lattice(stored: Stored) -> int:
+    """Return the lattice on which spectra (sample, stage, component, m, k, part) are compared."""
+    return lattice_for(stored.shape[-2] - 1)
+
+
 def correlations(stored: Stored, samples: Samples, shapes: list[Fresh]) -> Array:
     """Return the mean correlation (stage,) of the radial wrinkles of neighbouring samples."""
-    pairs = samples.adjacent()
+    pairs, starts = samples.adjacent(), [fresh(shape, _lattice(stored)) for shape in shapes]
     found = np.empty((len(pairs), stored.shape[1]))
     for j in range(stored.shape[1]):
-        seen = [surface_of(Blend(complex_view(stored[i, j])), fresh(shape)).wrinkles for i, shape in enumerate(shapes)]
+        seen = [surface_of(Blend(complex_view(stored[i, j])), start).wrinkles for i, start in enumerate(starts)]
         norms = [float(np.sqrt(_dot(w, w))) + 1e-12 for w in seen]
         found[:, j] = [_dot(seen[a], seen[b]) / (norms[a] * norms[b]) for a, b in pairs]
     value: Array = found.mean(axis=0)

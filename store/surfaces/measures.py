@@ -15,11 +15,11 @@ from solver.arrays import Array
 
 from . import harmonics, spectra, surface
 
-__all__ = ["OF", "UNITS", "Measures", "Surface", "compare", "mean"]
+__all__ = ["OF", "UNITS", "Measures", "Surface", "compare", "lattice_for", "mean"]
 
 
-#: Lattice on which spectra are compared.
-LATTICE = 64
+#: Coarsest lattice on which shapes are compared.
+_LATTICE = 64
 #: Bands per doubling of the degree, for the error of band powers.
 _PER_OCTAVE = 3
 #: Bands with less than this share of the truth's power are noise to both.
@@ -28,6 +28,15 @@ _LEAST = 1e-3
 _WINDOW = 0.35
 #: Amplitude [r1] below which a surface counts as smooth: ratios of nothing to nothing are 1.
 _SMOOTH = 1e-4
+
+
+def lattice_for(band: int) -> int:
+    """Return the lattice on which shapes with waves up to `band` are compared: one that holds them all.
+
+    On a coarser one the wrinkles of thin skins are no more there to be wrong: at te = 0.01 most of them are above
+    degree 64.
+    """
+    return max(_LATTICE, band)
 
 
 class Measures(NamedTuple):

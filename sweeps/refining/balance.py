@@ -22,7 +22,9 @@ from solver.lattice import lattice
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import measures
-from store.surfaces.measures import LATTICE, Surface
+from store.surfaces.measures import Surface
+
+from ..relaxing import begun, lattice_of
 
 __all__ = ["STEPS", "Distance", "at_hand", "between", "distance", "mean"]
 
@@ -79,21 +81,21 @@ def distance(
         InvalidInput: it relaxes nothing.
 
     """
-    shape = table.at(values, stage, resolution=LATTICE, fields=("position", "displacement"), method=method)
-    assert shape.position is not None
-    assert shape.displacement is not None
-    need = Need(fields=("displacement", "position"), quality=table.info.quality, resolution=LATTICE)
+    n = measures.lattice_for(table.resolution)
+    looked_up = table.at(values, stage, resolution=n, fields=("displacement",), method=method).displacement
+    assert looked_up is not None
+    surface = begun(table, values, stage, method, lattice_of(table))
+    need = Need(fields=("displacement", "position"), quality=table.info.quality, resolution=n)
     told, library = table.at_parameters(values), None if store is None else store.find
     params = solver.parse({name: value for name, value in told.items() if library is not None or name != "pattern"})
-    surface = np.asarray(shape.position, float)
     try:
         found = solver.relaxed(params, surface, stage, need, Context(library=library), STEPS).isel(stage=0)
     except SolverError as error:
         if error.code == "invalid-input":
             raise
         return None
-    fresh = table.fresh(values).points(*lattice(LATTICE))
-    alike = measures.compare(Surface(fresh, shape.displacement), Surface(fresh, found["displacement"].values))
+    fresh = table.fresh(values).points(*lattice(n))
+    alike = measures.compare(Surface(fresh, looked_up), Surface(fresh, found["displacement"].values))
     said = {name: float(found[name]) for name in ("residual_placed", "residual", "moved")}
     return Distance(method, stage, **said, rgh=alike.rgh, dB=alike.dB, W1=alike.W1, corr=alike.corr)
 

@@ -21,7 +21,7 @@ from store.ledger.jobs import Job
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import measures, spectra
-from store.surfaces.measures import LATTICE, Measures, Surface
+from store.surfaces.measures import Measures, Surface
 
 from ..errors import InvalidOption
 from ..pictures.sheet import Panel, sheet
@@ -36,9 +36,12 @@ _SEED = "seed"
 
 @dataclass(frozen=True)
 class Case:
-    """A shape that is known and one that is looked up: both displacements (n, 2n, 3) on the lattice of `LATTICE`."""
+    """A shape that is known and one that is looked up: both displacements (n, 2n, 3), on the `lattice` of n that holds
+    the table's waves.
+    """
 
     label: str
+    lattice: int
     start: Fresh
     truth: Callable[[float], Array]
     found: Callable[[str, float], Array]
@@ -46,7 +49,7 @@ class Case:
     @property
     def fresh(self) -> Array:
         """Fresh positions (n, 2n, 3)."""
-        return self.start.points(*lattice(LATTICE))
+        return self.start.points(*lattice(self.lattice))
 
 
 class Row(NamedTuple):
@@ -157,33 +160,34 @@ def picture(found: Sequence[Case], stage: float, pixels: int = 260, most: int = 
 
 
 def _left_out(table: ShapeTable, i: int) -> Case:
-    values = table.sample(i)
+    values, n = table.sample(i), measures.lattice_for(table.resolution)
 
     def truth(stage: float) -> Array:
-        shape = table.at(values, stage, resolution=LATTICE, fields=("displacement",))
+        shape = table.at(values, stage, resolution=n, fields=("displacement",))
         assert shape.displacement is not None
         return shape.displacement
 
-    return Case(_label(values), table.fresh(values), truth, lambda method, s: table.left_out(i, s, method, LATTICE))
+    return Case(_label(values), n, table.fresh(values), truth, lambda method, s: table.left_out(i, s, method, n))
 
 
 def _held_out(table: ShapeTable, result: xr.Dataset, job: Job) -> Case:
     values = read_axes(job.params, {name: table.info.places[name] for name in table.axes})
     fields = result["displacement"].transpose("stage", "colatitude", "azimuth", "component")
+    n = measures.lattice_for(table.resolution)
 
     def truth(stage: float) -> Array:
         at = int(np.abs(result["stage"].values - stage).argmin())
         field = fields.values[at].astype(float)
         # to the table's band, which is all that a look-up could know
         waves = spectra.truncate(spectra.spectrum(field), table.resolution)
-        return spectra.synthesize(waves, LATTICE)
+        return spectra.synthesize(waves, n)
 
     def found(method: str, stage: float) -> Array:
-        shape = table.at(values, stage, resolution=LATTICE, fields=("displacement",), method=method)
+        shape = table.at(values, stage, resolution=n, fields=("displacement",), method=method)
         assert shape.displacement is not None
         return shape.displacement
 
-    return Case(_label(values), table.fresh(values), truth, found)
+    return Case(_label(values), n, table.fresh(values), truth, found)
 
 
 def _runs(store: Store, table: ShapeTable, held: Path) -> Iterator[tuple[xr.Dataset, Job]]:

@@ -15,8 +15,10 @@ from solver.dehydration import SOLVER
 from solver.lattice import azimuths, colatitudes, directions, lattice
 from store.lookup import ShapeTable
 from store.starter import ROOT
+from store.surfaces import spectra
 from sweeps.outputs import of_result
-from sweeps.relaxing import relaxed
+from sweeps.relaxing import begun as begun_at
+from sweeps.relaxing import lattice_of, relaxed
 
 POINT, STAGE = {"te": 0.034, "gamma": 22.0}, 0.2
 
@@ -45,7 +47,13 @@ def test_what_is_relaxed_starts_and_ends_as_in_a_job(resolution: int | None) -> 
 
     shape = table.at(POINT, STAGE, resolution=resolution)
     found, _ = relaxed(replace(SOLVER, relax=relax), table, shape)
-    assert np.array_equal(begun[0], np.asarray(table.at(POINT, STAGE).position, float))
+    own = table.at(POINT, STAGE).position
+    assert own is not None
+    assert begun[0].shape == (lattice_of(table), 2 * lattice_of(table), 3)
+    assert np.array_equal(begun[0], begun_at(table, POINT, STAGE, shape.method, lattice_of(table)))
+    waves = spectra.truncate(spectra.spectrum(begun[0]), table.resolution)
+    assert np.abs(spectra.synthesize(waves, table.resolution) - own).max() < 1e-6
+    assert np.array_equal(begun_at(table, POINT, STAGE, shape.method), np.asarray(own, float))
     job = of_result(results[0], shape.parameters, 0)
     assert found.position is not None
     assert found.poles is not None

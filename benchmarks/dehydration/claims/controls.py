@@ -55,8 +55,12 @@ def main() -> None:
 def _need(table_: ShapeTable) -> Need:
     fields = ("displacement", *_COMPARED)
     return SOLVER.settle(
-        Need(stages=table_.stages, quality=table_.info.quality, fields=fields, resolution=measures.LATTICE)
+        Need(stages=table_.stages, quality=table_.info.quality, fields=fields, resolution=_lattice(table_))
     )
+
+
+def _lattice(table_: ShapeTable) -> int:
+    return measures.lattice_for(table_.resolution)
 
 
 def _cheapest(store: Store, name: str) -> tuple[float, str, int]:
@@ -76,8 +80,8 @@ def _controlled(store: Store, table_: ShapeTable, i: int) -> Row:
     """Return the numbers of a sample as it is in its table, solved anew, and of the same fruit without a pattern."""
     sample = table_.sample(i)
     params = SOLVER.parse(table_.at_parameters(sample))
-    fresh = trust.fresh(registry.surface(SOLVER.name).of(params.model_dump()), measures.LATTICE)
-    stored = [table_.at(sample, s, resolution=measures.LATTICE, fields=("displacement",)) for s in table_.stages]
+    fresh = trust.fresh(registry.surface(SOLVER.name).of(params.model_dump()), _lattice(table_))
+    stored = [table_.at(sample, s, resolution=_lattice(table_), fields=("displacement",)) for s in table_.stages]
     truth = [Surface(fresh, one.displacement) for one in stored]
     row: Row = {
         "sample": sample,
