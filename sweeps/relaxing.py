@@ -24,11 +24,13 @@ __all__ = ["begun", "lattice_of", "relaxed", "starts"]
 #: linear between its points: with two points to the shortest wave, ridges are cut off. What relaxing moves of runs
 #: of te = 0.01 in a table falls from .10 of their roughness to .02; twice as fine again changes nothing.
 _FINER = 4
+#: Finest lattice that is made for it.
+_FINEST = 1024
 
 
 def lattice_of(table: ShapeTable) -> int:
     """Return the lattice from which shapes of a table are laid on the mesh."""
-    return _FINER * table.resolution
+    return max(table.resolution, min(_FINER * table.resolution, _FINEST))
 
 
 def begun(

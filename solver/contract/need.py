@@ -48,7 +48,7 @@ class Start(BaseModel):
     digest: str = Field(min_length=1, max_length=100, description="Its generation, as GET /v1/tables says it")
     method: str = Field(min_length=1, max_length=100, description="How to look up in it")
     lattice: int | None = Field(
-        None, ge=4, le=2048, description="Colatitudes of the lattice that is laid on the mesh; None is the table's own"
+        None, ge=4, le=1024, description="Colatitudes of the lattice that is laid on the mesh; None is the table's own"
     )
 
     @model_serializer(mode="wrap")

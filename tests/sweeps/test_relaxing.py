@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import xarray as xr
 
 from solver import registry
 from solver.arrays import Floats
-from solver.contract import Context, Need, Params
+from solver.contract import Context, Need, Params, Start
 from solver.dehydration import SOLVER
 from solver.lattice import azimuths, colatitudes, directions, lattice
 from store.lookup import ShapeTable
@@ -66,3 +68,17 @@ def test_what_is_relaxed_starts_and_ends_as_in_a_job(resolution: int | None) -> 
     assert found.tier == job.tier == "relaxed"
     # the closed form of the waves, of which the rings' means are off by more than they could by rounding
     assert np.allclose(found.poles, [[0, 1.1, 0], [0, -1.1, 0]], atol=1e-4)
+
+
+@pytest.mark.parametrize(("own", "laid"), [(48, 192), (300, 1024), (1024, 1024)])
+def test_what_is_laid_on_the_mesh_is_finer_within_what_a_start_may_be(own: int, laid: int) -> None:
+    table = cast("ShapeTable", SimpleNamespace(resolution=own))
+    assert lattice_of(table) == laid
+    assert Start(table="one", digest="d", method="idw", lattice=lattice_of(table)).lattice == laid
+
+
+def test_a_start_without_a_lattice_is_written_as_before_there_was_one() -> None:
+    """Keys of what was stored then stay."""
+    start = Start(table="one", digest="d", method="idw")
+    assert Need(start=start).model_dump()["start"] == {"table": "one", "digest": "d", "method": "idw"}
+    assert Need.parse({"start": start.model_dump()}).start == start
