@@ -40,7 +40,7 @@ from store.store import Store
 from sweeps.planning.plan import Plan
 from sweeps.refining import balance
 from sweeps.refining.balance import Distance
-from sweeps.relaxing import relaxed
+from sweeps.relaxing import lattice_of, relaxed
 from sweeps.running import executors
 from sweeps.running.runner import run_plan
 
@@ -95,7 +95,14 @@ def _score(names: Sequence[str] | None, stages: Sequence[float], count: int) -> 
     opened = {name: ShapeTable.open(ROOT, name, surfaces=registry.surface) for name in package.table_names()}
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
     about = {
-        name: {"version": SOLVER.version, "family": name, "digest": one.digest, "stages": [*stages], "points": count}
+        name: {
+            "version": SOLVER.version,
+            "family": name,
+            "digest": one.digest,
+            "stages": [*stages],
+            "points": count,
+            "lattice": lattice_of(one),
+        }
         for name, one in opened.items()
         if one.size > 1
     }
