@@ -21,12 +21,13 @@ from solver.arrays import Floats
 from store import starter
 from store.lookup import ShapeTable
 from store.store import Store
+from store.surfaces.measures import lattice_for
 
 __all__ = ["table"]
 
 NAME = "dehydration-jumps"
-#: Colatitudes; steps along a line; how many of them are halved, and how often.
-_LATTICE, _STEPS, _HALVED, _TIMES = 64, 120, 3, 17
+#: Steps along a line; how many of them are halved, and how often.
+_STEPS, _HALVED, _TIMES = 120, 3, 17
 #: Stages at which parameters move: to the first folds, and where all folds.
 _STAGES = (0.2, 0.3)
 #: A line by the stage goes so far, and on to the end.
@@ -42,12 +43,16 @@ def main() -> None:
         n: ShapeTable.open(starter.ROOT, n, surfaces=registry.surface) for n in Store.open(starter.ROOT).table_names()
     }
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
-    runs = {r["family"]: r for r in kept if r["family"] in tables and r["digest"] == tables[r["family"]].digest}
+    about = {
+        name: {"family": name, "digest": one.digest, "resolution": lattice_for(one.resolution)}
+        for name, one in tables.items()
+    }
+    runs = {r["family"]: r for r in kept if r["family"] in about and about[r["family"]].items() <= r.items()}
     for name, one in tables.items():
         if name in runs:
             continue
-        runs[name] = {"family": name, "digest": one.digest, "lines": list(_lines(one))}
-        figures.keep(NAME, [runs[k] for k in tables if k in runs], "dehydration", resolution=_LATTICE, steps=_STEPS)
+        runs[name] = {**about[name], "lines": list(_lines(one))}
+        figures.keep(NAME, [runs[k] for k in tables if k in runs], "dehydration", steps=_STEPS)
         print(name, file=sys.stderr, flush=True)
 
 
@@ -66,12 +71,13 @@ def _lines(table_: ShapeTable) -> Iterator[Row]:
 def _line(
     table_: ShapeTable, place: dict[str, float], axis: str, stage: float, low: float, high: float
 ) -> Iterator[Row]:
+    n = lattice_for(table_.resolution)
     for field in ("displacement", "position"):
 
         def shape(share: float, field: str = field) -> Floats:
             x = low + (high - low) * share
             asked, s = (place, x) if axis == "s" else ({**place, axis: x}, stage)
-            found = table_.at(asked, s, resolution=_LATTICE, fields=(field,))
+            found = table_.at(asked, s, resolution=n, fields=(field,))
             return np.asarray(found.position if field == "position" else found.displacement, np.float64)
 
         jump, at, step = _largest(shape)
