@@ -34,7 +34,7 @@ from .generations.samples import insert
 from .manifest import TableInfo
 from .shape import Shape
 from .store import Store
-from .surfaces import surface
+from .surfaces import harmonics, surface
 from .surfaces.apart import COARSE, Evened, even_out
 from .surfaces.measures import Measures
 from .surfaces.window import WHOLE, Patch, Window
@@ -51,6 +51,8 @@ _Fields = tuple[Array | None, Array | None, Array | None]
 _FRESH = -1
 #: Descriptors that are zero on the fresh shape; the others have no known value next to it.
 _ZERO_AT_FIRST = ("roughness", "buckle_count", "penetration")
+#: Power [r1^2] that is no wrinkle's but round-off.
+_NO_WRINKLES = 1e-10
 
 
 class ShapeTable:
@@ -81,6 +83,7 @@ class ShapeTable:
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
         self._samples = None if values is None else Samples(values)
         self._blender = Blender(self._spectra, self._samples, power)
+        self._below = None if power is None else _up_to(power)
         self._trust = None
         if found is not None and self._samples is not None:
             self._trust = trust.Trust(*found, self._samples)
@@ -219,6 +222,7 @@ class ShapeTable:
             crossings=crossings,
             converged=self._has_converged(near, stages),
             expected_error=expected,
+            held=self._held(near, stages, n),
             method=str(how),
             table=self.digest,
             units={name: self._units[name] for name in (*fields, *self.info.descriptors)},
@@ -305,6 +309,21 @@ class ShapeTable:
             return None
         return self._trust.expect(near, _stored(stages))
 
+    def _held(self, near: Weighted, stages: Mapping[int, float], n: int) -> float | None:
+        """Return the share of the wrinkles' height (rms) in waves of degrees up to n: a lattice of n holds all of them,
+        and of others a part. None where the table has no power by degree.
+        """
+        stored = _stored(stages)
+        if n >= self.resolution or not stored:
+            return 1.0
+        if self._below is None:
+            return None
+        places, shares = np.array(list(stored), int), np.array(list(stored.values()), float)
+        below = self._below[near.samples][:, places]
+        weights = np.maximum(near.weights, 0)  # those that extrapolate may be negative
+        part, whole = (float(weights @ below[..., degree] @ shares) for degree in (n, -1))
+        return float(np.sqrt(np.clip(part / whole, 0.0, 1.0))) if whole > _NO_WRINKLES else 1.0
+
     def _bracket(self, stage: float) -> dict[int, float]:
         """Return the stages around one with their weights: stored ones by their place, and `_FRESH`."""
         after = bisect.bisect_left(self._knots, stage)
@@ -390,6 +409,14 @@ def _check(fields: Sequence[str], n: int, m: int, eta: float) -> None:
         raise OutsideTable(f"a resolution of {n} is out of reach.", "Ask for 4 to 1024 colatitudes.")
     if m < 1 or not eta > 0:
         raise OutsideTable(f"m = {m} neighbours with eta = {eta} give no weights.", "Take m >= 1 and eta > 0.")
+
+
+def _up_to(power: Array) -> Array:
+    """Return the power (sample, stage, l) of wrinkles up to each degree l, of that by degree."""
+    wrinkles = power.astype(float)
+    wrinkles[..., : harmonics.LOWEST] = 0
+    found: Array = wrinkles.cumsum(axis=-1)
+    return found
 
 
 def _stored(stages: Mapping[int, float]) -> dict[int, float]:

@@ -28,6 +28,9 @@ class Shape:
     stage that it was made of had not reached its residual.
     `expected_error` says by measure (`store.surfaces.measures`, as errors: |rgh - 1| and 1 - corr) how far the shape
     may be off the true one; None where the table does not know, as for any method but the one it was built for.
+    `held` is the share of the wrinkles' height (rms) that the lattice holds at least, by waves of degrees up to its n;
+    1 where it holds all waves of the table; None where the table does not say. None of the errors expected is of what a
+    coarse lattice leaves out.
     `crossings` counts the pairs of triangles of the closed lattice that cross, on these positions; None where no
     positions were computed, or those of a part. `tier`: whether it is looked up in a `table`,
     `relaxed` from there by its solver, or a `run`.
@@ -50,6 +53,7 @@ class Shape:
     inside: bool = True
     expected_error: Mapping[str, float] | None = None
     method: str = ""
+    held: float | None = None
     crossings: int | None = None
     tier: str = "table"
 
@@ -62,6 +66,7 @@ class Shape:
             "tier": self.tier,
             "nearest": self.nearest,
             "inside": self.inside,
+            "held": self.held,
             "expected_error": None if self.expected_error is None else dict(self.expected_error),
         }
 

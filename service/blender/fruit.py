@@ -16,6 +16,8 @@ __all__ = ["ask", "follow", "insert", "is_fruit", "sliders"]
 
 #: Names of what an object remembers besides its sliders.
 _SOLVER, _TABLE, _AXES, _STAGE, _N = "wizen_solver", "wizen_table", "wizen_axes", "wizen_stage", "wizen_n"
+#: Share of the wrinkles' height from which on a mesh holds them.
+_ALL_HELD = 0.995
 
 
 def is_fruit(thing: Any) -> bool:
@@ -100,6 +102,9 @@ def _take(name: str, found: Points) -> None:
     trust = "a run" if found.about.get("exact") else "between runs"
     rough = error.get("rgh")
     STATE.trust = f"{name}: {trust}" + ("" if rough is None else f", roughness to {100 * rough:.1f} %")
+    held = found.about.get("held")
+    if held is not None and held < _ALL_HELD:
+        STATE.trust += f"; this mesh holds {100 * held:.0f} % of the wrinkles' height"
 
 
 def _lattice(mesh: Any, n: int) -> None:

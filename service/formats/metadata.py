@@ -23,7 +23,8 @@ def encode(shape: Shape, about: About) -> bytes:
     where no positions were computed.
 
     `nearest` is the scaled distance to the nearest stored result, `exact` that this is a stored result itself, `inside`
-    that stored results surround it, `expected_error` how far it may be off by measure, null where nobody knows.
+    that stored results surround it, `held` at least what share of the wrinkles' height the lattice holds,
+    `expected_error` how far it may be off by measure, null where nobody knows.
     """
     whose = " (of the runs)" if shape.tier == "table" else ""
     described = {

@@ -195,6 +195,7 @@ class _Rows:
                 **{f"expected_{name}": value for name, value in (shape.expected_error or {}).items()},
                 "nearest": shape.nearest,
                 "inside": shape.inside,
+                "held": np.nan if shape.held is None else shape.held,
                 "exact": shape.exact,
                 "converged": shape.converged,
                 "crossings": np.nan if shape.crossings is None else shape.crossings,

@@ -72,6 +72,10 @@ class ShapePage(BaseModel):
     )
     nearest: float = Field(description="Distance to the nearest run; 1 is a whole range of a parameter")
     inside: bool = Field(description="The runs surround the question")
+    held: float | None = Field(
+        description="Share of the wrinkles' height (rms) that a lattice as fine as this one holds at least; null where "
+        "the table does not say. What it lacks is no error in `expected_error`"
+    )
     expected_error: dict[str, float | None] | None = Field(description="By measure; null where nobody knows")
     method: str
     units: dict[str, str]

@@ -33,8 +33,7 @@ _SMOOTH = 1e-4
 def lattice_for(band: int) -> int:
     """Return the lattice on which shapes with waves up to `band` are compared: one that holds them all.
 
-    On a coarser one the wrinkles of thin skins are no more there to be wrong: at te = 0.01 most of them are above
-    degree 64.
+    On a coarser one what is finest is no more there to be wrong, and slopes are those of a wave with a few points.
     """
     return max(_LATTICE, band)
 

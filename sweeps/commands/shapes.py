@@ -257,6 +257,9 @@ def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path |
             for key in errors[0]
         ]
     rows += [["a stored run, as it is", "", *("yes" if shape.exact else "no" for shape in shapes)]]
+    if any((shape.held or 1.0) < _ALL_HELD for shape in shapes):
+        told = ("unknown" if shape.held is None else f"{100 * shape.held:.0f}" for shape in shapes)
+        rows += [["wrinkles' height that this lattice holds", "%", *told]]
     if any(shape.crossings is not None for shape in shapes):
         told = ("unknown" if shape.crossings is None else str(shape.crossings) for shape in shapes)
         rows += [["crossing pairs as handed over", "1", *told]]
@@ -268,6 +271,10 @@ def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path |
     grid(console, head, rows, title=f"{name}: {place}" if place else name)
     if out is not None:
         console.print(f"written to {out}", markup=False)
+
+
+#: Share of the wrinkles' height above which a lattice holds it.
+_ALL_HELD = 0.995
 
 
 def _limits(text: str | None) -> dict[str, float] | None:

@@ -96,6 +96,12 @@ def test_every_format_says_what_error_to_expect(client: httpx.Client, built: Pat
     assert stored["expected_error"] == dict.fromkeys(Measures._fields, 0.0)
 
 
+def test_a_coarse_lattice_is_said_to_leave_wrinkles_out(client: httpx.Client, built: Path) -> None:
+    own = ShapeTable.open(built, surfaces=registry.surface).resolution
+    coarse, fine = (ask(client, resolution=n).json()["held"] for n in (4, own))
+    assert 0 < coarse < 0.9 < fine == 1.0
+
+
 def test_outside_the_hull_is_said(tmp_path: Path) -> None:
     store = Store.open(tmp_path / "store", create=True)
     for te, gamma in ((0.02, 5.0), (0.06, 5.0), (0.02, 20.0)):

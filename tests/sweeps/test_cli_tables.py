@@ -99,6 +99,13 @@ def test_query(table: Path, tmp_path: Path) -> None:
     assert said["stages"][0]["volume"] == pytest.approx(inside, rel=1e-5)
 
 
+def test_a_coarse_lattice_is_said_to_leave_wrinkles_out() -> None:
+    thin = ("query", "--preset", "sphere", "--set", "te=0.01", "--stages", "0.1")
+    said = "wrinkles' height that this lattice holds"
+    assert said in " ".join(wizen(*thin, "--resolution", 32).stdout.split())
+    assert said not in " ".join(wizen(*thin).stdout.split())
+
+
 def test_what_falls_apart_when_relaxed_says_what_to_type(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise Unstable("elements turned inside out.", advice="Run it from the start.")

@@ -33,6 +33,9 @@ export function verdict(about: About): Verdict {
 const short = (value: number): string => digits(Number(value.toPrecision(2)));
 const percent = (share: number): string => `${short(100 * share)} %`;
 
+/** Share of the wrinkles' height from which on a mesh holds them. */
+const ALL_HELD = 0.995;
+
 /** Errors by measure, in words and their own units; docs/service.md says what they are. */
 const MEASURES: Record<string, [string, (value: number) => string]> = {
   rgh: ["Roughness, off by", percent],
@@ -52,6 +55,7 @@ export function showTrust(root: HTMLElement, about: About, speed: string): void 
     const value = about.expected_error?.[name];
     if (value !== undefined) rows.push([word, say(value)]);
   }
+  if (about.held != null && about.held < ALL_HELD) rows.push(["Wrinkles that this mesh holds", percent(about.held)]);
   rows.push(["Looked up by", about.method]);
   rows.push(["Settled", about.converged ? "yes" : "not every stage it is made of"]);
   rows.push(["Made of", bars(about.weights)]);

@@ -59,6 +59,8 @@ export interface About {
   /** Measured on the mesh itself; null where it was not computed. */
   crossings: number | null;
   volume: number | null;
+  /** Share of the wrinkles' height that a lattice as fine as this holds. */
+  held: number | null;
   expected_error: Record<string, number> | null;
   method: string;
   /** How it came about: looked up in a table, relaxed from there, or a run. */
