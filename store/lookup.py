@@ -196,8 +196,8 @@ class ShapeTable:
         n = self.resolution if resolution is None else resolution
         _check(fields, n, m, eta)
         how, patch = methods.parse(method), window.on(n)
-        point = np.array(list(values.values())) if self._samples is not None else None
-        near, stages = self._near(point, how, m, eta), self._bracket(s)
+        point, stages = None if self._samples is None else np.array(list(values.values())), self._bracket(s)
+        near = self._near(point, how, m, eta)
         mixed = self._blender.mix(point, near, tuple(_stored(stages)), how)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
@@ -205,10 +205,9 @@ class ShapeTable:
             trust.refuse(expected, max_error, inside, self._judged)
         exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
         found, crossings = self._fields(fields, patch, values, self._blend(point, mixed, stages, how, n), exact)
-        colatitude, azimuth = _angles(n)
         return Shape(
-            colatitude=colatitude[patch.rows],
-            azimuth=azimuth[patch.columns],
+            colatitude=_angles(n)[0][patch.rows],
+            azimuth=_angles(n)[1][patch.columns],
             position=found[0],
             displacement=found[1],
             poles=found[2],
