@@ -1,9 +1,10 @@
 """Controls of the package's families: python -m benchmarks.dehydration.claims.controls [--seconds 300].
 
 Of each family that was started from a pattern, the sample that is expected to take least is solved again twice: from
-the pattern, by the solver as it is, which may not be the version that made the table; and without it, from its bumps
-alone. What that changes in what is counted and measured, stage by stage, and how alike the wrinkles are. Kept after
-each run; what the record has of the solver's version is not run again, and what is expected to take longer is left out.
+the pattern, by the solver as it is, where another version made the table; and without it, from its bumps alone, or
+taken from a store that has that run. What that changes in what is counted and measured, stage by stage, and how alike
+the wrinkles are. Kept after each run; what the record has of the solver's version is not run again, and what is
+expected to take longer is left out.
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from pathlib import Path
 from typing import Any
+
+import xarray as xr
 
 from benchmarks import figures
 from benchmarks.figures import Row, markdown
@@ -35,11 +39,14 @@ def main() -> None:
     """Run what is missing, the cheapest first."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=300.0, help="most that one run is expected to take [s]")
-    limit = parser.parse_args().seconds
+    parser.add_argument("--families", nargs="+", help="only these")
+    parser.add_argument("--store", type=Path, help="take cold runs from there where it has them")
+    asked = parser.parse_args()
+    limit, other = asked.seconds, None if asked.store is None else Store.open(asked.store)
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
     runs = [row for row in kept if row["version"] == SOLVER.version]
     store = Store.open(starter.ROOT)
-    for seconds, name, i in sorted(_cheapest(store, name) for name in store.table_names()):
+    for seconds, name, i in sorted(_cheapest(store, name) for name in asked.families or store.table_names()):
         table_ = ShapeTable.open(store, name, surfaces=registry.surface)
         digest = table_.digest[:12]
         if not table_.at_parameters(table_.sample(i)).get("pattern") or seconds > limit:
@@ -47,9 +54,10 @@ def main() -> None:
         if any((row["family"], row["digest"]) == (name, digest) for row in runs):
             continue
         runs = [row for row in runs if row["family"] != name]
-        runs.append({"version": SOLVER.version, "family": name, "digest": digest, **_controlled(store, table_, i)})
+        about = {"version": SOLVER.version, "family": name, "digest": digest}
+        runs.append({**about, **_controlled(store, table_, i, other)})
         figures.keep(NAME, runs, "dehydration", threads=1)
-        print(name, runs[-1]["cold"]["cpu"], file=sys.stderr, flush=True)
+        print(name, file=sys.stderr, flush=True)
 
 
 def _need(table_: ShapeTable) -> Need:
@@ -76,7 +84,19 @@ def _cold(table_: ShapeTable, i: int) -> Any:
     return SOLVER.parse({**table_.at_parameters(table_.sample(i)), "pattern": None})
 
 
-def _controlled(store: Store, table_: ShapeTable, i: int) -> Row:
+def _stored(other: Store | None, table_: ShapeTable, params: Any) -> xr.Dataset | None:
+    """Return a run of these parameters, quality, stages and lattice that a store holds, of the solver as it is."""
+    said = params.model_dump(mode="json")
+    for job in [] if other is None else other.ledger.jobs("done"):
+        if job.params == said and job.version == SOLVER.version and job.need["quality"] == table_.info.quality:
+            assert other is not None
+            run = other.get(job.key)
+            if run["stage"].values.tolist() == list(table_.stages) and len(run["colatitude"]) == _lattice(table_):
+                return run
+    return None
+
+
+def _controlled(store: Store, table_: ShapeTable, i: int, other: Store | None) -> Row:
     """Return the numbers of a sample as it is in its table, solved anew, and of the same fruit without a pattern."""
     sample = table_.sample(i)
     params = SOLVER.parse(table_.at_parameters(sample))
@@ -91,10 +111,14 @@ def _controlled(store: Store, table_: ShapeTable, i: int) -> Row:
         "table_version": table_.info.version,
         "stored": {name: [one.descriptors[name] for one in stored] for name in _COMPARED},
     }
-    for name, asked in (("anew", params), ("cold", _cold(table_, i))):
+    ways = {"anew": params, "cold": _cold(table_, i)}
+    if table_.info.version == SOLVER.version:
+        del ways["anew"]  # they would be the samples
+    for name, asked in ways.items():
         begin = time.process_time()
-        run = SOLVER.solve(asked, _need(table_), Context(library=store.find))
-        spent = time.process_time() - begin
+        held = _stored(other, table_, asked)
+        run = SOLVER.solve(asked, _need(table_), Context(library=store.find)) if held is None else held
+        spent = time.process_time() - begin if held is None else None
         found = [Surface(fresh, u) for u in run["displacement"].transpose("stage", ...).values]
         row[name] = {each: run[each].values.tolist() for each in _COMPARED} | {
             "correlation": [measures.compare(a, b).corr for a, b in zip(found, truth, strict=True)],
@@ -110,13 +134,13 @@ def table(record: Row) -> str:
     lines = []
     for row in record["runs"]:
         said = ", ".join(f"{axis} {value:g}" for axis, value in row["sample"].items())
-        for name in ("anew", "cold"):
-            run = row[name]
+        for name, run in ((name, row[name]) for name in ("anew", "cold") if name in row):
             off = [
                 " ".join(_off(c, p) for c, p in zip(run[each], row["stored"][each], strict=True)) for each in _COMPARED
             ]
             alike = " ".join(f"{value:.2f}" for value in run["correlation"])
-            lines.append([row["family"], said, row["quality"], name, alike, *off, f"{run['cpu']:.0f}"])
+            spent = "stored" if run["cpu"] is None else f"{run['cpu']:.0f}"
+            lines.append([row["family"], said, row["quality"], name, alike, *off, spent])
     stages = ", ".join(f"{s:g}" for s in record["runs"][0]["stages"])
     return markdown(
         (
