@@ -33,6 +33,8 @@ _FAINT = 1e-3
 #: No band is made stronger or weaker than this: sixteen incoherent samples lose a factor of four.
 _MOST = 4.0
 _QUANTILES = (np.arange(48) + 0.5) / 48
+#: Least way [ln l] from one quantile to the next; of a spectrum that is a single band it is five times that.
+_LEAST_RISE = 1e-3
 #: Bytes of what leads from gains to factors that are kept over all tables: 50 kB at 64 colatitudes, .2 MB at 128.
 _ROOM = 8 << 20
 
@@ -97,9 +99,7 @@ class Targets:
         mean = (weights.T[:, None] @ known.rows)[:, 0]
         to_total, to_centroid = known.slopes @ point
         total = np.exp(mean[:, 0] + to_total)
-        # weights that are negative may turn quantiles round
-        moved = np.maximum.accumulate(mean[:, 1:-bands], axis=1)
-        moved += to_centroid[:, None]
+        moved = _rising(mean[:, 1:-bands]) + to_centroid[:, None]
         shares = self._shares(moved)
         shares *= np.exp(mean[:, -bands:])
         shares *= (np.maximum(total - _NOTHING, 0) / shares.sum(axis=1))[:, None]
@@ -125,6 +125,21 @@ class Targets:
         shares: Array = below[:, 1:] - below[:, :-1]
         shares += 1e-4
         return shares
+
+
+def _rising(quantiles: Array) -> Array:
+    """Return quantiles (stages, count) that weights may have turned round, as negative ones do, in order again, about the
+    same mean.
+
+    None are alike: power that lies at a point would change its band at once as that point passes an edge.
+    """
+    rises = np.diff(quantiles, axis=1)
+    if rises.min() >= _LEAST_RISE:
+        return quantiles
+    found = np.zeros_like(quantiles)
+    np.maximum(rises, _LEAST_RISE).cumsum(axis=1, out=found[:, 1:])
+    found += (quantiles.mean(axis=1) - found.mean(axis=1))[:, None]
+    return found
 
 
 class _Known(NamedTuple):
