@@ -128,8 +128,8 @@ class Targets:
 
 
 def _rising(quantiles: Array) -> Array:
-    """Return quantiles (stages, count) that weights may have turned round, as negative ones do, in order again, about the
-    same mean.
+    """Return quantiles (stages, count), which negative weights may have turned round, in order again, about the same
+    mean.
 
     None are alike: power that lies at a point would change its band at once as that point passes an edge.
     """
