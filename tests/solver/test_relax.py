@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from solver import registry
 from solver.arrays import Floats
-from solver.contract import InvalidInput, Need
+from solver.contract import InvalidInput, Need, Unstable
+from solver.dehydration import SOLVER, relax
 from solver.dehydration.fresh.mesh import cubed_sphere
+from solver.dehydration.motion import Motion
 from solver.dehydration.relax import RESIDUAL, on_columns
 from solver.lattice import closed_lattice, directions, lattice
 from store.lookup import ShapeTable
 from store.starter import ROOT
+from store.store import Store
+from sweeps.refining import balance
 from sweeps.relaxing import relaxed
 
 NEED = Need(quality="preview", resolution=32, fields=("position", "lattice_crossings", "crossings"))
@@ -114,6 +120,37 @@ def test_so_many_steps_and_no_more(steps: int, most: int) -> None:
     found = solver.relaxed(solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED, steps=steps).isel(stage=0)
     assert steps <= int(found["iterations"]) < most
     assert float(found["residual_placed"]) > float(found["residual"])
+
+
+def test_what_blows_up_is_pushed_on_in_more_increments(monkeypatch: pytest.MonkeyPatch) -> None:
+    real, tried = relax._put_on, []
+
+    def put_on(motion: Motion, target: Floats, stage: float, increments: int) -> Any:
+        tried.append(increments)
+        found = real(motion, target, stage, increments)
+        if increments < enough:
+            raise Unstable("the run blew up.", advice="")
+        return found
+
+    monkeypatch.setattr(relax, "_put_on", put_on)
+    solver, enough = registry.get("dehydration"), 15
+    found = solver.relaxed(solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED, steps=1).isel(stage=0)
+    assert tried == [5, 15]
+    # those that led nowhere are not counted
+    assert 300 <= int(found["iterations"]) < 300 + 15 * 20 + 200
+    enough = 1000
+    with pytest.raises(Unstable, match="blew up"):
+        solver.relaxed(solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED, steps=1)
+    assert tried == [5, 15, 5, 15, 45]
+
+
+@pytest.mark.slow
+def test_deep_folds_of_a_plum_are_relaxed() -> None:
+    """Pushed on in five increments, elements below them blow up."""
+    table = ShapeTable.open(ROOT, "plum1", surfaces=registry.surface)
+    distance = balance.distance(SOLVER, table, {"te": 0.0125, "gamma": 7.0}, 0.3, "nearest", Store.open(ROOT))
+    assert distance is not None
+    assert distance.moved < 0.05
 
 
 def test_what_is_no_lattice_or_relaxes_nothing_is_refused() -> None:
