@@ -104,7 +104,7 @@ def _take(name: str, found: Points) -> None:
     STATE.trust = f"{name}: {trust}" + ("" if rough is None else f", roughness to {100 * rough:.1f} %")
     held = found.about.get("held")
     if held is not None and held < _ALL_HELD:
-        STATE.trust += f"; this mesh holds {100 * held:.0f} % of the wrinkles' height"
+        STATE.trust += f"; this mesh holds at least {100 * held:.0f} % of the wrinkles' height"
 
 
 def _lattice(mesh: Any, n: int) -> None:

@@ -259,7 +259,7 @@ def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path |
     rows += [["a stored run, as it is", "", *("yes" if shape.exact else "no" for shape in shapes)]]
     if any(shape.held is not None and shape.held < _ALL_HELD for shape in shapes):
         told = ("unknown" if shape.held is None else f"{100 * shape.held:.0f}" for shape in shapes)
-        rows += [["wrinkles' height that this lattice holds", "%", *told]]
+        rows += [["wrinkles' height that this lattice holds, at least", "%", *told]]
     if any(shape.crossings is not None for shape in shapes):
         told = ("unknown" if shape.crossings is None else str(shape.crossings) for shape in shapes)
         rows += [["crossing pairs as handed over", "1", *told]]

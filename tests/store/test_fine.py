@@ -35,10 +35,8 @@ def wrinkled(order: int) -> Array:
 def test_waves_above_the_coarsest_lattice_are_alike_or_not() -> None:
     assert SHAPES is not None
     assert lattice_for(0) < DEGREE
-    samples, shapes = (
-        Samples(np.array([[10.0], [20.0], [30.0]])),
-        [SHAPES.of(SOLVER.parse({"te": 0.01}).model_dump())] * 3,
-    )
+    samples = Samples(np.array([[10.0], [20.0], [30.0]]))
+    shapes = [SHAPES.of(SOLVER.parse({"te": 0.01}).model_dump())] * 3
     alike, other = (np.stack([wrinkled(m) for m in orders]) for orders in ((8, 8, 8), (8, 24, 40)))
     assert trust.correlations(alike, samples, shapes)[0] > 0.999
     assert abs(trust.correlations(other, samples, shapes)[0]) < 0.01
@@ -65,6 +63,7 @@ def test_a_coarse_lattice_says_what_it_holds(name: str, point: dict[str, float])
             continue
         heights = [height(one.displacement) for one in (*said[:-1], table.at(point, stage, fields=("displacement",)))]
         assert shares[0] < 0.9
+        # of waves of higher degrees a lattice holds the parts that are no finer along either angle: up to .22 measured
         for share, found in zip(shares[:-1], heights[:-1], strict=True):
             assert share - 0.01 < found / heights[-1] < share + 0.25
 

@@ -55,7 +55,7 @@ export function showTrust(root: HTMLElement, about: About, speed: string): void 
     const value = about.expected_error?.[name];
     if (value !== undefined) rows.push([word, say(value)]);
   }
-  if (about.held != null && about.held < ALL_HELD) rows.push(["Wrinkles that this mesh holds", percent(about.held)]);
+  if (about.held != null && about.held < ALL_HELD) rows.push(["Wrinkles that this mesh holds", `at least ${percent(about.held)}`]);
   rows.push(["Looked up by", about.method]);
   rows.push(["Settled", about.converged ? "yes" : "not every stage it is made of"]);
   rows.push(["Made of", bars(about.weights)]);

@@ -59,7 +59,7 @@ export interface About {
   /** Measured on the mesh itself; null where it was not computed. */
   crossings: number | null;
   volume: number | null;
-  /** Share of the wrinkles' height that a lattice as fine as this holds. */
+  /** Share of the wrinkles' height that a lattice as fine as this holds at least. */
   held: number | null;
   expected_error: Record<string, number> | null;
   method: string;
