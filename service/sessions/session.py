@@ -46,6 +46,7 @@ class Session:
         #: Processor seconds so far, when a client was last heard and when the last one left [s, monotonic].
         self.spent, self.heard, self.left = 0.0, time.monotonic(), time.monotonic()
         self.has_died = False
+        self._is_closing = False
         self._client: WebSocket | None = None
         self._pump: asyncio.Task[None] | None = None
         self._saved: asyncio.Future[dict[str, Any]] | None = None
@@ -133,6 +134,8 @@ class Session:
                 async with asyncio.timeout(_SAVING):
                     await self._send(b"C", "save")
                     saved = await self._saved
+        # the engine works on until it is ended; a client takes the word that it is sent away with as the last one
+        self._is_closing = True
         with contextlib.suppress(Exception):
             async with asyncio.timeout(_READING):
                 await client.send_text(orjson.dumps({"say": "closing", "why": why, **saved}).decode())
@@ -169,7 +172,7 @@ class Session:
                 elif letter == b"A":
                     if self._saved is not None and not self._saved.done():
                         self._saved.set_result(json.loads(content))
-                elif self._client is not None:
+                elif self._client is not None and not self._is_closing:
                     await self._pass_on(self._client, letter, content)
         self.has_died = True
         if self._saved is not None and not self._saved.done():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import time
@@ -10,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.websockets import WebSocket
 from websockets.exceptions import ConnectionClosed
 
 from service.sessions.keeping import Sessions
+from service.sessions.session import Session
 from store.store import Store
 
 from .._jobs import bearer
@@ -109,6 +112,32 @@ def test_sessions_that_nobody_uses_end(tmp_path: Path) -> None:
         assert not engines()
         assert found.client().opened()["say"] == "opened"
     assert not engines()
+
+
+def test_the_word_a_client_is_sent_away_with_is_the_last_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever its engine goes on to say until it is ended."""
+    had = set[Any]()
+    closed = Session._close
+
+    async def late(self: Session, client: WebSocket, status: int, why: str) -> None:
+        await asyncio.sleep(1.0)
+        await closed(self, client, status, why)
+
+    monkeypatch.setattr(Sessions, "_over", lambda self, session: (408, "enough.") if session.id in had else None)
+    monkeypatch.setattr(Session, "_close", late)
+    with serving(tmp_path / "store") as found:
+        client = found.client({**BALL, "step": 0.001})
+        session = client.opened()["session"]
+        client.ask("add", tool={"kind": "spot", "at": [0, 0, 1], "stretch": [1.5, 1.5]})
+        client.ask("play", until=1.0)
+        client.until(lambda c: len(c.frames) > 2)
+        had.add(session)
+        client.until(lambda c: c.told[-1]["say"] == "closing")
+        frames = len(client.frames)
+        with pytest.raises(ConnectionClosed):
+            client.until(lambda c: False)
+        assert len(client.frames) == frames
+        assert client.told[-1]["say"] == "closing"
 
 
 def test_nobody_waits_for_an_engine_that_does_not_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
