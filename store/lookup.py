@@ -318,9 +318,8 @@ class ShapeTable:
         if self._below is None:
             return None
         places, shares = np.array(list(stored), int), np.array(list(stored.values()), float)
-        below = self._below[near.samples][:, places]
         weights = np.maximum(near.weights, 0)  # those that extrapolate may be negative
-        part, whole = (float(weights @ below[..., degree] @ shares) for degree in (n, -1))
+        part, whole = (float(weights @ (self._below[at][near.samples][:, places] @ shares)) for at in (n, -1))
         return float(np.sqrt(np.clip(part / whole, 0.0, 1.0))) if whole > _NO_WRINKLES else 1.0
 
     def _bracket(self, stage: float) -> dict[int, float]:
@@ -411,10 +410,10 @@ def _check(fields: Sequence[str], n: int, m: int, eta: float) -> None:
 
 
 def _up_to(power: Array) -> Array:
-    """Return the power (sample, stage, l) of wrinkles up to each degree l, of that by degree."""
-    wrinkles = power.astype(float)
-    wrinkles[..., : harmonics.LOWEST] = 0
-    found: Array = wrinkles.cumsum(axis=-1)
+    """Return the power (l, sample, stage) of wrinkles up to each degree l, of that (sample, stage, l) by degree."""
+    wrinkles = np.moveaxis(power.astype(float), -1, 0)
+    wrinkles[: harmonics.LOWEST] = 0
+    found: Array = wrinkles.cumsum(axis=0)
     return found
 
 
