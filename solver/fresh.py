@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,12 +19,17 @@ __all__ = ["SURFACE", "FreshFruit"]
 class FreshFruit(Fresh):
     """A fruit at rest, in units of r1."""
 
-    def __init__(self, fruit: Fruit) -> None:
-        self.fruit = fruit
+    def __init__(self, radii: tuple[float, ...], stone: tuple[float, ...], te: float) -> None:
+        self._radii, self._stone, self._te = radii, stone, te
+
+    @cached_property
+    def _fruit(self) -> Fruit:
+        # made where it is needed: for a lattice that is not, and it takes longer than all else here
+        return Fruit.model_construct(radii=self._radii, stone=self._stone, exocarp_thickness=self._te)  # type: ignore[arg-type]
 
     def points(self, colatitude: Array, azimuth: Array) -> Array:
         """Return points (..., 3) of the outer surface."""
-        return self.fruit.surface(colatitude, azimuth)
+        return self._fruit.surface(colatitude, azimuth)
 
     def planes(
         self, n: int, rows: slice, columns: slice | Array, components: tuple[int, ...], kind: np.dtype[Any]
@@ -33,11 +38,10 @@ class FreshFruit(Fresh):
 
         Only the generatrix and the azimuth's sine and cosine are evaluated, each once; the surface is their product.
         """
-        fruit = self.fruit
-        x, y, x_along_ray, y_along_ray = (values[rows] for values in _generatrix(fruit.radii, n))
-        cosine, sine = (values[columns] for values in _circle(n, fruit.radii[7] / fruit.radii[3], kind.str))
-        te = fruit.exocarp_thickness
-        if fruit.is_axisymmetric:
+        x, y, x_along_ray, y_along_ray = (values[rows] for values in _generatrix(self._radii, n))
+        cosine, sine = (values[columns] for values in _circle(n, self._radii[7] / self._radii[3], kind.str))
+        te = self._te
+        if self._radii[7] == self._radii[3]:
             across: Array = (x + te * x_along_ray)[:, None].astype(kind)
             along: Array = (y + te * y_along_ray)[:, None].astype(kind)
         else:
@@ -49,12 +53,12 @@ class FreshFruit(Fresh):
 
     def poles(self) -> Array:
         """Return the two poles (2, 3)."""
-        inner, distance = _ends(self.fruit.radii)
-        return inner * (1 + self.fruit.exocarp_thickness / distance)
+        inner, distance = _ends(self._radii)
+        return inner * (1 + self._te / distance)
 
     def core(self, rays: Array) -> Array | None:
         """Return how far the stone reaches along unit rays; None without one."""
-        return self.fruit.stone_distance(rays) if self.fruit.has_stone else None
+        return self._fruit.stone_distance(rays) if self._fruit.has_stone else None
 
 
 @lru_cache(maxsize=64)
@@ -91,7 +95,7 @@ def _check(radii: tuple[float, ...], stone: tuple[float, ...]) -> None:
 def _of(values: Mapping[str, Any]) -> FreshFruit:
     radii, stone, te = tuple(values["radii"]), tuple(values["stone"]), values["exocarp_thickness"]
     _check(radii, stone)
-    return FreshFruit(Fruit.model_construct(radii=radii, stone=stone, exocarp_thickness=te))
+    return FreshFruit(radii, stone, te)
 
 
 SURFACE = Surface(("radii", "stone", "exocarp_thickness"), _of)

@@ -319,7 +319,8 @@ class ShapeTable:
             return None
         places, shares = np.array(list(stored), int), np.array(list(stored.values()), float)
         weights = np.maximum(near.weights, 0)  # those that extrapolate may be negative
-        part, whole = (float(weights @ (self._below[at][near.samples][:, places] @ shares)) for at in (n, -1))
+        ends = np.array([[[n]], [[-1]]])
+        part, whole = (self._below[ends, near.samples[:, None], places] @ shares @ weights).tolist()
         return float(np.sqrt(np.clip(part / whole, 0.0, 1.0))) if whole > _NO_WRINKLES else 1.0
 
     def _bracket(self, stage: float) -> dict[int, float]:

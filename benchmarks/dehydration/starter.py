@@ -4,8 +4,9 @@
 
 Without a store: the table that comes with wizen, each sample predicted from the others, and how neighbours correlate
 (record dehydration-left-out). With `--held-out`, a store with runs between the samples, these are predicted (record
-dehydration-held-out). Records of another table than the default have its name at their end, and say which version of
-the solver made the table.
+dehydration-held-out), and those that differ in their seed alone stand beside each other: no prediction of one of them
+can be better. Records of another table than the default have its name at their end, and say which version of the solver
+made the table.
 """
 
 from __future__ import annotations
@@ -40,10 +41,11 @@ def main() -> None:
     table = ShapeTable.open(store, asked.name, surfaces=registry.surface)
     cases, pairs = scores.cases(store, table, asked.held_out)
     report = scores.score(table, cases, pairs, tuple(_NAMES), asked.held_out is not None)
+    names = _NAMES | ({"seed": "the same fruit from another seed"} if pairs else {})
     record = "dehydration-held-out" if asked.held_out else "dehydration-left-out"
     record += "" if asked.name == "default" else f"-{asked.name}"
     sheet = Sheet(record, _HEAD, table.info.solver)
-    for method, name in _NAMES.items():
+    for method, name in names.items():
         for row in (row for row in report.rows if row.method == method):
             m, alike = row.measures, report.correlation.get(row.stage)
             cells = (f"{m.rgh:.3f}", f"{m.dB:.2f}", f"{m.W1:.2f}", f"{m.patch:.3f}", f"{m.corr:.2f}")

@@ -18,14 +18,15 @@ def fruit(name: str) -> Fruit:
 @pytest.mark.parametrize("name", list(PRESETS))
 @pytest.mark.parametrize(("dtype", "error"), [(np.float32, 3e-7), (np.float64, 1e-14)])
 def test_fresh_surface_is_the_fruit_s(name: str, dtype: type, error: float) -> None:
-    n = 20
+    n, known = 20, fruit(name)
+    fresh = FreshFruit(known.radii, known.stone, known.exocarp_thickness)
     u = np.random.default_rng(0).standard_normal((3, n, 2 * n)).astype(dtype)
-    position = surface.add_fresh(FreshFruit(fruit(name)), u)
+    position = surface.add_fresh(fresh, u)
     assert position.dtype == dtype
     assert position.flags.c_contiguous
-    np.testing.assert_allclose(position, fruit(name).surface(*lattice(n)) + np.moveaxis(u, 0, -1), atol=5 * error)
-    truth = fruit(name).surface(np.array([0.0, np.pi]), np.zeros(2))
-    np.testing.assert_array_equal(FreshFruit(fruit(name)).poles(), truth)
+    np.testing.assert_allclose(position, known.surface(*lattice(n)) + np.moveaxis(u, 0, -1), atol=5 * error)
+    truth = known.surface(np.array([0.0, np.pi]), np.zeros(2))
+    np.testing.assert_array_equal(fresh.poles(), truth)
 
 
 @pytest.mark.parametrize("n", [16, 17])
