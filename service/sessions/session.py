@@ -123,9 +123,8 @@ class Session:
             raise errors.EngineDied("the engine ended of itself.", advice="Open a new session.") from None
 
     async def dismiss(self, status: int, why: str) -> None:
-        """Send the client away with what was made."""
-        client = self._client
-        if client is None:
+        """Send the client away with what was made: the one that is there once it is saved."""
+        if self._client is None:
             return
         saved: dict[str, Any] = {}
         if not self.has_died:
@@ -135,7 +134,9 @@ class Session:
                     await self._send(b"C", "save")
                     saved = await self._saved
         # the engine works on until it is ended; a client takes the word that it is sent away with as the last one
-        self._is_closing = True
+        self._is_closing, client = True, self._client
+        if client is None:
+            return
         with contextlib.suppress(Exception):
             async with asyncio.timeout(_READING):
                 await client.send_text(orjson.dumps({"say": "closing", "why": why, **saved}).decode())

@@ -168,9 +168,15 @@ def test_nobody_waits_for_an_engine_that_does_not_save(tmp_path: Path, monkeypat
                 with suppress(TimeoutError):
                     still.receive(0.5)
             assert still.told[-1]["say"] != "closing"
+            # who takes the session up meanwhile is the one that gets it
+            back = Client(found.url, token=found.token, session=first["session"], key=first["key"])
+            with pytest.raises(ConnectionClosed) as closed:
+                still.until(lambda c: False)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 4409
         finally:
             os.kill(engine, signal.SIGCONT)
         with pytest.raises(ConnectionClosed):
-            still.until(lambda c: False)
-        assert still.told[-1]["say"] == "closing"
-        assert "thickness = 0.1" in still.told[-1]["toml"]
+            back.until(lambda c: False)
+        assert back.told[-1]["say"] == "closing"
+        assert "thickness = 0.1" in back.told[-1]["toml"]
