@@ -15,7 +15,7 @@ from store.starter import ROOT
 from store.surfaces.window import Window
 
 #: Questions to the table in the package whose blends cross themselves.
-ASKED = ({"te": 0.0374, "gamma": 44.5}, {"te": 0.0332, "gamma": 38.5})
+ASKED = ({"te": 0.0385, "gamma": 34.2}, {"te": 0.0323, "gamma": 43.6})
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_no_shape_between_samples_crosses_itself(table: ShapeTable, point: dict[
 
 
 def test_a_fine_lattice_takes_few_rounds(table: ShapeTable, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Slivers and the needles around a pole overlap by next to nothing: this one once took 538 rounds, 9 s."""
+    """Slivers and the needles around a pole overlap by next to nothing: one once took 538 rounds, 9 s."""
     rounds: list[int] = []
 
     def counted(
@@ -53,9 +53,9 @@ def test_a_fine_lattice_takes_few_rounds(table: ShapeTable, monkeypatch: pytest.
     put_apart = apart.put_apart
     monkeypatch.setattr(apart, "put_apart", counted)
     for te, gamma, s in (
-        (0.036059441656784624, 34.27206934563351, 0.29),
-        (0.03219, 38.02, 0.2829),
-        (0.0395, 38.8, 0.287),
+        (0.0379, 34.2, 0.28),
+        (0.0323, 43.6, 0.295),
+        (0.0373, 24.6, 0.295),
     ):
         shape = table.at({"te": te, "gamma": gamma}, s, resolution=256)
         assert shape.position is not None
