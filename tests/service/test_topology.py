@@ -30,7 +30,7 @@ from .conftest import client_of
 Floats, Ints = NDArray[np.float64], NDArray[np.intp]
 SHAPE = "/v1/shapes/dehydration"
 #: Folded shapes: a table, its parameters and a stage, on which the other diagonal crosses.
-FOLDED = {"table": "prolate-01", "s": 0.3, "resolution": 48}
+FOLDED = {"table": "raisin", "s": 0.3, "resolution": 48}
 VIEWER = Path(page.__file__).parent / "viewer"
 
 
@@ -107,7 +107,7 @@ def _npz(data: bytes) -> tuple[dict[str, Any], Floats]:
 def test_triangles_follow_from_the_answer_alone(packed: httpx.Client, read: Any) -> None:
     kind = "points" if read is points else "npz"
     turned = 0
-    for point in ({"r4": 0.7}, {"r4": 0.8}, {"r4": 0.9}):
+    for point in ({"te": 0.0102, "gamma": 13.2}, {"te": 0.0104, "gamma": 13.5}, {"te": 0.0107, "gamma": 12.1}):
         answer = packed.get(SHAPE, params={**FOLDED, **point, "format": kind})
         assert answer.status_code == 200, answer.text
         about, found = read(answer.content)

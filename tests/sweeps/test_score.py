@@ -31,11 +31,11 @@ def test_samples_predicted_from_each_other(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     document = json.loads(done.stdout)
     assert not document["held_out"]
-    assert len(document["cases"]) == 12
+    assert len(document["cases"]) == 21
     assert document["default"] == methods.DEFAULT
     late = {row["method"]: row for row in document["rows"] if row["stage"] == 0.2}
-    # the paper's weights flatten what lies between samples, the corrected ones do not
-    assert late["idw"]["rgh"] < 0.85
+    # the paper's weights flatten what lies between samples, though these lie close, the corrected ones do not
+    assert late["idw"]["rgh"] < 0.9
     assert 0.9 < late["linear+LL+env"]["rgh"] < 1.1
     assert late["linear+LL+env"]["W1"] < late["idw"]["W1"] / 2
     likeness = [row["correlation"] for row in document["neighbour_correlation"]]
@@ -48,7 +48,7 @@ def test_samples_predicted_from_each_other(tmp_path: Path) -> None:
 def held_out(root: Path, table: ShapeTable) -> Store:
     """Return runs between the samples whose shape is by construction what `linear` says, one more with another seed."""
     store = Store.open(root, create=True)
-    values, n = {"te": 0.034, "gamma": 22.0}, 64
+    values, n = {"te": 0.0325, "gamma": 26.0}, 64
     u = np.stack([table.at(values, s, fields=("displacement",), method="linear").displacement for s in table.stages])
     for seed in (0, 1):
         params = SOLVER.parse({**table.at_parameters(values), "seed": seed})
@@ -67,7 +67,7 @@ def test_held_out_runs_and_the_floor_of_another_seed(tmp_path: Path) -> None:
     table = ShapeTable.open(starter.ROOT, surfaces=registry.surface)
     runs = held_out(tmp_path / "held", table)
     found, pairs = score.cases(Store.open(starter.ROOT), table, runs.root)
-    assert [case.label for case in found] == ["te = 0.034, gamma = 22"]
+    assert [case.label for case in found] == ["te = 0.0325, gamma = 26"]
     report = score.score(table, found, pairs, ("linear", "nearest"))
     assert report.seeds == 1
     rows = {(row.method, row.stage): row.measures for row in report.rows}
