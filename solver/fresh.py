@@ -25,7 +25,9 @@ class FreshFruit(Fresh):
     @cached_property
     def _fruit(self) -> Fruit:
         # made where it is needed: for a lattice that is not, and it takes longer than all else here
-        return Fruit.model_construct(radii=self._radii, stone=self._stone, exocarp_thickness=self._te)  # type: ignore[arg-type]
+        fruit: Any = Fruit.model_construct
+        found: Fruit = fruit(radii=self._radii, stone=self._stone, exocarp_thickness=self._te)
+        return found
 
     def points(self, colatitude: Array, azimuth: Array) -> Array:
         """Return points (..., 3) of the outer surface."""

@@ -4,8 +4,8 @@
 
 Without a store: the table that comes with wizen, each sample predicted from the others, and how neighbours correlate
 (record dehydration-left-out). With `--held-out`, a store with runs between the samples, these are predicted (record
-dehydration-held-out), and those that differ in their seed alone stand beside each other: no prediction of one of them
-can be better. Records of another table than the default have its name at their end, and say which version of the solver
+dehydration-held-out), and those that differ in their seed alone are compared with each other: so far is one run from
+another. Records of another table than the default have its name at their end, and say which version of the solver
 made the table.
 """
 

@@ -26,8 +26,8 @@ __all__ = ["COARSE", "Cell", "Cells"]
 COARSE = 12
 #: Degree up to which the envelope is resolved, and the width [radian] of the window in which amplitude is averaged.
 _SMOOTH, _WIDTH = 9, 0.35
-#: Bytes of cells that all tables keep. One takes .1 to 1 MB and some 10 ms to make, which is ten look-ups: a table of a
-#: hundred cells is to find all of them again.
+#: Bytes of cells that all tables keep. One takes .1 to 1 MB and some 10 ms to make, which is ten look-ups, of tables of
+#: twenty samples and more 2 MB and 60 ms: a small table is to find all of its cells again, a large one fifty of them.
 _ROOM = 96 << 20
 #: Lattice on which squares are taken; wrinkles beyond degree 48 are folded there, which moves no energy far.
 _SQUARES = 48
