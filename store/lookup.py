@@ -82,7 +82,8 @@ class ShapeTable:
         self._numbers = np.array([columns[name] for name in table.descriptors], float).reshape(-1, *shape)
         values = np.stack([columns[name] for name in table.axes], axis=-1) if table.axes else None
         self._samples = None if values is None else Samples(values)
-        self._blender = Blender(self._spectra, self._samples, power)
+        products = opened["band_products"].values if "band_products" in opened else None
+        self._blender = Blender(self._spectra, self._samples, power, products)
         self._below = None if power is None else _up_to(power)
         self._trust = None
         if found is not None and self._samples is not None:

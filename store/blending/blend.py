@@ -18,6 +18,7 @@ from ..surfaces.window import Patch
 from . import methods
 from .methods import Method, bands, envelope, poles
 from .methods.cells import Cells
+from .methods.products import Products
 from .methods.thin import Mixture, Thin, outer
 from .methods.weights import Samples
 from .neighbours import Weighted
@@ -70,13 +71,17 @@ class Blend(NamedTuple):
 class Blender:
     """Blends the spectra (sample, stage, component, m, k, part) of a table.
 
-    `power` (sample, stage, l) by degree is read from the spectra where a table does not say.
+    `power` (sample, stage, l) by degree and `products` (`methods.products.all_of`) are read from the spectra where a
+    table does not say.
     """
 
-    def __init__(self, stored: Stored, samples: Samples | None, power: Array | None = None) -> None:
+    def __init__(
+        self, stored: Stored, samples: Samples | None, power: Array | None = None, products: Array | None = None
+    ) -> None:
         self._stored = stored
         self._samples = samples
         self._given = power
+        self._products = Products(stored, bands.Bands(stored.shape[-2] - 1), products)
         self._stacks = Stacks(stored)
 
     def mix(
@@ -132,13 +137,13 @@ class Blender:
     @cached_property
     def _thin(self) -> Thin:
         assert self._samples is not None
-        return Thin(self._stored, self._samples)
+        return Thin(self._products, self._samples)
 
     @cached_property
     def _tools(self) -> tuple[bands.Targets, Cells, Samples]:
         assert self._samples is not None
         targets = bands.Targets(self.power, self._samples)
-        return targets, Cells(self._stored, targets.bands), self._samples
+        return targets, Cells(self._stored, self._products), self._samples
 
 
 @lru_cache(maxsize=16)

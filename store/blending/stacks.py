@@ -19,8 +19,9 @@ __all__ = ["Stacks"]
 _ROOM = 64 << 20
 #: Share of waves that are not zero up to which the others are left out: putting them back takes its time, too.
 _SPARSE = 0.6
-
-
+#: Samples up to which they have a stack of their own: the corners of a cell. Where splines count, more take part, and
+#: neighbouring cells share most of them: these use one stack by stage, of all samples of a table, up to so many.
+_CORNERS, _MOST = 4, 64
 #: Terms up to which they are added one by one, which reads no others. Leaning leaves two or four in most answers.
 _FEW = 4
 
@@ -50,6 +51,17 @@ class Stacks:
         """Return the sum (component, m, k, part), m, k <= `band`, of all samples at all stages, samples first, times
         their `parts`; zero where there are none.
         """
+        if not stages or len(samples) <= _CORNERS or len(self._stored) > _MOST:
+            return self._sum(samples, stages, parts, band)
+        every = np.zeros((len(stages), len(self._stored)), parts.dtype)
+        every[:, list(samples)] = parts.reshape(len(samples), -1).T
+        whole = tuple(range(len(self._stored)))
+        found = self._sum(whole, stages[:1], every[0], band)
+        for j, own in zip(stages[1:], every[1:], strict=True):
+            found += self._sum(whole, (j,), own, band)
+        return found
+
+    def _sum(self, samples: tuple[int, ...], stages: tuple[int, ...], parts: Array, band: int) -> Array:
         stack = self._kept.get((samples, stages, band), lambda: self._stack(samples, stages, band))
         found = _total(parts.astype(stack.waves.dtype), stack.waves)
         if stack.place is not None:

@@ -142,7 +142,7 @@ def _trust(opened: xr.Dataset) -> Iterator[str]:
                 quantities.unit_attrs(unit)["units"],
             ):
                 yield f"{name} is missing, or not in {unit!r}. {_REBUILD}"
-    for name in ("spectrum", "degree_power", "neighbour_correlation", *names):
+    for name in ("spectrum", "degree_power", "band_products", "neighbour_correlation", *names):
         if name in opened and not np.isfinite(opened[name].values).all():
             yield f"{name} is not finite everywhere. {_REBUILD}"
 

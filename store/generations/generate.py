@@ -20,6 +20,8 @@ from solver.contract import Solver
 
 from ..blending import methods
 from ..blending.blend import Blender, powers
+from ..blending.methods import products
+from ..blending.methods.bands import Bands
 from ..blending.methods.weights import Samples as Points
 from ..canonical import canonical
 from ..errors import MixedSamples, StorageFull
@@ -203,7 +205,7 @@ def _small(samples: Samples, rows: list[Rows], solver: Solver, band: int) -> xr.
 
 
 def _judge(stored: packed.Stored, samples: Samples, solver: Solver) -> dict[str, xr.Variable]:
-    """Return what look-ups want to know of the spectra: power by degree, errors, likeness of neighbours."""
+    """Return what look-ups want to know of the spectra: power by degree, products, errors, likeness of neighbours."""
     import xarray as xr
 
     power = _rounded(powers(stored))
@@ -217,8 +219,16 @@ def _judge(stored: packed.Stored, samples: Samples, solver: Solver) -> dict[str,
     points, shapes = samples.points(), samples.fresh(solver.surface)
     if points is None or shapes is None:
         return found
+    known = None
+    if len(points) <= products.MOST:
+        bands = Bands(stored.shape[-2] - 1)
+        known = _rounded(products.all_of(stored, bands))
+        about = {"units": "1", "long_name": "mean products of wrinkles by band, of a stage and with the next, in r1^2"}
+        found["band_products"] = xr.Variable(("ahead", "stage", "sample", "other", "band"), known, about)
+        about = {"units": "1", "long_name": "first spherical-harmonic degree of a band"}
+        found["band"] = xr.Variable("band", bands.first, about)
     scattered, method = Points(points), methods.parse(methods.DEFAULT)
-    blender = Blender(stored, scattered, power)
+    blender = Blender(stored, scattered, power, known)
     errors = trust.leave_one_out(blender, stored, scattered, shapes, method)
     found |= {
         f"left_out_{name}": xr.Variable(

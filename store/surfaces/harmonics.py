@@ -15,7 +15,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.lattice import colatitudes
 
-__all__ = ["LOWEST", "area", "degrees", "legendre", "low_series", "power", "shares", "without_low"]
+__all__ = ["LOWEST", "area", "degrees", "legendre", "low", "low_series", "power", "shares", "without_low"]
 
 
 #: Degrees below this are the shape of the fruit (size, shift, ellipticity), not wrinkles.
@@ -52,15 +52,21 @@ def power(harmonics: Array, other: Array | None = None) -> Array:
     return found
 
 
-def without_low(spectrum: Array, harmonics: Array | None = None) -> Array:
+def low(spectrum: Array) -> Array:
+    """Return the harmonics (..., m, l) below `LOWEST` of spectra (..., m, k)."""
+    found: Array = np.einsum("mlk,...mk->...ml", _low_matrices(spectrum.shape[-1] - 1), spectrum[..., :LOWEST, :])
+    return found
+
+
+def without_low(spectrum: Array, own: Array | None = None) -> Array:
     """Return spectra (..., m, k) without their harmonics below `LOWEST`: what is left are the wrinkles.
 
-    `harmonics` are those of the spectra, where they are known.
+    `own` are these harmonics, where they are known.
     """
-    band = spectrum.shape[-1] - 1
-    low = (degrees(spectrum) if harmonics is None else harmonics)[..., :LOWEST, :LOWEST]
     rest = spectrum.copy()
-    rest[..., :LOWEST, :] -= np.einsum("...ml,mlk->...mk", low, low_series(band)).astype(rest.dtype)
+    series = low_series(spectrum.shape[-1] - 1)
+    found = low(spectrum) if own is None else own
+    rest[..., :LOWEST, :] -= np.einsum("...ml,mlk->...mk", found, series).astype(rest.dtype)
     return rest
 
 
@@ -117,10 +123,20 @@ def _fejer(n: int) -> Array:
 @lru_cache(maxsize=4)
 def _matrices(band: int) -> Array:
     """Return the matrices (m, l, k) from amplitudes of the spectrum to harmonics."""
+    return _to_degrees(band, band)
+
+
+@lru_cache(maxsize=8)
+def _low_matrices(band: int) -> Array:
+    """Return those of the harmonics below `LOWEST`."""
+    return _to_degrees(LOWEST - 1, band)
+
+
+def _to_degrees(highest: int, band: int) -> Array:
     n = 2 * band + 2
     angles = np.outer(np.arange(band + 1), colatitudes(n))
-    weighted = _functions(band, n) * _fejer(n) / 2
-    found = np.empty((band + 1, band + 1, band + 1))
+    weighted = _functions(highest, n) * _fejer(n) / 2
+    found = np.empty((highest + 1, highest + 1, band + 1))
     found[0::2] = weighted[0::2] @ np.cos(angles).T
     found[1::2] = weighted[1::2] @ np.sin(angles).T
     return found

@@ -26,7 +26,8 @@ def _total(parts: Array, terms: Array) -> Array:
     for first in range(0, count, _AT_ONCE):
         last = min(first + _AT_ONCE, count)
         for t in range(len(parts)):
-            _add_times(found[first:last], terms[t, first:last], parts[t])
+            if parts[t] != 0:
+                _add_times(found[first:last], terms[t, first:last], parts[t])
     return found
 
 

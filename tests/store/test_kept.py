@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from store.blending.methods import bands, cells, poles
+from store.blending.methods.products import Products
 from store.kept import Kept, Part
 
 
@@ -76,7 +77,7 @@ def test_threads_that_make_one_thing_twice_count_it_once() -> None:
 def test_a_table_of_a_hundred_cells_makes_each_of_them_once() -> None:
     """A grid of 5 x 6 samples at 5 stages has so many: to make one anew takes as long as ten look-ups."""
     stored = np.random.default_rng(3).standard_normal((30, 5, 3, 25, 25, 2)).astype(np.float32)
-    known, made = cells.Cells(stored, bands.Bands(24)), 0
+    known, made = cells.Cells(stored, Products(stored, bands.Bands(24))), 0
     corners = [
         ((i, i + 1, i + 6, i + 7), stages)
         for i in (6 * row + column for row in range(4) for column in range(5))

@@ -21,6 +21,11 @@ from .conftest import GAMMA, TE
 QUERY, STAGE = {"te": 0.033, "gamma": 14.0}, 0.17
 
 
+def squares(waves: np.ndarray) -> np.ndarray:
+    """Return the mean square of the wrinkles around each place of the coarse lattice."""
+    return np.asarray(cells._local(waves[None], harmonics.degrees(waves)[None, ..., :3, :3])[0, 0])
+
+
 def plain(table: ShapeTable, n: int, shared: float) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (n, 2n, 3) and poles (2, 3) of the default method."""
     samples, stored, blender = table._samples, table._spectra, table._blender
@@ -47,8 +52,8 @@ def plain(table: ShapeTable, n: int, shared: float) -> tuple[np.ndarray, np.ndar
     knots = [np.log(2.9), *targets.bands.centres, np.log(3.0 * modes[-1] + 3)]
     poles.multiply(waves, np.interp(degree, knots, [1, *sharp, sharp[-1]]), targets.highest)
 
-    local = cells._local(full[None])[0, 0]
-    sizes = [np.sqrt(cells._local(complex_view(stored[i, j]).astype(complex)[None])[0, 0]) for i, j, _ in terms]
+    local = squares(full)
+    sizes = [np.sqrt(squares(complex_view(stored[i, j]).astype(complex))) for i, j, _ in terms]
     wanted = sum(w * amplitude for (_, _, w), amplitude in zip(terms, sizes, strict=True))
     settled = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
     ratio = envelope.factor(local, np.asarray(wanted), settled)

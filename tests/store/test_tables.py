@@ -41,6 +41,9 @@ def test_a_table_explains_itself(filled: Store) -> None:
             "k": 17,
             "part": 2,
             "degree": 17,
+            "ahead": 2,
+            "other": 9,
+            "band": 8,
         }
         assert set(opened.coords) >= {"te", "gamma", "stage", "m", "k", "component", "part", "key"}
         assert opened.spectrum.dtype == np.float32

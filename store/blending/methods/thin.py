@@ -18,10 +18,9 @@ import numpy as np
 
 from solver.arrays import Array
 
-from ...surfaces import harmonics
-from ...surfaces.packed import Stored
 from ..neighbours import Weighted
 from .lean import leaning
+from .products import Products
 from .weights import Samples
 
 __all__ = ["Mixture", "Thin", "outer"]
@@ -32,8 +31,6 @@ _UNLIKE, _ALIKE = 0.5, 0.8
 _CALM, _WILD = 2.0, 3.0
 #: Samples that one spline passes through: all of a small table, the nearest of a large one.
 _ALL, _MOST = 16, 12
-#: Power [r1^2] below which there is no pattern to be like.
-_NOTHING = 1e-12
 #: What is left of 1 after all shares, at most, where they sum to it.
 _ROUNDED = 1e-12
 
@@ -66,10 +63,10 @@ class _Cell(NamedTuple):
 
 
 class Thin:
-    """Splines through the samples of a table with spectra (sample, stage, component, m, k, part)."""
+    """Splines through the samples of a table."""
 
-    def __init__(self, stored: Stored, samples: Samples) -> None:
-        self._stored, self._points = stored, samples.points
+    def __init__(self, products: Products, samples: Samples) -> None:
+        self._products, self._points = products, samples.points
         self._beside: dict[int, list[int]] = {}
         for a, b in samples.adjacent():
             self._beside.setdefault(a, []).append(b)
@@ -126,15 +123,8 @@ class Thin:
 
     def _share_of(self, i: int, j: int) -> float:
         """Return how far the spline counts at sample `i` and stage `j`."""
-        own, *others = (
-            harmonics.degrees(self._stored[k, j].view(np.result_type(self._stored.dtype, np.complex64))[..., 0])
-            for k in (i, *self._beside.get(i, ()))
-        )
-        power = _product(own, own)
-        if power < _NOTHING:
-            return 1.0
-        alike = [_product(own, one) / max(np.sqrt(power * _product(one, one)), _NOTHING) for one in others]
-        return _ramp(float(np.mean(alike)) if alike else 0.0, _UNLIKE, _ALIKE)
+        alike = self._products.likeness(i, tuple(self._beside.get(i, ())), j)
+        return 1.0 if alike is None else _ramp(alike, _UNLIKE, _ALIKE)
 
 
 class _Spline:
@@ -168,11 +158,6 @@ def _kept(samples: tuple[int, ...], points: bytes, axes: int) -> _Spline | None:
 def _kernel(distance: Array) -> Array:
     found: Array = distance * distance * np.log(np.maximum(distance, 1e-150))
     return found
-
-
-def _product(a: Array, b: Array) -> float:
-    """Return the mean product of the wrinkles of harmonics (component, m, l)."""
-    return float(harmonics.power(a, b)[:, harmonics.LOWEST :].sum())
 
 
 def _ramp(value: float, none: float, whole: float) -> float:
