@@ -15,6 +15,8 @@ import numpy as np
 from solver.arrays import Array
 from solver.lattice import colatitudes
 
+from . import alone
+
 __all__ = ["LOWEST", "area", "degrees", "legendre", "low", "low_series", "power", "shares", "without_low"]
 
 
@@ -36,11 +38,13 @@ def degrees(spectrum: Array) -> Array:
     Of a spectrum that is not smooth at the poles only the part that harmonics can hold is returned.
     """
     band = spectrum.shape[-1] - 1
-    matrices = _matrices(band)
     lead = spectrum.shape[:-2]
     lines = np.moveaxis(spectrum.reshape(-1, band + 1, band + 1), 0, -1)
     parts = np.ascontiguousarray(lines).astype(complex).view(float)
-    found = np.ascontiguousarray(matrices @ parts).view(complex)
+    found = np.empty_like(parts)
+    for parity, matrices in enumerate(_matrices(band)):
+        np.matmul(matrices, parts[:, parity::2], out=found[:, parity::2])
+    found = found.view(complex)
     return np.moveaxis(found, -1, 0).reshape(*lead, band + 1, band + 1)
 
 
@@ -76,13 +80,10 @@ def shares(band: int) -> Array:
     Degrees are taken with random phases. Modes are not orthogonal over the sphere, so small parts are negative.
     """
     n = 2 * band + 2
-    angles = np.outer(colatitudes(n), np.arange(band + 1))
-    functions = _functions(band, n) * (2 / n)
-    series = np.empty((band + 1, band + 1, band + 1))
-    series[0::2], series[1::2] = functions[0::2] @ np.cos(angles), functions[1::2] @ np.sin(angles)
+    series = _sums(band, band, np.full(n, 2 / n))
     series[0::2, :, 0] /= 2
     both = np.where(np.arange(band + 1) == 0, 1.0, 2.0)
-    found = np.einsum("m,mlk->lmk", both, series * _matrices(band))
+    found = np.einsum("m,mlk->lmk", both, series * _to_degrees(band, band))
     value: Array = found / (2 * np.arange(band + 1) + 1)[:, None, None]
     return value
 
@@ -93,12 +94,12 @@ def legendre(highest: int, n: int) -> Array:
 
     They are kept: ask for low degrees.
     """
-    return _functions(highest, n)
+    return _functions(highest, colatitudes(n))
 
 
-def _functions(highest: int, n: int) -> Array:
-    x, y = np.cos(colatitudes(n)), np.sin(colatitudes(n))
-    found = np.zeros((highest + 1, highest + 1, n))
+def _functions(highest: int, colatitude: Array) -> Array:
+    x, y = np.cos(colatitude), np.sin(colatitude)
+    found = np.zeros((highest + 1, highest + 1, len(colatitude)))
     found[0, 0] = 1
     for m in range(1, highest + 1):
         found[m, m] = np.sqrt((2 * m + 1) / (2 * m)) * y * found[m - 1, m - 1]
@@ -121,35 +122,47 @@ def _fejer(n: int) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _matrices(band: int) -> Array:
-    """Return the matrices (m, l, k) from amplitudes of the spectrum to harmonics."""
-    return _to_degrees(band, band)
+def _matrices(band: int) -> tuple[Array, Array]:
+    """Return the matrices (m, l, k) from amplitudes of the spectrum to harmonics: of even l and k, then of odd ones, as
+    others do not meet.
+    """
+    found = _to_degrees(band, band)
+    even, odd = (np.ascontiguousarray(found[:, parity::2, parity::2]) for parity in (0, 1))
+    return even, odd
 
 
 @lru_cache(maxsize=8)
 def _low_matrices(band: int) -> Array:
-    """Return those of the harmonics below `LOWEST`."""
+    """Return the matrices (m, l, k) from amplitudes to harmonics below `LOWEST`."""
     return _to_degrees(LOWEST - 1, band)
 
 
 def _to_degrees(highest: int, band: int) -> Array:
-    n = 2 * band + 2
-    angles = np.outer(np.arange(band + 1), colatitudes(n))
-    weighted = _functions(highest, n) * _fejer(n) / 2
-    found = np.empty((highest + 1, highest + 1, band + 1))
-    found[0::2] = weighted[0::2] @ np.cos(angles).T
-    found[1::2] = weighted[1::2] @ np.sin(angles).T
+    """Return the matrices (m, l, k) from amplitudes of the spectrum to harmonics m, l <= `highest`."""
+    return _sums(highest, band, _fejer(2 * band + 2) / 2)
+
+
+def _sums(highest: int, band: int, weight: Array) -> Array:
+    """Return the sums (m, l, k) over colatitudes of harmonics times waves k, cosines for even m and sines for odd m, by
+    a `weight` (2 band + 2,) that is the same on both hemispheres.
+    """
+    north = colatitudes(len(weight))[: band + 1]
+    functions = _functions(highest, north) * (2 * weight[: band + 1])
+    angles = np.outer(north, np.arange(band + 1))
+    waves = np.cos(angles), np.sin(angles)
+    found = np.zeros((highest + 1, highest + 1, band + 1))
+    for m in range(highest + 1):
+        for first in (m, m + 1):
+            # what changes its sign across the equator does not meet what does not: l and k are both even or both odd
+            degrees, k = slice(first, None, 2), slice(first % 2, None, 2)
+            found[m, degrees, k] = alone.product(functions[m, degrees], waves[m % 2][:, k])
     return found
 
 
 @lru_cache(maxsize=8)
 def low_series(band: int) -> Array:
     """Return the amplitudes (m, l, k) of the harmonics below `LOWEST`."""
-    # sums rather than transforms: these few lines are no reason to import scipy.fft
     n = 2 * band + 2
-    angles = np.outer(colatitudes(n), np.arange(band + 1))
-    found = _functions(LOWEST - 1, n) * (2 / n)
-    series = np.empty((LOWEST, LOWEST, band + 1))
-    series[0::2], series[1::2] = found[0::2] @ np.cos(angles), found[1::2] @ np.sin(angles)
+    series = _sums(LOWEST - 1, band, np.full(n, 2 / n))
     series[0::2, :, 0] /= 2
     return series

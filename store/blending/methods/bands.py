@@ -17,7 +17,7 @@ import numpy as np
 from solver.arrays import Array
 
 from ...kept import Kept
-from ...surfaces import harmonics, steps
+from ...surfaces import alone, harmonics, steps
 from . import poles
 from .weights import Samples
 
@@ -213,11 +213,8 @@ def _unleak(highest: int) -> Array:
     bands, shares = Bands(highest), harmonics.shares(highest)
     spread = _spreading(highest, tuple(bands.centres.tolist()))
     size = np.diff([*bands.first, highest + 1])
-    leak = np.empty((len(size), len(size)))
-    for i, gains in enumerate(np.eye(len(size))):
-        passed = (shares * (spread @ gains).reshape(highest + 1, -1)).sum(axis=(1, 2))
-        leak[:, i] = np.add.reduceat(passed, bands.first) / size
-    return np.linalg.inv(leak)
+    passed = alone.product(shares.reshape(highest + 1, -1), spread)
+    return np.linalg.inv(np.add.reduceat(passed, bands.first, axis=0) / size[:, None])
 
 
 def _places(band: int, centres: tuple[float, ...]) -> tuple[Array, Array]:
