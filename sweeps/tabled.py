@@ -32,20 +32,21 @@ def shape(solver: str, point: Mapping[str, float], stage: float, resolution: int
     from store.errors import OutsideTable
 
     try:
-        found = _table(solver, tuple(point.items()), stage).at(
-            point, stage, resolution=resolution, fields=("displacement",)
-        )
+        table, filled = _table(solver, tuple(point.items()), stage)
+        found = table.at({**filled, **point}, stage, resolution=resolution, fields=("displacement",))
     except OutsideTable as error:
         raise InvalidInput(f"no shape of {solver}: {error.message}", advice=error.advice) from error
     assert found.displacement is not None
     return np.asarray(found.displacement, float)
 
 
-def _table(solver: str, point: tuple[tuple[str, float], ...], stage: float) -> ShapeTable:
-    """Return the table that holds a point, or the nearest one, which says what it does not hold."""
+def _table(solver: str, point: tuple[tuple[str, float], ...], stage: float) -> tuple[ShapeTable, Mapping[str, float]]:
+    """Return the table that holds a point, or the nearest one, which says what it does not hold; and the values of
+    axes that are not named.
+    """
     families = _families(solver)
-    fit = families.choose(dict(point), stage)
-    return _open((fit or families.nearest(dict(point), stage)[0]).info.name)
+    info = (families.choose(dict(point), stage) or families.nearest(dict(point), stage)[0]).info
+    return _open(info.name), families.filled(info)
 
 
 @cache

@@ -86,11 +86,10 @@ def choose(families: Families, said: Mapping[str, Any], symbol: str, preset: str
     numbers = {name: value for name, value in said.items() if name in known or name in families.infos[0].fixed}
     stage = said.get(symbol)
     fit = families.choose(numbers, stage, preset)
-    filled = families.values({}, preset) if preset is not None else {}
     if fit is not None:
-        return Found(fit.info.name, preset, filled)
+        return Found(fit.info.name, preset, families.filled(fit.info, preset))
     fits = tuple(families.nearest(numbers, stage, preset))
-    return Found(fits[0].info.name, preset, filled, fits)
+    return Found(fits[0].info.name, preset, families.filled(fits[0].info, preset), fits)
 
 
 def preset_of(solver: Solver, name: str | None) -> str | None:

@@ -1,13 +1,14 @@
 """One question over all tables of a solver: which family answers it.
 
-What is said must fit, a preset's values like the asker's own. What nobody said is the solver's default, but in a lone
-table and in those called `default` or like the solver, which stand for themselves. Of several families that hold the
-fruit, the one with the nearest sample answers, then the one of the better quality, then of the finer waves.
+What is said must fit, a preset's values like the asker's own. What nobody said is the solver's default, but what lone
+tables and those called `default` or like the solver hold fixed, as these stand for themselves; a lone one asks for all
+of its axes. Of several families that hold a fruit that of the best quality answers, of these the one called so, then
+the one whose samples lie closest, then that of the finer waves. None of it hangs on where in a family a fruit lies:
+each has a pattern of its own, and to go from one to the other within what both hold would be a jump.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -53,6 +54,7 @@ class Families:
         self._usual = flat(base.defaults, self._axes)
         self._presets = {name: flat(values, self._axes) for name, values in base.presets.items()}
         self._still = lru_cache(maxsize=256)(self._stand)
+        self._spacings: dict[str, float] = {}
 
     def only(self, name: str) -> Families:
         """Return these families with that one alone; what nobody says is still the solver's default."""
@@ -88,7 +90,13 @@ class Families:
             return holding[0] if holding else None
         least = min(len(fit.missing) for fit in holding)
         fits = [fit for fit in holding if len(fit.missing) == least]
-        return fits[0] if len(fits) == 1 else min(fits, key=lambda fit: self._rank(fit, values))
+        return fits[0] if len(fits) == 1 else min(fits, key=lambda fit: self._rank(fit.info))
+
+    def filled(self, info: TableInfo, preset: str | None = None) -> dict[str, Any]:
+        """Return the values for what an asker does not say of a table chosen among several: a preset's, and where there
+        is none the solver's defaults on its axes.
+        """
+        return {**self._fills(info), **(self._presets[preset] if preset is not None else {})}
 
     def nearest(self, said: Mapping[str, Any], stage: float | None, preset: str | None = None) -> list[Fit]:
         """Return all families with what each misses, the nearest first: for a question that none of them holds."""
@@ -106,7 +114,7 @@ class Families:
             info,
             tuple(compare(info, values, counting, self._usual)),
             tuple(compare(info, {**rest, **values}, unsaid, self._usual)),
-            tuple(name for name in info.axes if name not in values),
+            tuple(name for name in info.axes if name not in values and name not in self._fills(info)),
         )
 
     def _stand(self, preset: str | None, names: frozenset[str]) -> tuple[_Still, ...]:
@@ -120,7 +128,7 @@ class Families:
             tied = tuple(k for k in counting if k in info.tied and info.tied[k].leader in names)
             misses = compare(info, known, [k for k in counting if k not in tied], self._usual)
             if not misses:
-                missing = tuple(k for k in info.axes if k not in given and k not in names)
+                missing = tuple(k for k in info.axes if k not in {*given, *names, *self._fills(info)})
                 found.append(_Still(Fit(info, (), (), missing), known, tied))
         return tuple(found)
 
@@ -131,21 +139,27 @@ class Families:
     def _is_own(self, info: TableInfo) -> bool:
         return self._count == 1 or info.name in ("default", self._base.solver)
 
-    def _rank(self, fit: Fit, values: Mapping[str, Any]) -> tuple[float, int, int, bool, str]:
-        quality = fit.info.quality
-        place = _QUALITIES.index(quality) if quality in _QUALITIES else len(_QUALITIES)
-        info = fit.info
-        return round(self._nearest_sample(info, values), 9), place, -info.resolution, not self._is_own(info), info.name
+    def _fills(self, info: TableInfo) -> dict[str, Any]:
+        """Return the defaults of a table's axes that lie on them; none of a lone table."""
+        usual = {name: self._usual[name] for name in info.axes if name in self._usual}
+        return {name: value for name, value in usual.items() if self._count > 1 and not compare(info, usual, [name])}
 
-    def _nearest_sample(self, info: TableInfo, values: Mapping[str, Any]) -> float:
-        samples = self._places(info)
-        if samples is None:
-            return 0.0
-        offsets = []
-        for column, name in zip(samples.T, info.axes, strict=True):
-            asked = values.get(name)
-            if asked is None:
-                continue
-            is_ratio = asked > 0 and bool((column > 0).all())
-            offsets.append(np.log(column / asked) if is_ratio else column - asked)
-        return math.sqrt(float(np.min(np.sum(np.square(offsets), axis=0)))) if offsets else 0.0
+    def _rank(self, info: TableInfo) -> tuple[int, bool, float, int, str]:
+        place = _QUALITIES.index(info.quality) if info.quality in _QUALITIES else len(_QUALITIES)
+        return place, not self._is_own(info), round(self._spacing(info), 9), -info.resolution, info.name
+
+    def _spacing(self, info: TableInfo) -> float:
+        """Return the mean distance of a table's samples from the nearest other one; 0 of a single one."""
+        if info.name not in self._spacings:
+            samples = self._places(info)
+            self._spacings[info.name] = 0.0 if samples is None else _spacing(samples)
+        return self._spacings[info.name]
+
+
+def _spacing(samples: Array) -> float:
+    if len(samples) < 2:
+        return 0.0
+    is_ratio = (samples > 0).all(axis=0)
+    points = np.where(is_ratio, np.log(np.where(is_ratio, samples, 1.0)), samples)
+    nearest = [np.sort(np.square(points - point).sum(axis=1))[1] for point in points]
+    return float(np.sqrt(nearest).mean())

@@ -12,11 +12,12 @@ import pytest
 
 from solver import registry
 from solver.dehydration import SOLVER
-from store import tables
+from store import starter, tables
 from store.errors import OutsideTable
 from store.families import stored, ties
 from store.families.choose import Families
 from store.lookup import ShapeTable
+from store.manifest import TableInfo
 from store.store import Store
 
 from .conftest import fill
@@ -120,15 +121,68 @@ def test_what_a_table_says_nothing_of_is_the_default(families: Families) -> None
     assert [(miss.name, miss.held) for miss in near.misses] == [("light", (0.0, 0.0, 0.0))]
 
 
-def test_of_several_the_one_with_the_nearest_sample_answers(families: Families) -> None:
-    assert chosen(families, {"te": 0.0319, "gamma": 10.0}) == "thin"
-    assert chosen(families, {"te": 0.0301, "gamma": 10.0}) == "sphere"
+def test_of_several_the_one_with_the_closest_samples_answers_wherever_both_do(families: Families) -> None:
+    for te in (0.03, 0.0301, 0.0319, 0.032):
+        assert chosen(families, {"te": te, "gamma": 10.0}) == "sphere"
+    raisin, sphere, thin = families.infos
+    better = dataclasses.replace(thin, need={**thin.need, "quality": "fine"})
+    assert chosen(again(families, raisin, sphere, better), {"te": 0.03, "gamma": 10.0}) == "thin"
+    named = dataclasses.replace(thin, name="default")
+    assert chosen(again(families, raisin, sphere, named), {"te": 0.03, "gamma": 10.0}) == "default"
+
+
+def again(families: Families, *infos: TableInfo) -> Families:
+    """Return families of other tables with the same samples, those of `default` like those of `thin`."""
+    places = families._places
+    base, thin = stored.base(SOLVER), families.infos[2]
+    return Families(infos, base, lambda info: places(thin if info.name == "default" else info))
+
+
+def test_which_family_answers_hangs_on_which_hold_the_fruit_alone() -> None:
+    """In the package: a parameter that moves within what several hold leads from none to another."""
+    known = stored.families(Store.open(starter.ROOT), SOLVER)
+    rng, answers = np.random.default_rng(0), dict[frozenset[str], set[str | None]]()
+    spheres = [info for info in known.infos if info.name.startswith(("default", "sphere", "stone", "prolate"))]
+    edges = {name: sorted({x for i in spheres for x in i.axes.get(name, ())}) for name in ("te", "gamma", "rs1")}
+    for _ in range(1500):
+        te = rng.choice([*edges["te"], 0.01, 0.02, rng.uniform(0.01, 0.04)])
+        gamma = rng.choice([10.0, 10.0, rng.uniform(10, 50)])
+        rs1 = rng.choice([0.4, 0.4, *edges["rs1"], rng.uniform(0.3, 0.7)])
+        said = {"te": float(te), "gamma": float(gamma), "rs1": float(rs1), "rs2": float(rng.choice([0.4, rs1]))}
+        holding = frozenset(info.name for info in spheres if known.only(info.name).choose(said, 0.2) is not None)
+        answers.setdefault(holding, set()).add(chosen(known, said))
+    assert sum(len(holding) > 1 for holding in answers) >= 4
+    assert all(len(found) == 1 for found in answers.values())
+
+
+def test_naming_a_default_changes_no_answer() -> None:
+    known = stored.families(Store.open(starter.ROOT), SOLVER)
+    usual = {"gamma": 10.0, "rs1": 0.4, "rs2": 0.4, "r4": 1.0}
+    for te in (0.01, 0.02, 0.03, 0.0374165, 0.0374166, 0.04):
+        found = {chosen(known, {"te": te})}
+        for name, value in usual.items():
+            found |= {chosen(known, {"te": te, name: value}), chosen(known, {"te": te, name: value}, "sphere")}
+        found.add(chosen(known, {"te": te, **usual}))
+        assert len(found) == 1
+        assert None not in found
+    assert chosen(known, {}) == "default"
 
 
 def test_axes_without_a_value_and_stages_out_of_reach(families: Families) -> None:
     fit = families.choose({"te": 0.035}, 0.2)
     assert fit is not None
-    assert (fit.info.name, fit.missing) == ("sphere", ("gamma",))
+    assert (fit.info.name, fit.missing) == ("sphere", ())
+    assert families.filled(fit.info) == {"te": 0.04, "gamma": 10.0}
+    assert families.filled(families.infos[0], "raisin")["te"] == 0.01
+    # no default lies on an axis of stiff skins
+    stiff = dataclasses.replace(fit.info, name="stiff", axes={**fit.info.axes, "gamma": (20.0, 30.0)})
+    fit = Families([families.infos[0], stiff], stored.base(SOLVER), families._places).choose({"te": 0.035}, 0.2)
+    assert fit is not None
+    assert (fit.info.name, fit.missing) == ("stiff", ("gamma",))
+    # a lone table asks for its axes
+    fit = Families([families.infos[1]], stored.base(SOLVER), families._places).choose({"te": 0.035}, 0.2)
+    assert fit is not None
+    assert fit.missing == ("gamma",)
     assert families.choose({"te": 0.035, "gamma": 10.0}, 0.5) is None
 
 

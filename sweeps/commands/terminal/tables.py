@@ -58,7 +58,7 @@ def asked_table(
     chosen = solver_of(opened, name, solver)
     if preset is not None and preset not in chosen.presets:
         chosen.parse({}, preset)  # says which there are
-    families = stored.families(opened, chosen)
+    families, filled = stored.families(opened, chosen), {}
     if name is None:
         fit = families.choose(said, stage, preset)
         if fit is None and (preset is not None or len(families.infos) > 1):
@@ -70,10 +70,11 @@ def asked_table(
                 error.message, f"{error.advice} To run it: {run_command(chosen.name, preset, said, stage)}"
             )
         # a lone table says itself what it does not hold
-        name = families.infos[0].name if fit is None else fit.info.name
+        info = families.infos[0] if fit is None else fit.info
+        name, filled = info.name, families.filled(info)
     table = ShapeTable.open(opened, name, surfaces=registry.surface)
     stored.check_version(table.info, chosen)
-    asked = families.values(said, preset)
+    asked = {**filled, **families.values(said, preset)}
     # entries that no axis reaches are no names to ask by
     quiet = {key for key in asked if key not in said and (key in chosen.incidental or not key.isidentifier())}
     return table, {key: value for key, value in asked.items() if key not in quiet}
