@@ -179,13 +179,15 @@ class ShapeTable:
         eta: float = 2.0,
         max_error: float | Mapping[str, float] | None = None,
         window: Window = WHOLE,
+        apart: bool = True,
     ) -> Shape:
         """Return the shape at parameters and a stage, on the lattice of `resolution` (None: the table's own).
 
         `fields` are position and/or displacement; nothing else is computed. `window` limits them to a part of the
         lattice and to some components; the rest is not computed where that pays. `method` is named as in
         `store.blending.methods`; in `idw`, and where the samples form no grid, the `m` nearest take part, with weights
-        distance^-eta. `max_error` limits the expected error, of the roughness or by measure.
+        distance^-eta. `max_error` limits the expected error, of the roughness or by measure. What folds into itself is
+        put `apart`, where the table knows fresh shapes; without, positions and displacements are the blend as it is.
 
         Raises:
             OutsideTable: the table does not reach there, or does not hold that, or has no such method.
@@ -205,7 +207,8 @@ class ShapeTable:
         if max_error is not None:
             trust.refuse(expected, max_error, inside, self._judged)
         exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
-        found, crossings = self._fields(fields, patch, values, self._blend(point, mixed, stages, how, n), exact)
+        blend = self._blend(point, mixed, stages, how, n)
+        found, crossings = self._fields(fields, patch, values, blend, exact, apart)
         return Shape(
             colatitude=_angles(n)[0][patch.rows],
             azimuth=_angles(n)[1][patch.columns],
@@ -229,19 +232,26 @@ class ShapeTable:
         )
 
     def _fields(
-        self, fields: Sequence[str], patch: Patch, values: Mapping[str, float], blend: Callable[[], Blend], exact: bool
+        self,
+        fields: Sequence[str],
+        patch: Patch,
+        values: Mapping[str, float],
+        blend: Callable[[], Blend],
+        exact: bool,
+        apart: bool,
     ) -> tuple[_Fields, int | None]:
         """Return what is asked for, out of contact with itself, and the pairs of triangles that cross nevertheless.
 
-        A stored result stays as it is unless it crosses on this lattice, coarser than the run's or finer. So does a
-        displacement that is asked for alone: it is the blend. None: no positions were computed, or those of a part.
+        A stored result stays as it is unless it crosses on this lattice, coarser than the run's or finer. None: nobody
+        looked, or at a part alone.
         """
         if not fields:
             return (None, None, None), None
-        waves, displaced = blend(), "displacement" in fields
-        if "position" not in fields:
-            return _synthesize(waves, patch, None, displaced), None
+        waves, displaced, placed = blend(), "displacement" in fields, "position" in fields
+        if not (apart and (placed or self._surface)):
+            return _synthesize(waves, patch, self.fresh(values) if placed else None, displaced), None
         fresh = self.fresh(values)
+        start = fresh if placed else None
         kept: dict[int, tuple[Array, Array]] = {}
 
         def whole(n: int) -> tuple[Array, Array]:
@@ -255,13 +265,13 @@ class ShapeTable:
         is_all = patch == WHOLE.on(patch.n)
         if not is_all and not even_out(whole, min(patch.n, COARSE), exact, self._before_folds).near:
             # what does not touch as a whole does not in part: only that is computed
-            return _synthesize(waves, patch, fresh, displaced), None
+            return _synthesize(waves, patch, start, displaced), None
         moved = even_out(whole, patch.n, exact, self._before_folds)
         if is_all and not displaced:
             position, poles = kept[patch.n]
             found: _Fields = position, None, poles
         else:
-            found = _synthesize(waves, patch, fresh, displaced)
+            found = _synthesize(waves, patch, start, displaced)
         return _shifted(found, moved, patch), moved.crossings if is_all else None
 
     def sample(self, i: int) -> dict[str, float]:

@@ -31,8 +31,8 @@ class Shape:
     `held` is the share of the wrinkles' height (rms) that the lattice holds at least, by waves of degrees up to its n;
     1 where it holds all waves of the table; None where the table does not say. None of the errors expected is of what a
     coarse lattice leaves out.
-    `crossings` counts the pairs of triangles of the closed lattice that cross, on these positions; None where no
-    positions were computed, or those of a part. `tier`: whether it is looked up in a `table`,
+    `crossings` counts the pairs of triangles that cross, of the closed lattice as it is handed over; None of a part and
+    of a blend that was not put out of contact. `tier`: whether it is looked up in a `table`,
     `relaxed` from there by its solver, or a `run`.
     """
 

@@ -170,7 +170,8 @@ def _row(sheet: Sheet, name: str, stage: float, m: Measures, seconds: float | No
 
 
 def _stored(table: ShapeTable, sample: dict[str, float], stage: float) -> Array:
-    found = table.at(sample, stage, resolution=lattice_for(table.resolution), fields=("displacement",)).displacement
+    n = lattice_for(table.resolution)
+    found = table.at(sample, stage, resolution=n, fields=("displacement",), apart=False).displacement
     assert found is not None
     return found.astype(float)
 

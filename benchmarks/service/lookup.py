@@ -122,7 +122,7 @@ def main() -> None:
         for n in (32, 64, 96, 128, 256, 512):
             for what, options_ in {
                 "position": {"m": 8},
-                "displacement": {"m": 8, "fields": ("displacement",)},
+                "displacement": {"m": 8, "fields": ("displacement",), "apart": False},
                 "both": {"m": 8, "fields": ("position", "displacement")},
             }.items():
                 ms = median(lambda n=n, o=options_: table.at(QUERY, STAGE, resolution=n, **o), options.seconds)
@@ -173,7 +173,7 @@ def _in_turn() -> list[dict[str, Any]]:
             for table in opened:
                 point = {name: float(rng.uniform(*span)) for name, span in table.axes.items()}
                 stage = min(_TURNED, max(table.stages))
-                ms = _once(table, point, stage, resolution=n, fields=("displacement",))
+                ms = _once(table, point, stage, resolution=n, fields=("displacement",), apart=False)
                 if turn > 1:
                     times[n].append(ms)
     return [_row(n, _IN_TURN, found) for n, found in times.items()]

@@ -105,7 +105,7 @@ def _points(table: ShapeTable, point: Mapping[str, float], stage: float, n: int)
     """Return a shape's points and poles (2 n^2 + 2, 3) [r1] as they are blended: not put out of contact, which takes
     longer than all the rest and moves them by less than is compared here.
     """
-    shape = table.at(point, stage, resolution=n, fields=("displacement",))
+    shape = table.at(point, stage, resolution=n, fields=("displacement",), apart=False)
     position = table.fresh(point).points(*lattice(n)) + shape.displacement
     found: Array = np.concatenate([position.reshape(-1, 3), position[[0, -1]].mean(axis=1)])
     return found

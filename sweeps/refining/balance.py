@@ -82,7 +82,8 @@ def distance(
 
     """
     n = measures.lattice_for(table.resolution)
-    looked_up = table.at(values, stage, resolution=n, fields=("displacement",), method=method).displacement
+    shape = table.at(values, stage, resolution=n, fields=("displacement",), method=method, apart=False)
+    looked_up = shape.displacement
     assert looked_up is not None
     surface = begun(table, values, stage, method, lattice_of(table))
     need = Need(fields=("displacement", "position"), quality=table.info.quality, resolution=n)

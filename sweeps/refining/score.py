@@ -163,7 +163,7 @@ def _left_out(table: ShapeTable, i: int) -> Case:
     values, n = table.sample(i), measures.lattice_for(table.resolution)
 
     def truth(stage: float) -> Array:
-        shape = table.at(values, stage, resolution=n, fields=("displacement",))
+        shape = table.at(values, stage, resolution=n, fields=("displacement",), apart=False)
         assert shape.displacement is not None
         return shape.displacement
 
@@ -183,7 +183,7 @@ def _held_out(table: ShapeTable, result: xr.Dataset, job: Job) -> Case:
         return spectra.synthesize(waves, n)
 
     def found(method: str, stage: float) -> Array:
-        shape = table.at(values, stage, resolution=n, fields=("displacement",), method=method)
+        shape = table.at(values, stage, resolution=n, fields=("displacement",), method=method, apart=False)
         assert shape.displacement is not None
         return shape.displacement
 

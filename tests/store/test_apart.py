@@ -35,8 +35,16 @@ def test_no_shape_between_samples_crosses_itself(table: ShapeTable, point: dict[
     fresh = table.at(point, 0.0, resolution=n).position
     assert np.abs(shape.position - fresh - shape.displacement).max() < 1e-6
     if n == 64:
-        blend = table.at(point, 0.295, resolution=n, fields=("displacement",)).displacement
-        assert 0 < np.abs(shape.displacement - blend).max() < 0.1
+        alone = table.at(point, 0.295, resolution=n, fields=("displacement",))
+        np.testing.assert_array_equal(alone.displacement, shape.displacement)
+        assert (alone.position, alone.poles, alone.crossings) == (None, None, 0)
+        part = Window(colatitude=(0.5, 1.0), azimuth=(1.0, 2.0))
+        cut = table.at(point, 0.295, resolution=n, fields=("displacement",), window=part)
+        patch = part.on(n)
+        np.testing.assert_allclose(cut.displacement, alone.displacement[patch.rows][:, patch.columns], atol=1e-6)
+        blend = table.at(point, 0.295, resolution=n, fields=("displacement",), apart=False)
+        assert 0 < np.abs(shape.displacement - blend.displacement).max() < 0.1
+        assert blend.crossings is None
 
 
 def test_a_fine_lattice_takes_few_rounds(table: ShapeTable, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,7 +84,7 @@ def test_a_part_is_that_of_the_whole_out_of_contact(table: ShapeTable) -> None:
 
 def test_a_stored_result_stays_as_it_is(table: ShapeTable) -> None:
     stored = table.at({"te": 0.04, "gamma": 17.0}, 0.3, resolution=64, fields=("position", "displacement"))
-    blend = table.at({"te": 0.04, "gamma": 17.0}, 0.3, resolution=64, fields=("displacement",))
+    blend = table.at({"te": 0.04, "gamma": 17.0}, 0.3, resolution=64, fields=("displacement",), apart=False)
     assert stored.exact
     assert stored.crossings == 0
     assert np.array_equal(stored.displacement, blend.displacement)

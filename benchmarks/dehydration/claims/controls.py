@@ -101,7 +101,9 @@ def _controlled(store: Store, table_: ShapeTable, i: int, other: Store | None) -
     sample = table_.sample(i)
     params = SOLVER.parse(table_.at_parameters(sample))
     fresh = trust.fresh(registry.surface(SOLVER.name).of(params.model_dump()), _lattice(table_))
-    stored = [table_.at(sample, s, resolution=_lattice(table_), fields=("displacement",)) for s in table_.stages]
+    stored = [
+        table_.at(sample, s, resolution=_lattice(table_), fields=("displacement",), apart=False) for s in table_.stages
+    ]
     truth = [Surface(fresh, one.displacement) for one in stored]
     row: Row = {
         "sample": sample,

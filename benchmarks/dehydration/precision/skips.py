@@ -93,7 +93,7 @@ def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
         data = times[0][0]
         return data, float(np.median([seconds for _, seconds in times])), data.nbytes / 1e6
 
-    shape: dict[str, Any] = {"fields": ("displacement",)}
+    shape: dict[str, Any] = {"fields": ("displacement",), "apart": False}
     scalars = {"fields": ("roughness", "dominant_degree", "wavelength")}
     full, full_cpu, full_size = give({})
     whole = {"instead_of": "all default fields", "cpu_full": full_cpu, "MB_full": full_size}
