@@ -91,13 +91,16 @@ def look_again(x: Doubles, topology: Topology, before: Looked, moved: NDArray[np
     return Looked(np.concatenate([stay, _look(x, topology.triangles, moved, size)]), size)
 
 
-def put_apart(x: Doubles, topology: Topology, rounds: int = ROUNDS, looked: Looked | None = None) -> Apart:
+def put_apart(
+    x: Doubles, topology: Topology, rounds: int = ROUNDS, looked: Looked | None = None, least: float = 0.0
+) -> Apart:
     """Even out, in place, where the surface of vertices x (nv, 3) crosses itself; with no rounds, only count.
 
     `looked`: what a look at these very vertices found. What is counted are pairs of triangles without a common corner
-    that cross after rounding to single precision.
+    that cross after rounding to single precision. `least`: gap that stays between any two, twice of which is asked for:
+    of needles around a pole, a share of their size is less than rounding takes.
     """
-    return Apart(*_put_apart(x, *topology, rounds, *(looked or look(x, topology))))
+    return Apart(*_put_apart(x, *topology, rounds, *(looked or look(x, topology)), least))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)  # a service has others to answer meanwhile
@@ -108,7 +111,7 @@ def _look(x: Doubles, faces: Words, moved: NDArray[np.bool_], size: Doubles) -> 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _put_apart(
-    x: Doubles, faces: Words, first: Words, near: Words, rounds: int, found: Words, sizes: Doubles
+    x: Doubles, faces: Words, first: Words, near: Words, rounds: int, found: Words, sizes: Doubles, least: float
 ) -> tuple[int, int, int]:
     began, spent = -1, 0
     size, weight, way, gone = sizes.copy(), np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x))
@@ -121,7 +124,7 @@ def _put_apart(
                 return max(began, 0), spent, 0
             found = pairs(x, faces, some, size, moved)
         axes, until = np.zeros(len(found), np.int8), np.zeros(len(found))
-        active, pushed = _weigh(x, faces, found, axes, until, gone, size, weight, spent)
+        active, pushed = _weigh(x, faces, found, axes, until, gone, size, weight, spent, least)
         began = active if began < 0 else began
         if active == 0:
             return began, spent, 0
@@ -137,7 +140,7 @@ def _put_apart(
             _step(x, _spread(weight, pushed, way, first, near), way, gone, moved, first, near)
             spent += 1
             weight[pushed] = 0
-            active, pushed = _weigh(x, faces, few, few_axes, few_until, gone, size, weight, spent)
+            active, pushed = _weigh(x, faces, few, few_axes, few_until, gone, size, weight, spent, least)
         weight[pushed] = 0
 
 
@@ -228,6 +231,7 @@ def _weigh(
     size: Doubles,
     weight: Doubles,
     spent: int,
+    least: float,
 ) -> tuple[int, Words]:
     """Fill the way (nv,), zero before, that each vertex may go after so many rounds; return the number of pairs that
     ask for it, 0 if enough of the gap stays everywhere, and the vertices that have one.
@@ -245,7 +249,7 @@ def _weigh(
             way += gone[faces[a, k]] + gone[faces[b, k]]
         if way < until[n]:
             continue
-        gap = GAP * min(size[a], size[b])
+        gap = max(GAP * min(size[a], size[b]), 2 * least)
         # what told them apart last does so again, mostly
         overlap = _along(x, faces, a, b, axes[n])
         last = axes[n]
@@ -261,7 +265,7 @@ def _weigh(
             continue
         active += 1
         way = far * (overlap + gap)
-        is_enough = is_enough and overlap <= -enough * gap
+        is_enough = is_enough and overlap <= -max(enough * gap, least)
         if count + 6 > len(pushed):
             pushed = np.concatenate((pushed, pushed))
         for t in (a, b):

@@ -29,6 +29,8 @@ __all__ = ["COARSE", "Evened", "compiled", "crossings", "even_out"]
 COARSE = 64
 #: The smallest that is a surface.
 _LEAST = 4
+#: Gap that is left between triangles [r1]: rounded to single precision, two come nearer by up to that.
+_ROUNDED = 2e-7
 
 
 class Evened(NamedTuple):
@@ -98,19 +100,19 @@ def even_out(
     topology, moved = _topology(n), given.copy()
     looked = look(moved, topology)
     # of a fine lattice only whether it has to be, at first
-    found = put_apart(moved, topology, 0 if keep or n > COARSE else ROUNDS, looked)
+    found = put_apart(moved, topology, 0 if keep or n > COARSE else ROUNDS, looked, _ROUNDED)
     near = found.near
     if not near or (keep and not found.crossings):
         return Evened(None, None, found.crossings, near)
     if keep and n <= COARSE:
-        found = put_apart(moved, topology, looked=looked)
+        found = put_apart(moved, topology, looked=looked, least=_ROUNDED)
     if n > COARSE:
         coarse = even_out(whole, max(COARSE, n // 2), before=before)
         if coarse.points is not None and coarse.poles is not None:
             moved[:-2] += _refine(coarse.points, coarse.poles, n).reshape(-1, 3)
             moved[-2:] += coarse.poles
             looked = look_again(moved, topology, looked, (moved != given).any(axis=1))
-        found = put_apart(moved, topology, looked=looked)
+        found = put_apart(moved, topology, looked=looked, least=_ROUNDED)
     shift = moved - given
     return Evened(shift[:-2].reshape(n, 2 * n, 3), shift[-2:], found.crossings, near)
 

@@ -166,7 +166,7 @@ def test_a_pair_is_asked_again_once_its_corners_have_gone_as_far_as_it_was_apart
     axes, until, gone, size = np.zeros(1, np.int8), np.zeros(1), np.zeros(6), np.full(2, 0.5**0.5)
 
     def active() -> int:
-        return int(_weigh(x, faces, pair, axes, until, gone, size, np.zeros(6), 0)[0])
+        return int(_weigh(x, faces, pair, axes, until, gone, size, np.zeros(6), 0, 0.0)[0])
 
     assert active() == 0
     assert until[0] == pytest.approx(0.3 - GAP * size[0])
