@@ -127,15 +127,17 @@ def test_of_several_the_one_with_the_closest_samples_answers_wherever_both_do(fa
     raisin, sphere, thin = families.infos
     better = dataclasses.replace(thin, need={**thin.need, "quality": "fine"})
     assert chosen(again(families, raisin, sphere, better), {"te": 0.03, "gamma": 10.0}) == "thin"
+    first = dataclasses.replace(thin, name="broad")
+    assert chosen(again(families, raisin, sphere, first), {"te": 0.03, "gamma": 10.0}) == "sphere"
     named = dataclasses.replace(thin, name="default")
     assert chosen(again(families, raisin, sphere, named), {"te": 0.03, "gamma": 10.0}) == "default"
 
 
 def again(families: Families, *infos: TableInfo) -> Families:
-    """Return families of other tables with the same samples, those of `default` like those of `thin`."""
+    """Return families of other tables with the same samples, those of one that is called otherwise like `thin`'s."""
     places = families._places
     base, thin = stored.base(SOLVER), families.infos[2]
-    return Families(infos, base, lambda info: places(thin if info.name == "default" else info))
+    return Families(infos, base, lambda info: places(info if info.name in ("raisin", "sphere") else thin))
 
 
 def test_which_family_answers_hangs_on_which_hold_the_fruit_alone() -> None:
