@@ -49,8 +49,10 @@ FIELDS = ("position", "displacement")
 _Fields = tuple[Array | None, Array | None, Array | None]
 #: Stands for the fresh shape among the stored stages.
 _FRESH = -1
-#: Descriptors that are zero on the fresh shape; the others have no known value next to it.
+#: Descriptors that are zero on the fresh shape, and those of them that grow from there; the others have no known value
+#: next to it. Buckles come up at once, somewhere before the first stored stage.
 _ZERO_AT_FIRST = ("roughness", "buckle_count", "penetration")
+_GROWING = ("roughness", "penetration")
 #: Power [r1^2] that is no wrinkle's but round-off.
 _NO_WRINKLES = 1e-10
 
@@ -371,7 +373,7 @@ class ShapeTable:
         places, parts = np.array(list(stored), int), np.array(list(stored.values()), float)
         # (name, sample, stage) to (name,)
         found = (self._numbers[:, near.samples][:, :, places] @ parts) @ np.asarray(near.weights, float)
-        known = _ZERO_AT_FIRST if _FRESH in stages else self._descriptors
+        known = self._descriptors if _FRESH not in stages else _GROWING if stored else _ZERO_AT_FIRST
         told = dict(zip(self._descriptors, found.tolist(), strict=True))
         return {name: told[name] for name in known if name in told}
 

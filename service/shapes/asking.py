@@ -174,6 +174,7 @@ def words_of(solver: Solver, table: ShapeTable, max_resolution: int, tables: Liv
     stored.check_version(table.info, solver)
     described = vocabulary.axes(solver.name)
     fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
+    texts = {k: v for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, str)}
     units = {name: described[name].units for name in (*table.axes, *table.info.tied, *fixed) if name in described}
     return Words(
         axes=table.axes,
@@ -185,4 +186,5 @@ def words_of(solver: Solver, table: ShapeTable, max_resolution: int, tables: Liv
         tied=table.info.tied,
         made=stored.made(table.info, solver),
         shade=covering.shade(solver, table.info, tables.families(solver)),
+        texts=texts,
     )

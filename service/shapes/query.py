@@ -43,8 +43,8 @@ Range = tuple[float, float]
 
 
 class Words(NamedTuple):
-    """What may be asked: axes and stage with their ranges and units, the numbers that the table holds fixed, and those
-    that follow one of its axes. `made` says how its runs were done, `shade` what its fruits wear.
+    """What may be asked: axes and stage with their ranges and units, numbers and `texts` that the table holds fixed, and
+    numbers that follow one of its axes. `made` says how its runs were done, `shade` what its fruits wear.
     """
 
     axes: Mapping[str, Range]
@@ -56,6 +56,7 @@ class Words(NamedTuple):
     tied: Mapping[str, Tie] = {}
     made: Mapping[str, Any] = {}
     shade: Shade | None = None
+    texts: Mapping[str, str] = {}
 
     @property
     def ranges(self) -> dict[str, Range]:
@@ -129,8 +130,12 @@ def parse(
                 wrong.append(Wrong(name, f"{text[:40]!r} is not a finite number", "Write it like 0.05."))
             else:
                 numbers[name] = number
+        elif name in words.texts:
+            if text != words.texts[name]:
+                detail = f"this table holds {name} = {words.texts[name]!r} only, not {text[:40]!r}"
+                wrong.append(Wrong(name, detail, f"Leave {name} out, or run it: POST /v1/jobs."))
         elif name not in RESERVED:
-            wrong.append(_unknown(name, [*ranges, *words.tied, *words.fixed, *RESERVED]))
+            wrong.append(_unknown(name, [*ranges, *words.tied, *words.fixed, *words.texts, *RESERVED]))
     said = dict(numbers)
     if filled:
         known = {**ranges, **words.fixed, **words.tied}
@@ -238,7 +243,8 @@ def _max_error(text: str, words: Words) -> dict[str, float] | Wrong:
 
 def _exact(text: str, words: Words) -> str | Wrong:
     if text not in EXACT:
-        return Wrong("exact", f"{text[:40]!r} is not {' or '.join(EXACT)}", "Write exact=run, or leave it out.")
+        advice = f"Write {' or '.join(f'exact={word}' for word in EXACT)}, or leave it out."
+        return Wrong("exact", f"{text[:40]!r} is not {' or '.join(EXACT)}", advice)
     return text
 
 

@@ -64,6 +64,15 @@ def test_a_preset_fills_what_is_not_said(client: httpx.Client) -> None:
     assert client.get(SHAPE, params={"te": 0.03, "gamma": 10, "s": 0.2, "format": "json"}).json()["table"] == "sphere"
 
 
+def test_how_a_run_was_done_may_be_named(client: httpx.Client) -> None:
+    said = {"preset": "raisin", "s": 0.2, "format": "json"}
+    assert client.get(SHAPE, params={**said, "mirrors": "xz"}).json()["made"] == {"mirrors": "xz"}
+    refused = client.get(SHAPE, params={**said, "mirrors": "xyz"})
+    assert refused.status_code == 422
+    assert "this table holds mirrors = 'xz' only, not 'xyz'" in refused.text
+    assert "exact=run or exact=relax" in client.get(SHAPE, params={**said, "exact": "foo"}).text
+
+
 def test_all_radii_typed_in_are_that_fruit(client: httpx.Client) -> None:
     radii = {f"r{i + 1}": r for i, r in enumerate(RAISIN["radii"]) if i}
     said = {**radii, "rs1": 0.3, "rs2": 0.2, "te": 0.01, "gamma": 10, "s": 0.2, "format": "json"}

@@ -106,6 +106,8 @@ def test_linear_between_stages_and_from_the_fresh_shape(table: ShapeTable) -> No
     # of the fresh shape only what vanishes on it is known
     assert dict(fresh.descriptors) == {"roughness": 0.0, "buckle_count": 0.0}
     assert set(table.at(query, 0.1).descriptors) == {"roughness", "buckle_count", "mean_radius"}
+    # there are no buckles until there are some
+    assert set(table.at(query, 0.05).descriptors) == {"roughness"}
     half, whole = (table.at(query, s).descriptors["roughness"] for s in (0.05, 0.1))
     assert half == pytest.approx(whole / 2)
 
