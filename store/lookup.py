@@ -186,10 +186,9 @@ class ShapeTable:
         """Return the shape at parameters and a stage, on the lattice of `resolution` (None: the table's own).
 
         `fields` are position and/or displacement; nothing else is computed. `window` limits them to a part of the
-        lattice and to some components; the rest is not computed where that pays. `method` is named as in
-        `store.blending.methods`; in `idw`, and where the samples form no grid, the `m` nearest take part, with weights
-        distance^-eta. `max_error` limits the expected error, of the roughness or by measure. What folds into itself is
-        put `apart`, where the table knows fresh shapes; without, positions and displacements are the blend as it is.
+        lattice and to some components. `method` is named as in `store.blending.methods`; in `idw`, and where samples
+        form no grid, the `m` nearest take part, with weights distance^-eta. `max_error` limits the expected error, of
+        the roughness or by measure. What folds is put `apart` where fresh shapes are known; without, it is the blend.
 
         Raises:
             OutsideTable: the table does not reach there, or does not hold that, or has no such method.
@@ -206,11 +205,9 @@ class ShapeTable:
         mixed = self._blender.mix(point, near, tuple(_stored(stages)), how)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
-        if max_error is not None:
-            trust.refuse(expected, max_error, inside, self._judged)
+        trust.refuse(expected, max_error, inside, self._judged)
         exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
-        blend = self._blend(point, mixed, stages, how, n)
-        found, crossings = self._fields(fields, patch, values, blend, exact, apart)
+        found, crossings = self._fields(fields, patch, values, self._blend(point, mixed, stages, how, n), exact, apart)
         return Shape(
             colatitude=_angles(n)[0][patch.rows],
             azimuth=_angles(n)[1][patch.columns],

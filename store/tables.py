@@ -18,16 +18,16 @@ from typing import TYPE_CHECKING, Literal, cast
 from solver.contract import Solver
 
 from . import seal
-from .errors import EmptyTable, MixedSamples
-from .generations import generate, generation
-from .generations.samples import Choice, Samples, collect
+from .errors import CorruptTable, EmptyTable, MixedSamples, StoreError, UnknownJob
+from .generations import generate, generation, own
+from .generations.samples import Choice, collect
 from .manifest import TableInfo, directory, read_manifest, write_manifest
 from .store import Store
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Precision", "TableInfo", "build", "info", "open", "path_of", "prune", "rebuild"]
+__all__ = ["Precision", "TableInfo", "build", "info", "is_alone", "open", "path_of", "prune", "rebuild"]
 
 #: How a spectrum's numbers are stored; int16 is packed, see `surfaces.packed`.
 Precision = Literal["int16", "float32", "float64"]
@@ -61,18 +61,24 @@ def build(
 
     """
     samples = collect(store, solver.name, solver.params.axes, Choice(plan, quality, version, keys))
-    return _write(store, solver, name, samples, resolution, dtype, text)
+    return _write(store, solver, name, generate.results(store, samples), resolution, dtype, text)
 
 
 def _write(
-    store: Store, solver: Solver, name: str, samples: Samples, resolution: int | None, dtype: Precision, text: str
+    store: Store,
+    solver: Solver,
+    name: str,
+    source: generate.Source,
+    resolution: int | None,
+    dtype: Precision,
+    text: str,
 ) -> TableInfo:
-    home = directory(store.tables_dir, name)
+    home, samples = directory(store.tables_dir, name), source.samples
     band = min(resolution or samples.need["resolution"], samples.need["resolution"])
     if band < 4:
         raise EmptyTable(f"a band of {band} waves holds no shape.", "Ask for a resolution of at least 4.")
     with seal.scratch(home / "next.h5") as temporary:
-        written = generate.write(temporary, store, samples, solver, band, dtype)
+        written = generate.write(temporary, source, solver, band, dtype)
         seal.seal(temporary)
         file = f"{written.digest[:16]}.h5"
         seal.adopt(temporary, home / file)
@@ -112,14 +118,17 @@ def rebuild(
 ) -> TableInfo:
     """Write a table of `solver` anew from the results that it was built of, and make it current; no run is repeated.
 
+    A table that is here without them (`is_alone`) is written from its own spectra, with as many waves or fewer.
+
     What is not said stays: `resolution` and `dtype` of the current generation, even where its file is damaged. `more`
     names results to add. A `resolution` above that of the runs means theirs.
 
     Raises:
         UnknownTable: there is none of that name.
-        CorruptTable: its manifest is damaged, so that nobody knows what it was built of.
+        CorruptTable: its manifest is damaged, so that nobody knows what it was built of; or it is without its runs, and
+            damaged.
         MixedSamples: it is another solver's, or the results to add differ from the others in more than their axes.
-        UnknownJob: a result is gone.
+        UnknownJob: a result is gone, or all are, and more is wanted than the table holds.
         CorruptShard: a result is damaged.
         StorageFull: the disk is full; the old generation stays current.
 
@@ -128,8 +137,42 @@ def rebuild(
     if now.solver != solver.name:
         raise MixedSamples(f"table {name!r} is of {now.solver}, not of {solver.name}.", "Build one under another name.")
     precision: Precision = dtype or cast(Precision, now.dtype)
-    samples = collect(store, solver.name, now.places, Choice(keys={*now.keys, *more}))
-    return _write(store, solver, name, samples, resolution or now.resolution, precision, now.plan)
+    band = resolution or now.resolution
+    if is_alone(store, now):
+        source = _own(store, now, band, more)
+    else:
+        source = generate.results(store, collect(store, solver.name, now.places, Choice(keys={*now.keys, *more})))
+    return _write(store, solver, name, source, band, precision, now.plan)
+
+
+def is_alone(store: Store, table: TableInfo) -> bool:
+    """Return whether none of a table's runs is stored, but for the one whose pattern they start from: so are the tables
+    that come with wizen.
+    """
+    origin = (table.template.get("pattern") or {}).get("key")
+    return not any(store.has(key) for key in table.keys if key != origin)
+
+
+def _own(store: Store, table: TableInfo, band: int, more: Collection[str]) -> generate.Source:
+    """Return a table that is alone as the source of its next generation.
+
+    Raises:
+        UnknownJob: what is wanted is not in it.
+        CorruptTable: it is damaged.
+
+    """
+    path = path_of(store, table)
+
+    def refused(kind: type[StoreError], why: str) -> StoreError:
+        advice = f"`wizen table plan {table.name} --store {store.root}` prints the plan that makes them."
+        return kind(f"table {table.name!r} is here without its runs, {why}.", advice if table.plan else "")
+
+    if band > table.resolution or more:
+        what = "samples" if more else "waves"
+        raise refused(UnknownJob, f"and without them it gets no more {what} than it holds")
+    if not path.is_file() or not seal.is_whole(path):
+        raise refused(CorruptTable, f"and {path} is damaged")
+    return own.source(path, table)
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["check_suffix", "fields_for", "of_result", "panels", "save", "suffixes", "triangles"]
 
+#: Whole numbers of a stage that say how its run went, not what the surface is like.
+_WENT = ("converged", "iterations")
 #: Pictures of meshes leave out what is farther from the middle than this, over the radius that they show.
 _BEYOND = 1.6
 
@@ -39,6 +41,15 @@ def _npz(made: Made) -> bytes:
         np.savez_compressed(out, **arrays)
         return out.getvalue()
     first = made.shapes[0]
+    if first.position is not None and first.poles is None:  # a part is no closed mesh
+        np.savez_compressed(
+            out,
+            stage=np.array([shape.stage for shape in made.shapes]),
+            colatitude=first.colatitude,
+            azimuth=first.azimuth,
+            position=np.stack([shape.position for shape in made.shapes if shape.position is not None]),
+        )
+        return out.getvalue()
     volumes = [np.nan if shape.volume is None else shape.volume for shape in made.shapes]
     np.savez_compressed(
         out,
@@ -249,7 +260,7 @@ def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Sh
     numbers = {
         str(name): float(variable[index])
         for name, variable in result.data_vars.items()
-        if variable.dims == ("stage",) and variable.dtype.kind == "f"
+        if variable.dims == ("stage",) and variable.dtype.kind in "fiu" and name not in _WENT
     }
     return Shape(
         colatitude=result["colatitude"].values,

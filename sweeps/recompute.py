@@ -55,6 +55,9 @@ def recompute(
             "Install that version, or sweep and build anew.",
         )
         return
+    if not keys:
+        yield Finding("run", table.name, "none of its runs is here: nothing was solved again. Run its plan again.")
+        return
     drawn = np.random.default_rng(seed).permutation(len(keys))[:count]
     chosen = [keys[i] for i in sorted(drawn.tolist())]
     for key in chosen:

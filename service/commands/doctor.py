@@ -238,7 +238,9 @@ def _tables(root: Path, deep: bool) -> Iterator[Finding]:
                 yield Finding("bytes", "bad", f"{name}: {error.message}", error.advice)
                 continue
             advice = f"`wizen table rebuild --store {named}` makes the table anew from its results."
-            yield from (Finding("bytes", "bad", f"{name}: {found.message}", advice) for found in wrong)
+            for found in wrong:
+                told = f"{name}: {found.message}"
+                yield Finding("bytes", "note", told) if found.remark else Finding("bytes", "bad", told, advice)
             if not wrong:
                 yield Finding(
                     "bytes", "good", f"{name}: every byte is as it was written, and the runs can be had again"

@@ -20,26 +20,33 @@ from ..errors import CorruptShard, CorruptTable, MixedSamples, UnknownJob
 from ..generations import generate, generation
 from ..store import Store
 from ..surfaces.measures import UNITS
-from ..tables import TableInfo, info, path_of
+from ..tables import TableInfo, info, is_alone, path_of
 
 __all__ = ["Finding", "verify"]
 
 _REBUILD = "Rebuild the table."
+_ALONE = "None of the table's runs is here: it was checked by itself, and gets no more waves than it holds."
 #: Largest distance between a stored wave and the run's, over the largest wave of the run: a few roundings, or half a
 #: step.
 _ROUNDING = {"int16": 2e-5, "float32": 1e-6, "float64": 1e-13}
 
 
 class Finding(NamedTuple):
-    """Something wrong: in which part (manifest, generation, trust, result, run), of what name, and what it is."""
+    """Something wrong: in which part (manifest, generation, trust, result, run), of what name, and what it is.
+
+    A `remark` is nothing wrong, but worth knowing.
+    """
 
     part: str
     name: str
     message: str
+    remark: bool = False
 
 
 def verify(store: Store, name: str = "default") -> list[Finding]:
     """Check a table to the last byte, and that it could be rebuilt to be the same; return what is wrong.
+
+    Of a table that is here without its runs, as one that comes with wizen, the latter is only remarked.
 
     Raises:
         UnknownTable: there is none of that name.
@@ -57,6 +64,8 @@ def verify(store: Store, name: str = "default") -> list[Finding]:
         with generation.open(path) as opened:
             findings += [Finding("generation", path.name, message) for message in _schema(opened, table)]
             findings += [Finding("trust", path.name, message) for message in _trust(opened)]
+    if is_alone(store, table):
+        return [*findings, Finding("result", "all", _ALONE, remark=True)]
     if stored is not None and stored.shape != _shape(table):
         stored = None
     digests = {job.key: job.digest for job in store.ledger.jobs("done")}

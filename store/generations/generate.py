@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -36,11 +36,29 @@ from .samples import Samples
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Written", "axis", "spectra_of", "write"]
+__all__ = ["Source", "Taken", "Written", "axis", "results", "spectra_of", "write"]
 
 _PAGE = 4096
 #: What a result says per stage: name -> values and attributes.
 Rows = dict[str, "xr.Variable"]
+
+
+class Taken(NamedTuple):
+    """What a generation takes of a sample: its rows, and its waves (stage, component, m, k, part) in float64."""
+
+    rows: Rows
+    waves: Array
+
+
+class Source(NamedTuple):
+    """What a generation is made of: samples, and what is taken of each, one after the other, up to a band.
+
+    `lost` is how far (rms, largest) [r1] packing has moved their surfaces already.
+    """
+
+    samples: Samples
+    taken: Callable[[int], Iterator[Taken]]
+    lost: tuple[float, float] = (0.0, 0.0)
 
 
 class Written(NamedTuple):
@@ -50,22 +68,35 @@ class Written(NamedTuple):
     descriptors: tuple[str, ...]
 
 
-def write(
-    path: Path,
-    store: Store,
-    samples: Samples,
-    solver: Solver,
-    band: int,
-    dtype: Literal["int16", "float32", "float64"],
-) -> Written:
-    """Write the generation of `samples` to `path`, one sample in memory at a time.
+def results(store: Store, samples: Samples) -> Source:
+    """Return the results of samples as what a generation is made of.
 
     Raises:
+        UnknownJob: when they are taken: a result is gone.
         CorruptShard: a result is damaged.
         MixedSamples: a result is not what its need says.
-        StorageFull: the disk is full.
 
     """
+
+    def taken(band: int) -> Iterator[Taken]:
+        for key in samples.keys:
+            result = store.get(key)
+            yield Taken(_rows(result), spectra_of(result, key, samples.need, band))
+
+    return Source(samples, taken)
+
+
+def write(
+    path: Path, source: Source, solver: Solver, band: int, dtype: Literal["int16", "float32", "float64"]
+) -> Written:
+    """Write the generation of a source to `path`, one sample in memory at a time.
+
+    Raises:
+        StorageFull: the disk is full.
+        StoreError: as its source says.
+
+    """
+    samples = source.samples
     shape = (len(samples.keys), len(samples.need["stages"]), 3, band + 1, band + 1, 2)
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
     if shutil.disk_usage(path.parent).free < size:
@@ -73,10 +104,9 @@ def write(
     rows: list[Rows] = []
 
     def blocks() -> Iterator[Array]:
-        for key in samples.keys:
-            result = store.get(key)
-            rows.append(_rows(result))
-            yield spectra_of(result, key, samples.need, band)
+        for sample in source.taken(band):
+            rows.append(sample.rows)
+            yield sample.waves
 
     total = hashlib.sha256()
     more: dict[str, Any] = {}
@@ -90,12 +120,14 @@ def write(
             codes = packed.encode(whole)
             file.dimensions = dict(zip(PACKED, codes.codes.shape, strict=True))
             target = _spectrum(file, PACKED, dtype)
-            target.attrs["rms_loss"], target.attrs["max_loss"] = packed.loss(whole, codes)
+            _state_loss(target, np.add(packed.loss(whole, codes), source.lost))
             more, stored = _packing(codes), packed.Packed(codes)
             written: Iterable[Array] = codes.codes
         else:
             file.dimensions = dict(zip(DIMS, shape, strict=True))
             target = _spectrum(file, DIMS, dtype)
+            if any(source.lost):
+                _state_loss(target, source.lost)
             written = (block.astype(dtype) for block in blocks())
         for i, block in enumerate(written):
             total.update(block.data)
@@ -129,6 +161,10 @@ def _spectrum(file: Any, dims: tuple[str, ...], dtype: str) -> Any:
         "; times wave_step of their shell" if dims == PACKED else ""
     )
     return target
+
+
+def _state_loss(target: Any, lost: Iterable[float]) -> None:
+    target.attrs["rms_loss"], target.attrs["max_loss"] = lost
 
 
 def _packing(codes: packed.Codes) -> dict[str, xr.Variable]:

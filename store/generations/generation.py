@@ -28,6 +28,7 @@ __all__ = [
     "CONVERGENCE",
     "DIMS",
     "PACKED",
+    "ROWS",
     "Column",
     "Judged",
     "combined",
@@ -43,6 +44,8 @@ __all__ = [
 DIMS = ("sample", "stage", "component", "m", "k", "part")
 #: Dimensions of packed spectra, see `surfaces.packed`.
 PACKED = ("sample", "stage", "wave")
+#: Dimensions of what runs say by stage.
+ROWS = ("sample", "stage")
 
 #: Rows of a result that say how its run went, not what the surface is like.
 CONVERGENCE = ("converged", "residual", "iterations")

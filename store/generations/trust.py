@@ -134,9 +134,9 @@ class Trust:
 
 
 def refuse(
-    expected: Mapping[str, float] | None, limit: float | Mapping[str, float], inside: bool, known: str | None
+    expected: Mapping[str, float] | None, limit: float | Mapping[str, float] | None, inside: bool, known: str | None
 ) -> None:
-    """Refuse an answer that is worse than asked for; a number limits the error of the roughness.
+    """Refuse an answer that is worse than asked for; a number limits the error of the roughness, None nothing.
 
     `known` is the method whose errors the table holds, if it holds any.
 
@@ -145,7 +145,7 @@ def refuse(
         OutsideTable: there is no such measure.
 
     """
-    limits = limit if isinstance(limit, Mapping) else {"rgh": limit}
+    limits = limit if isinstance(limit, Mapping) else {} if limit is None else {"rgh": limit}
     for name, most in limits.items():
         if name not in Measures._fields or not most >= 0:
             raise OutsideTable(f"max_error {name} = {most}.", f"Limit any of {', '.join(Measures._fields)}, from 0 on.")

@@ -36,7 +36,8 @@ def rebuild(
     """Write a table anew from the runs that it was built of: another grid, band limit or precision; no run is repeated.
 
     What is not said stays as it is. The old generation serves until the new one is whole, and whoever has it open
-    keeps it. `wizen table build` chooses runs; this keeps them.
+    keeps it. `wizen table build` chooses runs; this keeps them. A table that came without its runs is written from its
+    own waves: as many or fewer.
 
     [bold]Examples[/bold]
 
@@ -52,13 +53,14 @@ def rebuild(
 
     opened = Store.open(store)
     old = tables.info(opened, name)
-    path = tables.path_of(opened, old)
+    path, alone = tables.path_of(opened, old), tables.is_alone(opened, old)
     try:
-        was = (path.stat().st_size, truncation.losses(opened, old)) if path.is_file() else None
+        was = (path.stat().st_size, [] if alone else truncation.losses(opened, old)) if path.is_file() else None
     except CorruptTable:
         was = None
     new = tables.rebuild(opened, registry.get(old.solver), name, resolution=resolution, dtype=precision)
-    size, lost = tables.path_of(opened, new).stat().st_size, truncation.losses(opened, new)
+    size = tables.path_of(opened, new).stat().st_size
+    lost = truncation.losses(opened, new, old if alone else None)
 
     def side(table: Any, size: int | None, losses: Any) -> dict[str, Any]:
         return {
@@ -71,7 +73,8 @@ def rebuild(
         }
 
     before, after = side(old, *(was or (None, None))), side(new, size, lost)
-    document = {"table": name, "changed": old.digest != new.digest, "before": before, "after": after}
+    document = {"table": name, "changed": old.digest != new.digest, "source": "table" if alone else "runs"}
+    document |= {"before": before, "after": after}
     symbol = registry.get(old.solver).stages.symbol
     emit(document, as_json, lambda console: _show_rebuilt(console, document, symbol))
 
@@ -79,6 +82,9 @@ def rebuild(
 def _show_rebuilt(console: Any, document: dict[str, Any], symbol: str) -> None:
     before, after = document["before"], document["after"]
     console.print(f"table {document['table']}: rebuilt" + ("" if document["changed"] else ", and the same"))
+    alone = document["source"] == "table"
+    if alone:
+        console.print("from its own spectra, as none of its runs is here; lost is what these lose")
     rows = [
         ["digest", before["digest"][:16], after["digest"][:16]],
         *([word, str(before[word]), str(after[word])] for word in ("resolution", "precision", "samples")),
@@ -87,7 +93,7 @@ def _show_rebuilt(console: Any, document: dict[str, Any], symbol: str) -> None:
     lost = {row["stage"]: row for row in before["truncation"]}
     for row in after["truncation"]:
         gone = lost.get(row["stage"])
-        then = f"{gone['rms']:.2g} (max {gone['max']:.2g})" if gone else "damaged"
+        then = f"{gone['rms']:.2g} (max {gone['max']:.2g})" if gone else "" if alone else "damaged"
         rows.append([f"lost at {symbol} = {row['stage']:g} [r1]", then, f"{row['rms']:.2g} (max {row['max']:.2g})"])
     grid(console, ["", "before", "after"], rows)
 
@@ -105,6 +111,7 @@ def verify(
     """Check a table to the last byte, and every run behind it. Exit code 1 if anything is wrong.
 
     Manifest, seal, digest, variables, units, trust; each run's seal and digest, and that the table holds its waves.
+    That none of the runs is here, as of the tables in the package, is said and is nothing wrong.
 
     [bold]Examples[/bold]
 
@@ -121,20 +128,19 @@ def verify(
 
     opened = Store.open(store)
     findings = audit.verify(opened, name)
-    spots = []
+    spots: list[Any] = []
     if recompute and not any(finding.part == "manifest" for finding in findings):
         table = tables.info(opened, name)
         broken = {finding.name for finding in findings if finding.part == "result"}
-        kept = [key for key in table.keys if key not in broken]
+        kept = [key for key in table.keys if key not in broken and not tables.is_alone(opened, table)]
         with progress.stopping() as stop:
             for found in solve_again(opened, table, kept, recompute, seed, tolerance, stop.is_set):
-                if isinstance(found, audit.Finding):
-                    findings.append(found)
-                else:
-                    spots.append(found)
+                known: list[Any] = findings if isinstance(found, audit.Finding) else spots
+                known.append(found)
+    sound = all(finding.remark for finding in findings)
     document = {
         "table": name,
-        "sound": not findings,
+        "sound": sound,
         "findings": [finding._asdict() for finding in findings],
         "recomputed": [spot._asdict() for spot in spots],
     }
@@ -142,14 +148,14 @@ def verify(
     def show(console: Any) -> None:
         if findings:
             grid(console, ["part", "name", "finding"], [[f.part, f.name[:16], f.message] for f in findings])
-        else:
+        if sound:
             console.print(f"table {name} is sound", markup=False)
         for spot in spots:
             how = "the same bytes" if spot.same else f"displacement within {spot.apart:.2g} r1"
             console.print(f"solved again: {spot.key[:12]}: {how}", markup=False)
 
     emit(document, as_json, show)
-    if findings:
+    if not sound:
         raise typer.Exit(1)
 
 

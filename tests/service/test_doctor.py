@@ -45,6 +45,14 @@ def test_a_sound_store_is_found_sound(own: Store, port: int) -> None:
     }
 
 
+def test_a_table_that_came_without_its_runs_is_noted(own: Store, port: int) -> None:
+    for key in list(own.keys()):
+        own.shard_path(key).unlink()
+    seen = found(own.root, port, deep=True)["bytes"]
+    assert (seen.state, seen.advice) == ("note", "")
+    assert "None of the table's runs is here" in seen.seen
+
+
 def test_a_port_that_another_has_is_told_from_our_own(own: Store) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         taken = other.getsockname()[1]

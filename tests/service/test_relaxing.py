@@ -83,6 +83,9 @@ def test_what_is_looked_up_is_relaxed_once_and_says_so(
     assert crossings(whole, closed_lattice(64)).count == 0
     assert np.corrcoef(*radii)[0, 1] > 0.8
     assert np.abs(radii[0] - radii[1]).max() > 1e-4
+    said = [ask(client, headers, format="json", **how) for how in ({}, {"exact": "relax"})]
+    table, kept = (client.get(one.headers.get("location", one.url)).json()["descriptors"] for one in said)
+    assert {"buckle_count", *table} <= {*kept}
     numbers = client.get(f"{sent.headers['location']}/fields", params={"names": "residual,moved,converged"}).json()
     assert numbers["fields"]["residual"]["values"][0] <= 5e-3
     assert numbers["fields"]["converged"]["values"] == [1]

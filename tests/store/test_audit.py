@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -96,8 +97,6 @@ def _axis(file: h5py.File) -> None:
     ],
 )
 def test_what_a_seal_does_not_tell(tabled: Store, edit: Callable[[h5py.File], None], part: str, said: str) -> None:
-    from dataclasses import replace
-
     from store.generations import generation
 
     store = tabled
@@ -190,3 +189,66 @@ def test_comparing_other_samples_and_settings(filled: Store, tmp_path: Path) -> 
     flip(b, 0.5)
     with pytest.raises(CorruptTable, match="Rebuild"):
         compare.compare(a, b)
+
+
+def bereft(store: Store) -> None:
+    """Take the runs away, as of the tables that come with the package."""
+    for key in list(store.keys()):
+        store.shard_path(key).unlink()
+
+
+@pytest.mark.parametrize(("resolution", "dtype"), [(5, "float32"), (None, "int16"), (9, "float64"), (None, None)])
+def test_a_table_without_its_runs_is_made_of_its_own_spectra(
+    filled: Store, resolution: int | None, dtype: tables.Precision | None
+) -> None:
+    """The same bytes as of the runs: it holds all that they said, and all else follows from its waves."""
+    tables.build(filled, SOLVER, dtype="float64", text="# a plan\n")
+    wanted = tables.rebuild(filled, SOLVER, resolution=resolution, dtype=dtype)
+    first = tables.build(filled, SOLVER, dtype="float64", text="# a plan\n")
+    assert not tables.is_alone(filled, first)
+    bereft(filled)
+    assert tables.is_alone(filled, first)
+    made = tables.rebuild(filled, SOLVER, resolution=resolution, dtype=dtype)
+    assert (made.digest, made.dtype, made.resolution) == (wanted.digest, wanted.dtype, wanted.resolution)
+    assert (made.axes, made.keys, made.need, made.plan) == (wanted.axes, wanted.keys, wanted.need, wanted.plan)
+    assert set(made.descriptors) == set(wanted.descriptors)
+    assert all(finding.remark for finding in audit.verify(filled))
+
+
+def test_more_than_a_table_holds_is_not_made_without_its_runs(filled: Store) -> None:
+    keys = tables.build(filled, SOLVER, text="# a plan\n").keys
+    cut = tables.rebuild(filled, SOLVER, resolution=6)
+    bereft(filled)
+    for asked, what in (({"resolution": 7}, "waves"), ({"more": keys[:1]}, "samples")):
+        with pytest.raises(UnknownJob, match=f"without its runs, .* no more {what}") as refused:
+            tables.rebuild(filled, SOLVER, **asked)
+        assert f"`wizen table plan default --store {filled.root}` prints the plan" in refused.value.advice
+    flip(tables.path_of(filled, cut), 0.5)
+    with pytest.raises(CorruptTable, match=r"without its runs, and .* is damaged"):
+        tables.rebuild(filled, SOLVER)
+    assert tables.info(filled) == cut
+
+
+def test_that_no_run_is_here_is_remarked_and_that_some_are_gone_is_wrong(tabled: Store) -> None:
+    first, *others = tables.info(tabled).keys
+    kept = {key: tabled.shard_path(key).read_bytes() for key in (first, *others)}
+    bereft(tabled)
+    (finding,) = audit.verify(tabled)
+    assert (finding.part, finding.remark) == ("result", True)
+    assert "None of the table's runs is here" in finding.message
+    flip(tables.path_of(tabled, tables.info(tabled)), 0.5)
+    assert [finding.remark for finding in audit.verify(tabled)] == [False, True]
+    flip(tables.path_of(tabled, tables.info(tabled)), 0.5)
+    tabled.shard_path(first).write_bytes(kept[first])
+    findings = audit.verify(tabled)
+    assert [(finding.name, finding.remark) for finding in findings] == [(key, False) for key in others]
+    assert all("is gone" in finding.message for finding in findings)
+
+
+def test_the_run_that_others_start_from_is_not_one_of_a_table_s_runs(tabled: Store) -> None:
+    table = tables.info(tabled)
+    for key in table.keys[1:]:
+        tabled.shard_path(key).unlink()
+    assert not tables.is_alone(tabled, table)
+    pattern = {"key": table.keys[0], "stage": 0.1, "amplitude": 0.01}
+    assert tables.is_alone(tabled, replace(table, template={**table.template, "pattern": pattern}))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -110,3 +113,21 @@ def test_rebuilding_packs_unpacks_and_keeps_the_plan(both: Store) -> None:
     again = tables.rebuild(both, SOLVER, "packed", dtype="int16")
     assert (again.digest, again.plan) == (digest, "# a plan\n")
     assert tables.rebuild(both, SOLVER, "packed").dtype == "int16"
+
+
+def test_what_packing_lost_is_still_said_of_what_is_made_of_packed_spectra(both: Store, tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "alone", create=True)
+    shutil.copytree(both.tables_dir / "packed", store.tables_dir / "packed")
+
+    def stated() -> list[float]:
+        with tables.open(store, "packed") as opened:
+            return [float(opened.spectrum.attrs[name]) for name in ("rms_loss", "max_loss")]
+
+    first = stated()
+    assert min(first) > 0
+    tables.rebuild(store, SOLVER, "packed", dtype="int16")
+    assert stated() == pytest.approx(first, rel=1e-3)
+    tables.rebuild(store, SOLVER, "packed", dtype="float32")
+    assert stated() == pytest.approx(first, rel=1e-3)
+    tables.rebuild(store, SOLVER, "packed", resolution=8, dtype="int16")
+    assert all(now >= 0.999 * before for now, before in zip(stated(), first, strict=True))

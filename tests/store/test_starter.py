@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,8 @@ from solver.dehydration.measures.penetration import of_lattice
 from solver.geometry.crossings import crossings
 from solver.lattice import closed_lattice
 from store import seal, starter, tables
-from store.errors import StaleTable
+from store.checking import audit
+from store.errors import StaleTable, UnknownJob
 from store.families import stored
 from store.generations import generation
 from store.lookup import ShapeTable
@@ -144,3 +146,25 @@ def test_it_stands_in_where_there_is_no_store(tmp_path: Path, given: str | None)
     assert starter.own_or_starter(None if given is None else tmp_path / given) == starter.ROOT
     Store.open(tmp_path / "own", create=True)
     assert starter.own_or_starter(tmp_path / "own") == tmp_path / "own"
+
+
+@pytest.mark.parametrize("name", ["default", *FAMILIES])
+def test_untouched_it_is_sound_and_says_once_that_its_runs_are_not_here(name: str) -> None:
+    (finding,) = audit.verify(Store(starter.ROOT), name)
+    assert finding.remark
+    assert "None of the table's runs is here" in finding.message
+
+
+def test_a_copy_is_made_smaller_of_its_own_spectra_and_served(tmp_path: Path) -> None:
+    store = Store.open(tmp_path / "own", create=True)
+    shutil.copytree(starter.ROOT / "tables" / "sphere-02", store.tables_dir / "sphere-02")
+    whole = ShapeTable.open(store, "sphere-02", surfaces=registry.surface)
+    made = tables.rebuild(store, registry.get("dehydration"), "sphere-02", resolution=24, dtype="float32")
+    small = ShapeTable.open(store, "sphere-02", surfaces=registry.surface)
+    assert (small.digest, small.resolution, made.samples) == (made.digest, 24, whole.info.samples)
+    asked = {"gamma": 20.0}
+    a, b = (table.at(asked, 0.2, resolution=24) for table in (whole, small))
+    assert dict(a.descriptors) == dict(b.descriptors)
+    assert np.sqrt(np.mean((np.asarray(a.position) - np.asarray(b.position)) ** 2)) < 0.02
+    with pytest.raises(UnknownJob, match="without its runs"):
+        tables.rebuild(store, registry.get("dehydration"), "sphere-02", resolution=96)

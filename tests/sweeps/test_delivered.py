@@ -47,3 +47,17 @@ def test_crossings_are_counted_with_the_poles_of_the_file(height: float, crosses
     rings = np.concatenate([position.reshape(-1, 3), position[[0, -1]].mean(axis=1)]).astype(float)
     assert crossings(rings, closed_lattice(N)).count == 0
     assert json.loads(write(shape, "json"))["crossings"] == shape.crossings
+
+
+def test_counts_are_among_the_numbers_of_a_run_and_how_it_went_is_not() -> None:
+    run = xr.Dataset(
+        {
+            "position": (("stage", "colatitude", "azimuth", "component"), flat_with_a_rim(0.0)[None]),
+            "buckle_count": ("stage", [7]),
+            "roughness": ("stage", [0.1]),
+            "converged": ("stage", np.ones(1, np.int8)),
+            "iterations": ("stage", [2000]),
+        },
+        {"stage": [0.1], "colatitude": colatitudes(N), "azimuth": azimuths(N)},
+    )
+    assert outputs.of_result(run, {}, 0).descriptors == {"buckle_count": 7.0, "roughness": 0.1}
