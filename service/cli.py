@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sweeps.commands.cli import app
-from sweeps.commands.terminal import kernels, watchdog
+from sweeps.commands.terminal import kernels, regions, watchdog
 from sweeps.commands.terminal.console import emit, note
 from sweeps.errors import InvalidOption, SweepError
 from sweeps.formats import extend
@@ -271,7 +271,20 @@ def _encode(chosen: Format, made: Made) -> bytes:
     return chosen.encode(made.shapes[0], about)
 
 
+def _part(text: str) -> regions.Part:
+    """Return the part of a surface that a text names, as `region` does over HTTP."""
+    from .shapes import detail
+
+    found = detail.read({"region": text})
+    if found.wrong:
+        first = found.wrong[0]
+        raise InvalidOption(f"--region {first.detail}.", first.advice)
+    top, bottom, left, right = map(float, found.region.replace(":", ",").split(","))
+    return regions.Part(found.region, (top, bottom), (left, right), found.window)
+
+
 extend(_formats)
+regions.read_by(_part)
 cli_export.add_to(app)
 cli_scene.add_to(app)
 cli_match.add_to(app)

@@ -59,7 +59,7 @@ def stages(
     asked, conditions = [float(text) for text in hours.split(",")], _conditions(under)
     return Stages(
         hours=asked,
-        stages=list(solver.stages_after(asked, conditions, preset)),
+        stages=list(_after(solver, asked, conditions, preset)),
         symbol=solver.stages.symbol,
         under=conditions,
         conditions=solver.clock.conditions.model_json_schema()["properties"] if solver.clock else {},
@@ -93,11 +93,23 @@ def timed(items: Sequence[tuple[str, str]], solver: Solver, preset: str | None =
         raise InvalidQuery.of(wrong)
     under = _conditions(given.get("under", ""))
     try:
-        (stage,) = solver.stages_after([hours], under, preset)
+        (stage,) = _after(solver, [hours], under, preset)
     except InvalidInput as error:
         name, advice = _blamed(solver, under, preset), error.advice or "Write it like under=temperature:60."
         raise InvalidQuery.of([Wrong(name, error.message.rstrip("."), advice)]) from None
     return [*kept, (symbol, repr(stage))]
+
+
+def _after(solver: Solver, hours: Sequence[float], under: Mapping[str, str], preset: str | None) -> tuple[float, ...]:
+    """Return the stages after hours; what advice says of conditions is written as a query has them."""
+    try:
+        return solver.stages_after(hours, under, preset)
+    except InvalidInput as error:
+        raise InvalidInput(error.message, advice=solver.conditions_as(error.advice, _written)) from None
+
+
+def _written(conditions: Mapping[str, str]) -> str:
+    return "under=" + ",".join(f"{name}:{value}" for name, value in conditions.items())
 
 
 def _is_twice(name: str, items: Sequence[tuple[str, str]]) -> bool:

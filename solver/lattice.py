@@ -34,18 +34,21 @@ def lattice(resolution: int) -> tuple[Floats, Floats]:
     return theta, phi
 
 
-def window(resolution: int, region: Region | None) -> tuple[slice, slice]:
-    """Return the rows and columns of the lattice that lie inside a region; all of them if there is none."""
+def window(resolution: int, region: Region | None) -> tuple[slice, slice | Ints]:
+    """Return the rows and columns of the lattice that lie inside a region; all of them if there is none.
+
+    Columns of a region on both sides of azimuth 0 go from its beginning to its end.
+    """
     if region is None:
         return slice(None), slice(None)
-    slices = []
-    for samples, (low, high) in (
-        (colatitudes(resolution), region.colatitude),
-        (azimuths(resolution), region.azimuth),
-    ):
-        first, last = np.searchsorted(np.degrees(samples), [low, high])
-        slices.append(slice(int(first), int(last)))
-    return slices[0], slices[1]
+    top, bottom = np.searchsorted(np.degrees(colatitudes(resolution)), region.colatitude)
+    around, count = np.degrees(azimuths(resolution)), 2 * resolution
+    turns = np.concatenate([around - 360, around, around + 360])
+    left, right = np.searchsorted(turns, region.azimuth) - count
+    rows = slice(int(top), int(bottom))
+    if left >= 0 and right <= count:
+        return rows, slice(int(left), int(right))
+    return rows, np.arange(left, right) % count
 
 
 def directions(colatitude: Floats, azimuth: Floats) -> Floats:

@@ -8,7 +8,8 @@ from store.errors import Advised
 
 __all__ = ["BAD_INPUT", "InvalidOption", "PlanError", "SweepError", "describe", "exit_code", "installing"]
 
-#: Codes that mean "what was asked for is wrong", as opposed to "it could not be done".
+#: Codes that mean "what was asked for is wrong", as opposed to "it could not be done". Tables, jobs and tokens that a
+#: store does not hold are of the second kind, as a store that is not there is: the same line may do tomorrow.
 BAD_INPUT = frozenset(
     {
         "invalid-input",

@@ -47,7 +47,8 @@ class _Asked:
         None
     )
     threads: Annotated[
-        int | None, typer.Option("--threads", help="GLB, USD: N threads of mould at most, as cards or curves.")
+        int | None,
+        typer.Option("--threads", help="GLB, USD: N threads of a decay's mould at most, cards or curves."),
     ] = None
     full: Annotated[
         bool, typer.Option("--full", help="GLB, USD: threads, stem and calyx; GLB, USDZ: fine pictures of the skin.")
@@ -111,6 +112,7 @@ def export(asked: _Asked) -> None:
     chosen, out = _format(asked.format, asked.out, asked.result)
     run = _shown(_read(asked.result, asked.store))
     options = Options.parse({"map": asked.map_, **{name: getattr(asked, name) for name in _SHARED}})
+    _warn_of_threads(run, asked.threads)
     sequence = prepared(run, options, asked.stage, chosen is None or chosen.single)
     bound = None
     with progress.one_run("export") as observe:
@@ -202,6 +204,14 @@ def _shown(run: xr.Dataset) -> xr.Dataset:
     note("the result was stored without its surface: it is solved again, which takes as long as it took.")
     with progress.one_run("solve") as observe, progress.stopping() as stop:
         return surfaced(run, Context(observe, stop.is_set, shapes=tabled.shape)) or run
+
+
+def _warn_of_threads(run: xr.Dataset, threads: int | None) -> None:
+    """Say where threads are asked for and nothing that grows them is in the result."""
+    from sweeps.pictures import colours
+
+    if threads and colours.looks(run).fur is None:
+        note(f"no mould grows on results of {run.attrs.get('solver', 'this solver')}: --threads adds nothing.")
 
 
 def _written(sequence: Sequence, chosen: Export | None, options: Options) -> bytes:

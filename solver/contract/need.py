@@ -29,7 +29,10 @@ class Region(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     colatitude: tuple[float, float] = Field((0.0, 180.0), description="From the pole y > 0 [degree]")
-    azimuth: tuple[float, float] = Field((0.0, 360.0), description="About the y axis, from x towards z [degree]")
+    azimuth: tuple[float, float] = Field(
+        (0.0, 360.0),
+        description="About the y axis, from x towards z [degree]; -40 to 40, or 320 to 400, is on both sides of 0",
+    )
 
     @field_validator("colatitude", "azimuth")
     @classmethod

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import __version__, quantities
 from ..arrays import Floats
-from ..lattice import window
+from ..lattice import azimuths, colatitudes, window
 from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
@@ -149,6 +149,10 @@ class Solver:
                 advice=f"Name stages: {self.stages.long_name} [{self.stages.units}].",
             )
         return self.clock.stages(hours, under, preset)
+
+    def conditions_as(self, advice: str, write: Callable[[Mapping[str, str]], str]) -> str:
+        """Return an advice about hours with its conditions, NAME=VALUE there, as whoever asked writes them."""
+        return advice if self.clock is None else self.clock.written(advice, write)
 
     def metres(self, values: Mapping[str, Any]) -> float | None:
         """Return the length of r1 [m] of what has these parameters, plain values by name; None where nobody knows.
@@ -351,14 +355,14 @@ def finish(result: xr.Dataset, solver: Solver, params: Params, need: Need) -> xr
 
 def _check_region(region: Region, resolution: int) -> None:
     """Refuse a part of the surface that would be less than what is named, or nothing."""
-    about = "Stay within 0 to 360: a part on both sides of azimuth 0 is two regions."
-    for name, (low, high), whole, advice in (
-        ("colatitude", region.colatitude, 180, "Stay within 0 to 180."),
-        ("azimuth", region.azimuth, 360, about),
+    for name, (low, high), least, most, advice in (
+        ("colatitude", region.colatitude, 0, 180, "Stay within 0 to 180."),
+        ("azimuth", region.azimuth, -360, 720, "Take a turn at most, within -360 to 720."),
     ):
-        if low < 0 or high > whole:
+        if low < least or high > most or high - low > 360:
             raise InvalidInput(f"region.{name} runs from {low:g} to {high:g} degrees.", advice=advice)
-    if any(part.start == part.stop for part in window(resolution, region)):
+    rows, columns = window(resolution, region)
+    if not colatitudes(resolution)[rows].size or not azimuths(resolution)[columns].size:
         raise InvalidInput(
             f"no point of the lattice of {resolution} colatitudes lies in this region.",
             advice=f"Widen it, or raise the resolution: points are {180 / resolution:.3g} degrees apart.",

@@ -25,6 +25,7 @@ from .terminal.options import (
     numbers,
     stages_asked,
 )
+from .terminal.regions import Region, check_file, part
 from .terminal.tables import asked_table, open_store, run_command, solver_of
 
 if TYPE_CHECKING:
@@ -116,6 +117,7 @@ class _Asked:
     ] = None
     solver: Annotated[str | None, typer.Option("--solver", help="Whose shapes, if several have tables.")] = None
     resolution: Annotated[int | None, typer.Option("--resolution", help="Colatitude samples (4 to 1024).")] = None
+    region: Region = None
     method: Annotated[str | None, typer.Option("--method", help="How to look up, as `table score` names it.")] = None
     max_error: Annotated[
         str | None,
@@ -147,6 +149,8 @@ def query(asked: _Asked) -> None:
 
     wizen query --set te=0.034 --set gamma=22 --hours 48 --under kinetics=grape --out sunny.glb
 
+    wizen query --preset plum1 --stages 0.2 --region 45:90,350:20 --out part.npz
+
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --max-error rgh:0.1,dB:3
 
     wizen query --set te=0.034 --set gamma=22 --stages 0.2 --relax --out balanced.glb
@@ -169,8 +173,12 @@ def query(asked: _Asked) -> None:
         "path": None if asked.out is None else str(asked.out),
         "stages": [{**_document(shape), **note} for shape, note in zip(shapes, notes, strict=True)],
     }
+    where = part(asked.region)
+    if where is not None:
+        document["region"] = where.said(asked.resolution or table.resolution)
     if asked.out is not None:
-        title = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
+        place = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
+        title = ": ".join(word for word in (asked.preset or name, place) if word)
         made = Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units())
         shade = families.shade(known, table.info, stored.families(open_store(asked.store), known))
         outputs.save(asked.out, replace(made, shade=shade, reach=table.reach))
@@ -193,13 +201,19 @@ def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, An
     if not wanted:
         low, high = table.reach
         raise InvalidOption("--stages is missing.", f"The table has stages {low:g} to {high:g}.")
+    where = part(asked.region)
+    if where is not None and asked.relax:
+        raise InvalidOption("--relax is of whole shapes, and --region leaves a part.", "Keep one of them.")
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
     fields = outputs.fields_for(out, False)
+    if out is not None and where is not None and "position" in fields:
+        check_file(out, False)
     if asked.relax:
         fields = tuple(sorted({*fields, "position"}))
     how, limits = asked.method or methods.DEFAULT, _limits(asked.max_error)
     told: dict[str, Any] = {"resolution": asked.resolution, "fields": fields, "method": how, "max_error": limits}
+    told |= {} if where is None else {"window": where.window}
     shapes = [table.at(values, stage, **told) for stage in wanted]
     notes: list[Mapping[str, Any]] = [{} for _ in shapes]
     if asked.relax:

@@ -26,10 +26,11 @@ from .terminal.options import (
     Stages,
     Under,
     assignments,
-    numbers,
     parameters,
+    shown,
     stages_asked,
 )
+from .terminal.regions import Region, check_file, part
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,9 +41,6 @@ if TYPE_CHECKING:
     from ..formats import Made
 
 __all__ = ["add_to"]
-
-#: Files that hold a part of a surface as well.
-_PARTS = (".h5", ".npz")
 
 
 def add_to(app: typer.Typer) -> None:
@@ -71,10 +69,7 @@ class _Asked:
     resolution: Annotated[
         int | None, typer.Option("--resolution", metavar="N", help="Colatitudes of surface fields; azimuths are 2 N.")
     ] = None
-    region: Annotated[
-        str | None,
-        typer.Option("--region", metavar="A,B,C,D", help="Colatitudes A to B and azimuths C to D alone (degree)."),
-    ] = None
+    region: Region = None
     dtype: Annotated[str | None, typer.Option("--dtype", help="float32 or float64, of surface fields.")] = None
     seed: Seed = None
     max_seconds: Most_seconds = None
@@ -104,6 +99,8 @@ def solve(asked: _Asked) -> None:
     wizen solve decay --preset orange --stages 0,4,8 --out open.png --cut 0,0,0,0,0,1
 
     wizen solve dehydration --fields mesh_position --stages 0.2 --out as-solved.glb
+
+    wizen solve dehydration --stages 0.2 --region 45:90,350:20 --out part.npz
 
     wizen solve dehydration --preset raisin --quality preview --hours 24,48,96 --out sunny.glb
 
@@ -135,8 +132,7 @@ def solve(asked: _Asked) -> None:
         "descriptors": per_stage(result),
     }
     if asked.out is not None:
-        of = asked.preset or (asked.params_file.stem if asked.params_file else asked.solver)
-        _save(asked.out, of, chosen, params, result, document, asked.cut)
+        _save(asked.out, _title(asked, chosen), chosen, params, result, document, asked.cut)
     emit(document, asked.as_json, lambda console: show_run(console, document, chosen.stages.symbol))
 
 
@@ -149,7 +145,8 @@ def _parsed(asked: _Asked) -> tuple[Solver, Parameters, Need]:
     own = {} if asked.seed is None else {"seed": asked.seed}
     params = chosen.parse(parameters(asked.params_file) | assignments(asked.set_) | own, asked.preset)
     said: dict[str, Any] = {name: getattr(asked, name) for name in ("quality", "tolerance", "resolution", "dtype")}
-    said["region"] = _region(asked.region)
+    where = part(asked.region)
+    said["region"] = None if where is None else where.need
     wanted = stages_asked(chosen, asked.stages, asked.hours, asked.under, asked.preset)
     names = asked.fields.split(",") if asked.fields else ()
     kept = {"stages": wanted, "fields": [name.strip() for name in names]}
@@ -181,17 +178,23 @@ def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:
 
     outputs.check_suffix(out, True, len(need.stages))
     wanted = outputs.fields_for(out, True, solver, need.fields)
-    if need.region is not None and "position" in wanted and out.suffix.lower() not in _PARTS:
-        raise InvalidOption(
-            f"--out {out}: {out.suffix} holds whole surfaces, and --region leaves a part.",
-            f"Leave --region out, or write {' or '.join(_PARTS)}.",
-        )
+    if need.region is not None and "position" in wanted:
+        check_file(out, True)
     return solver.settle(need.model_copy(update={"fields": (*need.fields, *wanted)}))
+
+
+def _title(asked: _Asked, solver: Solver) -> str:
+    """Return what a picture is called: preset or file of parameters, and what was set besides; stages have labels."""
+    of = asked.preset or (asked.params_file.stem if asked.params_file else "")
+    said = shown([*(asked.set_ or ()), *([] if asked.seed is None else [f"seed={asked.seed}"])])
+    if said:
+        return f"{of or solver.name}: {said}"
+    return f"{solver.title}: {of}" if of else solver.title
 
 
 def _save(
     out: Path,
-    of: str,
+    title: str,
     solver: Solver,
     params: Parameters,
     result: xr.Dataset,
@@ -208,7 +211,7 @@ def _save(
     made = Made(
         [outputs.of_result(result, axes, i) for i in range(count)],
         document,
-        f"{solver.title}: {of}",
+        title,
         solver.name,
         stage_symbol=solver.stages.symbol,
         units=solver.axis_units(),
@@ -250,16 +253,3 @@ def _check_cut(cut: str, out: Path | None) -> None:
         section.plane(cut)
     if out is None or out.suffix.lower() != ".png":
         raise InvalidOption("--cut draws a picture.", "Name it: --out FILE.png.")
-
-
-def _region(text: str | None) -> dict[str, Any] | None:
-    """Return the part of the surface that --region names."""
-    if text is None:
-        return None
-    found = numbers(text, "--region")
-    if len(found) != 4:
-        raise InvalidOption(
-            f"--region {text!r} is not four numbers.",
-            "Write colatitudes and azimuths in degrees, for example --region 0,90,0,180.",
-        )
-    return {"colatitude": found[:2], "azimuth": found[2:]}

@@ -21,6 +21,7 @@ from ..surfaced import positions
 from . import colours
 from .render import mesh
 from .shading import BACKGROUND
+from .sheet import fit
 
 __all__ = ["Plane", "cut", "picture", "plane"]
 
@@ -99,6 +100,7 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
     paper = tuple(BACKGROUND ** (1 / 2.2))
     width, height = 16 + pixels * len(cuts) + 16, pixels + 118
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=paper)
+    canvas = FigureCanvasAgg(figure)
     for i, (segments, colour) in enumerate(cuts):
         axes = figure.add_axes(((16 + i * pixels) / width, 34 / height, pixels / width, pixels / height))
         if "colatitude" in run.dims:  # seen whole from the centre, so the fan of triangles is the inside
@@ -115,11 +117,12 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
         label = f"{symbol} = {float(run['stage'][i]):g}"
         figure.text((16 + (i + 0.5) * pixels) / width, 1 - 66 / height, label, fontsize=11, color=_INK, ha="center")
     heading = ", ".join(word for word in (title, where.title) if word)
-    figure.text(16 / width, 1 - 28 / height, heading, fontsize=13, color=_INK, va="center", fontweight="bold")
+    written = figure.text(16 / width, 1 - 28 / height, heading, fontsize=13, color=_INK, va="center", fontweight="bold")
+    fit(written, 13, width - 24)
     note = "Band: the surface's colour, not a depth. Dashed: the first stage. The inside is not solved."
     figure.text(16 / width, 17 / height, note, fontsize=8.5, color=_INK, va="center")
     out = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(out)
+    canvas.print_png(out)
     return out.getvalue()
 
 

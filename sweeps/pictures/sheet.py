@@ -18,7 +18,7 @@ from .shading import BACKGROUND
 if TYPE_CHECKING:
     from matplotlib.text import Text
 
-__all__ = ["Panel", "sheet"]
+__all__ = ["Panel", "fit", "sheet"]
 
 #: Dots per inch of a sheet; pixels and points follow from it.
 _DPI = 100
@@ -106,11 +106,11 @@ def sheet(
                 write(x + pixels / 2, y + pixels - 9, panel.note, 8.5, alpha=0.8, **middle)
     if title:
         begin = left if row_labels else 16
-        _fit(write(begin, 32, title, 14, va="center", fontweight="bold"), 14, width - begin - 8)
+        fit(write(begin, 32, title, 14, va="center", fontweight="bold"), 14, width - begin - 8)
     if column_title:
         write(left + columns * pixels / 2, top - 48, column_title, 11, **middle)
     for j, label in enumerate(column_labels):
-        _fit(write(left + (j + 0.5) * pixels, top - 18, label, 11, **middle), 11, pixels)
+        fit(write(left + (j + 0.5) * pixels, top - 18, label, 11, **middle), 11, pixels)
     if row_title:
         write(22, top + len(rows) * pixels / 2, row_title, 11, rotation=90, **middle)
     for i, label in enumerate(row_labels):
@@ -120,7 +120,7 @@ def sheet(
     return out.getvalue()
 
 
-def _fit(written: Text, size: float, room: float) -> None:
+def fit(written: Text, size: float, room: float) -> None:
     """Make a text of that size no wider than `room` [pixel]: smaller, and cut at the end where that is not enough."""
     while written.get_window_extent().width > room and size > _LEAST:
         size -= 0.5

@@ -19,6 +19,7 @@ from service.cli import app
 TYPED = """
 - -- 0 -1 0.1 1e400 nan inf -inf 1_0 ٣ default none te=0.03 te=0.03,gamma=7 te= =0.1 te=0.03,te=0.04
 te=nan,gamma=7 s=0.2 0.1,0.2 0.1:0.3:5 , out.glb out.obj out.npz out.json out.doc missing/out.glb . / ~ ../x
+0,90,0,90 45:90,350:20 0:90,-45:45 0:90,20 :,: raisin plum1 kinetics=grape rate=1
 idw linear+LL+env idw+idw rgh:0.1 rgh: glb usda png read 90d -3d 1e99d
 """
 WORDS = st.one_of(
@@ -51,6 +52,7 @@ def words(command: str, *names: str, stored: bool = True, arguments: int = 1) ->
 #: None of them runs a solver, or listens.
 COMMANDS = st.one_of(
     words("query", "--set", "--stages", "--name", "--resolution", "--method", "--max-error", "--out"),
+    words("query", "--set", "--stages", "--hours", "--under", "--preset", "--region", "--out"),
     words("export", "--out", "--format", "--stage", "--colour", "--textures", "--size", "--scale", "--fps", "--map"),
     words("status", arguments=2),
     words("table build", "--name", "--solver", "--quality", "--version"),
@@ -64,7 +66,7 @@ COMMANDS = st.one_of(
     words("token revoke", arguments=2),
     words("presets", "--nothing", stored=False),
     words("serve", "--port", "--workers", stored=False).map(lambda found: [*found, "--port", "99999999"]),
-    words("solve", "--preset", "--set", "--stages", "--quality", "--out", stored=False).map(
+    words("solve", "--preset", "--set", "--stages", "--quality", "--region", "--out", stored=False).map(
         lambda found: [*found, "--set", "nobody=1"]
     ),
     words("sweep", "--workers", "--scheduler").map(lambda found: [*found, "plan.toml"]),

@@ -44,6 +44,18 @@ def run(*words: str) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
+def test_threads_where_no_mould_grows_are_said_to_add_nothing(stored: tuple[Store, str], tmp_path: Path) -> None:
+    solver = registry.get("growth")
+    params, need = solver.parse({"step": 0.2, "thickness": 0.1}), solver.settle(Need(quality="preview", stages=(0.1,)))
+    path, out = tmp_path / "run.h5", str(tmp_path / "a.glb")
+    shards.write(path, solver.solve(params, need), job(solver, params, need).key)
+    said = "no mould grows on results of growth: --threads adds nothing"
+    assert said in run(str(path), "--out", out, "--threads", "100")[1]
+    assert said not in run(str(path), "--out", out)[1]
+    store, key = stored
+    assert "no mould" not in run(key[:10], "--store", str(store.root), "--out", out, "--threads", "100")[1]
+
+
 def test_the_command_line_writes_by_key_and_by_file(stored: tuple[Store, str], tmp_path: Path) -> None:
     store, key = stored
     code, said = run(key[:10], "--store", str(store.root), "--out", str(tmp_path / "a.ply.zip"), "--json")

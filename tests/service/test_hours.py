@@ -65,6 +65,14 @@ def test_a_shape_after_hours_that_nobody_measured_is_refused(client: httpx.Clien
     assert {wrong["name"] for wrong in problem["errors"]} <= {"hours", "under"}
 
 
+def test_conditions_are_named_as_a_query_takes_them(client: httpx.Client) -> None:
+    asked = {"preset": "jujube1", "hours": 48}
+    (wrong,) = checked(client.get(SHAPE, params={**POINT, "hours": 48}), 422, "invalid-query")["errors"]
+    assert wrong["advice"].startswith("Say under which conditions: under=kinetics:grape, jujube, or page")
+    problem = checked(client.get("/v1/solvers/dehydration/stages", params=asked), 422, "invalid-input")
+    assert "For example under=temperature:60,air_speed:1,diameter:22 (C" in problem["advice"]
+
+
 @pytest.mark.parametrize(
     ("query", "wrong"),
     [

@@ -215,9 +215,10 @@ def test_a_partial_result_survives_pickling(solver):
     assert back.partial.identical(error.partial)
 
 
-def test_region_returns_a_part_of_the_whole(solver):
+@pytest.mark.parametrize("azimuth", [(80, 250), (-80, 40)])
+def test_region_returns_a_part_of_the_whole(solver, azimuth):
     params, need, _ = small(solver)
-    asked = need.model_copy(update={"region": Region(colatitude=(30, 90), azimuth=(80, 250))})
+    asked = need.model_copy(update={"region": Region(colatitude=(30, 90), azimuth=azimuth)})
     whole = solved(solver.name)
     if "colatitude" not in whole.dims:
         with pytest.raises(InvalidInput, match=r"no lattice|colatitude"):
@@ -237,11 +238,13 @@ def test_region_returns_a_part_of_the_whole(solver):
     [
         ({"colatitude": (-10, 90)}, "colatitude runs from -10 to 90"),
         ({"colatitude": (90, 190)}, "Stay within 0 to 180"),
-        ({"azimuth": (-40, 40)}, "two regions"),
-        ({"azimuth": (350, 370)}, "azimuth runs from 350 to 370"),
+        ({"azimuth": (-400, -300)}, "azimuth runs from -400 to -300"),
+        ({"azimuth": (-10, 360)}, "Take a turn at most"),
+        ({"azimuth": (700, 730)}, "within -360 to 720"),
         # between the points of the lattice
         ({"colatitude": (0, 1e-3)}, "no point of the lattice of 16 colatitudes"),
         ({"azimuth": (1, 2)}, "points are 11.2 degrees apart"),
+        ({"azimuth": (-2, -1)}, "points are 11.2 degrees apart"),
     ],
 )
 def test_a_region_that_would_lose_points_is_refused_before_any_work(region, words):

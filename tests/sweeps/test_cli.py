@@ -240,8 +240,10 @@ def test_a_solve_that_fails_has_exit_code_1(shrinking: Solves) -> None:
         ("solve dehydration --stages 0.9", 2, "lies outside"),
         ("solve dehydration --quality good", 2, "quality"),
         ("solve dehydration --fields positon", 2, "did you mean 'position'"),
-        ("solve dehydration --region 0,90", 2, "four numbers"),
-        ("solve dehydration --region 90,0,0,180", 2, "smaller to a larger"),
+        ("solve dehydration --region 0,90", 2, "colatitude,azimuth in degrees, like 45:90,0:120"),
+        ("solve dehydration --region 90,0,0,180", 2, "'90:0,0:180' is empty"),
+        ("solve dehydration --region 0:90,0:400", 2, "-360 to 360"),
+        ("solve dehydration --threads 100", 2, "--threads"),
         ("solve dehydration --dtype float16", 2, "dtype"),
         ("solve dehydration --resolution 3", 2, "resolution"),
         ("solve dehydration --tolerance 0.0001", 2, "finer than"),
@@ -258,7 +260,10 @@ def test_a_solve_that_fails_has_exit_code_1(shrinking: Solves) -> None:
         ("table build --store {tmp}/nowhere", 1, "there is no store"),
         ("table info --store {table} --name other", 1, "other"),
         ("table build --store {table} --solver decay", 1, "decay"),
+        ("query --store {table} --name other", 1, "other"),
         ("query --store {table} --set te=0.03 --set gamma=10", 2, "--stages"),
+        ("query --store {table} --set te=0.03 --set gamma=10 --stages 0.1 --region 0,90", 2, "like 45:90,0:120"),
+        ("query --store {table} --set te=0.03 --set gamma=10 --stages 0.1 --region 0,90,0,90 --relax", 2, "--relax"),
         ("query --store {table} --set te=0.03 --set gamma=99 --stages 0.1", 2, "lies outside"),
         ("query --store {table} --set te=0.03 --stages 0.1", 2, "gamma must be given"),
         ("map --store {table} --out map.jpg", 2, ".png"),
@@ -428,6 +433,16 @@ def test_hours_stand_in_for_stages(shrinking: Solves) -> None:
     unmeasured = wizen("solve", "dehydration", "--preset", "raisin", "--hours", "30", "--under", "temperature=60")
     assert unmeasured.exit_code == 2
     assert "open sun" in unmeasured.stderr
+
+
+@pytest.mark.parametrize("command", [("query",), ("solve", "dehydration"), ("query", "--set", "kinetics=grape")])
+def test_conditions_are_named_as_the_command_line_takes_them(command: tuple[str, ...]) -> None:
+    refused = wizen(*command, "--preset", "plum1", "--hours", "24")
+    assert refused.exit_code == 2
+    assert "Say under which conditions: --under kinetics=grape, jujube, or page" in refused.stderr
+    several = wizen(*command, "--preset", "jujube1", "--hours", "24")
+    assert "For example --under temperature=60 --under air_speed=1 --under diameter=22 (C" in several.stderr
+    assert "Write for example --under temperature=60" in wizen(*command, "--hours", "24", "--under", "hot").stderr
 
 
 def test_what_takes_too_long_is_refused_before_it_begins(shrinking: Solves, tmp_path: Path, write_plan: Write) -> None:

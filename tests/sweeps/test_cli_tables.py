@@ -71,6 +71,7 @@ def test_rebuild_and_compare(table: Path, tmp_path: Path) -> None:
     said = document(wizen("table", "rebuild", "--store", copy, "--resolution", 5, "--precision", "float64", "--json"))
     assert said["changed"]
     assert (said["after"]["resolution"], said["after"]["precision"]) == (5, "float64")
+    assert said["source"] == "runs"
     # a shrinking sphere has few waves, so that hardly more than single precision's round-off is lost
     assert [row["rms"] < 1e-7 for row in said["after"]["truncation"]] == [True, True]
     found = document(wizen("table", "compare", table, copy, "--json"))
@@ -79,6 +80,30 @@ def test_rebuild_and_compare(table: Path, tmp_path: Path) -> None:
     assert "the same content" in shown
     assert wizen("table", "compare", "default", "default", "--store", copy, "--name", "x").exit_code == 0
     assert wizen("table", "compare", "nothing.h5", copy).exit_code == 2
+
+
+def test_a_table_whose_runs_are_not_here(table: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(table, tmp_path / "copy")
+    for path in (copy / "shards").glob("??/*.h5"):
+        path.unlink()
+    said = document(wizen("table", "verify", "--store", copy, "--json"))
+    assert (said["sound"], [finding["remark"] for finding in said["findings"]]) == (True, [True])
+    result = wizen("table", "verify", "--store", copy)
+    assert result.exit_code == 0
+    assert "None of the table's runs is here" in " ".join(result.stdout.split())
+    assert "is sound" in result.stdout
+    result = wizen("table", "verify", "--store", copy, "--recompute", 2)
+    assert result.exit_code == 1
+    assert "nothing was solved again" in " ".join(result.stdout.split())
+    shown = wizen("table", "rebuild", "--store", copy, "--precision", "float64")
+    assert shown.exit_code == 0
+    assert "its own spectra" in shown.stdout
+    assert "damaged" not in shown.stdout
+    said = document(wizen("table", "rebuild", "--store", copy, "--resolution", 5, "--json"))
+    assert (said["source"], said["before"]["truncation"], len(said["after"]["truncation"])) == ("table", [], 2)
+    refused = wizen("table", "rebuild", "--store", copy, "--resolution", 6)
+    assert refused.exit_code == 1
+    assert "without its runs" in refused.stderr
 
 
 def test_query(table: Path, tmp_path: Path) -> None:

@@ -47,8 +47,8 @@ def _stage(hours: float, under: Drying, preset: str | None) -> float:
     if name is None:
         raise InvalidInput(
             f"nobody measured how {preset or 'this fruit'} dries over hours.",
-            advice="Set kinetics=grape, jujube, or page with rate, exponent and moisture of your own; presets with "
-            f"kinetics of their own: {', '.join(_FRUITS)}.",
+            advice="Say under which conditions: kinetics=grape, jujube, or page with rate, exponent and moisture of "
+            f"your own; presets with kinetics of their own: {', '.join(_FRUITS)}.",
         )
     law = _KINETICS[name]
     water = law.water if under.moisture is None else under.moisture

@@ -71,7 +71,7 @@ def jujube(hours: float, under: Drying) -> float:
         missing = [name for name in ("temperature", "air_speed", "diameter") if getattr(under, name) is None]
         raise InvalidInput(
             f"jujubes in hot air want {', '.join(missing)}.",
-            advice="For example temperature=60 (C), air_speed=1 (m/s), diameter=22 (mm).",
+            advice="For example temperature=60, air_speed=1, diameter=22 (C, m/s, mm).",
         )
     (cold, slow, least), (hot, fast, largest) = _SLOWEST, _FASTEST
     _within("temperature", under.temperature, cold, hot, "C")
@@ -94,7 +94,7 @@ def page(hours: float, under: Drying) -> float:
 
     """
     if under.rate is None:
-        raise InvalidInput("kinetics=page wants a rate k.", advice="For example rate=0.05 (per hour), exponent=1.")
+        raise InvalidInput("kinetics=page wants a rate k.", advice="For example rate=0.05, exponent=1 (per hour).")
     _within("hours", hours, 0.0, math.inf, "h")
     return math.exp(-under.rate * hours**under.exponent)
 

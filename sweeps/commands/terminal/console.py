@@ -57,7 +57,9 @@ class Root(TyperGroup):
     """The `wizen` command: whatever goes wrong below it ends in one line and the right exit code."""
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **more: Any) -> Any:
-        """Run a command line. Exits with 2 for bad input, 1 for other failures, 130 after Ctrl-C."""
+        """Run a command line. Exits with 2 for bad input, 1 for other failures (what a store does not hold is
+        one), 130 after Ctrl-C.
+        """
         given = list(sys.argv[1:] if args is None else args)
         try:
             code = super().main(given, *rest, **{**more, "standalone_mode": False})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,6 +35,7 @@ __all__ = [
     "check_place",
     "numbers",
     "parameters",
+    "shown",
     "stages_asked",
     "with_files",
 ]
@@ -83,6 +84,12 @@ StoreToRead = Annotated[
 TableName = Annotated[str, typer.Option("--name", help="Name of the table.")]
 
 
+#: What pairs of names and values look like, by option.
+_EXAMPLES = {"--set": "--set te=0.04", "--under": "--under temperature=60"}
+#: Longest value [characters] of a title; longer ones are lists and tables.
+_SHORT = 24
+
+
 def assignments(pairs: Sequence[str] | None, option: str = "--set") -> dict[str, Any]:
     """Return the values of `--set NAME=VALUE` options, or of another option of that grammar.
 
@@ -96,11 +103,18 @@ def assignments(pairs: Sequence[str] | None, option: str = "--set") -> dict[str,
     for pair in pairs or ():
         name, equals, text = (part.strip() for part in pair.partition("="))
         if not (name and equals and text):
-            raise InvalidOption(f"{option} {pair!r} is not NAME=VALUE.", "Write for example --set te=0.04.")
+            raise InvalidOption(f"{option} {pair!r} is not NAME=VALUE.", f"Write for example {_EXAMPLES[option]}.")
         if name in values:
             raise InvalidOption(f"{option} {name} is given twice.", "Keep one of them.")
         values[name] = _value(text)
     return values
+
+
+def shown(pairs: Sequence[str]) -> str:
+    """Return what --set options say as a line of a title; of long values the names alone."""
+    parts = (pair.partition("=") for pair in pairs)
+    words = [(name.strip(), text.strip()) for name, _, text in parts]
+    return ", ".join(f"{name} = {text}" if len(text) <= _SHORT else f"{name} = …" for name, text in words)
 
 
 def parameters(path: Path | None) -> dict[str, Any]:
@@ -205,10 +219,21 @@ def stages_asked(
         InvalidInput: the solver knows no hours, or not under these conditions.
 
     """
+    from solver.contract import InvalidInput
+
     if hours is None:
         if under:
             raise InvalidOption("--under says how --hours are spent, and there are none.", "Write --hours 24,48.")
         return numbers(stages)
     if stages is not None:
         raise InvalidOption("--hours and --stages exclude each other.", "Keep one of them.")
-    return solver.stages_after(numbers(hours, "--hours"), assignments(under, "--under"), preset)
+    asked, conditions = numbers(hours, "--hours"), assignments(under, "--under")
+    try:
+        return solver.stages_after(asked, conditions, preset)
+    except InvalidInput as error:
+        raise InvalidInput(error.message, advice=solver.conditions_as(error.advice, _under)) from None
+
+
+def _under(conditions: Mapping[str, str]) -> str:
+    """Return conditions as the command line is told them."""
+    return " ".join(f"--under {name}={value}" for name, value in conditions.items())
