@@ -43,8 +43,8 @@ Range = tuple[float, float]
 
 
 class Words(NamedTuple):
-    """What may be asked: axes and stage with their ranges and units, numbers and `texts` that the table holds fixed, and
-    numbers that follow one of its axes. `made` says how its runs were done, `shade` what its fruits wear.
+    """What may be asked: axes and stage with their ranges and units, what the table holds fixed, numbers and `texts`,
+    and numbers that follow one of its axes. `made` says how its runs were done, `shade` what its fruits wear.
     """
 
     axes: Mapping[str, Range]

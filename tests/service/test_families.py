@@ -64,6 +64,15 @@ def test_a_preset_fills_what_is_not_said(client: httpx.Client) -> None:
     assert client.get(SHAPE, params={"te": 0.03, "gamma": 10, "s": 0.2, "format": "json"}).json()["table"] == "sphere"
 
 
+def test_what_nobody_says_is_the_solvers_default(client: httpx.Client) -> None:
+    said = {"te": 0.03, "s": 0.2, "format": "json"}
+    plain, named = (client.get(SHAPE, params=params) for params in (said, {**said, "gamma": 10}))
+    assert (plain.json()["table"], plain.json()["params"]["gamma"]) == ("sphere", 10.0)
+    assert plain.headers["etag"] == named.headers["etag"]
+    # a table that is named asks for its axes
+    assert client.get(SHAPE, params={**said, "table": "sphere"}).json()["errors"][0]["name"] == "gamma"
+
+
 def test_how_a_run_was_done_may_be_named(client: httpx.Client) -> None:
     said = {"preset": "raisin", "s": 0.2, "format": "json"}
     assert client.get(SHAPE, params={**said, "mirrors": "xz"}).json()["made"] == {"mirrors": "xz"}
