@@ -27,7 +27,7 @@ from .store import Store
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Precision", "TableInfo", "build", "info", "is_alone", "open", "path_of", "prune", "rebuild"]
+__all__ = ["Precision", "TableInfo", "build", "check_grows", "info", "is_alone", "open", "path_of", "prune", "rebuild"]
 
 #: How a spectrum's numbers are stored; int16 is packed, see `surfaces.packed`.
 Precision = Literal["int16", "float32", "float64"]
@@ -162,17 +162,29 @@ def _own(store: Store, table: TableInfo, band: int, more: Collection[str]) -> ge
 
     """
     path = path_of(store, table)
-
-    def refused(kind: type[StoreError], why: str) -> StoreError:
-        advice = f"`wizen table plan {table.name} --store {store.root}` prints the plan that makes them."
-        return kind(f"table {table.name!r} is here without its runs, {why}.", advice if table.plan else "")
-
-    if band > table.resolution or more:
-        what = "samples" if more else "waves"
-        raise refused(UnknownJob, f"and without them it gets no more {what} than it holds")
+    if more:
+        check_grows(store, table)
+    if band > table.resolution:
+        raise _alone(UnknownJob, store, table, "and without them it gets no more waves than it holds")
     if not path.is_file() or not seal.is_whole(path):
-        raise refused(CorruptTable, f"and {path} is damaged")
+        raise _alone(CorruptTable, store, table, f"and {path} is damaged")
     return own.source(path, table)
+
+
+def check_grows(store: Store, table: TableInfo) -> None:
+    """Refuse a table that gets no more samples than it holds.
+
+    Raises:
+        UnknownJob: none of its runs is here.
+
+    """
+    if is_alone(store, table):
+        raise _alone(UnknownJob, store, table, "and without them it gets no more samples than it holds")
+
+
+def _alone(kind: type[StoreError], store: Store, table: TableInfo, why: str) -> StoreError:
+    advice = f"`wizen table plan {table.name} --store {store.root}` prints the plan that makes them."
+    return kind(f"table {table.name!r} is here without its runs, {why}.", advice if table.plan else "")
 
 
 def _bounds(values: Iterable[float]) -> tuple[float, float]:

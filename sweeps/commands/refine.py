@@ -74,6 +74,7 @@ def refine(asked: _Asked) -> None:
     read, opened, measure = Plan.load(asked.plan), Store.open(asked.store), asked.measure
     if asked.dry_run:
         refining.check(read, tables.info(opened, asked.name))
+        tables.check_grows(opened, tables.info(opened, asked.name))
         state = refining.read(opened, asked.name, measure)
         error = None if asked.held_out is None else held_out_error(opened, asked.name, asked.held_out, measure)
         proposals = list(itertools.islice(refining.propose(read, state), max(asked.count, _LOOKED_AT)))

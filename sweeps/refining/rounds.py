@@ -74,12 +74,14 @@ def rounds(
     Raises:
         PlanError, MixedSamples: the plan and the table do not fit; nothing was run.
         InvalidOption: no run of `held` lies between the table's samples; nothing was run.
+        UnknownJob: none of the table's own runs is stored; nothing was run.
         StoreError: the store is full or damaged; what is done is kept.
 
     """
     halt = stop or threading.Event()
     width = getattr(executor, "width", 1)
     refine.check(plan, tables.info(store, name))
+    tables.check_grows(store, tables.info(store, name))
     if held is not None:
         _held(store, name, held)
 

@@ -16,7 +16,7 @@ from benchmarks.dehydration import refining
 from service.cli import app
 from solver import registry
 from store import tables
-from store.errors import MixedSamples
+from store.errors import MixedSamples, UnknownJob
 from store.store import Store
 from sweeps.errors import InvalidOption, PlanError
 from sweeps.planning.plan import Plan
@@ -139,6 +139,15 @@ def test_a_line_of_a_grid_with_an_impossible_fruit_is_left_out(
     rest = list(refine.propose(plan, state))
     assert rest == [line for line in lines if hole not in line.points]
     assert len(rest) < len(lines)
+
+
+def test_a_table_without_its_runs_is_refused_before_any_is_made(site: None, tmp_path: Path) -> None:
+    full, plan = made(tmp_path / "full", GRID)
+    bare = Store.open(tmp_path / "bare", create=True)
+    shutil.copytree(full.tables_dir, bare.tables_dir, dirs_exist_ok=True)
+    with pytest.raises(UnknownJob, match="no more samples than it holds"):
+        refined(bare, plan, 4)
+    assert not list(bare.keys())
 
 
 def test_plan_and_table_must_fit(site: None, tmp_path: Path) -> None:
