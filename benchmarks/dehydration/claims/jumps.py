@@ -77,7 +77,7 @@ def _line(
         def shape(share: float, field: str = field) -> Floats:
             x = low + (high - low) * share
             asked, s = (place, x) if axis == "s" else ({**place, axis: x}, stage)
-            found = table_.at(asked, s, resolution=n, fields=(field,))
+            found = table_.at(asked, s, resolution=n, fields=(field,), apart=field == "position")
             return np.asarray(found.position if field == "position" else found.displacement, np.float64)
 
         jump, at, step = _largest(shape)
