@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -35,12 +35,15 @@ _kept_words: WeakKeyDictionary[ShapeTable, Words] = WeakKeyDictionary()
 
 
 class Found(NamedTuple):
-    """The table for a question, and the numbers of its preset; `fits` are the nearest ones where none holds it."""
+    """The table for a question, and the numbers of its preset or defaults; where none holds it, `fits` are the nearest
+    ones, and `said` the names of what the asker said.
+    """
 
     name: str
     preset: str | None = None
     filled: Mapping[str, Any] = {}
     fits: tuple[Fit, ...] = ()
+    said: Collection[str] = ()
 
 
 class Asked(NamedTuple):
@@ -89,7 +92,7 @@ def choose(families: Families, said: Mapping[str, Any], symbol: str, preset: str
     if fit is not None:
         return Found(fit.info.name, preset, families.filled(fit.info, preset))
     fits = tuple(families.nearest(numbers, stage, preset))
-    return Found(fits[0].info.name, preset, families.filled(fits[0].info, preset), fits)
+    return Found(fits[0].info.name, preset, families.filled(fits[0].info, preset), fits, tuple(numbers))
 
 
 def preset_of(solver: Solver, name: str | None) -> str | None:
@@ -158,10 +161,13 @@ def beyond(found: Found, words: Words) -> list[Wrong]:
     if not found.fits:
         return []
     near = found.fits[0]
-    return [
-        Wrong(words.stage if miss.name == STAGE else miss.name, *stored.describe(miss, near.info))
-        for miss in (*near.misses, *near.unusual)
-    ]
+    wrong = []
+    for miss in (*near.misses, *near.unusual):
+        detail, advice = stored.describe(miss, near.info)
+        if found.preset is not None and miss.name in found.filled and miss.name not in found.said:
+            advice = f"That is of the preset {found.preset}: choose another, say {miss.name} yourself, or have it run."
+        wrong.append(Wrong(words.stage if miss.name == STAGE else miss.name, detail, advice))
+    return wrong
 
 
 def words_of(solver: Solver, table: ShapeTable, max_resolution: int, tables: LiveTables) -> Words:

@@ -149,12 +149,18 @@ def parse(
         wrong.append(Wrong("max_error", "nobody knows the error of what is relaxed", "Leave it out."))
     if wrong:
         raise InvalidQuery.of([*wrong, *outside])
-    named_already = {w.name for w in outside}
-    outside += [w for w in beyond if w.name not in named_already]
+    outside = _together(outside, beyond, said)
     point = {name: numbers[name] for name in words.axes}
     named = {name: value for name, value in said.items() if name not in ranges}
     chosen |= {"said": said, "is_elsewhere": any(w.name not in ranges for w in outside)}
     return ShapeQuery(point, numbers[words.stage], named=named, outside=tuple(outside), **chosen)
+
+
+def _together(outside: Sequence[Wrong], beyond: Sequence[Wrong], said: Mapping[str, float]) -> list[Wrong]:
+    """Return what is off the table, each once; what nobody said is not theirs to leave out, as `beyond` knows."""
+    advice = {w.name: w.advice for w in beyond if w.name not in said}
+    found = [w._replace(advice=advice.get(w.name, w.advice)) for w in outside]
+    return [*found, *(w for w in beyond if w.name not in {w.name for w in found})]
 
 
 def _unknown(name: str, known: Sequence[str]) -> Wrong:

@@ -73,6 +73,16 @@ def test_what_nobody_says_is_the_solvers_default(client: httpx.Client) -> None:
     assert client.get(SHAPE, params={**said, "table": "sphere"}).json()["errors"][0]["name"] == "gamma"
 
 
+def test_who_named_a_preset_is_not_told_to_leave_out_its_numbers(client: httpx.Client) -> None:
+    said = {"preset": "potato", "s": 0.2, "format": "json"}
+    told = {wrong["name"]: wrong["advice"] for wrong in client.get(SHAPE, params=said).json()["errors"]}
+    assert told
+    assert all("That is of the preset potato: choose another" in advice for advice in told.values())
+    again = client.get(SHAPE, params={**said, "rs1": 0.35}).json()["errors"]
+    (own,) = (wrong["advice"] for wrong in again if wrong["name"] == "rs1")
+    assert "Leave rs1 out" in own
+
+
 def test_how_a_run_was_done_may_be_named(client: httpx.Client) -> None:
     said = {"preset": "raisin", "s": 0.2, "format": "json"}
     assert client.get(SHAPE, params={**said, "mirrors": "xz"}).json()["made"] == {"mirrors": "xz"}
