@@ -18,6 +18,7 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,8 @@ _FOLDED, _PLACES = (0.2, 0.25, 0.3), 12
 #: out of contact).
 _RANDOM, _TURNS, _TURNED = 500, 6, 0.22
 _WANDERING, _IN_TURN = "unfolded, places at random", "displacements, all tables in turn"
+#: Tables of the package in which many runs take part in an answer, and stages between stored ones at which they do.
+_DENSE, _BETWEEN = ("default", "plum2"), (0.125, 0.175)
 
 
 def smooth(rng: np.random.Generator, stages: int, band: int) -> np.ndarray:
@@ -136,14 +139,15 @@ def main() -> None:
         ms = median(lambda: table.at(QUERY, STAGE, m=8, fields=()), options.seconds)
         rows.append({"resolution": 0, "what": "descriptors only", "ms": round(ms, 4)})
         rows += _wandering(table)
-    rows += _in_turn() + _folded()
+    rows += _in_turn() + [_first_in_cells(name) for name in _DENSE] + _folded()
     print(f"fft: {transforms.backend()}, one core, medians [ms of processor]")
     for row in rows:
         print(f"{row['resolution']:>5} {row['what']:<28} {row['ms']:9.3f}")
     usual = {row["resolution"]: row["ms"] for row in rows if row["what"] == "position"}
     head = ["lattice", *(f"{n} x {2 * n}" for n in usual)]
     cells = []
-    for what, told in {"position": "unfolded, one place", _WANDERING: _WANDERING, _IN_TURN: _IN_TURN}.items():
+    shown = {name: name for name in (_WANDERING, _IN_TURN, *map(_first, _DENSE))}
+    for what, told in {"position": "unfolded, one place", **shown}.items():
         found = {row["resolution"]: row["ms"] for row in rows if row["what"] == what}
         cells.append([f"{told}, ms", *(f"{found[n]:.2f}" if n in found else "" for n in usual)])
     for s in _FOLDED:
@@ -177,6 +181,24 @@ def _in_turn() -> list[dict[str, Any]]:
                 if turn > 1:
                     times[n].append(ms)
     return [_row(n, _IN_TURN, found) for n, found in times.items()]
+
+
+def _first(name: str) -> str:
+    return f"displacements, first in a cell of {name}"
+
+
+def _first_in_cells(name: str) -> dict[str, Any]:
+    """Return a row of the median over the middles of a table's cells, each asked once, after one at another stage."""
+    table = ShapeTable.open(Store.open(starter.ROOT), name, surfaces=registry.surface)
+    ticks = {axis: sorted({table.sample(i)[axis] for i in range(table.size)}) for axis in table.axes}
+    middles = {axis: [(a + b) / 2 for a, b in pairwise(values)] for axis, values in ticks.items()}
+    points = [dict(zip(middles, values, strict=True)) for values in product(*middles.values())]
+    options: dict[str, Any] = {"resolution": 64, "fields": ("displacement",), "apart": False}
+    table.at(points[0], table.stages[0], **options)
+    times = [_once(table, point, stage, **options) for stage in _BETWEEN for point in points]
+    runs = [len(table.at(point, stage, **options).weights) for stage in _BETWEEN for point in points]
+    ms, worst = round(statistics.median(times), 3), round(max(times), 3)
+    return {"resolution": 64, "what": _first(name), "ms": ms, "worst": worst, "times": len(times), "runs": runs}
 
 
 def _once(table: ShapeTable, point: dict[str, float], stage: float, **options: Any) -> float:
