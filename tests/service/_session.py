@@ -129,4 +129,6 @@ class Client:
         told = {"number": number, "base": base, "stage": stage, "residual": residual, "input": input_, "ms": ms}
         self.frames.append({**told, "flags": flags, "bytes": len(data), "fields": fields, "vertices": n})
         if self.acknowledges:
-            self.send(do="seen", frame=number)
+            # what came before the end is still to be read, though nothing can be answered any more
+            with suppress(ConnectionClosed):
+                self.send(do="seen", frame=number)
