@@ -89,7 +89,7 @@ class ShapeTable:
         self._below = None if power is None else _up_to(power)
         self._trust = None
         if found is not None and self._samples is not None:
-            self._trust = trust.Trust(*found, self._samples)
+            self._trust = trust.Trust(*found, self._samples, generation.skipped(opened))
         self._judged = None if self._trust is None else self._trust.method
         stored = {stage: j for j, stage in enumerate(table.stages)}
         self._knots = sorted({0.0, *stored})
@@ -205,7 +205,8 @@ class ShapeTable:
         mixed = self._blender.mix(point, near, tuple(_stored(stages)), how)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
-        trust.refuse(expected, max_error, inside, self._judged)
+        known = self._trust is not None and self._trust.knows(str(how))
+        trust.refuse(expected, max_error, inside, self._judged, known and len(stages) > 1)
         exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
         found, crossings = self._fields(fields, patch, values, self._blend(point, mixed, stages, how, n), exact, apart)
         return Shape(
@@ -316,7 +317,7 @@ class ShapeTable:
             return dict.fromkeys(Measures._fields, 0.0)
         if self._trust is None or not self._trust.knows(str(method)):
             return None
-        return self._trust.expect(near, _stored(stages))
+        return self._trust.expect(near, stages)
 
     def _held(self, near: Weighted, stages: Mapping[int, float], n: int) -> float | None:
         """Return the share of the wrinkles' height (rms) in waves of degrees up to n: a lattice of n holds all of them,

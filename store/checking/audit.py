@@ -142,8 +142,9 @@ def _schema(opened: xr.Dataset, table: TableInfo) -> Iterator[str]:
 
 def _trust(opened: xr.Dataset) -> Iterator[str]:
     """Check what look-ups believe of the table: finite, in its units, by one method."""
-    names = {f"left_out_{name}": unit for name, unit in UNITS.items()}
-    if "left_out_rgh" in opened:
+    kinds = [kind for kind in ("left_out", "skipped") if f"{kind}_rgh" in opened]
+    names = {f"{kind}_{name}": unit for kind in kinds for name, unit in UNITS.items()}
+    if names:
         for name, unit in names.items():
             # tables of before write units as people do
             if name not in opened or opened[name].attrs.get("units") not in (

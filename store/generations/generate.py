@@ -265,17 +265,24 @@ def _judge(stored: packed.Stored, samples: Samples, solver: Solver) -> dict[str,
         found["band"] = xr.Variable("band", bands.first, about)
     scattered, method = Points(points), methods.parse(methods.DEFAULT)
     blender = Blender(stored, scattered, power, known)
-    errors = trust.leave_one_out(blender, stored, scattered, shapes, method)
+    told = {
+        "left_out": (
+            trust.leave_one_out(blender, stored, scattered, shapes, method),
+            "of the sample predicted from the others",
+        ),
+        "skipped": (
+            trust.skip_a_stage(blender, stored, scattered, shapes, samples.need["stages"], method),
+            "of the stage predicted from those beside it",
+        ),
+    }
     found |= {
-        f"left_out_{name}": xr.Variable(
+        f"{kind}_{name}": xr.Variable(
             ("sample", "stage"),
-            _rounded(errors[..., i]),
-            {
-                **quantities.unit_attrs(UNITS[name]),
-                "long_name": f"{name} of the sample predicted from the others",
-                "method": str(method),
-            },
+            _rounded(measures[..., i]),
+            {**quantities.unit_attrs(UNITS[name]), "long_name": f"{name} {what}", "method": str(method)},
         )
+        for kind, (measures, what) in told.items()
+        if measures is not None
         for i, name in enumerate(Measures._fields)
     }
     likeness = trust.correlations(stored, scattered, shapes)

@@ -39,6 +39,8 @@ __all__ = [
     "map_spectra",
     "open",
     "read",
+    "skipped",
+    "skipped_names",
 ]
 
 DIMS = ("sample", "stage", "component", "m", "k", "part")
@@ -175,6 +177,17 @@ def left_out(opened: Mapping[str, Column]) -> tuple[Array, str] | None:
     if names[0] not in opened:
         return None
     return np.stack([opened[name].values for name in names], axis=-1), str(opened[names[0]].attrs["method"])
+
+
+def skipped(opened: Mapping[str, Column]) -> Array | None:
+    """Return the measures (sample, stage, measure) of stages predicted from those beside them, if a table has any."""
+    names = skipped_names()
+    return np.stack([opened[name].values for name in names], axis=-1) if names[0] in opened else None
+
+
+def skipped_names() -> list[str]:
+    """Return the columns that say how far stages are from what those beside them predict."""
+    return [f"skipped_{name}" for name in Measures._fields]
 
 
 def left_out_names() -> list[str]:

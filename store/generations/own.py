@@ -44,7 +44,7 @@ def source(path: Path, table: TableInfo) -> Source:
 
 
 def _taken(path: Path, band: int) -> Iterator[Taken]:
-    judged = generation.left_out_names()
+    judged = (*generation.left_out_names(), *generation.skipped_names())
     with generation.open(path) as opened:
         rows = {str(n): v.variable.load() for n, v in opened.data_vars.items() if v.dims == generation.ROWS}
     rows = {name: row for name, row in rows.items() if name not in judged}

@@ -1,12 +1,13 @@
 """How far a table can be trusted: every sample predicted from the others, and how alike neighbours are.
 
 A sample is predicted from its neighbours on both sides, so over twice the table's spacing; one at a corner has none
-and is extrapolated. Both err more than a query between the samples does, never less.
+and is extrapolated. Both err more than a query between the samples does, never less. Likewise a stored stage of a
+sample is predicted from the stages beside it, over twice the way from one to the next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -24,12 +25,28 @@ from ..surfaces.measures import Measures, Surface, compare, lattice_for
 from ..surfaces.packed import Stored
 from ..surfaces.window import WHOLE
 
-__all__ = ["COVERED", "Trust", "correlations", "errors", "foretold", "fresh", "leave_one_out", "refuse", "surface_of"]
+__all__ = [
+    "COVERED",
+    "Trust",
+    "correlations",
+    "errors",
+    "foretold",
+    "fresh",
+    "leave_one_out",
+    "refuse",
+    "skip_a_stage",
+    "surface_of",
+]
 
 
 def errors(found: Measures) -> dict[str, float]:
     """Return measures as errors, all zero for a perfect answer: |rgh - 1|, 1 - corr, and the others as they are."""
     return {**found._asdict(), "rgh": abs(found.rgh - 1), "corr": 1 - found.corr}
+
+
+def _errors_of(found: Array) -> Array:
+    """Return measures (sample, stage, measure) as errors."""
+    return np.array([[list(errors(Measures(*row)).values()) for row in rows] for rows in found])
 
 
 def surface_of(blend: Blend, start: Array) -> Surface:
@@ -55,6 +72,35 @@ def leave_one_out(blender: Blender, stored: Stored, samples: Samples, shapes: li
                 for j in range(stored.shape[1])
             ]
         )
+    return np.array(rows)
+
+
+def skip_a_stage(
+    blender: Blender, stored: Stored, samples: Samples, shapes: list[Fresh], stages: Sequence[float], method: Method
+) -> Array | None:
+    """Return measures (sample, stage, measure) of every sample's stages predicted from the two beside each.
+
+    The fresh shape is one, at s = 0. The first or last stage, which has none on one side, stands for what its
+    neighbour does. None where no stage has one on both sides.
+    """
+    knots = sorted({0.0, *stages})
+    inner = [j for j, s in enumerate(stages) if knots[0] < s < knots[-1]]
+    if not inner:
+        return None
+    rows = []
+    for i, shape in enumerate(shapes):
+        start, point = fresh(shape, _lattice(stored)), samples.values[i]
+        alone = Weighted(np.array([i]), np.ones(1), 0.0)
+        found = []
+        for j in inner:
+            at = knots.index(stages[j])
+            low, high = knots[at - 1], knots[at + 1]
+            part = (stages[j] - low) / (high - low)
+            beside = {s: t for s, t in ((low, 1 - part), (high, part)) if s in stages}
+            shares = {list(stages).index(s): t for s, t in beside.items()}
+            made = blender(point, blender.mix(point, alone, tuple(shares), method), shares, method)
+            found.append(compare(surface_of(made, start), surface_of(Blend(complex_view(stored[i, j])), start)))
+        rows.append([found[min(range(len(inner)), key=lambda k: abs(inner[k] - j))] for j in range(len(stages))])
     return np.array(rows)
 
 
@@ -97,7 +143,7 @@ def foretold(found: Array, method: str, samples: Samples) -> tuple[Array, Array]
     """Return the errors (sample, stage, measure) that leave-one-out measures stand for, and for each sample those that
     the other samples' let expect there.
     """
-    own = np.array([[list(errors(Measures(*row)).values()) for row in rows] for rows in found])
+    own = _errors_of(found)
     others = [samples.without(i, parse(method).weighting) for i in range(len(own))]
     # weights that extrapolate may be negative: an error is none the less for that
     expected = [np.maximum(np.tensordot(near.weights, own[near.samples], 1), 0) for near in others]
@@ -105,14 +151,18 @@ def foretold(found: Array, method: str, samples: Samples) -> tuple[Array, Array]
 
 
 class Trust:
-    """Leave-one-out measures (sample, stage, measure) of a table, interpolated to queries.
+    """Leave-one-out measures (sample, stage, measure) of a table, interpolated to queries; and those of stages that
+    were skipped, where it knows them.
 
     What neighbours' errors foretell of a sample's is a mean: half of the samples err more. So what is said is that many
-    times larger, the same factor in the whole table, that it covers `COVERED` of them.
+    times larger, the same factor in the whole table, that it covers `COVERED` of them. What a stage half-way between
+    two stored ones errs by is within what the worse of these errs by over twice the way (record
+    dehydration-calibration); nearer to one it is less.
     """
 
-    def __init__(self, found: Array, method: str, samples: Samples) -> None:
+    def __init__(self, found: Array, method: str, samples: Samples, skipped: Array | None = None) -> None:
         self.method = method
+        self._skipped = None if skipped is None else _errors_of(skipped)
         own, expected = foretold(found, method, samples)
         ratios = (own / np.maximum(expected, _NOTHING)).reshape(-1, own.shape[-1])
         own = own * np.maximum(np.quantile(ratios, COVERED, axis=0), 1.0)
@@ -123,22 +173,41 @@ class Trust:
         """Return whether the table knows what errors of that method to expect."""
         return method == self.method or (method == DEFAULT and self.method in _FORMER)
 
-    def expect(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float]:
-        """Return what errors of each measure hardly exceed: nothing at a sample, most of them a whole spacing away."""
+    def expect(self, near: Weighted, stages: Mapping[int, float]) -> dict[str, float] | None:
+        """Return what errors of each measure hardly exceed: nothing at a stored stage of a sample, most of them a whole
+        spacing away or half-way between two stages.
+
+        `stages` are shares by place, that of the fresh shape, which takes part before the first one, below 0. None
+        between two stages of a table that knows nothing of what lies between them.
+        """
         *own, spacing = (near.weights @ self._rows[near.samples]).tolist()
         share, count = min(near.nearest / spacing, 1.0), len(Measures._fields)
+        stored = {j: t for j, t in stages.items() if j >= 0}
+        between = [0.0] * count
+        if len(stages) > 1:
+            if self._skipped is None:
+                return None
+            rows = self._skipped[near.samples][:, list(stored)]
+            # weights that extrapolate may be negative: an error is none the less for that
+            worse = np.abs(near.weights) @ rows.max(axis=1)
+            between = (4 * float(np.prod(list(stages.values()))) * worse).tolist()
         return {
-            name: share * sum(t * own[count * j + k] for j, t in stages.items())
+            name: between[k] + share * sum(t * own[count * j + k] for j, t in stored.items())
             for k, name in enumerate(Measures._fields)
         }
 
 
 def refuse(
-    expected: Mapping[str, float] | None, limit: float | Mapping[str, float] | None, inside: bool, known: str | None
+    expected: Mapping[str, float] | None,
+    limit: float | Mapping[str, float] | None,
+    inside: bool,
+    known: str | None,
+    between: bool = False,
 ) -> None:
     """Refuse an answer that is worse than asked for; a number limits the error of the roughness, None nothing.
 
-    `known` is the method whose errors the table holds, if it holds any.
+    `known` is the method whose errors the table holds, if it holds any; `between`: what it does not know are those
+    between two stages.
 
     Raises:
         TooUncertain: an expected error is above its limit, or nobody knows it.
@@ -154,6 +223,11 @@ def refuse(
                 raise TooUncertain(
                     "this table does not say how far it errs: it holds one result, or no errors were stored with it.",
                     "Rebuild the table (`wizen table build`) from two results or more, or ask without max_error.",
+                )
+            if between:
+                raise TooUncertain(
+                    "this table does not say how far it errs between two stages: no such errors were stored with it.",
+                    "Rebuild the table (`wizen table rebuild`), ask for a stored stage, or ask without max_error.",
                 )
             raise TooUncertain(
                 f"this table does not say how far methods other than {known} err.",

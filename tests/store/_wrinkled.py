@@ -43,16 +43,26 @@ def own(i: int, j: int, shared: float = 0.0) -> np.ndarray:
     return shared * pattern(99, 0.3 / TE[1], rms) + (1 - shared**2) ** 0.5 * alone if shared else alone
 
 
-def wrinkled(store: Store, onset: float = 0.0, shared: float = 0.0) -> dict[tuple[float, float], np.ndarray]:
+def at(i: int, j: int, stage: float, shared: float = 0.0, turning: float = 0.0, onset: float = 0.0) -> np.ndarray:
+    """Return the displacement (N, 2N, 3) of a sample; its pattern becomes another one, `turning` by stage [rad]."""
+    radial = own(i, j, shared)
+    if turning:
+        other = pattern(10 * i + j + 50, 0.3 / TE[i], 0.9 * TE[i])
+        radial = np.cos(turning * stage) * radial + np.sin(turning * stage) * other
+    found: np.ndarray = (max(stage - onset, 0) * radial - 0.5 * stage)[..., None] * directions(*lattice(N))
+    return found
+
+
+def wrinkled(
+    store: Store, onset: float = 0.0, shared: float = 0.0, turning: float = 0.0
+) -> dict[tuple[float, float], np.ndarray]:
     """Fill a store with patterns that have nothing in common but how rough and how fine they are, and what they
     `shared`.
     """
-    theta, phi = lattice(N)
     fields = {}
     for i, te in enumerate(TE):
         for j, gamma in enumerate(GAMMA):
-            radial = own(i, j, shared)
-            u = np.stack([(max(s - onset, 0) * radial - 0.5 * s)[..., None] * directions(theta, phi) for s in STAGES])
+            u = np.stack([at(i, j, s, shared, turning, onset) for s in STAGES])
             params, need = question(te=te, gamma=gamma, resolution=N)
             coords = {"stage": list(STAGES), "colatitude": colatitudes(N), "azimuth": azimuths(N)}
             data = {"displacement": (("stage", "colatitude", "azimuth", "component"), u.astype(np.float32))}

@@ -21,9 +21,9 @@ from store.generations import trust
 from store.lookup import ShapeTable
 from store.store import Store
 from store.surfaces import harmonics, spectra
-from store.surfaces.measures import Measures
+from store.surfaces.measures import Measures, Surface, compare
 
-from ._wrinkled import N, grid, pattern, wrinkled
+from ._wrinkled import N, at, grid, pattern, wrinkled
 from .conftest import GAMMA, STAGES, TE, fill
 
 CORRECTED = (
@@ -91,10 +91,10 @@ def test_samples_stay_as_they_are_and_so_does_the_fresh_shape(rough: ShapeTable,
 def test_no_jump_at_samples_cells_or_stages(rough: ShapeTable, method: str) -> None:
     places = [(0.04, 20.0, 0.2), (0.04, 14.0, 0.2), (0.036, 20.0, 0.15), (0.036, 14.0, 0.2), (0.036, 14.0, 1e-5)]
     for te, gamma, stage in places:
-        at = found(rough, te, gamma, stage, method)
+        there = found(rough, te, gamma, stage, method)
         for step in ((1e-8, 0, 0), (-1e-8, 0, 0), (0, 1e-5, 0), (0, -1e-5, 0), (0, 0, 1e-6), (0, 0, -1e-6)):
             moved = found(rough, te + step[0], gamma + step[1], stage + step[2], method)
-            assert np.abs(moved - at).max() < 1e-5
+            assert np.abs(moved - there).max() < 1e-5
 
 
 def test_smooth_stages_are_left_alone(tmp_path: Path) -> None:
@@ -164,8 +164,8 @@ def test_gains_reach_the_degrees_they_are_meant_for() -> None:
 
 
 def test_expected_errors_vanish_at_samples_and_grow_between(rough: ShapeTable) -> None:
-    at = rough.at({"te": 0.04, "gamma": 20.0}, 0.2, fields=())
-    assert at.expected_error == dict.fromkeys(Measures._fields, 0.0)
+    there = rough.at({"te": 0.04, "gamma": 20.0}, 0.2, fields=())
+    assert there.expected_error == dict.fromkeys(Measures._fields, 0.0)
     near, far = (rough.at({"te": 0.04 - d, "gamma": 20.0}, 0.2, fields=()).expected_error for d in (1e-4, 5e-3))
     assert near is not None
     assert far is not None
@@ -175,8 +175,55 @@ def test_expected_errors_vanish_at_samples_and_grow_between(rough: ShapeTable) -
     assert far["L2nr"] > 0.4
     assert far["corr"] > 0.25
     assert far["rgh"] < 0.3
-    assert at.inside
-    assert at.method == methods.DEFAULT
+    assert there.inside
+    assert there.method == methods.DEFAULT
+
+
+def test_between_two_stages_an_error_is_expected_as_well(tmp_path: Path) -> None:
+    """At the parameters of a run, too: patterns go on merging between one stage and the next."""
+    store = Store.open(tmp_path, create=True)
+    wrinkled(store, turning=6.0)
+    tables.build(store, SOLVER)
+    table = ShapeTable.open(store, surfaces=registry.surface)
+    query, start = {"te": TE[1], "gamma": GAMMA[1]}, directions(*lattice(N))
+    for stage in STAGES:
+        assert table.at(query, stage, fields=(), max_error=0).expected_error == dict.fromkeys(Measures._fields, 0.0)
+    halves, last = [], 0.0
+    for stage in (0.05, 0.15, 0.25):
+        shape = table.at(query, stage, fields=("displacement",), resolution=N, apart=False)
+        assert shape.displacement is not None
+        assert shape.expected_error is not None
+        truth = Surface(start, at(1, 1, stage, turning=6.0))
+        made = trust.errors(compare(Surface(start, shape.displacement), truth))
+        halves.append({name: (made[name], shape.expected_error[name]) for name in ("L2nr", "corr", "ang")})
+    # half-way from one stage to the next it errs, and by no more than is said
+    assert all(0 < error <= said for half in halves for error, said in half.values())
+    assert all(half["L2nr"][0] > 0.05 for half in halves)
+    with pytest.raises(TooUncertain, match="expected error"):
+        table.at(query, 0.15, max_error={"L2nr": 0.01})
+    # no jump at a stage: the nearer, the less
+    for stage in (0.15, 0.175, 0.19, 0.1999, 0.2):
+        expected = table.at(query, stage, fields=()).expected_error
+        assert expected is not None
+        assert stage == 0.15 or expected["L2nr"] < last
+        last = expected["L2nr"]
+    # and between the runs both add up
+    off = table.at({"te": 0.035, "gamma": 14.0}, 0.15, fields=()).expected_error
+    assert off is not None
+    alone = table.at({"te": 0.035, "gamma": 14.0}, 0.2, fields=()).expected_error
+    assert alone is not None
+    assert off["L2nr"] > 0.7 * alone["L2nr"]
+
+
+def test_a_table_that_knows_nothing_between_its_stages_says_so(rough: ShapeTable) -> None:
+    found, samples = np.zeros((9, 3, len(Measures._fields))), rough._samples
+    assert samples is not None
+    trusted, near = trust.Trust(found, methods.DEFAULT, samples), samples.without(4, "linear")
+    assert trusted.expect(near, {1: 1.0}) is not None
+    assert trusted.expect(near, {0: 0.5, 1: 0.5}) is None
+    with pytest.raises(TooUncertain, match="between two stages") as refused:
+        trust.refuse(None, 0.1, True, methods.DEFAULT, True)
+    assert "rebuild" in refused.value.advice
 
 
 def test_nine_tenths_of_the_errors_are_within_what_is_expected() -> None:
