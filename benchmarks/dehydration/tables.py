@@ -14,6 +14,7 @@ from .claims import controls, jumps
 from .precision import order
 from .precision.buckled import STAGES, kind, summary
 from .precision.spheres import SHIPPED, ratios
+from .stress import onward
 
 __all__ = ["table"]
 
@@ -49,6 +50,7 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-skips": _skips,
         "dehydration-settling changed": _changed,
         "dehydration-settling thick": _thick,
+        "dehydration-onward fruits": onward.table,
         "dehydration-meshes": order.table,
         "dehydration-controls": controls.table,
         "dehydration-jumps": jumps.table,
