@@ -1,6 +1,6 @@
 """Whether the error that a look-up says to expect covers what it errs by between two stored stages.
 
-    python -m benchmarks.dehydration.between [--store DIR]
+    python -m benchmarks.dehydration.claims.between [--store DIR]
 
 A small family, 3 x 3 eighths of spheres at preview with stages every 0.05, asked half-way between its stages: at its
 own parameters, where nothing else is to err, and between them. Runs of the very fruits to those stages are the truth
